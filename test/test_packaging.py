@@ -1,0 +1,310 @@
+"""The package installs twice from one tree: with pip into a prefix, with colcon into a workspace."""
+
+import importlib.metadata
+import os
+import re
+import runpy
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import rclpy
+import yaml
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
+from catkin_pkg.package import parse_package
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from rclpy.node import Node
+
+ROOT = Path(__file__).resolve().parents[1]
+SHIPPED = (
+    "LICENSE",
+    "package.xml",
+    "pyproject.toml",
+    "setup.cfg",
+    "setup.py",
+    "config",
+    "launch",
+    "resource",
+    "scripts",
+)
+NODES = (
+    "contact_estimator",
+    "driver",
+    "force_loop",
+    "gravity",
+    "recorder",
+    "scenario",
+    "transform",
+    "velocity_loop",
+)
+DOMAIN = 150 + os.getpid() % 80
+
+
+def copy_tree(target: Path) -> Path:
+    """Copy what a clone holds and a build reads: pip and setuptools leave things behind where they build."""
+    target.mkdir(parents=True)
+    for path in (*(ROOT / name for name in SHIPPED), *ROOT.glob("wam_*")):
+        if path.is_dir():
+            shutil.copytree(path, target / path.name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy2(path, target)
+    return target
+
+
+def environment(prefix: Path, **more: str) -> dict[str, str]:
+    """What a shell has after `source <prefix>/setup.sh`, with nothing of the user's."""
+    paths = (str(Path(sys.executable).parent), "/usr/bin", "/bin")
+    wheels = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
+    return {
+        "PATH": os.pathsep.join(paths),
+        "HOME": str(prefix),
+        "ROS_LOG_DIR": str(prefix / "ros_log"),
+        "MPLCONFIGDIR": str(prefix / "matplotlib"),
+        "ROS_DOMAIN_ID": str(DOMAIN),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "AMENT_PREFIX_PATH": str(prefix),
+        "PYTHONPATH": os.pathsep.join(str(path) for path in prefix.glob("lib/python3*/site-packages")),
+        **{name: os.environ[name] for name in wheels if name in os.environ},
+        **more,
+    }
+
+
+def clean_environment(home: Path) -> dict[str, str]:
+    """What a shell has in which no workspace is sourced yet."""
+    return environment(home, COLCON_HOME=str(home / "colcon"), AMENT_PREFIX_PATH="", PYTHONPATH="")
+
+
+def sourced(workspace: Path) -> list[str]:
+    """The beginning of a command that runs in a sourced workspace."""
+    return ["sh", "-c", f'. "{workspace}/install/setup.sh" && exec "$@"', "sh"]
+
+
+def run(*command: str | Path, cwd: Path, env: dict[str, str]) -> str:
+    """Run a command to its end; its output, or a failure that shows it."""
+    done = subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, f"{command} gave {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory) -> Path:
+    """`pip install` of this tree into an empty prefix, with no index at hand."""
+    base = tmp_path_factory.mktemp("pip")
+    tree = copy_tree(base / "tree")
+    offline = ("--no-index", "--no-deps", "--no-build-isolation", "--no-warn-script-location")
+    # --ignore-installed: pip would uninstall the copy that runs these tests
+    command = ("install", "--quiet", "--ignore-installed", *offline, "--prefix", base / "prefix", tree)
+    run(sys.executable, "-m", "pip", "--disable-pip-version-check", *command, cwd=base, env=environment(base))
+    return base / "prefix"
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory) -> Path:
+    """`colcon build` of this tree in a workspace of its own."""
+    base = tmp_path_factory.mktemp("colcon")
+    copy_tree(base / "src" / "wam_stack")
+    env = clean_environment(base)
+    run(Path(sys.executable).with_name("colcon"), "build", cwd=base, env=env)
+    return base
+
+
+@pytest.fixture(scope="module", params=["pip", "colcon"])
+def installed(request) -> Path:
+    """The prefix of the package, as each of the two builds lays it out."""
+    if request.param == "pip":
+        return request.getfixturevalue("prefix")
+    return request.getfixturevalue("workspace") / "install" / "wam_stack"
+
+
+def files_in(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir() if path.is_file()}
+
+
+def test_ament_index_finds_the_package(installed, monkeypatch):
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(installed))
+    assert get_package_prefix("wam_stack") == str(installed)
+    share = Path(get_package_share_directory("wam_stack"))
+    assert (share / "package.xml").read_bytes() == (ROOT / "package.xml").read_bytes()
+    assert files_in(share / "config") == {path.name for path in ROOT.glob("config/*.yaml")}
+    assert files_in(share / "launch") == {path.name for path in ROOT.glob("launch/*.launch.py")}
+
+
+def test_every_node_is_where_ros2_run_looks(installed):
+    executables = installed / "lib" / "wam_stack"
+    assert files_in(executables) - {"wam"} == set(NODES)
+    assert all(os.access(path, os.X_OK) for path in executables.iterdir())
+
+
+def test_every_python_module_is_installed(installed):
+    (site,) = installed.glob("lib/python3*/site-packages")
+    modules = {path.relative_to(ROOT) for path in ROOT.glob("wam_*/**/*.py")}
+    assert {path.relative_to(site) for path in site.glob("wam_*/**/*.py")} == modules
+
+
+def test_pip_puts_one_command_on_path_and_colcon_none(prefix, workspace):
+    assert files_in(prefix / "bin") == {"wam"}
+    assert not (workspace / "install" / "wam_stack" / "bin").exists()
+    assert "demo" in run(prefix / "bin" / "wam", "--help", cwd=prefix, env=environment(prefix))
+
+
+def test_launchers_and_console_scripts_name_the_same_modules(prefix, workspace):
+    launchers = {}
+    for path in (prefix / "lib" / "wam_stack").iterdir():
+        launchers[path.name] = re.search(r"from (\S+) import main", path.read_text())[1]
+    (egg_info,) = (workspace / "install").glob("wam_stack/lib/python3*/site-packages/*.egg-info")
+    (distribution,) = importlib.metadata.distributions(path=[str(egg_info.parent)])
+    scripts = {point.name: point.module for point in distribution.entry_points if point.name != "wam"}
+    assert launchers == scripts
+
+
+def test_launcher_prefers_the_python_of_its_own_prefix(prefix, tmp_path):
+    launcher = tmp_path / "lib" / "wam_stack" / "driver"
+    python = tmp_path / "bin" / "python3"
+    for path in (launcher, python):
+        path.parent.mkdir(parents=True)
+    shutil.copy2(prefix / "lib" / "wam_stack" / "driver", launcher)
+    python.write_text("#!/bin/sh\nfor last; do :; done\necho own python got $last\n")
+    python.chmod(0o755)
+    said = run(launcher, "--ros-args", "-p", "a:=1", cwd=tmp_path, env=environment(tmp_path))
+    assert said == "own python got a:=1\n"
+
+
+def test_each_build_runs_its_own_copy(prefix, workspace):
+    # with another one on the path of the interpreter, as in `make test`
+    where = (sys.executable, "-P", "-c", "import wam_ros; print(wam_ros.__file__)")
+    assert run(*where, cwd=prefix, env=environment(prefix)).startswith(str(prefix))
+    said = run(*sourced(workspace), *where, cwd=workspace, env=clean_environment(workspace))
+    assert said.startswith(str(workspace))
+
+
+@pytest.fixture(scope="module")
+def onlooker() -> Iterator[Node]:
+    """A node that sees which others are there."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=DOMAIN)
+    node = rclpy.create_node("onlooker", context=context)
+    yield node
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
+
+
+def start_and_stop(command: list[str | Path], name: str, onlooker, cwd: Path, env: dict[str, str]) -> None:
+    """Start a node, wait until the ROS graph has it, interrupt it, and expect a clean end."""
+    process = subprocess.Popen(
+        command, cwd=cwd, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    try:
+        deadline = time.monotonic() + 60.0
+        while not onlooker.wait_for_node(f"/wam/{name}", timeout=0.5):
+            assert process.poll() is None, f"{name} ended with {process.returncode}:\n{process.stdout.read()}"
+            assert time.monotonic() < deadline, f"{name} did not appear within a minute"
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=20)
+        assert process.returncode == 0, f"{name} ended with {process.returncode}:\n{said}"
+        assert "Traceback" not in said, said
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
+
+
+def arguments(prefix: Path) -> list[str]:
+    config = prefix / "share" / "wam_stack" / "config" / "wam.yaml"
+    return ["--ros-args", "--params-file", str(config), "-r", "__ns:=/wam"]
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_every_executable_starts_its_node_and_stops_when_interrupted(prefix, onlooker, tmp_path, name):
+    command = [prefix / "lib" / "wam_stack" / name, *arguments(prefix)]
+    start_and_stop(command, name, onlooker, tmp_path, environment(prefix))
+
+
+def test_a_sourced_colcon_workspace_starts_a_node(workspace, onlooker, tmp_path):
+    package = workspace / "install" / "wam_stack"
+    command = [*sourced(workspace), package / "lib" / "wam_stack" / "velocity_loop", *arguments(package)]
+    env = clean_environment(tmp_path)
+    start_and_stop(command, "velocity_loop", onlooker, tmp_path, env)
+
+
+def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(prefix, monkeypatch):
+    # the module `launch` on PyPI is another program, so the few names that the file takes stand in for it
+    given = {"config": "wam", "namespace": "left", "mode": "lockstep", "record": "true"}
+    for module, names in {
+        "launch": {"LaunchContext": object, "LaunchDescription": list},
+        "launch.actions": {
+            "DeclareLaunchArgument": lambda name, **_: name,
+            "OpaqueFunction": SimpleNamespace,
+        },
+        "launch.substitutions": {
+            "LaunchConfiguration": lambda name: SimpleNamespace(perform=lambda context: context[name])
+        },
+        "launch_ros": {},
+        "launch_ros.actions": {"Node": SimpleNamespace},
+    }.items():
+        monkeypatch.setitem(sys.modules, module, SimpleNamespace(**names))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
+    share = prefix / "share" / "wam_stack"
+
+    *declared, start = runpy.run_path(str(share / "launch" / "wam.launch.py"))[
+        "generate_launch_description"
+    ]()
+    assert set(declared) == set(given)
+    nodes = start.function(given)
+    config = yaml.safe_load((share / "config" / "wam.yaml").read_text())
+    assert [node.name for node in nodes] == [*config["/**"]["ros__parameters"]["nodes"], "recorder"]
+    assert {node.executable for node in nodes} <= set(NODES)
+    assert {node.package for node in nodes} == {"wam_stack"}
+    assert {node.namespace for node in nodes} == {"left"}
+    for node in nodes:
+        assert node.parameters == [str(share / "config" / "wam.yaml"), {"timing.mode": "lockstep"}]
+    assert len(start.function({**given, "record": "false"})) == len(nodes) - 1
+    with pytest.raises(ValueError, match=r"config:=nowhere is no file and none of: .*wam"):
+        start.function({**given, "config": "nowhere"})
+
+
+def test_package_xml_is_valid_for_ros():
+    warnings: list[str] = []
+    package = parse_package(str(ROOT / "package.xml"), warnings=warnings)
+    package.validate(warnings=warnings)
+    assert warnings == []
+    assert package.name == "wam_stack"
+    assert package.get_build_type() == "ament_python"
+    depends = {dependency.name for dependency in package.exec_depends}
+    name_of_ros = re.compile(r"\b(\w+_msgs|std_srvs|rclpy|ament_index_python)(?:[./]|\s+import)")
+    named = {name for path in ROOT.glob("wam_*/*.py") for name in name_of_ros.findall(path.read_text())}
+    assert named <= depends
+
+
+def reached(
+    name: str, extras: frozenset[str], seen: set[tuple[str, frozenset[str]]]
+) -> Iterator[Requirement]:
+    """Every requirement that a package with its extras leads to."""
+    if (name, extras) in seen:
+        return
+    seen.add((name, extras))
+    for line in importlib.metadata.requires(name) or []:
+        requirement = Requirement(line)
+        marker = requirement.marker
+        if marker is None or any(marker.evaluate({"extra": extra}) for extra in ("", *extras)):
+            yield requirement
+            yield from reached(requirement.name, frozenset(requirement.extras), seen)
+
+
+def test_constraints_pin_every_package_that_make_test_installs(prefix, monkeypatch):
+    lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
+    assert [line for line in lines if not re.fullmatch(r"[a-z0-9.-]+==[0-9][0-9a-z.+]*", line)] == []
+    pins = {canonicalize_name(name): version for name, version in (line.split("==") for line in lines)}
+    assert len(pins) == len(lines)
+
+    (site,) = prefix.glob("lib/python3*/site-packages")
+    monkeypatch.syspath_prepend(str(site))
+    needed = {canonicalize_name(one.name) for one in reached("wam_stack", frozenset({"ros", "test"}), set())}
+    installed = {name: importlib.metadata.version(name) for name in needed}
+    assert installed == {name: pins.get(name) for name in needed}
