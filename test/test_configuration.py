@@ -1,0 +1,164 @@
+"""Configurations read from parameter files without ROS."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError, parameter
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Parameters of a node in these tests."""
+
+    gain: float = parameter("gain", low=0.0)
+    names: tuple[str, ...] = parameter("names")
+
+
+LOOP = "/**/loop:\n  ros__parameters:\n    gain: 2.5\n    names: [a, b]\n"
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The WAM's configuration with one more node."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(packaged("wam").read_text() + LOOP)
+    return path
+
+
+def test_shared_part_and_nodes_become_parameter_objects(file: Path) -> None:
+    configuration = Configuration.load(file)
+    assert configuration.shared.arm.name == "wam"
+    assert configuration.shared.timing.period_ns == 1_000_000
+    assert configuration.node("loop", Loop) == Loop(2.5, ("a", "b"))
+    assert configuration.text == file.read_text()
+    assert len(configuration.sha256) == 64
+
+
+def test_replaced_values_leave_the_original_alone(file: Path) -> None:
+    original = Configuration.load(file)
+    changed = original.with_values({"timing.mode": "lockstep", "loop:gain": 3.0, "loop:names": ("c",)})
+    assert changed.shared.timing.mode == "lockstep"
+    assert changed.node("loop", Loop) == Loop(3.0, ("c",))
+    assert original.shared.timing.mode == "realtime"
+    assert original.node("loop", Loop).gain == 2.5
+    assert changed.sha256 != original.sha256
+    assert changed.path == original.path
+
+
+def test_text_of_a_changed_configuration_gives_the_same_values(file: Path, tmp_path: Path) -> None:
+    changed = Configuration.load(file).with_values({"loop:gain": 1e-7, "arm.tool": (0.1, 0.0, 1 / 3)})
+    (tmp_path / "again.yaml").write_text(changed.text)
+    again = Configuration.load(tmp_path / "again.yaml")
+    assert again.sections == changed.sections
+    assert again.shared == changed.shared
+
+
+def test_sections_cannot_be_written(file: Path) -> None:
+    with pytest.raises(TypeError):
+        Configuration.load(file).sections["loop"]["gain"] = 1.0  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        (
+            "timing.mod",
+            r"mine\.yaml: section '/\*\*' has no parameter 'timing.mod' to set to 1; it has: .*timing.mode",
+        ),
+        ("loop:gian", r"mine\.yaml: node 'loop' has no parameter 'gian' to set to 1; it has: gain, names"),
+        ("lop:gain", r"mine\.yaml: no section '/\*\*/lop' for node 'lop'; sections: .*loop"),
+    ],
+)
+def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        Configuration.load(file).with_values({key: 1})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [1,", "is not YAML"),
+        ("", r"has no section '/\*\*'"),
+        ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
+        ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
+        ("/**: {ros__parameters: 3}", r"section '/\*\*' needs 'ros__parameters:'"),
+        (
+            "/**: {ros__parameters: {}}\ndriver: {ros__parameters: {}}",
+            r"section 'driver' is not allowed; write",
+        ),
+        (
+            "/**: {ros__parameters: {}}\n/**/a/b: {ros__parameters: {}}",
+            r"section '/\*\*/a/b' is not allowed; write",
+        ),
+    ],
+)
+def test_file_that_is_no_configuration_is_refused_by_name(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "odd.yaml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=rf"odd\.yaml.*{message}"):
+        Configuration.load(path)
+
+
+def test_missing_file_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"none\.yaml is not a file"):
+        Configuration.load(tmp_path / "none.yaml")
+
+
+def test_misspelt_parameter_is_refused_with_file_section_and_name(file: Path) -> None:
+    file.write_text(file.read_text().replace("gain:", "gian:").replace("period:", "perod:"))
+    configuration = Configuration.load(file)
+    with pytest.raises(
+        ParameterError, match=r"mine\.yaml, section '/\*\*/loop': missing .*'gain'.*unknown .*'gian'"
+    ):
+        configuration.node("loop", Loop)
+    with pytest.raises(
+        ParameterError, match=r"mine\.yaml, section '/\*\*': missing parameter 'timing.period'"
+    ):
+        _ = configuration.shared
+    with pytest.raises(ParameterError, match="no section"):
+        configuration.node("pool", Loop)
+
+
+def test_packaged_configuration_is_found_in_the_source_tree_and_unknown_names_are_refused() -> None:
+    assert packaged("wam") == Path(__file__).resolve().parents[1] / "config" / "wam.yaml"
+    with pytest.raises(
+        ParameterError, match=r"no configuration 'wum' comes with wam_stack; there are: .*wam"
+    ):
+        packaged("wum")
+
+
+@pytest.mark.parametrize("way", ["own prefix", "ament prefix"])
+def test_packaged_configuration_is_found_when_installed(tmp_path: Path, way: str) -> None:
+    source = Path(__file__).resolve().parents[1]
+    prefix = tmp_path / "prefix"
+    packages = prefix / "lib" / "site-packages" if way == "own prefix" else tmp_path / "elsewhere"
+    shutil.copytree(source / "wam_description", packages / "wam_description")
+    share = prefix / "share" / "wam_stack" / "config"
+    share.mkdir(parents=True)
+    shutil.copy(source / "config" / "wam.yaml", share)
+    environment = {**os.environ, "PYTHONPATH": str(packages)}
+    environment["AMENT_PREFIX_PATH"] = f"/nowhere{os.pathsep}{prefix}" if way == "ament prefix" else ""
+    code = "from wam_description.configuration import packaged; print(packaged('wam'))"
+    found = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert Path(found.stdout.strip()) == share / "wam.yaml"
+
+
+def test_every_packaged_configuration_is_plain_yaml_with_a_shared_part() -> None:
+    for path in packaged("wam").parent.glob("*.yaml"):
+        if "/**" in (yaml.safe_load(path.read_text()) or {}):
+            assert Configuration.load(path).shared.arm.motors.names

@@ -1,0 +1,191 @@
+"""Kinematics and dynamics of the links against the table of appendix A and finite differences."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration, packaged
+from wam_description.jacobian import hand_jacobian_transposed
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+
+Array = NDArray[np.float64]
+L3, L4 = 22 * 0.0254, 16 * 0.0254
+GRAVITY = 9.80665
+
+
+@pytest.fixture(scope="module")
+def arm() -> Arm:
+    return Configuration.load(packaged("wam")).shared.arm
+
+
+@pytest.fixture(scope="module")
+def body(arm: Arm) -> RigidBody:
+    return RigidBody(arm)
+
+
+def poses(count: int) -> Array:
+    return np.random.default_rng(7).uniform(-2.5, 2.5, (count, 4))
+
+
+def frame(twist: float, length: float, offset: float, angle: float) -> Array:
+    """Frame i in frame i-1 as a (4, 4) matrix, printed (A.4)."""
+    c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(twist), np.sin(twist)
+    return np.array(
+        [
+            [c, -s, 0, length],
+            [s * ca, c * ca, -sa, -sa * offset],
+            [s * sa, c * sa, ca, ca * offset],
+            [0, 0, 0, 1],
+        ]
+    )
+
+
+def frames(q: Array) -> list[Array]:
+    """Frames 1 to 5 in the base by the table of appendix A."""
+    table = [(0, 0, 0), (np.pi / 2, 0, 0), (-np.pi / 2, 0, L3), (np.pi / 2, 0, 0), (0, L4, 0)]
+    result, product = [], np.eye(4)
+    for row, angle in zip(table, (*q, 0.0), strict=True):
+        product = product @ frame(*row, angle)
+        result.append(product)
+    return result
+
+
+def slope(function: object, q: Array) -> Array:
+    """Central difference of a vector function, (m, n)."""
+    assert callable(function)
+    step = 1e-5
+    return np.stack(
+        [(function(q + step * e) - function(q - step * e)) / (2 * step) for e in np.eye(4)], axis=1
+    )
+
+
+def test_poses_of_the_appendix_put_the_tip_where_it_says(body: RigidBody) -> None:
+    inch = 0.0254
+    assert body.tool_pose([0, 0, 0, 0]).position == pytest.approx([16 * inch, 0, 22 * inch])
+    assert body.tool_pose([0, -np.pi / 2, 0, np.pi / 2]).position == pytest.approx(
+        [38 * inch, 0, 0], abs=1e-12
+    )
+    assert body.tool_pose([0, 0, 0, -np.pi / 2]).position == pytest.approx([0, 0, 6 * inch], abs=1e-12)
+
+
+def test_tool_and_covers_are_where_the_table_puts_them(body: RigidBody) -> None:
+    for q in poses(100):
+        third, fourth, fifth = frames(q)[2:]
+        assert np.allclose(body.tool_pose(q).position, fifth[:3, 3], atol=1e-9)
+        assert np.allclose(body.tool_pose(q).rotation, fifth[:3, :3], atol=1e-9)
+        assert np.allclose(body.cover_pose(q, "outer_link").rotation, fourth[:3, :3], atol=1e-9)
+        inner = body.cover_pose(q, "inner_link")
+        assert np.allclose(inner.position, 0.0, atol=1e-9)
+        assert np.allclose(
+            inner.rotation, np.column_stack([third[:3, 2], third[:3, 1], -third[:3, 0]]), atol=1e-9
+        )
+        assert np.allclose(body.point(q, "inner_link", [L3, 0.0, 0.0]), fourth[:3, 3], atol=1e-9)
+        assert np.allclose(
+            body.point(q, "outer_link", [0.1, 0.02, 0.03]), (fourth @ [0.1, 0.02, 0.03, 1])[:3]
+        )
+
+
+def test_hand_jacobian_is_corrected_a7(body: RigidBody) -> None:
+    for q in poses(100):
+        q1, q2, q3, q4 = q
+        expected = hand_jacobian_transposed((q1, q2, q3, q4), L3, L4).T
+        assert np.allclose(body.hand_jacobian(q), expected, atol=1e-9)
+        turned = body.tool_pose(q).rotation.T @ body.tool_jacobian(q)
+        assert np.allclose(turned, expected, atol=1e-9)
+
+
+def test_printed_a7_is_wrong_by_up_to_22_6_inches() -> None:
+    entries = [(L4 * (np.sin(q3) - np.cos(q3))) / 0.0254 for q3 in np.linspace(-np.pi, np.pi, 361)]
+    assert max(np.abs(entries)) == pytest.approx(22.6, abs=0.05)
+
+
+def test_jacobians_are_slopes_of_positions(body: RigidBody) -> None:
+    point = np.array([0.3, 0.02, -0.04])
+    for q in poses(30):
+        by_table = slope(lambda angles: frames(angles)[4][:3, 3], q)
+        assert np.allclose(body.tool_jacobian(q), by_table, atol=1e-7)
+        for cover in body.covers:
+            expected = slope(lambda angles, cover=cover: body.point(angles, cover, point), q)
+            assert np.allclose(body.point_jacobian(q, cover, point), expected, atol=1e-7)
+
+
+def test_elbow_does_not_move_the_inner_link(body: RigidBody) -> None:
+    jacobian = body.point_jacobian([0.1, 0.4, -0.3, 0.8], "inner_link", [0.4, 0.0, 0.0])
+    assert np.all(jacobian[:, 3] == 0.0)
+    assert np.linalg.norm(jacobian[:, 1]) > 0.3
+
+
+def test_gravity_torque_is_the_slope_of_the_height_of_the_masses(arm: Arm, body: RigidBody) -> None:
+    centres = np.reshape(arm.links.centre, (4, 3))
+
+    def energy(q: Array) -> Array:
+        heights = [(place @ [*centre, 1])[2] for place, centre in zip(frames(q), centres, strict=False)]
+        return np.array([GRAVITY * np.dot(arm.links.mass, heights)])
+
+    for q in poses(30):
+        assert np.allclose(body.gravity_torque(q), slope(energy, q)[0], atol=1e-7)
+
+
+def test_mass_matrix_gives_the_kinetic_energy_of_the_links(arm: Arm, body: RigidBody) -> None:
+    centres, inertias = np.reshape(arm.links.centre, (4, 3)), np.reshape(arm.links.inertia, (4, 3))
+    for q in poses(10):
+        expected = np.zeros((4, 4))
+        for i in range(4):
+            place = frames(q)[i]
+            moved = slope(lambda angles, i=i: (frames(angles)[i] @ [*centres[i], 1])[:3], q)
+            axes = np.column_stack([frames(q)[j][:3, 2] if j <= i else np.zeros(3) for j in range(4)])
+            spin = place[:3, :3].T @ axes
+            expected += arm.links.mass[i] * moved.T @ moved + spin.T @ np.diag(inertias[i]) @ spin
+        assert np.allclose(body.mass_matrix(q), expected, atol=1e-7)
+
+
+def test_momentum_rate_is_torque_plus_coriolis_transpose(body: RigidBody) -> None:
+    rng = np.random.default_rng(3)
+    for q in poses(20):
+        qd, qdd = rng.uniform(-2, 2, (2, 4))
+        step = 1e-5
+        before, after = (body.mass_matrix(q + h * qd) @ (qd + h * qdd) for h in (-step, step))
+        torque = body.inverse_dynamics(q, qd, qdd)
+        expected = torque - body.gravity_torque(q) + body.coriolis_transpose_times_velocity(q, qd)
+        assert np.allclose((after - before) / (2 * step), expected, atol=1e-6)
+
+
+def test_heavier_links_need_more_torque_in_proportion(arm: Arm, body: RigidBody) -> None:
+    heavy = RigidBody(arm, [1.1] * 4)
+    q = [0.2, -0.9, 0.3, 0.6]
+    assert heavy.gravity_torque(q) == pytest.approx(1.1 * body.gravity_torque(q))
+    assert heavy.mass_matrix(q) == pytest.approx(1.1 * body.mass_matrix(q))
+
+
+def test_results_stay_when_the_next_is_computed(body: RigidBody) -> None:
+    q, other = [0.1, 0.2, 0.3, 0.4], [1.0, -1.0, 1.0, -1.0]
+    for compute in (body.gravity_torque, body.mass_matrix, body.tool_jacobian, body.hand_jacobian):
+        first = compute(q)
+        kept = first.copy()
+        compute(other)
+        assert np.array_equal(first, kept)
+    pose = body.tool_pose(q)
+    position = pose.position.copy()
+    body.tool_pose(other)
+    assert np.array_equal(pose.position, position)
+
+
+def test_unknown_cover_and_bad_mass_scale_are_refused(arm: Arm, body: RigidBody) -> None:
+    with pytest.raises(ValueError, match="cover 'wrist' is not on arm 'wam'; covers: inner_link, outer_link"):
+        body.point([0, 0, 0, 0], "wrist", [0, 0, 0])
+    for scale in ([1.0, 1.0], [1.0, 1.0, 0.0, 1.0]):
+        with pytest.raises(ValueError, match="needs 4 factors above 0, one per link"):
+            RigidBody(arm, scale)
+
+
+def test_worst_motor_torque_for_ten_pounds_is_below_the_continuous_one(arm: Arm, body: RigidBody) -> None:
+    """7.2.2 claims 10 lb at any point in any configuration; the assumed masses must allow it."""
+    matrix = TransmissionMap.of(arm).joint_from_motor
+    lower, upper = np.array(arm.joints.lower), np.array(arm.joints.upper)
+    worst = 0.0
+    for q in np.random.default_rng(1).uniform(lower, upper, (4000, 4)):
+        force = 10 * 4.4482216 * np.linalg.norm(matrix.T @ body.tool_jacobian(q).T, axis=1)
+        worst = max(worst, float(np.max(np.abs(matrix.T @ body.gravity_torque(q)) + force)))
+    assert 0.8 * arm.motors.continuous_torque[0] < worst < arm.motors.continuous_torque[0]

@@ -1,0 +1,1 @@
+"""What the arm is: constants, parameters, transmission map, kinematics, MJCF and URDF."""

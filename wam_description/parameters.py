@@ -1,0 +1,177 @@
+"""Parameters as data: frozen dataclasses that carry unit, range and meaning of every field.
+
+A parameter class is the only place that says what a parameter means; its value stands in one
+YAML file below ``config/`` and nowhere else.  The same classes check the values, name what is
+wrong, describe the parameters to ROS and fill ``docs/parameters.md``.
+"""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+
+T = TypeVar("T")
+Value = bool | int | float | str | tuple[Any, ...]
+
+
+class ParameterError(ValueError):
+    """A parameter set that is refused as a whole; the message names the parameter."""
+
+
+class Field(NamedTuple):
+    """One parameter: its dotted name, Python type and what the class says of it."""
+
+    name: str
+    kind: type
+    is_array: bool
+    doc: str
+    unit: str
+    low: float
+    high: float
+    choices: tuple[str, ...]
+    live: bool
+
+    @property
+    def allowed(self) -> str:
+        """The allowed values in words, empty where anything of the type is allowed."""
+        if self.choices:
+            return "one of " + ", ".join(self.choices)
+        if math.isinf(self.low) and math.isinf(self.high):
+            return ""
+        if math.isinf(self.high):
+            return f"at least {self.low:g}"
+        if math.isinf(self.low):
+            return f"at most {self.high:g}"
+        return f"{self.low:g} to {self.high:g}"
+
+
+def parameter(
+    doc: str,
+    unit: str = "",
+    low: float = -math.inf,
+    high: float = math.inf,
+    choices: tuple[str, ...] = (),
+    live: bool = False,
+) -> Any:
+    """Declare a field of a parameter class.
+
+    Parameters
+    ----------
+    doc : what the parameter is, one sentence.
+    unit : SI unit, empty for pure numbers and names.
+    low, high : inclusive range of each number.
+    choices : allowed strings.
+    live : True where a running node may take a new value.
+    """
+    return dataclasses.field(
+        metadata={"doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live}
+    )
+
+
+def fields(cls: type, prefix: str = "") -> Iterator[Field]:
+    """Every parameter of a class, nested classes as dotted names, in order of declaration."""
+    hints = get_type_hints(cls)
+    for item in dataclasses.fields(cls):
+        hint = hints[item.name]
+        name = prefix + item.name
+        if dataclasses.is_dataclass(hint):
+            assert isinstance(hint, type)
+            yield from fields(hint, name + ".")
+            continue
+        is_array = get_origin(hint) is tuple
+        kind = get_args(hint)[0] if is_array else hint
+        yield Field(name, kind, is_array, **item.metadata)
+
+
+def flatten(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """A nested mapping as a flat one with dotted names, the form that ROS uses."""
+    flat: dict[str, Any] = {}
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            flat.update(flatten(value, f"{prefix}{key}."))
+        else:
+            flat[prefix + key] = value
+    return flat
+
+
+def values(instance: Any, prefix: str = "") -> dict[str, Value]:
+    """The flat ``{dotted name: value}`` of a parameter object; the inverse of `build`."""
+    flat: dict[str, Value] = {}
+    for item in dataclasses.fields(instance):
+        value = getattr(instance, item.name)
+        if dataclasses.is_dataclass(value):
+            flat.update(values(value, f"{prefix}{item.name}."))
+        else:
+            flat[prefix + item.name] = value
+    return flat
+
+
+def build(cls: type[T], flat: Mapping[str, Any]) -> T:
+    """Make a parameter object from flat names and values, or refuse the set as a whole.
+
+    Raises
+    ------
+    ParameterError
+        names every missing and unknown parameter, or the first value that is not allowed.
+    """
+    known = {field.name: field for field in fields(cls)}
+    missing = [name for name in known if name not in flat]
+    unknown = [name for name in flat if name not in known]
+    if missing or unknown:
+        parts = [f"missing parameter '{name}'" for name in missing]
+        parts += [f"unknown parameter '{name}'" for name in unknown]
+        raise ParameterError("; ".join(parts) + " (compare with docs/parameters.md)")
+    checked = {name: _checked(field, flat[name]) for name, field in known.items()}
+    return _assemble(cls, checked, "")
+
+
+def _assemble(cls: type[T], flat: Mapping[str, Value], prefix: str) -> T:
+    hints = get_type_hints(cls)
+    arguments: dict[str, Any] = {}
+    for item in dataclasses.fields(cls):  # type: ignore[arg-type]
+        hint = hints[item.name]
+        if dataclasses.is_dataclass(hint):
+            assert isinstance(hint, type)
+            arguments[item.name] = _assemble(hint, flat, f"{prefix}{item.name}.")
+        else:
+            arguments[item.name] = flat[prefix + item.name]
+    return cls(**arguments)
+
+
+def _checked(field: Field, value: Any) -> Value:
+    if field.is_array:
+        if isinstance(value, str) or not hasattr(value, "__iter__"):
+            raise ParameterError(f"parameter '{field.name}' is {value!r}; it must be a list of {field.kind.__name__}")
+        return tuple(_checked_scalar(field, element) for element in value)
+    return _checked_scalar(field, value)
+
+
+def _checked_scalar(field: Field, value: Any) -> bool | int | float | str:
+    def refuse(allowed: str) -> ParameterError:
+        unit = f" {field.unit}" if field.unit else ""
+        return ParameterError(f"parameter '{field.name}' is {value!r}{unit}; allowed: {allowed}")
+
+    if field.kind is str or field.kind is bool:
+        if not isinstance(value, field.kind):
+            raise refuse(f"a {field.kind.__name__}")
+        if field.choices and value not in field.choices:
+            raise refuse(field.allowed)
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise refuse("a number")
+    if field.kind is int and value != int(value):
+        raise refuse("a whole number")
+    if not math.isfinite(value) or not field.low <= value <= field.high:
+        raise refuse(field.allowed or "a finite number")
+    return field.kind(value)
+
+
+def require(condition: bool, message: str) -> None:
+    """Refuse a parameter set whose values do not fit each other."""
+    if not condition:
+        raise ParameterError(message)
+
+
+@dataclasses.dataclass(frozen=True)
+class Nothing:
+    """The parameters of a node that has none of its own."""

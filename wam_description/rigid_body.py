@@ -1,0 +1,173 @@
+"""Kinematics and dynamics of the links as rigid bodies, by pinocchio, from the arm's parameters."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from wam_description.arm import Arm
+
+Array = NDArray[np.float64]
+
+
+class Pose(NamedTuple):
+    """A frame seen from the base.
+
+    Attributes
+    ----------
+    rotation : (3, 3), turns coordinates in the frame into coordinates in the base frame.
+    position : (3,), origin of the frame in the base frame, m.
+    """
+
+    rotation: Array
+    position: Array
+
+
+class RigidBody:
+    """The chain of links: places, Jacobians, gravity, inertia; no rotors, pulleys or friction.
+
+    Joint i turns about z of frame i of (A.4).  Base frame: frame 0, z up.  Joint angles q, rad,
+    and velocities qd, rad/s, have shape (n,) and may be any sequence.  Every result is a new array.
+
+    Parameters
+    ----------
+    arm : the arm's parameters.
+    mass_scale : factor on mass and inertia of each link, n; None leaves them as they are.
+
+    Raises
+    ------
+    ValueError
+        where `mass_scale` has another length than the links or a factor is not above zero.
+    """
+
+    def __init__(self, arm: Arm, mass_scale: Sequence[float] | None = None) -> None:
+        self.arm = arm
+        self.covers = arm.covers.names
+        self._model = _model(arm, [1.0] * len(arm.links.names) if mass_scale is None else mass_scale)
+        self._data = self._model.createData()
+        self._tool = self._model.getFrameId("tool")
+        self._frame = {name: self._model.getFrameId(name) for name in self.covers}
+        self._joint = {name: self._model.frames[frame].parentJoint for name, frame in self._frame.items()}
+
+    def cover_pose(self, q: ArrayLike, cover: str) -> Pose:
+        """Frame of a cover, seen from the base."""
+        return self._pose(q, self._known(cover))
+
+    def tool_pose(self, q: ArrayLike) -> Pose:
+        """Frame of the tool (frame 5 of A.4), seen from the base."""
+        return self._pose(q, self._tool)
+
+    def point(self, q: ArrayLike, cover: str, p: ArrayLike) -> Array:
+        """Base coordinates, (3,), m, of a point p, (3,), m, given in the cover's frame."""
+        return self._placement(q, self._known(cover)).act(_vector(p))
+
+    def point_jacobian(self, q: ArrayLike, cover: str, p: ArrayLike) -> Array:
+        """Velocity of a point of a cover per joint velocity.
+
+        Parameters
+        ----------
+        q : (n,), rad.
+        cover : name of the cover.
+        p : (3,), the point in the cover's frame, m.
+
+        Returns
+        -------
+        (3, n), m/rad, in base coordinates; its transpose turns a force on the point, N, in base
+        coordinates, into joint torques, N m.
+        """
+        frame = self._known(cover)
+        jacobians = pin.computeJointJacobians(self._model, self._data, _vector(q))
+        place = pin.updateFramePlacement(self._model, self._data, frame).act(_vector(p))
+        result: Array = jacobians[:3] - pin.skew(place) @ jacobians[3:]
+        result[:, self._joint[cover] :] = 0.0
+        return result
+
+    def tool_jacobian(self, q: ArrayLike) -> Array:
+        """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in base coordinates."""
+        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        return pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, aligned)[:3]
+
+    def hand_jacobian(self, q: ArrayLike) -> Array:
+        """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in frame 5 (A.7 corrected)."""
+        local = pin.ReferenceFrame.LOCAL
+        return pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, local)[:3]
+
+    def gravity_torque(self, q: ArrayLike) -> Array:
+        """Joint torques that carry the links at rest, (n,), N m."""
+        return pin.computeGeneralizedGravity(self._model, self._data, _vector(q))
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Inertia of the links at the joints, (n, n), kg m^2, symmetric; pulleys and rotors not in it."""
+        return pin.crba(self._model, self._data, _vector(q))
+
+    def coriolis_transpose_times_velocity(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """C(q, qd)^T qd, (n,), N m, with dM/dt = C + C^T: what a momentum observer adds to the torques."""
+        velocity = _vector(qd)
+        return pin.computeCoriolisMatrix(self._model, self._data, _vector(q), velocity).T @ velocity
+
+    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Joint torques, (n,), N m, that give the links the acceleration qdd, (n,), rad/s^2."""
+        return pin.rnea(self._model, self._data, _vector(q), _vector(qd), _vector(qdd))
+
+    def _known(self, cover: str) -> int:
+        if cover not in self._frame:
+            raise ValueError(
+                f"cover '{cover}' is not on arm '{self.arm.name}'; covers: {', '.join(self.covers)}"
+            )
+        return self._frame[cover]
+
+    def _placement(self, q: ArrayLike, frame: int) -> pin.SE3:
+        pin.forwardKinematics(self._model, self._data, _vector(q))
+        return pin.updateFramePlacement(self._model, self._data, frame)
+
+    def _pose(self, q: ArrayLike, frame: int) -> Pose:
+        placement = self._placement(q, frame)
+        return Pose(placement.rotation.copy(), placement.translation.copy())
+
+
+def joint_placement(arm: Arm, i: int) -> pin.SE3:
+    """Frame i of (A.4) at joint angle zero in the frame before it; i counts from 0, lengths in m."""
+    twist, length, offset = arm.joints.twist[i], arm.joints.length[i], arm.joints.offset[i]
+    rotation = pin.rpy.rpyToMatrix(twist, 0.0, 0.0)
+    return pin.SE3(rotation, rotation @ np.array([length, 0.0, offset]))
+
+
+def cover_placement(arm: Arm, i: int) -> pin.SE3:
+    """Frame of cover i in its link's frame; i counts from 0, lengths in m.
+
+    `rotation` is about fixed x, then y, then z, as in URDF.
+    """
+    rows = slice(3 * i, 3 * i + 3)
+    return pin.SE3(pin.rpy.rpyToMatrix(*arm.covers.rotation[rows]), np.array(arm.covers.origin[rows]))
+
+
+def _vector(values: ArrayLike) -> Array:
+    return np.asarray(values, dtype=float)
+
+
+def _model(arm: Arm, mass_scale: Sequence[float]) -> pin.Model:
+    if len(mass_scale) != len(arm.links.names) or not all(factor > 0.0 for factor in mass_scale):
+        raise ValueError(
+            f"mass_scale is {list(mass_scale)}; it needs {len(arm.links.names)} factors above 0, one per link"
+        )
+    model = pin.Model()
+    model.name = arm.name
+    model.gravity.linear = np.array(arm.gravity)
+    centres = np.reshape(arm.links.centre, (-1, 3))
+    inertias = np.reshape(arm.links.inertia, (-1, 3))
+    joint = 0
+    for i, name in enumerate(arm.joints.names):
+        joint = model.addJoint(joint, pin.JointModelRZ(), joint_placement(arm, i), name)
+        mass = arm.links.mass[i] * mass_scale[i]
+        inertia = pin.Inertia(mass, centres[i], np.diag(inertias[i] * mass_scale[i]))
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    _add_frame(model, "tool", joint, pin.SE3(np.eye(3), np.array(arm.tool)))
+    for i, name in enumerate(arm.covers.names):
+        _add_frame(model, name, 1 + arm.links.names.index(arm.covers.links[i]), cover_placement(arm, i))
+    return model
+
+
+def _add_frame(model: pin.Model, name: str, joint: int, placement: pin.SE3) -> None:
+    model.addFrame(pin.Frame(name, joint, 0, placement, pin.FrameType.OP_FRAME))

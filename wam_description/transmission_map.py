@@ -1,0 +1,107 @@
+"""The map between motors and joints, (A.5), for positions, velocities and torques."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wam_description.arm import Arm
+
+LARGEST_CONDITION = 1e8
+
+
+class TransmissionMap:
+    """Positions, velocities and torques from motors to joints and back, (A.5).
+
+    With q = M theta, equal power on both sides asks for tau_motor = M^T tau.  The methods take and
+    return plain lists of n numbers: on four numbers scalar Python is faster than numpy.
+
+    Parameters
+    ----------
+    matrix : (n, n), M of (A.5), rad at the joints per rad at the motors.
+
+    Attributes
+    ----------
+    joint_from_motor : (n, n), read-only, M.
+    motor_from_joint : (n, n), read-only, inverse of M.
+
+    Raises
+    ------
+    ValueError
+        where the matrix is not square, not finite or singular.
+    """
+
+    def __init__(self, matrix: ArrayLike) -> None:
+        forward = np.array(matrix, dtype=float)
+        _check(forward)
+        inverse = np.linalg.inv(forward) + 0.0  # turns -0.0 into 0.0
+        forward.setflags(write=False)
+        inverse.setflags(write=False)
+        self.joint_from_motor: NDArray[np.float64] = forward
+        self.motor_from_joint: NDArray[np.float64] = inverse
+        self._forward, self._inverse = _terms(forward), _terms(inverse)
+        self._forward_transposed, self._inverse_transposed = _terms(forward.T), _terms(inverse.T)
+
+    @classmethod
+    def of(cls, arm: Arm) -> "TransmissionMap":
+        """The map of an arm, from its `joint_from_motor` row by row."""
+        return cls(np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names))))
+
+    def joint_positions(self, theta: Sequence[float]) -> list[float]:
+        """Joint angles q = M theta, n, rad, of motor angles theta, n, rad (A.5)."""
+        return _product(self._forward, theta)
+
+    def motor_positions(self, q: Sequence[float]) -> list[float]:
+        """Motor angles theta = M^-1 q, n, rad, of joint angles q, n, rad (A.5)."""
+        return _product(self._inverse, q)
+
+    def joint_velocities(self, thetad: Sequence[float]) -> list[float]:
+        """Joint velocities M thetad, n, rad/s, of motor velocities, n, rad/s (A.5)."""
+        return _product(self._forward, thetad)
+
+    def motor_velocities(self, qd: Sequence[float]) -> list[float]:
+        """Motor velocities M^-1 qd, n, rad/s, of joint velocities, n, rad/s (A.5)."""
+        return _product(self._inverse, qd)
+
+    def joint_torques(self, tau_motor: Sequence[float]) -> list[float]:
+        """Joint torques M^-T tau_motor, n, N m, of motor torques, n, N m (A.5, by power)."""
+        return _product(self._inverse_transposed, tau_motor)
+
+    def motor_torques(self, tau: Sequence[float]) -> list[float]:
+        """Motor torques M^T tau, n, N m, of joint torques, n, N m (A.5, by power)."""
+        return _product(self._forward_transposed, tau)
+
+    def largest_joint_torques(self, peak_torque: Sequence[float]) -> list[float]:
+        """Largest torque at each joint alone, n, N m, where motors give up to peak_torque, n, N m."""
+        absolute = [[(j, abs(factor)) for j, factor in row] for row in self._inverse_transposed]
+        return _product(absolute, peak_torque)
+
+
+def _check(matrix: NDArray[np.float64]) -> None:
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise ValueError(f"joint_from_motor has shape {matrix.shape}; it needs as many rows as columns")
+    if not np.all(np.isfinite(matrix)):
+        raise ValueError(f"joint_from_motor has a value that is not finite: {matrix.tolist()}")
+    condition = np.linalg.cond(matrix)
+    if not condition < LARGEST_CONDITION:
+        raise ValueError(
+            f"joint_from_motor is singular (condition number {condition:.3g}, allowed below "
+            f"{LARGEST_CONDITION:g}): no motor angles belong to some joint angles; each joint needs a "
+            f"combination of motors of its own, got {matrix.tolist()}"
+        )
+
+
+def _terms(matrix: NDArray[np.float64]) -> list[list[tuple[int, float]]]:
+    return [[(j, factor) for j, factor in enumerate(row) if factor != 0.0] for row in matrix.tolist()]
+
+
+def _product(terms: list[list[tuple[int, float]]], vector: Sequence[float]) -> list[float]:
+    if len(vector) != len(terms):
+        raise ValueError(f"got {len(vector)} values for {len(terms)} motors and joints: {list(vector)}")
+    result = []
+    for row in terms:
+        total = 0.0
+        for j, factor in row:
+            total += factor * vector[j]
+        result.append(total)
+    return result

@@ -1,0 +1,1 @@
+"""What the thesis predicts, as pure functions that cite their equations."""
