@@ -1,0 +1,224 @@
+"""A scenario: steps of a task as data, played into the stack at the outer rate."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from wam_control.force_loop import ForceCommand
+from wam_description.arm import Arm
+from wam_description.parameters import ParameterError, parameter, require
+from wam_description.signals import Contact
+
+REQUESTS = ("", "enable", "disable")
+NO_FORCE = ForceCommand("base", (0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class ScenarioParameters:
+    """Which task is played."""
+
+    script: str = parameter("YAML file with the steps; a bare name is looked up in the configurations' folder")
+
+
+class Push(NamedTuple):
+    """A push on a cover, seconds counted from the start of the step."""
+
+    cover: str
+    place: float  # m
+    force: tuple[float, float, float]  # N, in the cover's frame
+    begin: float  # s
+    end: float  # s
+
+
+class Step(NamedTuple):
+    """One step of a scenario."""
+
+    name: str
+    seconds: float
+    posture: tuple[float, ...] = ()  # rad; empty keeps the last one
+    until_force: float = 0.0  # N; above zero the step ends once a contact of this force is felt
+    force: ForceCommand = NO_FORCE
+    push: Push | None = None
+    request: str = ""  # asked of the driver when the step begins
+
+
+class ScenarioOutput(NamedTuple):
+    """What the scenario asks for in one outer period."""
+
+    posture: list[float]
+    force: ForceCommand
+    push_cover: str
+    push_force: tuple[float, float, float]
+    push_torque: tuple[float, float, float]
+    request: str
+    step: str
+    done: bool
+    failure: str
+
+
+class Scenario:
+    """Plays steps one after the other.
+
+    Postures are reached along minimum-jerk paths.  A step that waits for a contact and does not
+    feel one fails the scenario: brakes are asked for and it is done.
+    """
+
+    def __init__(self, steps: Sequence[Step]) -> None:
+        require(len(steps) > 0, "the scenario has no steps")
+        self._steps = list(steps)
+        self._index = -1
+        self._elapsed = 0.0
+        self._from: list[float] = []
+        self._posture: list[float] = []
+        self.failure = ""
+        self.done = False
+
+    def step(self, q: Sequence[float], contact: Contact, dt: float) -> ScenarioOutput:
+        """One outer period.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        contact : what is felt.
+        dt : outer period, s.
+        """
+        begins = self._index < 0
+        if begins:
+            self._posture = list(q)
+            self._begin(0, q)
+        else:
+            self._elapsed += dt
+            begins = self._advance(q, contact)
+        step = self._steps[self._index]
+        if step.posture and not self.done:
+            self._posture = self._on_path(step)
+        push = step.push
+        pushing = push is not None and push.begin <= self._elapsed < push.end and not self.done
+        force = push.force if push and pushing else (0.0, 0.0, 0.0)
+        lever = push.place if push and pushing else 0.0
+        request = "disable" if self.failure else step.request
+        return ScenarioOutput(
+            posture=list(self._posture),
+            force=NO_FORCE if self.done else step.force,
+            push_cover=push.cover if push else "",
+            push_force=force,
+            push_torque=(0.0, -lever * force[2], lever * force[1]),
+            request=request if begins else "",
+            step=step.name,
+            done=self.done,
+            failure=self.failure,
+        )
+
+    def _begin(self, index: int, q: Sequence[float]) -> None:
+        pressed = self._index >= 0 and self._steps[self._index].force != NO_FORCE
+        self._index, self._elapsed = index, 0.0
+        if pressed and self._steps[index].posture:
+            self._posture = list(q)  # the arm has moved along the force, off the posture
+        self._from = list(self._posture)
+
+    def _advance(self, q: Sequence[float], contact: Contact) -> bool:
+        """Go on to the next step where this one is over; whether a request may have to be sent."""
+        step = self._steps[self._index]
+        if self.done:
+            return False
+        felt = bool(contact.cover) and math.hypot(*contact.force) >= step.until_force > 0.0
+        if not felt and self._elapsed < step.seconds - 1e-9:
+            return False
+        if step.until_force > 0.0 and not felt:
+            self.failure = f"step '{step.name}': no contact of {step.until_force:g} N felt in {step.seconds:g} s"
+            self.done = True
+            return True
+        if self._index + 1 == len(self._steps):
+            self.done = True
+            return False
+        self._begin(self._index + 1, q)
+        return True
+
+    def _on_path(self, step: Step) -> list[float]:
+        s = min(self._elapsed / step.seconds, 1.0)
+        blend = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+        return [a + (b - a) * blend for a, b in zip(self._from, step.posture, strict=True)]
+
+
+def load(path: Path, arm: Arm) -> list[Step]:
+    """Read the steps of a scenario.
+
+    Raises
+    ------
+    ParameterError
+        names the file, the step and the value that is not allowed.
+    """
+    if not path.is_file():
+        raise ParameterError(f"scenario {path} is not a file; give the path of a YAML file with 'steps'")
+    try:
+        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        raise ParameterError(f"scenario {path} is not YAML: {error}") from error
+    if not isinstance(tree, dict) or not isinstance(tree.get("steps"), list):
+        raise ParameterError(f"scenario {path} has no list 'steps'")
+    return [_step(f"{path}, step {i + 1}", body, arm) for i, body in enumerate(tree["steps"])]
+
+
+def _step(where: str, body: Any, arm: Arm) -> Step:
+    if not isinstance(body, dict):
+        raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
+    _known(where, body, ("name", "seconds", "posture", "until_force", "force", "push", "request"), ("name", "seconds"))
+    posture = _floats(where, "posture", body.get("posture", []), (0, len(arm.joints.names)))
+    request = body.get("request", "")
+    require(request in REQUESTS, f"{where}: request is {request!r}; allowed: enable, disable")
+    seconds = _float(where, "seconds", body["seconds"])
+    require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
+    return Step(
+        name=str(body["name"]),
+        seconds=seconds,
+        posture=posture,
+        until_force=_float(where, "until_force", body.get("until_force", 0.0)),
+        force=_force(where, body["force"], arm) if "force" in body else NO_FORCE,
+        push=_push(where, body["push"], arm) if "push" in body else None,
+        request=request,
+    )
+
+
+def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
+    _known(where + ", force", body, ("frame", "newtons"), ("frame", "newtons"))
+    frames = ("base", *arm.covers.names)
+    require(body["frame"] in frames, f"{where}: frame is {body['frame']!r}; allowed: {', '.join(frames)}")
+    x, y, z = _floats(where, "newtons", body["newtons"], (3,))
+    return ForceCommand(body["frame"], (x, y, z))
+
+
+def _push(where: str, body: Any, arm: Arm) -> Push:
+    names = ("cover", "place", "newtons", "begin", "end")
+    _known(where + ", push", body, names, names)
+    require(
+        body["cover"] in arm.covers.names,
+        f"{where}: cover is {body['cover']!r}; allowed: {', '.join(arm.covers.names)}",
+    )
+    x, y, z = _floats(where, "newtons", body["newtons"], (3,))
+    place, begin, end = (_float(where, key, body[key]) for key in ("place", "begin", "end"))
+    return Push(body["cover"], place, (x, y, z), begin, end)
+
+
+def _known(where: str, body: Any, allowed: Sequence[str], needed: Sequence[str]) -> None:
+    if not isinstance(body, Mapping):
+        raise ParameterError(f"{where} is {body!r}; it must be a mapping with {', '.join(needed)}")
+    for key in body:
+        require(key in allowed, f"{where}: unknown key '{key}'; allowed: {', '.join(allowed)}")
+    for key in needed:
+        require(key in body, f"{where}: '{key}' is missing")
+
+
+def _float(where: str, key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ParameterError(f"{where}: {key} is {value!r}; it must be a finite number")
+    return float(value)
+
+
+def _floats(where: str, key: str, value: Any, lengths: tuple[int, ...]) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) not in lengths:
+        raise ParameterError(f"{where}: {key} is {value!r}; it must be a list of {lengths[-1]} numbers")
+    return tuple(_float(where, key, element) for element in value)

@@ -1,0 +1,128 @@
+"""Node `scenario`: plays a task into the stack, as a person's program would."""
+
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+from std_srvs.srv import SetBool
+
+from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, load
+from wam_description.configuration import packaged
+from wam_description.signals import State
+from wam_ros.lockstep import Gate, Need, seconds
+from wam_ros.messages import BASE, Wrench, contact_of, read_contact, read_joint_state, read_wrench, wrench_stamped
+from wam_ros.parameters import declare
+from wam_ros.ports import ERROR, OK, Ports
+from wam_ros.run import run
+
+PARAMETERS = ScenarioParameters
+NO_TORQUE = (0.0, 0.0, 0.0)
+
+
+class ScenarioNode(Node):
+    """Streams postures, forces and pushes; asks the driver to enable and to brake.
+
+    While a request is on its way nothing is streamed, so that in lockstep the arm stands still
+    until the driver has answered.
+
+    Attributes
+    ----------
+    done : whether the scenario is over, which ends the process.
+    failure : why it failed, '' where it did not.
+    """
+
+    def __init__(self, **ros: Any) -> None:
+        super().__init__("scenario", **ros)
+        shared, own = declare(self, PARAMETERS)
+        path = Path(own.script) if own.script.endswith(".yaml") else packaged(own.script)
+        self._scenario = Scenario(load(path, shared.arm))
+        self._ports = ports = Ports(self, shared)
+        self._outer_period = shared.timing.period_ns * shared.timing.outer_divisor
+        self._no_torque = [0.0] * len(shared.arm.joints.names)
+        self._last: int | None = None
+        self._step = ""
+        self._is_realtime = shared.timing.mode == "realtime"
+        self._pending: list[tuple[int, ScenarioOutput]] = []
+        self._asking = False
+        self.done = False
+        self.failure = ""
+        self._enable = self.create_client(SetBool, "driver/enable")
+        self._pause = self.create_client(SetBool, "driver/pause")
+        estimated = Need(True, streamed=ports.streamed("contact_estimator"))
+        gate = Gate(shared.timing, "joint_states", {"contact/wrench": estimated, "contact/point": estimated})
+        joints, frames = list(shared.arm.joints.names), (BASE, *shared.arm.covers.names)
+        ports.watch_peers()
+        ports.feed(gate, "joint_states", lambda m: read_joint_state(m, joints, "position"), self._work)
+        ports.feed(gate, "contact/wrench", lambda m: read_wrench(m, frames), self._work)
+        ports.feed(gate, "contact/point", lambda m: read_contact(m, frames), self._work)
+
+    def _work(self, stamp: int, inputs: dict[str, Any]) -> None:
+        if self._scenario.done or (self._is_realtime and self._ports.absent):
+            return  # in lockstep the arm does not move before all are there
+        dt = self._outer_period if self._last is None else stamp - self._last
+        self._last = stamp
+        contact = contact_of(inputs["contact/wrench"], inputs["contact/point"])
+        out = self._scenario.step(inputs["joint_states"].position, contact, seconds(dt))
+        if self._asking:
+            self._pending.append((stamp, out))
+            return
+        self._act(stamp, out)
+
+    def _act(self, stamp: int, out: ScenarioOutput) -> None:
+        """Ask what has to be asked first, then stream."""
+        if out.request:
+            self._ask(self._enable, out.request == "enable", stamp, out._replace(request=""))
+        elif out.done and not self.done and not self._asking:
+            self._ask(self._pause, True, stamp, out)
+        else:
+            self._stream(stamp, out)
+
+    def _ask(self, client: Any, data: bool, stamp: int, out: ScenarioOutput) -> None:
+        self._asking = True
+
+        def answered(future: Any) -> None:
+            answer = future.result()
+            self._asking = False
+            if not answer.success:
+                self._fail(stamp, answer.message)
+            if client is self._pause:
+                self._stream(stamp, out)
+                self._end(stamp, out.failure)
+                return
+            self._act(stamp, out)
+            while self._pending and not self._asking:
+                self._act(*self._pending.pop(0))
+
+        client.call_async(SetBool.Request(data=data)).add_done_callback(answered)
+
+    def _stream(self, stamp: int, out: ScenarioOutput) -> None:
+        ports = self._ports
+        if out.step != self._step:
+            self._step = out.step
+            ports.set_status(OK, out.step, stamp=str(stamp))
+            self.get_logger().info(f"{stamp / 1e9:6.2f} s  {out.step}")
+        force = out.force
+        ports.publish_joints("joint_posture_command", stamp, State(out.posture, [], []))
+        ports.publish("force_command", wrench_stamped(stamp, Wrench(force.frame, force.force, NO_TORQUE)))
+        frame = out.push_cover or BASE
+        ports.publish("sim/disturbance", wrench_stamped(stamp, Wrench(frame, out.push_force, out.push_torque)))
+        ports.report(stamp)
+
+    def _fail(self, stamp: int, reason: str) -> None:
+        self.failure = self.failure or reason
+        self.get_logger().error(reason)
+
+    def _end(self, stamp: int, failure: str) -> None:
+        if failure:
+            self._fail(stamp, failure)
+        self._ports.set_status(ERROR if self.failure else OK, self.failure or "done", stamp=str(stamp))
+        self.done = True
+
+
+def main() -> None:
+    """Run the node as this process."""
+    run(ScenarioNode)
+
+
+if __name__ == "__main__":
+    main()
