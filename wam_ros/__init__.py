@@ -1,0 +1,1 @@
+"""All ROS glue of the stack: parameters, messages, lockstep, run(), recorder, bring-up."""

@@ -1,0 +1,170 @@
+"""Starting the nodes together: each as its own process, or several in this one."""
+
+import importlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from wam_description.configuration import Configuration
+from wam_ros.run import NAMESPACE, PARENT, make_executor, prepare_logging_directory, spin
+
+MODULES: Final = {
+    "driver": "wam_driver.driver_node",
+    "transform": "wam_control.transform_node",
+    "velocity_loop": "wam_control.velocity_loop_node",
+    "gravity": "wam_control.gravity_node",
+    "force_loop": "wam_control.force_loop_node",
+    "contact_estimator": "wam_control.contact_estimator_node",
+    "scenario": "wam_control.scenario_node",
+    "recorder": "wam_ros.recorder_node",
+}
+LAST: Final = ("driver", "recorder")  # stopped after the others: brakes on, then the bag closed
+PATIENCE: Final = 1.5  # s, for a node to end by itself
+
+
+class Processes:
+    """Nodes as processes of their own; leaving the context stops them all, brakes first, bag last.
+
+    Parameters
+    ----------
+    configuration : values for all nodes; its `shared.nodes` says which ones are started.
+    namespace : namespace of the nodes.
+    """
+
+    def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
+        prepare_logging_directory()
+        self._stack = ExitStack()
+        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="wam_stack_")))
+        parameters = folder / "parameters.yaml"
+        parameters.write_text(configuration.text, encoding="utf-8")
+        self._processes = {
+            name: _start(name, ["--params-file", str(parameters), "-r", f"__ns:=/{namespace.strip('/')}"])
+            for name in configuration.shared.nodes
+        }
+
+    def __enter__(self) -> "Processes":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
+        self.stop()
+
+    def ended(self) -> dict[str, int]:
+        """Exit codes of the nodes that have ended, by name."""
+        codes = {name: process.poll() for name, process in self._processes.items()}
+        return {name: code for name, code in codes.items() if code is not None}
+
+    def wait(self, until: Callable[[dict[str, int]], bool]) -> dict[str, int]:
+        """Wait until the exit codes seen so far satisfy a condition; returns them."""
+        while not until(ended := self.ended()):
+            time.sleep(0.05)
+        return ended
+
+    def stop(self) -> None:
+        """Stop every node that runs, the hard way where one does not end by itself."""
+        others = [name for name in self._processes if name not in LAST]
+        _stop([self._processes[name] for name in others])
+        for name in LAST:
+            if name in self._processes:
+                _stop([self._processes[name]])
+        self._stack.close()
+
+
+def _start(name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+    # a session of its own: Ctrl-C reaches the parent alone, which stops the nodes in order
+    return subprocess.Popen(
+        [sys.executable, "-m", MODULES[name], "--ros-args", *arguments],
+        start_new_session=True,
+        env={**os.environ, PARENT: str(os.getpid())},
+    )
+
+
+def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
+    for process in processes:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+    deadline = time.monotonic() + PATIENCE
+    for process in processes:
+        try:
+            process.wait(max(0.0, deadline - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+class Composition:
+    """Nodes in this process, in one executor: for tests, and for lockstep at full speed.
+
+    Parameters
+    ----------
+    configuration : values for all nodes; its `shared.nodes` says which ones are made.
+    namespace : namespace of the nodes.
+    domain_id : ROS domain, the one of the environment where None.
+
+    Attributes
+    ----------
+    nodes : the nodes by name.
+    """
+
+    def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, domain_id: int | None = None) -> None:
+        prepare_logging_directory()
+        self.context = Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        self.executor = make_executor(self.context)
+        self.nodes: dict[str, Node] = {}
+        try:
+            with tempfile.TemporaryDirectory(prefix="wam_stack_") as folder:
+                parameters = Path(folder) / "parameters.yaml"
+                parameters.write_text(configuration.text, encoding="utf-8")
+                for name in configuration.shared.nodes:
+                    self._make(name, namespace, parameters)
+        except BaseException:
+            self.close()
+            raise
+
+    def _make(self, name: str, namespace: str, parameters: Path) -> None:
+        node = node_class(name)(
+            context=self.context,
+            namespace=namespace,
+            cli_args=["--ros-args", "--params-file", str(parameters)],
+            use_global_arguments=False,
+        )
+        self.nodes[name] = node
+        self.executor.add_node(node)
+
+    def __enter__(self) -> "Composition":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
+        self.close()
+
+    def spin(self, until: Callable[[], bool]) -> None:
+        """Spin until a condition holds."""
+        spin(self.executor, until)
+
+    def close(self) -> None:
+        """Destroy the nodes, driver and recorder last."""
+        for name in sorted(self.nodes, key=lambda name: LAST.index(name) + 1 if name in LAST else 0):
+            node = self.nodes.pop(name)
+            self.executor.remove_node(node)
+            node.destroy_node()
+        self.executor.shutdown()
+        rclpy.try_shutdown(context=self.context)
+
+
+def node_class(name: str) -> Any:
+    """The class of a node, from its module."""
+    module = importlib.import_module(MODULES[name])
+    return getattr(module, "".join(part.capitalize() for part in name.split("_")) + "Node")

@@ -1,0 +1,99 @@
+"""ROS parameters from parameter classes: declared, described, checked as a set."""
+
+from typing import Any, TypeVar
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from wam_description.arm import Shared
+from wam_description.parameters import Field, ParameterError, build, fields, values
+
+T = TypeVar("T")
+OWN_NAMES = ("use_sim_time", "start_type_description_service")  # what rclpy itself declares
+
+
+def declare(node: Node, cls: type[T]) -> tuple[Shared, T]:
+    """Declare the shared parameters and those of `cls` with the values given to the node.
+
+    Returns
+    -------
+    shared, own
+        the parameter objects.
+
+    Raises
+    ------
+    ParameterError
+        names every missing, unknown or refused parameter; nothing is declared then.
+    """
+    given = {name: _plain(parameter) for name, parameter in node._parameter_overrides.items() if name not in OWN_NAMES}
+    shared_names = {field.name for field in fields(Shared)}
+    if not given:
+        raise ParameterError(
+            f"node '{node.get_name()}' has no parameters; start it with --ros-args --params-file config/wam.yaml, "
+            "or with 'wam node'"
+        )
+    try:
+        shared = build(Shared, {name: value for name, value in given.items() if name in shared_names})
+        own = build(cls, {name: value for name, value in given.items() if name not in shared_names})
+    except ParameterError as error:
+        raise ParameterError(f"node '{node.get_name()}': {error}") from None
+    for part, instance in ((Shared, shared), (cls, own)):
+        current = values(instance)
+        for field in fields(part):
+            value = current[field.name]
+            node.declare_parameter(
+                field.name,
+                Parameter(field.name, value=list(value) if isinstance(value, tuple) else value).value,
+                descriptor(field),
+                ignore_override=True,
+            )
+    return shared, own
+
+
+def descriptor(field: Field) -> ParameterDescriptor:
+    """Describe a parameter to ROS: meaning, unit, range, whether it may change while running."""
+    unit = f" [{field.unit}]" if field.unit else ""
+    result = ParameterDescriptor(
+        name=field.name,
+        description=field.doc + unit,
+        additional_constraints=field.allowed,
+        read_only=not field.live,
+    )
+    low, high = max(field.low, -1e308), min(field.high, 1e308)
+    if field.kind is float and not field.is_array and (low, high) != (-1e308, 1e308):
+        result.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=0.0)]
+    if field.kind is int and not field.is_array and abs(field.low) < 2**62 and abs(field.high) < 2**62:
+        result.integer_range = [IntegerRange(from_value=int(low), to_value=int(high), step=1)]
+    return result
+
+
+def follow(node: Node, own: T, take: Any) -> None:
+    """Let the live parameters change while the node runs, as a set.
+
+    Parameters
+    ----------
+    own : the present parameter object.
+    take : called with the new parameter object; it may raise ParameterError to refuse the set.
+    """
+    state = {"own": own}
+
+    def changed(parameters: list[Parameter]) -> SetParametersResult:
+        known = values(state["own"])
+        update = {p.name: _plain(p) for p in parameters if p.name in known}
+        if not update:
+            return SetParametersResult(successful=True)
+        try:
+            new = build(type(own), {**known, **update})
+            take(new)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        state["own"] = new
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(changed)
+
+
+def _plain(parameter: Parameter) -> Any:
+    value = parameter.value
+    return tuple(value) if hasattr(value, "__iter__") and not isinstance(value, str) else value

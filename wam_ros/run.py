@@ -1,0 +1,123 @@
+"""One way to run nodes: in a process of their own or several in one, ended by SIGINT, SIGTERM or themselves."""
+
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy would start a thread a core for 4x4 matrices
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from wam_description.parameters import ParameterError
+
+NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
+PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
+PR_SET_PDEATHSIG = 1
+MakeNode = Callable[..., Node]
+
+
+def raise_priority(niceness: int) -> None:
+    """Ask the system to prefer this process; most grant it to privileged users only."""
+    with contextlib.suppress(PermissionError):
+        os.setpriority(os.PRIO_PROCESS, 0, niceness)
+
+
+def die_with_parent() -> None:
+    """Let the system end this process when the one that started it is gone, even by SIGKILL."""
+    parent = os.environ.get(PARENT)
+    if parent is None:
+        return
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != int(parent):
+        raise SystemExit("error: the program that started this node is gone")
+
+
+def make_executor(context: Context) -> Any:
+    """Events executor where this rclpy has it, the single-threaded one elsewhere."""
+    try:
+        from rclpy.experimental import EventsExecutor
+    except ImportError:
+        return SingleThreadedExecutor(context=context)
+    return EventsExecutor(context=context)
+
+
+class Stop:
+    """Set by SIGINT and SIGTERM; the context stays alive, so that nodes can say goodbye."""
+
+    def __init__(self) -> None:
+        self.is_set = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._take)
+
+    def _take(self, number: int, frame: object) -> None:
+        self.is_set = True
+
+
+def spin(executor: Any, until: Callable[[], bool]) -> None:
+    """Spin until `until` is true.
+
+    The events executor's own spin() hangs in the wheels built against old C libraries; spinning
+    for a future with a time-out works everywhere.
+    """
+    future: rclpy.Future[None] = rclpy.Future()
+    while not until():
+        executor.spin_until_future_complete(future, timeout_sec=0.1)
+
+
+def prepare_logging_directory() -> None:
+    """Let rclpy log somewhere even where HOME is missing or cannot be written."""
+    if "ROS_LOG_DIR" in os.environ or "ROS_HOME" in os.environ:
+        return
+    home = Path(os.environ.get("HOME", "/nonexistent"))
+    if not os.access(home, os.W_OK):
+        os.environ["ROS_LOG_DIR"] = str(Path(tempfile.gettempdir()) / f"wam_stack_log_{os.getuid()}")
+
+
+def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
+    """Run one node as this process, until SIGINT, SIGTERM or until its attribute `done` is true.
+
+    Parameters
+    ----------
+    make : node class, called with ``context`` and ``namespace``.
+    arguments : command line, sys.argv where None.
+
+    Raises
+    ------
+    SystemExit
+        with code 1 where the parameters are refused or the node has a `failure`.
+    """
+    prepare_logging_directory()
+    die_with_parent()
+    stop = Stop()
+    context = Context()
+    rclpy.init(
+        args=list(sys.argv if arguments is None else arguments),
+        context=context,
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
+    executor = make_executor(context)
+    node = None
+    try:
+        node = make(context=context, namespace=NAMESPACE)
+        executor.add_node(node)
+        spin(executor, lambda: stop.is_set or getattr(node, "done", False))
+    except ParameterError as error:
+        raise SystemExit(f"error: {error}") from None
+    finally:
+        if node is not None:
+            executor.remove_node(node)
+            node.destroy_node()
+        executor.shutdown()
+        rclpy.try_shutdown(context=context)
+    if failure := getattr(node, "failure", ""):
+        raise SystemExit(f"error: {failure}")
