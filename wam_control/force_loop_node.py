@@ -6,8 +6,9 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
+from wam_description.arm import seconds
 from wam_description.signals import State
-from wam_ros.lockstep import Gate, Need, seconds
+from wam_ros.lockstep import Gate, Need
 from wam_ros.messages import BASE, Wrench, contact_of, read_contact, read_joint_state, read_wrench, wrench_stamped
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
@@ -26,7 +27,7 @@ class ForceLoopNode(Node):
         self._loop = ForceLoop(shared.arm, own)
         follow(self, own, self._loop.tune)
         self._ports = ports = Ports(self, shared)
-        self._outer_period = shared.timing.period_ns * shared.timing.outer_divisor
+        self._outer_period = shared.timing.outer_period_ns
         self._last: int | None = None
         joints, frames = list(shared.arm.joints.names), (BASE, *shared.arm.covers.names)
         estimated = Need(True, streamed=ports.streamed("contact_estimator"))

@@ -7,9 +7,10 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool
 
 from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, load
+from wam_description.arm import seconds
 from wam_description.configuration import packaged
 from wam_description.signals import State
-from wam_ros.lockstep import Gate, Need, seconds
+from wam_ros.lockstep import Gate, Need
 from wam_ros.messages import BASE, Wrench, contact_of, read_contact, read_joint_state, read_wrench, wrench_stamped
 from wam_ros.parameters import declare
 from wam_ros.ports import ERROR, OK, Ports
@@ -37,7 +38,7 @@ class ScenarioNode(Node):
         path = Path(own.script) if own.script.endswith(".yaml") else packaged(own.script)
         self._scenario = Scenario(load(path, shared.arm))
         self._ports = ports = Ports(self, shared)
-        self._outer_period = shared.timing.period_ns * shared.timing.outer_divisor
+        self._outer_period = shared.timing.outer_period_ns
         self._no_torque = [0.0] * len(shared.arm.joints.names)
         self._last: int | None = None
         self._step = ""

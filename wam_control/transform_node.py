@@ -7,7 +7,7 @@ from rclpy.node import Node
 from wam_control.transform import Transform
 from wam_description.parameters import Nothing
 from wam_description.signals import State
-from wam_ros.lockstep import Gate, Need, is_outer
+from wam_ros.lockstep import Gate, Need
 from wam_ros.messages import read_joint_state
 from wam_ros.parameters import declare
 from wam_ros.ports import Ports
@@ -38,7 +38,7 @@ class TransformNode(Node):
             feed(efforts, topic, lambda m: read_joint_state(m, joints, "effort"), self._effort)
 
     def _states(self, stamp: int, inputs: dict[str, Any]) -> None:
-        if is_outer(self._timing, stamp):
+        if self._timing.is_outer(stamp):
             self._ports.publish_joints("joint_states", stamp, self._transform.joint_state(inputs["motor_states"]))
         self._ports.report(stamp)
 

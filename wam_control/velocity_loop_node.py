@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 from rclpy.node import Node
 
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
+from wam_description.arm import seconds
 from wam_description.signals import State
-from wam_ros.lockstep import Gate, Need, seconds
+from wam_ros.lockstep import Gate, Need
 from wam_ros.messages import read_joint_state, stamp_of
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports

@@ -185,14 +185,32 @@ class Timing:
         return round(self.period * 1e9)
 
     @property
-    def outer_period(self) -> float:
-        """Period of the joint side in seconds."""
-        return self.period * self.outer_divisor
+    def outer_period_ns(self) -> int:
+        """Period of the joint side in nanoseconds."""
+        return self.period_ns * self.outer_divisor
 
     @property
     def substep(self) -> float:
         """Step of the plant in seconds."""
         return self.period / self.substeps
+
+    def outer_stamp(self, stamp: int) -> int:
+        """Stamp of the outer period that `stamp` falls into, ns; the first period, tick 1, is an outer one."""
+        tick = stamp // self.period_ns
+        return (1 + (tick - 1) // self.outer_divisor * self.outer_divisor) * self.period_ns
+
+    def is_outer(self, stamp: int) -> bool:
+        """Whether the joint side works on the state of this stamp, ns."""
+        return self.outer_stamp(stamp) == stamp
+
+    def is_display(self, stamp: int) -> bool:
+        """Whether messages that are made for people are due at this stamp, ns."""
+        return (stamp - self.period_ns) % (self.outer_period_ns * self.display_divisor) == 0
+
+
+def seconds(nanoseconds: int) -> float:
+    """Time in seconds, the nearest number there is; everything that needs a dt takes it from here."""
+    return nanoseconds / 1_000_000_000
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ class RigidBody:
         coordinates, into joint torques, N m.
         """
         frame = self._known(cover)
-        jacobians = pin.computeJointJacobians(self._model, self._data, _vector(q))
+        jacobians = _columns(pin.computeJointJacobians(self._model, self._data, _vector(q)))
         place = pin.updateFramePlacement(self._model, self._data, frame).act(_vector(p))
         result: Array = jacobians[:3] - pin.skew(place) @ jacobians[3:]
         result[:, self._joint[cover] :] = 0.0
@@ -87,12 +87,12 @@ class RigidBody:
     def tool_jacobian(self, q: ArrayLike) -> Array:
         """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in base coordinates."""
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        return pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, aligned)[:3]
+        return _columns(pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, aligned))[:3]
 
     def hand_jacobian(self, q: ArrayLike) -> Array:
         """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in frame 5 (A.7 corrected)."""
         local = pin.ReferenceFrame.LOCAL
-        return pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, local)[:3]
+        return _columns(pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, local))[:3]
 
     def gravity_torque(self, q: ArrayLike) -> Array:
         """Joint torques that carry the links at rest, (n,), N m."""
@@ -141,6 +141,11 @@ def cover_placement(arm: Arm, i: int) -> pin.SE3:
     """
     rows = slice(3 * i, 3 * i + 3)
     return pin.SE3(pin.rpy.rpyToMatrix(*arm.covers.rotation[rows]), np.array(arm.covers.origin[rows]))
+
+
+def _columns(jacobian: Array) -> Array:
+    """A Jacobian as (6, n); pinocchio returns a flat array where there is one joint."""
+    return jacobian.reshape(6, -1)
 
 
 def _vector(values: ArrayLike) -> Array:

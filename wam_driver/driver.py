@@ -75,7 +75,7 @@ class Driver:
     @property
     def is_outer(self) -> bool:
         """True where the joint side works on the present state."""
-        return (self._tick - 1) % self._timing.outer_divisor == 0
+        return self._timing.is_outer(self.stamp)
 
     def command(self, stamp: int, currents: list[float]) -> None:
         """Take the currents, A (n,), that answer the state of time `stamp`, ns; ignored unless enabled."""

@@ -131,8 +131,7 @@ class DriverNode(Node):
         if wrench.frame == BASE:
             if any(wrench.force):
                 raise Refused(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
-            for cover in self._arm.covers.names:
-                self.driver.plant.push(cover, np.zeros(3), np.zeros(3))
+            self.driver.plant.release()
         else:
             self.driver.plant.push(wrench.frame, np.array(wrench.force), np.array(wrench.torque))
         self._push_stamp = stamp_of(message)

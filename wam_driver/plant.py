@@ -74,7 +74,7 @@ class Plant:
 
     def reset(self) -> None:
         """Return to power-up: start pose, at rest, brakes on, no pushes."""
-        self._pushes.clear()
+        self.release()
         self._rest()
 
     def brake(self, on: bool) -> None:
@@ -100,6 +100,10 @@ class Plant:
             self._pushes[cover] = (np.array(force, float), np.array(torque, float))
         else:
             self._pushes.pop(cover, None)
+
+    def release(self) -> None:
+        """End every push."""
+        self._pushes.clear()
 
     def step(self, torque: list[float]) -> None:
         """Advance by one step.

@@ -26,27 +26,6 @@ class Need(NamedTuple):
     streamed: bool = True
 
 
-def outer_stamp(timing: Timing, stamp: int) -> int:
-    """Stamp of the outer period that `stamp` falls into; the first period, tick 1, is an outer one."""
-    tick = stamp // timing.period_ns
-    return (1 + (tick - 1) // timing.outer_divisor * timing.outer_divisor) * timing.period_ns
-
-
-def is_outer(timing: Timing, stamp: int) -> bool:
-    """Whether the joint side works on the state of this stamp."""
-    return outer_stamp(timing, stamp) == stamp
-
-
-def is_display(timing: Timing, stamp: int) -> bool:
-    """Whether messages that are made for people are due."""
-    return (stamp // timing.period_ns - 1) % (timing.outer_divisor * timing.display_divisor) == 0
-
-
-def seconds(nanoseconds: int) -> float:
-    """Time in seconds, the nearest number there is; everything that needs a dt takes it from here."""
-    return nanoseconds / 1_000_000_000
-
-
 class Gate:
     """Collects the inputs of one kind of step and says when the step can be done.
 
@@ -95,7 +74,7 @@ class Gate:
         cause = stamp - need.delay * self._timing.period_ns
         if cause <= 0:
             return 0
-        return outer_stamp(self._timing, cause) if need.outer else cause
+        return self._timing.outer_stamp(cause) if need.outer else cause
 
     def _take(self, stamp: int) -> dict[str, Any]:
         taken: dict[str, Any] = {}

@@ -1,0 +1,373 @@
+"""Bags written without ROS and read by readers that are not ours, and the other way round."""
+
+import itertools
+import os
+import struct
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability, QosHistory, QosReliability, QosTime
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from wam_analysis.bag import BagError, BoolColumns, JointColumns, Messages, PointColumns, WrenchColumns, read
+from wam_analysis.comparison import compare
+from wam_ros.bag import INFINITE, BagWriter, RecordingError, exact_cdr, policies
+from wam_ros.definitions import DefinitionError, definition, schema, type_hash
+from wam_ros.message_layout import ExactLength, stamp_reader
+from wam_ros.topics import TOPICS
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+QOS = {
+    "history": "keep_last",
+    "depth": 7,
+    "reliability": "reliable",
+    "durability": "transient_local",
+    "deadline": INFINITE,
+    "lifespan": INFINITE,
+    "liveliness": "automatic",
+    "liveliness_lease_duration": INFINITE,
+    "avoid_ros_namespace_conventions": False,
+}
+TYPES = sorted({topic.type for topic in TOPICS})
+
+
+def header(stamp: int, frame: str = "") -> Any:
+    time = STORE.types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
+    return STORE.types["std_msgs/msg/Header"](stamp=time, frame_id=frame)
+
+
+def joint_state(stamp: int, names: list[str], *arrays: list[float]) -> bytes:
+    fields = [np.array(values, dtype=np.float64) for values in arrays]
+    message = STORE.types["sensor_msgs/msg/JointState"](header(stamp), names, *fields)
+    return bytes(STORE.serialize_cdr(message, "sensor_msgs/msg/JointState"))
+
+
+def vector(x: float, y: float, z: float, kind: str = "Vector3") -> Any:
+    return STORE.types[f"geometry_msgs/msg/{kind}"](x, y, z)
+
+
+def wrench(stamp: int, frame: str, *values: float) -> bytes:
+    inner = STORE.types["geometry_msgs/msg/Wrench"](vector(*values[:3]), vector(*values[3:]))
+    message = STORE.types["geometry_msgs/msg/WrenchStamped"](header(stamp, frame), inner)
+    return bytes(STORE.serialize_cdr(message, "geometry_msgs/msg/WrenchStamped"))
+
+
+def point(stamp: int, frame: str, *values: float) -> bytes:
+    message = STORE.types["geometry_msgs/msg/PointStamped"](
+        header(stamp, frame), vector(*values, kind="Point")
+    )
+    return bytes(STORE.serialize_cdr(message, "geometry_msgs/msg/PointStamped"))
+
+
+def status(name: str, text: str) -> bytes:
+    message = STORE.types["diagnostic_msgs/msg/DiagnosticStatus"](0, name, text, "", [])
+    return bytes(STORE.serialize_cdr(message, "diagnostic_msgs/msg/DiagnosticStatus"))
+
+
+def write_sample(path: Path, force: float = 3.0) -> None:
+    with BagWriter(path) as bag:
+        bag.add_topic("/wam/motor_states", "sensor_msgs/msg/JointState", QOS)
+        bag.add_topic("/wam/contact/wrench", "geometry_msgs/msg/WrenchStamped", QOS)
+        bag.add_topic("/wam/contact/point", "geometry_msgs/msg/PointStamped", QOS)
+        bag.add_topic("/wam/contact/in_contact", "std_msgs/msg/Bool", QOS)
+        bag.add_topic("/wam/status", "diagnostic_msgs/msg/DiagnosticStatus", QOS)
+        bag.add_topic("/wam/sim/disturbance", "geometry_msgs/msg/WrenchStamped", QOS)
+        bag.attach("parameters.yaml", "application/yaml", b"a: 1\n")
+        for k in range(1, 101):
+            t = k * 1_000_000
+            names = ["motor1", "motor2"] if k % 2 else ["motor2", "motor1"]
+            values = [0.1 * k, -0.1 * k] if k % 2 else [-0.1 * k, 0.1 * k]
+            bag.write("/wam/motor_states", joint_state(t, names, values, [], values), t, t - 5, k)
+            bag.write("/wam/contact/wrench", wrench(t, "outer_link", 1, 2, force, 4, 5, -0.0), t, t, k)
+            bag.write("/wam/contact/point", point(t, "outer_link", np.nan, 0, k), t, t, k)
+        bag.write("/wam/contact/in_contact", b"\0\1\0\0\1", 50_000_000, 50_000_000, 1)
+        bag.write("/wam/status", status("driver", "ready"), 0, 0, 1)
+        bag.metadata("recording", {"mode": "lockstep"})
+
+
+def test_rosbags_reads_counts_values_times_and_qos(tmp_path: Path) -> None:
+    write_sample(tmp_path / "sample")
+    with AnyReader([tmp_path / "sample"], default_typestore=STORE) as reader:
+        counts = {connection.topic: connection.msgcount for connection in reader.connections}
+        assert counts["/wam/motor_states"] == counts["/wam/contact/wrench"] == 100
+        assert counts["/wam/contact/in_contact"] == 1
+        assert counts["/wam/sim/disturbance"] == 0
+        assert (reader.start_time, reader.end_time) == (0, 100_000_001)
+        connection = next(c for c in reader.connections if c.topic == "/wam/contact/wrench")
+        (qos,) = connection.ext.offered_qos_profiles
+        assert (qos.history, qos.depth) == (QosHistory.KEEP_LAST, 7)
+        assert (qos.reliability, qos.durability) == (QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL)
+        assert qos.deadline == QosTime(9223372036, 854775807)
+        for k, (where, time, data) in enumerate(reader.messages([connection]), 1):
+            message = reader.deserialize(data, where.msgtype)
+            assert time == message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == k * 1_000_000
+            assert (message.wrench.force.z, message.header.frame_id) == (3.0, "outer_link")
+
+
+def test_mcap_ros2_reads_every_message_and_the_extras(tmp_path: Path) -> None:
+    write_sample(tmp_path / "sample")
+    with (tmp_path / "sample" / "sample_0.mcap").open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == "ros2"
+        decoded = list(reader.iter_decoded_messages(log_time_order=False))
+        assert len(decoded) == 302
+        first = next(item for item in decoded if item.channel.topic == "/wam/motor_states")
+        assert (first.message.sequence, first.message.publish_time) == (1, 999_995)
+        assert list(first.decoded_message.position) == [0.1, -0.1]
+        assert [item.data for item in reader.iter_attachments()] == [b"a: 1\n"]
+
+
+def test_metadata_yaml_has_every_field_that_rosbag2_writes(tmp_path: Path) -> None:
+    write_sample(tmp_path / "sample")
+    text = (tmp_path / "sample" / "metadata.yaml").read_text()
+    assert "&id" not in text
+    information = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    topic = information["topics_with_message_count"][0]
+    with Writer(tmp_path / "theirs", version=9, storage_plugin=StoragePlugin.MCAP) as theirs:
+        connection = theirs.add_connection("/a", "std_msgs/msg/Bool", typestore=STORE)
+        theirs.write(connection, 1, b"\0\1\0\0\1")
+    reference = yaml.safe_load((tmp_path / "theirs" / "metadata.yaml").read_text())[
+        "rosbag2_bagfile_information"
+    ]
+    assert information.keys() == reference.keys()
+    assert (
+        topic["topic_metadata"].keys() == reference["topics_with_message_count"][0]["topic_metadata"].keys()
+    )
+    assert information["files"][0].keys() == reference["files"][0].keys()
+    assert topic["topic_metadata"]["offered_qos_profiles"] == [QOS]
+    assert information["version"] == 9
+    assert (information["message_count"], information["files"][0]["message_count"]) == (302, 302)
+    assert information["duration"]["nanoseconds"] == 100_000_000
+    assert (
+        read(tmp_path / "sample").metadata["rosbag2"]["serialized_metadata"]
+        == yaml.dump(information, Dumper=_no_aliases(), sort_keys=False).strip()
+    )
+
+
+def _no_aliases() -> Any:
+    return type("Plain", (yaml.SafeDumper,), {"ignore_aliases": lambda self, data: True})
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_every_recorded_type_has_the_schema_and_hash_of_ros(name: str) -> None:
+    parsed = get_types_from_msg(schema(name).decode(), name)
+    assert parsed[name][1] == STORE.fielddefs[name][1]
+    assert type_hash(name) == STORE.hash_rihs01(name)
+    assert definition(name).fields
+
+
+def test_an_unknown_type_is_refused_with_its_name() -> None:
+    with pytest.raises(DefinitionError, match="no_such_msgs"):
+        schema("no_such_msgs/msg/Thing")
+    with pytest.raises(DefinitionError, match="sensor_msgs/msg/Nothing"):
+        schema("sensor_msgs/msg/Nothing")
+    with pytest.raises(DefinitionError, match="package/msg/Type"):
+        schema("JointState")
+
+
+def test_bytes_left_behind_a_message_are_cut_and_nothing_else() -> None:
+    length = ExactLength("sensor_msgs/msg/JointState")
+    names = [["a"], ["motor1", "motor2"], ["x" * 5, "", "yy"]]
+    arrays = [[], [1.0], [1.0, 2.0]]
+    for name, position, velocity, effort in itertools.product(names, arrays, arrays, arrays):
+        data = joint_state(1_500_000_000, name, position, velocity, effort)
+        for tail in range(17):
+            assert length(data + bytes(range(1, 1 + tail))) == len(data)
+        assert exact_cdr("sensor_msgs/msg/JointState", data + b"\7" * 9) == data
+    assert exact_cdr("std_msgs/msg/Bool", b"\0\1\0\0\1\7\7\7") == b"\0\1\0\0\1"
+
+
+@pytest.mark.parametrize("data", [b"", b"\0\1", b"\0\1\0\0", b"\0\1\0\0" + b"\xff" * 40])
+def test_what_is_not_a_message_is_left_as_it_is(data: bytes) -> None:
+    for name in TYPES:
+        if len(data) > 4 and name in ("std_msgs/msg/Bool", "rosgraph_msgs/msg/Clock"):
+            continue  # any bytes are one of these
+        if name == "geometry_msgs/msg/PointStamped":
+            continue
+        assert exact_cdr(name, data) == data
+
+
+def test_stamps_are_read_from_either_byte_order() -> None:
+    stamp_of = stamp_reader("sensor_msgs/msg/JointState")
+    assert stamp_of(joint_state(12_345_678_901, ["a"], [], [], [])) == 12_345_678_901
+    assert stamp_of(b"\0\0\0\0" + struct.pack(">iI", 2, 3)) == 2_000_000_003
+    assert stamp_reader("std_msgs/msg/Bool")(b"\0\1\0\0\1") is None
+    markers = stamp_reader("visualization_msgs/msg/MarkerArray")
+    assert markers(b"\0\1\0\0" + struct.pack("<I", 0)) is None
+    assert markers(b"\0\1\0\0" + struct.pack("<IiI", 1, 4, 5)) == 4_000_000_005
+
+
+def test_an_existing_target_is_refused_and_left_alone(tmp_path: Path) -> None:
+    write_sample(tmp_path / "sample")
+    before = (tmp_path / "sample" / "sample_0.mcap").read_bytes()
+    with pytest.raises(RecordingError, match=r"sample exists already.*another name"):
+        BagWriter(tmp_path / "sample")
+    assert (tmp_path / "sample" / "sample_0.mcap").read_bytes() == before
+
+
+def test_a_file_as_parent_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordingError, match="is a file"):
+        BagWriter(tmp_path / "file" / "bag")
+    with pytest.raises(RecordingError, match="is a file"):
+        BagWriter(tmp_path / "file" / "deeper" / "bag")
+
+
+@pytest.fixture
+def read_only() -> Iterator[Path]:
+    """A directory that this process cannot write into, root or not."""
+    path = Path(tempfile.mkdtemp(prefix="wam_stack_read_only_"))
+    path.chmod(0o555)
+    if os.geteuid() == 0:
+        os.seteuid(65534)  # nobody: root writes everywhere
+        yield path
+        os.seteuid(0)
+    else:
+        yield path
+    path.chmod(0o755)
+    path.rmdir()
+
+
+def test_a_read_only_directory_is_refused(read_only: Path) -> None:
+    with pytest.raises(RecordingError, match="cannot be made: Permission denied; give a directory"):
+        BagWriter(read_only / "bag")
+
+
+def test_a_qos_with_a_policy_missing_is_refused() -> None:
+    with pytest.raises(ValueError, match="exactly"):
+        policies({"depth": 3})
+
+
+def test_an_empty_bag_is_closed_and_read(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "empty") as bag:
+        bag.add_topic("/a", "sensor_msgs/msg/JointState", QOS)
+    with Reader(tmp_path / "empty") as reader:
+        assert reader.message_count == 0
+    columns = read(tmp_path / "empty").topics["/a"]
+    assert isinstance(columns, JointColumns)
+    assert columns.position.shape == (0, 0)
+
+
+def test_columns_are_matched_by_name(tmp_path: Path) -> None:
+    write_sample(tmp_path / "sample")
+    bag = read(tmp_path / "sample")
+    motors = bag.topics["/wam/motor_states"]
+    assert isinstance(motors, JointColumns)
+    assert motors.names == ("motor1", "motor2")
+    np.testing.assert_array_equal(motors.position[:, 0], 0.1 * np.arange(1, 101))
+    np.testing.assert_array_equal(motors.effort[:, 1], -motors.position[:, 0])
+    assert motors.velocity.shape == (100, 0)
+    assert motors.stamp_ns.tolist() == motors.log_time_ns.tolist() == [k * 1_000_000 for k in range(1, 101)]
+    force = bag.topics["/wam/contact/wrench"]
+    assert isinstance(force, WrenchColumns)
+    np.testing.assert_array_equal(force.torque[3], [4, 5, -0.0])
+    assert force.frames[0] == "outer_link"
+    place = bag.topics["/wam/contact/point"]
+    assert isinstance(place, PointColumns)
+    assert np.isnan(place.point[:, 0]).all()
+    touched = bag.topics["/wam/contact/in_contact"]
+    assert isinstance(touched, BoolColumns)
+    assert touched.data.tolist() == [True]
+    states = bag.topics["/wam/status"]
+    assert isinstance(states, Messages)
+    assert states.messages[0].name == "driver"
+    assert bag.types["/wam/status"] == "diagnostic_msgs/msg/DiagnosticStatus"
+    assert bag.attachments == {"parameters.yaml": b"a: 1\n"}
+    assert bag.metadata["recording"] == {"mode": "lockstep"}
+
+
+def test_a_bag_of_rosbags_is_read(tmp_path: Path) -> None:
+    with Writer(tmp_path / "theirs", version=9, storage_plugin=StoragePlugin.MCAP) as theirs:
+        connection = theirs.add_connection("/js", "sensor_msgs/msg/JointState", typestore=STORE)
+        theirs.write(connection, 7, joint_state(5, ["a", "b"], [1, 2], [], []))
+    columns = read(tmp_path / "theirs").topics["/js"]
+    assert isinstance(columns, JointColumns)
+    assert columns.position.tolist() == [[1.0, 2.0]]
+
+
+def test_broken_bags_are_refused_in_words(tmp_path: Path) -> None:
+    write_sample(tmp_path / "sample")
+    whole = (tmp_path / "sample" / "sample_0.mcap").read_bytes()
+    (tmp_path / "directory").mkdir()
+    cases = {
+        "nothing": (None, "does not exist"),
+        "directory": (None, "no .mcap file"),
+        "empty.mcap": (b"", "is empty"),
+        "text.mcap": (b"hello, this is not a bag at all", "is not MCAP"),
+        "cut.mcap": (whole[: len(whole) * 2 // 3], "was not closed"),
+        "flipped.mcap": (_flipped(whole), "is damaged"),
+        "foreign.mcap": (whole.replace(b"\4\0\0\0ros2", b"\4\0\0\0ros1", 1), "profile 'ros1'"),
+    }
+    for name, (data, words) in cases.items():
+        if data is not None:
+            (tmp_path / name).write_bytes(data)
+        with pytest.raises(BagError, match=words) as caught:
+            read(tmp_path / name)
+        assert name in str(caught.value)
+
+
+def _flipped(data: bytes) -> bytes:
+    where = data.index(b"zstd") + 20
+    return data[:where] + bytes(255 - byte for byte in data[where : where + 200]) + data[where + 200 :]
+
+
+def test_equal_bags_compare_equal_and_the_first_difference_is_named(tmp_path: Path) -> None:
+    write_sample(tmp_path / "a")
+    write_sample(tmp_path / "b")
+    write_sample(tmp_path / "c", force=np.nextafter(3.0, 4.0))
+    assert compare(tmp_path / "a", tmp_path / "b", log_times=True) == []
+    (difference,) = compare(tmp_path / "a", tmp_path / "c")
+    assert difference == "/wam/contact/wrench: message 0: wrench.force.z 3.0 and 3.0000000000000004"
+    assert compare(tmp_path / "a", tmp_path / "c", without=("/wam/contact/wrench",)) == []
+
+
+def _one(path: Path, kind: str, *messages: bytes) -> Path:
+    with BagWriter(path) as bag:
+        bag.add_topic("/t", kind, QOS)
+        for k, data in enumerate(messages):
+            bag.write("/t", data, k, k, k)
+    return path
+
+
+def test_padding_and_the_bits_of_nan_do_not_count_but_the_sign_of_zero_does(tmp_path: Path) -> None:
+    kind = "geometry_msgs/msg/PointStamped"
+    data = point(0, "a", np.nan, 0.0, 1.0)
+    assert data[18:20] == b"\0\0"  # "a\0" ends at 18, then padding
+    padded = data[:18] + b"\7\7" + data[20:]
+    assert compare(_one(tmp_path / "a", kind, data), _one(tmp_path / "b", kind, padded)) == []
+    other_nan = data.replace(struct.pack("<d", np.nan), b"\1\0\0\0\0\0\xf8\xff")
+    assert other_nan != data
+    assert compare(tmp_path / "a", _one(tmp_path / "c", kind, other_nan)) == []
+    (difference,) = compare(tmp_path / "a", _one(tmp_path / "d", kind, point(0, "a", np.nan, -0.0, 1.0)))
+    assert difference == "/t: message 0: point.y 0.0 and -0.0"
+    (difference,) = compare(tmp_path / "a", _one(tmp_path / "e", kind, data, data))
+    assert difference == "/t: 1 and 2 messages"
+
+
+def test_states_of_several_nodes_are_compared_per_node(tmp_path: Path) -> None:
+    kind = "diagnostic_msgs/msg/DiagnosticStatus"
+    a, b, c = status("driver", "ready"), status("gravity", "ready"), status("driver", "fault")
+    _one(tmp_path / "a", kind, a, b, c)
+    assert compare(tmp_path / "a", _one(tmp_path / "b", kind, b, a, c)) == []
+    (difference,) = compare(tmp_path / "a", _one(tmp_path / "c", kind, b, c, a))
+    assert difference == "/t from driver: message 0: message 'ready' and 'fault'"
+
+
+def test_a_disk_that_is_full_is_an_error_and_not_a_crash(tmp_path: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full here")
+    bag = BagWriter(tmp_path / "bag")
+    bag.add_topic("/t", "std_msgs/msg/Bool", QOS)
+    with Path("/dev/full").open("wb") as full:
+        os.dup2(full.fileno(), bag._stream.fileno())
+    with pytest.raises(OSError, match="No space"):
+        bag.write("/t", b"\0\1\0\0\1", 0, 0, 1)

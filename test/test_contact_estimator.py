@@ -1,0 +1,223 @@
+"""The contact estimator on the plant with elastic cables and true stick; its model is not the plant's."""
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from contact_truth import motor_from_joint
+
+from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.mjcf import Obstacles
+from wam_description.parameters import ParameterError
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import State
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.plant import Plant
+
+CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
+ARM, TIMING = CONFIGURATION.shared.arm, CONFIGURATION.shared.timing
+SENSORS = dataclasses.replace(
+    CONFIGURATION.node("contact_estimator", ContactEstimatorParameters), use_joint_sensors=True
+)
+MOTORS = dataclasses.replace(SENSORS, use_joint_sensors=False)
+NO_OBSTACLES = Obstacles((), (), (), (), (), (), (), ())
+ZERO = [0.0] * 4
+DT, SUBSTEPS, OUTER = 1e-3, 2, 5
+
+
+def plant(start: tuple[float, ...], friction: float = 1.0) -> Plant:
+    """The plant at a pose, its friction so many times the configured."""
+
+    def more(levels: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(friction * level for level in levels)
+
+    def scaled(group: object) -> dict[str, tuple[float, ...]]:
+        return {name: more(getattr(group, name)) for name in ("static_friction", "dynamic_friction")}
+
+    arm = dataclasses.replace(
+        ARM,
+        motors=dataclasses.replace(ARM.motors, **scaled(ARM.motors)),
+        joints=dataclasses.replace(ARM.joints, start=start, **scaled(ARM.joints)),
+    )
+    return Plant(arm, NO_OBSTACLES, DT / SUBSTEPS)
+
+
+def push(arm: Plant, cover: str, x: float, force: tuple[float, float, float]) -> None:
+    arm.push(cover, np.array(force), np.cross((x, 0.0, 0.0), force))
+
+
+def sense(estimator: ContactEstimator, arm: Plant, tau: list[float]) -> None:
+    motor = State(arm.theta, arm.thetad, tau)
+    assert estimator.observe(motor, State(arm.q, arm.qd, arm.strain_torque), DT)
+
+
+def at_rest(cover: str, x: float, force: tuple[float, float, float]) -> ContactEstimate:
+    """What joint sensors feel 0.2 s after a push began on the braked arm."""
+    arm, estimator = plant((0.0, -1.05, 0.0, 0.5)), ContactEstimator(ARM, TIMING, SENSORS)
+    for tick in range(250):
+        if tick == 50:
+            assert not estimator.estimate().in_contact
+            push(arm, cover, x, force)
+        for _ in range(SUBSTEPS):
+            arm.step(ZERO)
+        sense(estimator, arm, ZERO)
+    return estimator.estimate()
+
+
+@pytest.mark.parametrize("size", [5.0, 10.0])
+@pytest.mark.parametrize("phi", [0.0, 60.0, 90.0, 180.0, -90.0])
+def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> None:
+    force = (0.0, size * math.cos(math.radians(phi)), size * math.sin(math.radians(phi)))
+    felt = at_rest("outer_link", 0.28, force)
+    assert felt.in_contact
+    assert felt.link == "outer_link"
+    assert felt.place == pytest.approx(0.28, abs=0.02)
+    assert abs(felt.place - 0.28) < 2 * felt.place_sd
+    assert np.linalg.norm(np.subtract(felt.force, force)) < 0.05 * size
+    assert felt.reason == ""
+
+
+def test_joint_sensors_feel_the_moment_of_a_push_on_the_inner_link() -> None:
+    felt = at_rest("inner_link", 0.3, (0.0, 0.0, 8.0))
+    assert felt.link == "inner_link"
+    assert math.isnan(felt.place)
+    assert "the shoulder sees only the moment" in felt.reason
+    assert felt.moment[1] == pytest.approx(-2.4, rel=0.05)
+    assert np.linalg.norm(felt.force) <= 8.0
+
+
+class Move(NamedTuple):
+    """Smooth moves between random poses, with stops."""
+
+    seed: int
+    fastest: float  # rad/s
+
+    def reference(self, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+        """Joint angles and velocities, a row per millisecond."""
+        rng = np.random.default_rng(self.seed)
+        here, q, qd = np.array((0.0, -0.9, 0.0, 0.5)), [], []
+        while len(q) < seconds / DT:
+            there = rng.uniform((-1.0, -1.5, -1.0, -0.5), (1.0, -0.4, 1.0, 1.3))
+            duration = max(0.4, 1.9 * float(np.abs(there - here).max()) / self.fastest)
+            s = np.arange(0.0, 1.0, DT / duration)[:, None]
+            q += list(here + (there - here) * s**3 * (10 - 15 * s + 6 * s * s))
+            qd += list((there - here) * 30 * s * s * (1 - s) ** 2 / duration)
+            q += [there] * 200
+            qd += [np.zeros(4)] * 200
+            here = there
+        return np.array(q), np.array(qd)
+
+
+class Felt(NamedTuple):
+    tick: int
+    estimate: ContactEstimate
+
+
+def moving(
+    estimators: list[ContactEstimator], move: Move, seconds: float, friction: float, push_at: int = -1
+) -> list[list[Felt]]:
+    """What estimators feel while the arm moves under a plain motor servo."""
+    arm, transmission, body = plant((0.0, -0.9, 0.0, 0.5), friction), TransmissionMap.of(ARM), RigidBody(ARM)
+    arm.brake(False)
+    felt: list[list[Felt]] = [[] for _ in estimators]
+    for tick, (q, qd) in enumerate(zip(*move.reference(seconds), strict=True)):
+        if tick * DT >= seconds:
+            break
+        if tick == push_at:
+            push(arm, "outer_link", 0.28, (0.0, 4.0, 3.0))
+        weight = np.array(transmission.motor_torques(body.gravity_torque(q).tolist()))
+        servo = 0.05 * (motor_from_joint(qd) - arm.thetad) + (motor_from_joint(q) - arm.theta)
+        tau = (weight + servo).tolist()
+        for _ in range(SUBSTEPS):
+            arm.step(tau)
+        for estimator, results in zip(estimators, felt, strict=True):
+            sense(estimator, arm, tau)
+            if tick % OUTER == 0:
+                results.append(Felt(tick, estimator.estimate()))
+    return felt
+
+
+@pytest.mark.parametrize("friction", [0.8, 1.05])
+@pytest.mark.parametrize("fastest", [1.0, 2.5])
+def test_no_false_alarm_in_motion_at_reversals_and_at_stops(friction: float, fastest: float) -> None:
+    estimators = [ContactEstimator(ARM, TIMING, parameters) for parameters in (MOTORS, SENSORS)]
+    for results in moving(estimators, Move(3, fastest), 5.0, friction):
+        assert not any(felt.estimate.in_contact for felt in results)
+        assert all(felt.estimate.reason for felt in results)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_motors_alone_feel_5_newton_within_60_milliseconds_in_motion(seed: int) -> None:
+    (results,) = moving([ContactEstimator(ARM, TIMING, MOTORS)], Move(seed, 1.0), 1.5, 1.0, push_at=600)
+    assert not any(felt.estimate.in_contact for felt in results if felt.tick < 600)
+    first = next(felt for felt in results if felt.estimate.in_contact)
+    assert first.tick - 600 <= 60
+    settled = next(felt.estimate for felt in results if felt.tick >= 680)
+    assert settled.link == "outer_link"
+    assert np.linalg.norm(np.subtract(settled.force, (0, 4, 3))) < 2.0
+    assert abs(settled.place - 0.28) < max(0.04, 2.5 * settled.place_sd)
+
+
+def test_contact_is_released_below_the_lower_threshold_only() -> None:
+    arm, estimator = plant((0.0, -1.05, 0.0, 0.5)), ContactEstimator(ARM, TIMING, SENSORS)
+    states = []
+    for tick in range(500):
+        if tick in (100, 250):
+            push(arm, "outer_link", 0.28, (0.0, 0.0, 5.0 if tick == 100 else 0.0))
+        for _ in range(SUBSTEPS):
+            arm.step(ZERO)
+        sense(estimator, arm, ZERO)
+        found = estimator.estimate()
+        states.append(found.in_contact)
+        limit = SENSORS.release if len(states) > 1 and states[-2] else SENSORS.detect
+        assert found.in_contact == (found.statistic > limit)
+    changes = [i for i in range(1, 500) if states[i] != states[i - 1]]
+    assert len(changes) == 2
+    assert 100 <= changes[0] < 110
+    assert 250 < changes[1] < 500
+
+
+def test_bad_samples_are_counted_and_change_nothing() -> None:
+    arm, estimator = plant((0.0, -1.05, 0.0, 0.5)), ContactEstimator(ARM, TIMING, SENSORS)
+    for tick in range(100):
+        push(arm, "outer_link", 0.28, (0.0, 0.0, 5.0 * (tick > 20)))
+        for _ in range(SUBSTEPS):
+            arm.step(ZERO)
+        sense(estimator, arm, ZERO)
+    before = estimator.estimate()
+    motor, good = State(arm.theta, arm.thetad, ZERO), State(arm.q, arm.qd, arm.strain_torque)
+    assert not estimator.observe(motor, None, DT)
+    assert not estimator.observe(motor, State(good.position, [math.nan] * 4, good.effort), DT)
+    assert not estimator.observe(motor, State(good.position[:2], good.velocity, good.effort), DT)
+    assert estimator.refused == 3
+    assert estimator.estimate() == before
+    assert estimator.observe(State([math.nan] * 4, ZERO, ZERO), good, DT)  # not looked at
+
+
+def test_nothing_is_felt_before_anything_is_observed_or_after_reset() -> None:
+    estimator = ContactEstimator(ARM, TIMING, SENSORS)
+    for _ in range(2):
+        found = estimator.estimate()
+        assert not found.in_contact
+        assert found.link == ""
+        assert math.isnan(found.place)
+        assert found.reason == "not enough has been observed"
+        estimator.observe(State(ZERO, ZERO, ZERO), State(ZERO, ZERO, [9.0] * 4), DT)
+        estimator.reset()
+
+
+def test_sets_that_do_not_fit_are_refused() -> None:
+    blind: Arm = dataclasses.replace(ARM, joint_sensors=False)
+    with pytest.raises(ParameterError, match=r"use_joint_sensors.*set it to false"):
+        ContactEstimator(blind, TIMING, SENSORS)
+    ContactEstimator(blind, TIMING, MOTORS)
+    with pytest.raises(ParameterError, match="release"):
+        dataclasses.replace(SENSORS, release=30.0)
+    hasty = dataclasses.replace(SENSORS, observer=dataclasses.replace(SENSORS.observer, time_constant=1e-3))
+    with pytest.raises(ParameterError, match=r"time_constant.*two periods"):
+        ContactEstimator(ARM, TIMING, hasty)

@@ -1,0 +1,268 @@
+"""Contact inference against torques from the table of (A.4) and against geometry done by hand."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contact_truth import L3, L4, torques
+
+from wam_control import contact_inference
+from wam_control.contact_estimator import ContactEstimatorParameters
+from wam_control.contact_inference import ContactInference, Hypothesis, detection_statistic
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.rigid_body import RigidBody
+
+CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
+ARM = CONFIGURATION.shared.arm
+PARAMETERS = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).inference
+INFERENCE = ContactInference(ARM, RigidBody(ARM), PARAMETERS)
+EXACT = ContactInference(ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, force_scale=1e4, miss=0.0))
+POSE = (0.0, -1.05, 0.0, 0.5)
+SD = 0.02
+S = SD**2 * np.eye(4)
+
+
+def infer(
+    q: tuple[float, ...], cover: str, point: tuple[float, ...], force: tuple[float, ...]
+) -> tuple[Hypothesis, ...]:
+    return INFERENCE.infer(q, torques(q, cover, point, force).tolist(), S)
+
+
+def of(hypotheses: tuple[Hypothesis, ...], cover: str) -> Hypothesis:
+    return next(hypothesis for hypothesis in hypotheses if hypothesis.cover == cover)
+
+
+def test_in_plane_force_agrees_with_the_closed_form() -> None:
+    """F1 = (m_n2 - tau4)/(L3 s4), x = tau4/F1; with theta3 = 0 axis 2 is parallel to axis 4."""
+    x, force = 0.28, 6.0
+    tau2, tau4 = (L3 * math.sin(0.5) + x) * force, x * force
+    found = EXACT.infer(POSE, [0.0, tau2, 0.0, tau4], S)[0]
+    by_hand = (tau2 - tau4) / (L3 * math.sin(0.5))
+    assert found.cover == "outer_link"
+    assert found.force == pytest.approx((0.0, by_hand, 0.0), abs=1e-5)
+    assert found.place == pytest.approx(tau4 / by_hand, abs=1e-5)
+    assert found.place == pytest.approx(x, abs=1e-5)
+
+
+def test_out_of_plane_force_agrees_with_the_closed_form() -> None:
+    """F2 = m_u/(L3 c4), x = -m_n1/F2 - L3 s4, from a force that turns about axes 1 and 3 alone."""
+    x, force, s4, c4 = 0.28, 6.0, math.sin(0.5), math.cos(0.5)
+    # moment at the shoulder in frame 4: elbow at L3 (s4, c4) up to sign, force along z4
+    m_u, m_n1 = L3 * c4 * force, -(L3 * s4 + x) * force
+    u_on_inner, n_on_inner = s4, c4  # x4 and y4 seen along the inner link, axis 3
+    tau3 = m_u * u_on_inner + m_n1 * n_on_inner
+    across = m_u * c4 - m_n1 * s4  # the rest of the moment, across the inner link
+    tau1 = tau3 * math.cos(POSE[1]) + across * math.sin(POSE[1])
+    found = EXACT.infer(POSE, [tau1, 0.0, tau3, 0.0], S)[0]
+    assert found.cover == "outer_link"
+    assert found.force == pytest.approx((0.0, 0.0, m_u / (L3 * c4)), abs=1e-5)
+    assert found.place == pytest.approx(-m_n1 / found.force[2] - L3 * s4, abs=1e-5)
+
+
+def test_any_direction_and_pose_on_the_outer_link() -> None:
+    rng = np.random.default_rng(7)
+    errors, forces, wrong = [], [], 0
+    for _ in range(200):
+        q = (
+            rng.uniform(-3, 3),
+            rng.uniform(0.3, 2.2) * rng.choice((-1, 1)),
+            rng.uniform(-2.5, 2.5),
+            rng.uniform(-1.2, 2.4),
+        )
+        x, phi, size = rng.uniform(0.05, L4), rng.uniform(-math.pi, math.pi), rng.uniform(3, 20)
+        force = (0.0, size * math.cos(phi), size * math.sin(phi))
+        found = infer(q, "outer_link", (x, 0, 0), force)
+        wrong += found[0].cover != "outer_link"
+        outer = of(found, "outer_link")
+        if not math.isnan(outer.place):
+            errors.append(abs(outer.place - x))
+            forces.append(np.linalg.norm(np.subtract(outer.force, force)) / size)
+            assert outer.direction == pytest.approx(phi, abs=0.1)
+    assert len(errors) > 195
+    assert wrong <= 2
+    assert max(errors) < 0.02
+    assert np.quantile(errors, 0.95) < 0.002
+    assert np.quantile(forces, 0.95) < 0.01
+
+
+def test_reported_spread_is_the_spread_of_the_errors() -> None:
+    rng = np.random.default_rng(8)
+    scores = []
+    for _ in range(400):
+        q = tuple(rng.uniform(ARM.joints.lower, ARM.joints.upper))
+        x, phi, size = rng.uniform(0.1, 0.3), rng.uniform(-math.pi, math.pi), rng.uniform(5, 20)
+        tau = torques(q, "outer_link", (x, 0, 0), (0.0, size * math.cos(phi), size * math.sin(phi)))
+        outer = of(EXACT.infer(q, (tau + SD * rng.standard_normal(4)).tolist(), S), "outer_link")
+        if not math.isnan(outer.place):
+            scores.append(abs(outer.place - x) / outer.place_sd)
+    assert 0.5 < np.median(scores) < 0.85
+    assert np.quantile(scores, 0.9) < 2.0
+
+
+@pytest.mark.parametrize("x", [0.15, 0.3, 0.5])
+@pytest.mark.parametrize("phi", [0.0, 90.0, 180.0, -90.0])
+def test_inner_link_shows_moment_and_bound_but_no_place(x: float, phi: float) -> None:
+    force = (0.0, 8 * math.cos(math.radians(phi)), 8 * math.sin(math.radians(phi)))
+    found = of(infer(POSE, "inner_link", (x, 0, 0), force), "inner_link")
+    assert math.isnan(found.place)
+    assert math.isnan(found.place_sd)
+    assert "the shoulder sees only the moment" in found.reason
+    assert found.is_lower_bound
+    bound = x * 8 / L3
+    assert np.linalg.norm(found.force) == pytest.approx(bound, rel=0.03)
+    # the tube stands 4 degrees askew, so that its twist is not the push's
+    np.testing.assert_allclose(found.moment[1:], (-x * force[2], x * force[1]), atol=0.05 * x * 8)
+    turned = found.direction - math.radians(phi)
+    assert math.cos(turned) > 0.99
+
+
+def test_a_push_on_the_inner_link_is_told_from_one_on_the_outer() -> None:
+    """Along the kinematic link or along the tube, which is 1.6 in off at the elbow."""
+    for aside in (0.0, 0.04064 * 0.4 / L3):
+        for force in ((0.0, 8.0, 0.0), (0.0, 0.0, 8.0), (0.0, -5.0, 6.0)):
+            found = infer(POSE, "inner_link", (0.4, 0.0, aside), force)
+            assert found[0].cover == "inner_link"
+
+
+AMBIGUOUS = [
+    ((0.3, -1.0, 0.2, 0.0), "outer_link", (0.28, 0, 0), (0, 6, 0), contact_inference.BENT),
+    ((0.3, -1.0, 0.2, math.pi / 2), "outer_link", (0.28, 0, 0), (0, 0, 6), contact_inference.STRAIGHT),
+    ((0.3, 0.0, math.pi / 2, 0.5), "outer_link", (0.28, 0, 0), (0, 6, 0), contact_inference.SHOULDER),
+    ((0.3, -1.0, 0.2, math.pi / 2), "outer_link", (0.28, 0, 0), (0, 0, 6), contact_inference.STRAIGHT_LINK),
+    (POSE, "outer_link", (0.0, 0, 0), (0, 0, 6), contact_inference.ELBOW),
+    (POSE, "inner_link", (0.5, 0, 0), (0, 6, 0), contact_inference.ELBOW),
+    (POSE, "inner_link", (0.3, 0, 0), (0, 0, 6), contact_inference.MOMENT_ONLY),
+]
+
+
+@pytest.mark.parametrize(("q", "cover", "point", "force", "reason"), AMBIGUOUS)
+def test_each_ambiguous_pose_is_named(
+    q: tuple[float, ...], cover: str, point: tuple[float, ...], force: tuple[float, ...], reason: str
+) -> None:
+    found = infer(q, cover, point, force)
+    assert any(reason in hypothesis.reason for hypothesis in found[:1]), found[0].reason
+
+
+def test_unknown_places_always_have_a_reason_and_the_least_force() -> None:
+    rng = np.random.default_rng(9)
+    seen = 0
+    for _ in range(300):
+        q = tuple(rng.uniform(ARM.joints.lower, ARM.joints.upper))
+        tau = rng.normal(0.0, 2.0, 4)
+        for found in INFERENCE.infer(q, tau.tolist(), S):
+            if math.isnan(found.place):
+                seen += 1
+                assert found.reason
+                assert found.is_lower_bound
+            else:
+                assert 0.0 <= found.place <= L4
+                assert 0.0 < found.place_sd < L4 / math.sqrt(12)
+    assert seen >= 300
+
+
+def test_a_place_lost_in_noise_leaves_the_force_that_the_longest_lever_needs() -> None:
+    tau = torques(POSE, "outer_link", (0.2, 0, 0), (0, 2, 0))
+    outer = of(INFERENCE.infer(POSE, tau.tolist(), 0.3**2 * np.eye(4)), "outer_link")
+    assert contact_inference.WEAK in outer.reason
+    levers = torques(POSE, "outer_link", (L4, 0, 0), (0, 1, 0))
+    assert outer.force[1] == pytest.approx(levers @ tau / (levers @ levers), rel=0.03)
+
+
+def evidence(q: tuple[float, ...], tau: np.ndarray, cover: str) -> float:
+    """Log probability of torques by brute force: every place alike, normal force, twist that goes with it."""
+    length, slope = (L3, 0.04064 / L3) if cover == "inner_link" else (L4, 0.0)
+    twist_arm = PARAMETERS.miss * ARM.covers.radius[ARM.covers.names.index(cover)]
+    across = (0.0, 1.0, 0.0), (-slope, 0.0, 1.0)
+
+    def levers(x: float) -> np.ndarray:
+        return np.stack([torques(q, cover, (x, 0.0, slope * x), e) for e in across], axis=1)
+
+    first, last = levers(0.0), levers(1.0)
+    off = torques(q, cover, (0, 1, 0), (0, 0, 1)) - torques(q, cover, (0, 0, 0), (0, 0, 1))
+    logs = []
+    for x in np.linspace(0.0, length, 2001):
+        at = first + x * (last - first)
+        prior = np.linalg.inv(PARAMETERS.force_scale**2 * at @ at.T + S)
+        force = PARAMETERS.force_scale**2 * at.T @ prior @ tau
+        twist = twist_arm**2 * (force @ force) * np.outer(off, off)
+        spread = S + PARAMETERS.force_scale**2 * at @ at.T + twist
+        logs.append(-0.5 * (tau @ np.linalg.solve(spread, tau) + np.linalg.slogdet(spread)[1]))
+    return float(np.logaddexp.reduce(logs) - math.log(len(logs)))
+
+
+@pytest.mark.parametrize(
+    ("cover", "x", "force"),
+    [
+        ("outer_link", 0.0, (0, 6, 0)),
+        ("outer_link", 0.02, (0, 0, 6)),
+        ("outer_link", 0.05, (0, 0, 6)),
+        ("inner_link", 0.3, (0, 0, 6)),
+        ("inner_link", 0.5, (0, 4.2, 4.2)),
+    ],
+)
+def test_odds_of_the_links_are_those_of_brute_force(cover: str, x: float, force: tuple[float, float, float]) -> None:
+    tau = torques(POSE, cover, (x, 0, 0), force)
+    found = INFERENCE.infer(POSE, tau.tolist(), S)
+    odds = math.log(of(found, "inner_link").probability / of(found, "outer_link").probability)
+    assert odds == pytest.approx(evidence(POSE, tau, "inner_link") - evidence(POSE, tau, "outer_link"), abs=0.6)
+
+
+@pytest.mark.parametrize("size", [1.0, 10.0, 100.0])
+def test_spread_is_never_small_where_the_place_cannot_be_observed(size: float) -> None:
+    """A pseudo-inverse of the Fisher matrix reports 2 cm exactly here."""
+    for q, cover, point, direction, _ in (AMBIGUOUS[0], AMBIGUOUS[1], AMBIGUOUS[2], AMBIGUOUS[6]):
+        force = tuple(size / 6 * part for part in direction)
+        assert math.isnan(of(infer(q, cover, point, force), cover).place)
+
+
+def test_probabilities_add_up_to_1_and_the_best_comes_first() -> None:
+    rng = np.random.default_rng(10)
+    for scale in (1e-6, 1.0, 100.0):
+        for _ in range(50):
+            q = tuple(rng.uniform(ARM.joints.lower, ARM.joints.upper))
+            found = INFERENCE.infer(q, rng.normal(0.0, scale, 4).tolist(), S)
+            probabilities = [hypothesis.probability for hypothesis in found]
+            assert sum(probabilities) == pytest.approx(1.0)
+            assert probabilities == sorted(probabilities, reverse=True)
+
+
+def test_two_contacts_are_not_explained_by_one() -> None:
+    tau = torques(POSE, "outer_link", (0.35, 0, 0), (0, 0, 8)) + torques(POSE, "inner_link", (0.5, 0, 0), (0, 15, 4))
+    assert contact_inference.MORE in INFERENCE.infer(POSE, tau.tolist(), S)[0].reason
+    assert contact_inference.MORE not in infer(POSE, "outer_link", (0.35, 0, 0), (0, 0, 8))[0].reason
+
+
+def test_statistic_respects_the_covariance() -> None:
+    covariance = np.array([[1.0, 0.8], [0.8, 1.0]])
+    assert detection_statistic([1.0, 1.0], covariance) == pytest.approx(2 / 1.8)
+    assert detection_statistic([1.0, -1.0], covariance) == pytest.approx(2 / 0.2)
+
+
+def one_joint(arm: Arm) -> Arm:
+    """A testbed: the first motor and joint, lying down, with the outer cover on its link."""
+    first = lambda group: type(group)(**{k: v[: max(1, len(v) // 4)] for k, v in vars(group).items()})  # noqa: E731
+    covers = {k: v[len(v) // 2 :] for k, v in vars(arm.covers).items()}
+    return dataclasses.replace(
+        arm,
+        motors=first(arm.motors),
+        cables=first(arm.cables),
+        joints=first(arm.joints),
+        links=first(arm.links),
+        covers=type(arm.covers)(**{**covers, "links": ("link1",)}),
+        joint_from_motor=arm.joint_from_motor[:1],
+    )
+
+
+def test_a_single_joint_reports_what_it_sees() -> None:
+    arm = one_joint(ARM)
+    inference = ContactInference(arm, RigidBody(arm), PARAMETERS)
+    (found,) = inference.infer([0.4], [1.2], np.array([[SD**2]]))
+    assert found.cover == "outer_link"
+    assert found.probability == 1.0
+    assert math.isnan(found.place)
+    assert "the only joint sees only the moment" in found.reason
+    assert found.moment == pytest.approx((0.0, 0.0, 1.2), rel=0.01)
+    assert found.force == pytest.approx((0.0, 1.2 / L4, 0.0), rel=0.01)

@@ -1,0 +1,210 @@
+"""The momentum observer against an arm simulated by MuJoCo, which knows nothing of it."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
+
+from wam_control.contact_estimator import ContactEstimatorParameters
+from wam_control.momentum_observer import MomentumObserver, ObserverParameters
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.parameters import ParameterError
+from wam_description.signals import State
+
+CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
+ARM = CONFIGURATION.shared.arm
+NOMINAL = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
+EXACT = dataclasses.replace(NOMINAL, mass_scale=(1.0,) * 4, friction_scale=1.0)
+FREE = dataclasses.replace(EXACT, friction_scale=0.0)
+DT = 1e-3
+NONE = np.zeros(4)
+DRIVE = np.array([joint_torques(e) for e in np.eye(4)]).T
+POSE = (0.2, -1.05, 0.3, 0.5)
+
+
+def wave(time: float) -> np.ndarray:
+    """Joint torques on top of gravity that swing the arm fast, every joint to and fro."""
+    return np.array([6.0, 8.0, 3.0, 2.0]) * np.sin(2 * math.pi * np.array([1.1, 1.3, 1.7, 2.1]) * time)
+
+
+def swing(
+    observer: MomentumObserver,
+    plant: RigidArm,
+    seconds: float,
+    *,
+    external: Callable[[float], np.ndarray] = lambda _: NONE,
+    sensors: bool = False,
+    torque: Callable[[float], np.ndarray] = wave,
+) -> np.ndarray:
+    """Residuals of a swing, one row per millisecond."""
+    rows = []
+    for k in range(round(seconds / DT)):
+        tau = torque(k * DT) + plant.gravity()
+        motor = np.linalg.solve(DRIVE, tau)
+        plant.step(motor, external(k * DT))
+        state = State(*plant.sensors()) if sensors else State(*plant.motors(motor))
+        assert observer.observe(state, DT)
+        rows.append(list(observer.external_torques))
+    return np.array(rows)
+
+
+def test_residual_reaches_63_percent_of_a_step_after_the_time_constant() -> None:
+    push = torques(POSE, "outer_link", (0.28, 0, 0), (0, 3, 4))
+    observer = MomentumObserver(ARM, FREE, use_joint_sensors=False)
+    plant = RigidArm(ARM, POSE, friction=0.0)
+    rows = swing(observer, plant, 0.2, external=lambda t: push * (t > 0.0995), torque=lambda _: NONE)
+    after = round(FREE.time_constant / DT)
+    for ticks in (after // 2, after, 3 * after):
+        expected = push * (1 - math.exp(-ticks * DT / FREE.time_constant))
+        np.testing.assert_allclose(rows[99 + ticks], expected, atol=0.02)
+
+
+@pytest.mark.parametrize("sensors", [False, True])
+def test_motion_alone_gives_no_external_torque(sensors: bool) -> None:
+    observer = MomentumObserver(ARM, FREE, use_joint_sensors=sensors)
+    plant = RigidArm(ARM, POSE, friction=0.0)
+    rows = swing(observer, plant, 1.0, sensors=sensors)
+    assert np.abs(motor_from_joint(plant.data.qvel)).max() > 5.0
+    assert np.abs(rows).max() < 0.05
+
+
+def test_rotor_inertia_is_part_of_the_momentum() -> None:
+    without = dataclasses.replace(ARM, motors=dataclasses.replace(ARM.motors, inertia=(1e-9,) * 4))
+    worst = {}
+    for name, arm in (("with", ARM), ("without", without)):
+        rows = swing(MomentumObserver(arm, FREE, False), RigidArm(ARM, POSE, friction=0.0), 1.0)
+        worst[name] = np.abs(rows).max()
+    assert worst["with"] < 0.05
+    assert worst["without"] > 0.3
+
+
+def test_coulomb_friction_has_the_sign_of_each_motor() -> None:
+    """Joints 2 and 3 move together so that motor 2 runs fast and motor 3 hardly changes its way."""
+
+    def torque(time: float) -> np.ndarray:
+        return np.array([1.0, 1.5, 3.5, 1.0]) * (1.0 if time < 0.3 else -1.0)
+
+    def by_joints(arm: Arm) -> Arm:
+        """The same friction as if it were at the joints, signed by their velocities."""
+        levels = np.abs(DRIVE) @ arm.motors.dynamic_friction
+        moved = np.array(arm.joints.dynamic_friction) + levels
+        none = (0.0,) * 4
+        return dataclasses.replace(
+            arm,
+            motors=dataclasses.replace(arm.motors, static_friction=none, dynamic_friction=none),
+            joints=dataclasses.replace(arm.joints, static_friction=tuple(moved), dynamic_friction=tuple(moved)),
+        )
+
+    typical = {}
+    for name, arm in (("motors", ARM), ("joints", by_joints(ARM))):
+        plant = RigidArm(ARM, POSE, friction=1.0)
+        rows = swing(MomentumObserver(arm, EXACT, False), plant, 0.6, torque=lambda t: 1.5 * torque(t))
+        typical[name] = np.median(np.abs(rows[100:]), axis=0)
+    assert typical["motors"].max() < 0.1
+    assert typical["joints"][1:3].max() > 0.5
+    assert typical["joints"][[0, 3]].max() < 0.1  # which is why it looks fine
+
+
+def test_joint_sensors_see_neither_friction_nor_rotors() -> None:
+    push = torques(POSE, "outer_link", (0.28, 0, 0), (0, 0, 2))
+    plant = RigidArm(ARM, POSE, friction=1.7)
+    observer = MomentumObserver(ARM, EXACT, use_joint_sensors=True)
+    still = swing(observer, plant, 0.3, external=lambda _: push, sensors=True, torque=lambda _: NONE)
+    np.testing.assert_allclose(still[-1], push, atol=0.05)
+
+
+@pytest.mark.parametrize("sensors", [False, True])
+@pytest.mark.parametrize("friction", [0.8, 1.05])
+def test_declared_uncertainty_covers_a_nominal_model_that_is_wrong(sensors: bool, friction: float) -> None:
+    observer = MomentumObserver(ARM, NOMINAL, use_joint_sensors=sensors)
+    plant = RigidArm(ARM, POSE, friction=friction)
+    ratios = []
+    for _ in range(8):
+        rows = swing(observer, plant, 0.1, sensors=sensors)
+        ratios.append(np.abs(rows[-1]) / np.sqrt(observer.covariance().diagonal()))
+    assert np.max(ratios) < 4.0
+    assert np.median(ratios) < 1.5
+
+
+def test_uncertainty_of_joints_2_and_3_comes_from_both_motors() -> None:
+    """At rest: sd^2 = N2^2 (sd_2^2 + sd_3^2) and a quarter of it, sd of stiction plus the drive's own."""
+    only_stiction = dataclasses.replace(EXACT, mass_uncertainty=0.0, rest_uncertainty=0.5, motor_torque_sd=0.003)
+    observer = MomentumObserver(ARM, only_stiction, use_joint_sensors=False)
+    state = State(motor_from_joint(np.array(POSE)).tolist(), [0.0] * 4, [0.1] * 4)
+    for _ in range(3):
+        observer.observe(state, DT)
+    stiction, own = ARM.motors.static_friction, ARM.joints.static_friction
+    motor = (0.5 * stiction[1]) ** 2 / 2 + (0.5 * stiction[2]) ** 2 / 2 + 0.003**2
+    covariance = observer.covariance()
+    assert covariance[1, 1] == pytest.approx(30.4**2 * 2 * motor + (0.5 * own[1]) ** 2)
+    assert covariance[2, 2] == pytest.approx(15.2**2 * 2 * motor + (0.5 * own[2]) ** 2)
+    np.testing.assert_array_less(0.0, np.linalg.eigvalsh(covariance))
+
+
+def test_one_motor_that_rests_couples_the_errors_of_joints_2_and_3() -> None:
+    """cov(2, 3) = N2^2/2 (sd_2^2 - sd_3^2): a diagonal covariance would lose it."""
+    alone = dataclasses.replace(EXACT, mass_uncertainty=0.0, rest_uncertainty=1.0, moving_uncertainty=0.0)
+    observer = MomentumObserver(ARM, alone, use_joint_sensors=False)
+    state = State(motor_from_joint(np.array(POSE)).tolist(), [0.0, 0.0, 9.0, 0.0], [0.1] * 4)
+    for _ in range(3):
+        observer.observe(state, DT)
+    expected = 30.4**2 / 2 * ARM.motors.static_friction[1] ** 2
+    assert observer.covariance()[1, 2] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e308])
+@pytest.mark.parametrize("sensors", [False, True])
+def test_bad_samples_are_refused_and_leave_no_trace(bad: float, sensors: bool) -> None:
+    plant = RigidArm(ARM, POSE, friction=0.0)
+    observer = MomentumObserver(ARM, FREE, use_joint_sensors=sensors)
+    swing(observer, plant, 0.2, sensors=sensors)
+    before = (list(observer.external_torques), observer.covariance().tolist())
+    good = plant.sensors() if sensors else plant.motors(np.full(4, 0.1))
+    for part in range(3):
+        values = [list(array) for array in good]
+        values[part][2] = bad
+        taken = observer.observe(State(*values), DT)
+        assert not taken or math.isfinite(bad)
+    assert not observer.observe(State(good[0][:3], good[1], good[2]), DT)
+    for dt in (0.0, -1e-3, math.nan, math.inf):
+        assert not observer.observe(State(*good), dt)
+    if not math.isfinite(bad):
+        assert (list(observer.external_torques), observer.covariance().tolist()) == before
+    assert np.all(np.isfinite(observer.external_torques))
+    assert np.all(np.isfinite(observer.covariance()))
+
+
+def test_lost_samples_are_bridged() -> None:
+    plant, observer = RigidArm(ARM, POSE, friction=0.0), MomentumObserver(ARM, FREE, use_joint_sensors=True)
+    swing(observer, plant, 0.3, sensors=True)
+    for k in range(300, 304):
+        plant.step(np.zeros(4), NONE)
+        q, qd, tau = plant.sensors()
+        assert observer.observe(State(q, qd, [math.nan] * 4 if k < 302 else tau), DT) == (k >= 302)
+    assert np.abs(observer.external_torques).max() < 0.1
+
+
+def test_motors_without_current_at_rest_tell_nothing() -> None:
+    """Brakes hold: without this the arm's own weight would look like a contact."""
+    observer = MomentumObserver(ARM, EXACT, use_joint_sensors=False)
+    theta = motor_from_joint(np.array(POSE)).tolist()
+    for _ in range(100):
+        assert observer.observe(State(theta, [1e-9] * 4, [0.0] * 4), DT)
+    assert observer.external_torques == [0.0] * 4
+    assert not observer.is_ready
+
+
+def test_same_samples_give_the_same_bits() -> None:
+    runs = [swing(MomentumObserver(ARM, NOMINAL, False), RigidArm(ARM, POSE, 1.0), 0.2) for _ in range(2)]
+    assert np.array_equal(*runs)
+
+
+def test_mass_scale_of_another_arm_is_refused() -> None:
+    wrong: ObserverParameters = dataclasses.replace(NOMINAL, mass_scale=(1.0,))
+    with pytest.raises(ParameterError, match=r"mass_scale.*1 values; 4 links need 4"):
+        MomentumObserver(ARM, wrong, use_joint_sensors=False)

@@ -1,0 +1,337 @@
+"""The recorder against real publishers; its bags read by readers that are not ours."""
+
+import contextlib
+import errno
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from mcap.exceptions import McapError
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability, QosReliability
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, String
+
+from wam_analysis.bag import read
+from wam_description.parameters import ParameterError, flatten
+from wam_ros.bag import BagWriter
+from wam_ros.messages import header
+from wam_ros.ports import message_type
+from wam_ros.qos import qos
+from wam_ros.recorder import Numbering, Recorder
+from wam_ros.recorder_node import RecorderNode
+from wam_ros.topics import BY_NAME, TOPICS
+
+CONFIG = Path(__file__).parents[1] / "config" / "wam.yaml"
+ROOT = Path(__file__).parents[1]
+
+
+def parameters(
+    directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: str
+) -> Any:
+    shared = flatten(yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"])
+    changed = {"timing.mode": mode, "nodes": list(nodes), "directory": str(directory), "name": "bag", **own}
+    return {**shared, **changed}
+
+
+def recorder(ros: Any, directory: Path, **choices: Any) -> RecorderNode:
+    given = [Parameter(name, value=value) for name, value in parameters(directory, **choices).items()]
+    return ros.add(RecorderNode(context=ros.context, namespace="/wam", parameter_overrides=given))
+
+
+def publisher(node: Node, topic: str) -> Any:
+    return node.create_publisher(message_type(BY_NAME[topic]), topic, qos(BY_NAME[topic]))
+
+
+def matched(*publishers: Any, count: int = 1) -> Callable[[], bool]:
+    return lambda: all(p.get_subscription_count() >= count for p in publishers)
+
+
+def state(stamp: int, value: float) -> JointState:
+    return JointState(
+        header=header(stamp), name=["motor1", "motor2"], position=[value, -value], effort=[0.0, value]
+    )
+
+
+def received(node: RecorderNode, topic: str) -> int:
+    return sum(count.received for count in node.recorder.counts() if count.topic == topic)
+
+
+def start_process(ros: Any, directory: Path, **choices: Any) -> subprocess.Popen[str]:
+    file = directory / "recorder.yaml"
+    file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters(directory, **choices)}}))
+    command = [sys.executable, "-m", "wam_ros.recorder_node", "--ros-args", "-r", "__ns:=/wam"]
+    return subprocess.Popen(
+        [*command, "--params-file", str(file)],
+        env=ros.environment,
+        cwd=ROOT,
+        text=True,
+        stderr=subprocess.PIPE,
+    )
+
+
+def recovered(file: Path) -> list[Message]:
+    """Messages up to the break, as `mcap recover` finds them."""
+    found = []
+    with file.open("rb") as stream, contextlib.suppress(McapError, EOFError):
+        found.extend(record for record in StreamReader(stream).records if isinstance(record, Message))
+    return found
+
+
+def test_every_message_of_every_topic_is_in_the_bag(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    sender = ros.node("sender")
+    publishers = {topic.name: publisher(sender, topic.name) for topic in TOPICS}
+    ros.wait(matched(*publishers.values()))
+    for k in range(1, 301):
+        publishers["motor_states"].publish(state(k * 1_000_000, 0.1 * k))
+        if k % 5 == 0:
+            for topic in TOPICS:
+                if topic.name not in ("motor_states", "/diagnostics", "status"):
+                    publishers[topic.name].publish(message_type(topic)())
+    ros.wait(lambda: received(node, "/wam/motor_states") == 300 and received(node, "/clock") == 60)
+    ros.remove(node)
+    expected = {
+        n if n[0] == "/" else f"/wam/{n}": 60 for n in publishers if n not in ("/diagnostics", "status")
+    }
+    with AnyReader([tmp_path / "bag"]) as reader:
+        counts = {c.topic: c.msgcount for c in reader.connections}
+        assert counts | expected | {"/wam/motor_states": 300} == counts
+        assert Counter(connection.topic for connection, _, _ in reader.messages()) == {
+            k: v for k, v in counts.items() if v
+        }
+        for connection in reader.connections:
+            (offered,) = connection.ext.offered_qos_profiles
+            latched = BY_NAME[connection.topic.removeprefix("/wam/")].latched
+            assert offered.durability == (
+                QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE
+            )
+            assert (offered.reliability, offered.depth) == (QosReliability.RELIABLE, 1 if latched else 1000)
+        last = 0
+        states = [c for c in reader.connections if c.topic == "/wam/motor_states"]
+        for k, (connection, log_time, data) in enumerate(reader.messages(states), 1):
+            message = reader.deserialize(data, connection.msgtype)
+            assert message.position.tolist() == [0.1 * k, -0.1 * k]
+            assert message.name == ["motor1", "motor2"]
+            assert abs(log_time - time.time_ns()) < 60e9
+            assert log_time >= last
+            last = log_time
+
+
+def test_counts_and_drops_are_in_the_bag(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    sender.publish(state(0, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    for k in range(1500):  # nobody spins: the reader keeps the last 1000
+        sender.publish(state(k, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1001)
+    (count,) = [count for count in node.recorder.counts() if count.topic == "/wam/motor_states"]
+    assert count == ("/wam/motor_states", "driver", 1001, 500, 0)
+    ros.remove(node)
+    record = read(tmp_path / "bag").metadata["recording"]
+    assert record["mode"] == "realtime"
+    assert record["/wam/motor_states driver received"] == "1001"
+    assert record["/wam/motor_states driver dropped"] == "500"
+
+
+def test_latched_messages_sent_before_the_recorder_started_are_recorded(ros: Any, tmp_path: Path) -> None:
+    sender = publisher(ros.node("driver"), "robot_description")
+    sender.publish(String(data="<robot/>"))
+    node = recorder(ros, tmp_path)
+    ros.wait(lambda: received(node, "/wam/robot_description") == 1)
+    ros.remove(node)
+    (message,) = read(tmp_path / "bag").topics["/wam/robot_description"].messages
+    assert message.data == "<robot/>"
+
+
+def test_bytes_left_behind_by_serialize_message_are_cut(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    sender.publish(bytes(serialize_message(state(1, 0.5))))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    ros.remove(node)
+    with AnyReader([tmp_path / "bag"]) as reader:
+        ((connection, _, data),) = reader.messages()
+        assert reader.deserialize(data, connection.msgtype).effort.tolist() == [0.0, 0.5]
+
+
+def test_lockstep_times_are_those_of_the_messages(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path, mode="lockstep")
+    other = ros.node("contact_estimator")
+    torques, touched = publisher(other, "external_joint_torques"), publisher(other, "contact/in_contact")
+    ros.wait(matched(torques, touched))
+    touched.publish(Bool(data=False))
+    ros.wait(lambda: received(node, "/wam/contact/in_contact") == 1)
+    for k in range(1, 51):
+        torques.publish(state(k * 5_000_000, 0.0))
+    ros.wait(lambda: received(node, "/wam/external_joint_torques") == 50)
+    touched.publish(Bool(data=True))
+    ros.wait(lambda: received(node, "/wam/contact/in_contact") == 2)
+    ros.remove(node)
+    times = [5_000_000 * k for k in range(1, 51)]
+    bag = read(tmp_path / "bag")
+    assert bag.topics["/wam/external_joint_torques"].log_time_ns.tolist() == times
+    assert bag.topics["/wam/contact/in_contact"].log_time_ns.tolist() == [0, times[-1]]
+    published = [m.publish_time for m in recovered(tmp_path / "bag" / "bag_0.mcap")]
+    assert max(published) == times[-1]
+
+
+def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any, tmp_path: Path) -> None:
+    states: list[Any] = []
+    listener = ros.node("listener")
+    row = BY_NAME["status"]
+    listener.create_subscription(message_type(row), "status", states.append, qos(row))
+    node = recorder(ros, tmp_path, nodes=("gravity", "recorder"))
+    ros.wait(lambda: node.count_subscribers("/wam/status") == 2)
+    other = Node(
+        "gravity",
+        namespace="/wam",
+        context=ros.context,
+        parameter_overrides=[Parameter("arm.mass", value=[1.0, 2.5]), Parameter("on", value=True)],
+        automatically_declare_parameters_from_overrides=True,
+    )
+    ros.add(other)
+    ros.wait(lambda: not node.parameters_of_nodes.missing)
+    assert not states, "ready before the topics of gravity were there"
+    kept = [publisher(other, topic.name) for topic in TOPICS if "gravity" in topic.publisher]
+    ros.wait(lambda: states)
+    assert kept
+    assert (states[0].name, states[0].message) == ("recorder", "ready")
+    ros.remove(node)
+    attached = yaml.safe_load(read(tmp_path / "bag").attachments["parameters.yaml"])
+    assert attached["/wam/gravity"]["ros__parameters"]["arm"] == {"mass": [1.0, 2.5]}
+    assert attached["/wam/gravity"]["ros__parameters"]["on"] is True
+    assert attached["/wam/recorder"]["ros__parameters"]["timing"]["period"] == 0.001
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path, stop: signal.Signals) -> None:
+    sender = publisher(ros.node("driver"), "motor_states")
+    with start_process(ros, tmp_path) as process:
+        ros.wait(matched(sender), timeout=20.0)
+        for k in range(1, 501):
+            sender.publish(state(k, 0.0))
+        file = tmp_path / "bag" / "bag_0.mcap"
+        ros.wait(lambda: len(recovered(file)) >= 500)
+        process.send_signal(stop)
+        _, said = process.communicate(timeout=10)
+        assert process.returncode == 0, said
+    assert "none lost" in said
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert {c.topic: c.msgcount for c in reader.connections}["/wam/motor_states"] == 500
+
+
+def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Path) -> None:
+    sender = publisher(ros.node("driver"), "motor_states")
+    file = tmp_path / "bag" / "bag_0.mcap"
+    with start_process(ros, tmp_path) as process:
+        ros.wait(matched(sender), timeout=20.0)
+        sent: list[int] = []
+
+        def send() -> bool:
+            sent.append(time.time_ns())
+            sender.publish(state(len(sent), 0.0))
+            return len(sent) >= 250  # one each 10 ms of `wait`
+
+        ros.wait(send, timeout=20.0)
+        killed = time.time_ns()
+        process.kill()
+        process.wait()
+        process.stderr.close()
+    found = [m for m in recovered(file) if m.publish_time >= sent[0] - 1_000_000]
+    states = [m for m in found if len(m.data) > 60 and m.publish_time <= killed]
+    assert len([t for t in sent if t < killed - 1_000_000_000]) >= 100
+    assert states[-1].publish_time > killed - 1_000_000_000
+    numbers = [m.sequence for m in states if b"motor1" in m.data]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+def test_a_bag_that_cannot_be_made_stops_the_node_before_it_starts(ros: Any, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ParameterError, match=r"is a file.*'directory'"):
+        recorder(ros, tmp_path / "file")
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(ParameterError, match=r"exists already.*'name'"):
+        recorder(ros, tmp_path)
+    with pytest.raises(ParameterError, match="without directories"):
+        recorder(ros, tmp_path, name="../bag")
+
+
+def test_an_unnamed_bag_is_named_after_arm_and_time(ros: Any, tmp_path: Path) -> None:
+    ros.remove(recorder(ros, tmp_path, name=""))
+    (path,) = tmp_path.glob("wam_2*")
+    assert (path / f"{path.name}_0.mcap").is_file()
+    assert (path / "metadata.yaml").is_file()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "received", "dropped", "missed"),
+    [
+        ([1, 2, 3], 3, 0, 0),
+        ([1, 2, 5, 6, 9], 5, 4, 0),
+        ([7, 8, 10], 3, 1, 6),
+        ([1, 2, 3, 1, 2, 4], 6, 0, 0),  # started again: 4 follows the 3 of the first life
+        ([1, 1, 2, 2, 3, 3], 6, 0, 0),  # two publishers under one name
+        ([1, 1, 2, 2, 3, 4, 3, 6], 8, 1, 0),
+        ([0, 0], 2, 0, 0),  # a middleware that does not number
+    ],
+)
+def test_gaps_in_the_numbering_are_drops(
+    numbers: list[int], received: int, dropped: int, missed: int
+) -> None:
+    numbering = Numbering()
+    for number in numbers:
+        numbering.add(number)
+    assert (numbering.received, numbering.dropped, numbering.missed) == (received, dropped, missed)
+
+
+def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+    def data(node: str) -> bytes:
+        message = DiagnosticArray(header=header(5, "abc"), status=[DiagnosticStatus(name=f"{node}: timing")])
+        return bytes(serialize_message(message))
+
+    row = BY_NAME["/diagnostics"]
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)})
+        for number in (1, 2, 3):
+            machine.receive(row.name, data("driver"), 0, 0, number)
+        for number in (1, 9):
+            machine.receive(row.name, data("gravity"), 0, 0, number)
+        assert {c.publisher: (c.received, c.dropped) for c in machine.counts()} == {
+            "driver": (3, 0),
+            "gravity": (2, 7),
+        }
+
+
+def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path, monkeypatch: Any) -> None:
+    row = BY_NAME["contact/in_contact"]
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)})
+
+        def full(*_: Any) -> None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        machine.receive(row.name, b"\0\1\0\0\1", 1, 1, 1)
+        monkeypatch.setattr(bag, "write", full)
+        for number in (2, 3):
+            machine.receive(row.name, b"\0\1\0\0\1", 1, 1, number)
+        assert "No space left" in machine.failure
+        assert machine.lost_at_disk == 2

@@ -1,0 +1,1 @@
+"""From recordings to numbers and pictures, and runs without ROS."""

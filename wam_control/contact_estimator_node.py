@@ -1,0 +1,90 @@
+"""Node `contact_estimator`: what touches the arm, where, how hard, how sure."""
+
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from std_msgs.msg import Bool
+
+from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact_inference import Hypothesis
+from wam_description.arm import seconds
+from wam_description.signals import State
+from wam_ros.lockstep import Gate, Need
+from wam_ros.markers import contact_markers
+from wam_ros.messages import BASE, Wrench, header, point_stamped, read_joint_state, wrench_stamped
+from wam_ros.parameters import declare
+from wam_ros.ports import Ports
+from wam_ros.run import run
+
+PARAMETERS = ContactEstimatorParameters
+
+
+class ContactEstimatorNode(Node):
+    """Observes every motor state, publishes the estimate every outer period."""
+
+    def __init__(self, **ros: Any) -> None:
+        super().__init__("contact_estimator", **ros)
+        shared, own = declare(self, PARAMETERS)
+        self._estimator = ContactEstimator(shared.arm, shared.timing, own)
+        self._ports = ports = Ports(self, shared)
+        self._timing = shared.timing
+        self._last: int | None = None
+        self._in_contact: bool | None = None
+        motors, joints = list(shared.arm.motors.names), list(shared.arm.joints.names)
+        needs = {"joint_sensors": Need(outer=False)} if own.use_joint_sensors else {}
+        gate = Gate(shared.timing, "motor_states", needs)
+        fields = "position velocity effort"
+        ports.feed(gate, "motor_states", lambda m: read_joint_state(m, motors, fields), self._work)
+        if needs:
+            ports.feed(gate, "joint_sensors", lambda m: read_joint_state(m, joints, fields), self._work)
+
+    def _work(self, stamp: int, inputs: dict[str, Any]) -> None:
+        dt = self._timing.period_ns if self._last is None else stamp - self._last
+        self._last = stamp
+        self._estimator.observe(inputs["motor_states"], inputs.get("joint_sensors"), seconds(dt))
+        if self._timing.is_outer(stamp):
+            self._publish(stamp, self._estimator.estimate())
+        self._ports.report(stamp)
+
+    def _publish(self, stamp: int, estimate: ContactEstimate) -> None:
+        ports, frame = self._ports, estimate.link or BASE
+        ports.publish_joints("external_joint_torques", stamp, State([], [], list(estimate.external_torques)))
+        ports.publish("contact/wrench", wrench_stamped(stamp, Wrench(frame, estimate.force, estimate.moment)))
+        ports.publish("contact/point", point_stamped(stamp, frame, (estimate.place, 0.0, 0.0)))
+        if self._timing.is_display(stamp):
+            ports.publish("contact/hypotheses", hypotheses(stamp, estimate))
+            ports.publish("contact/markers", contact_markers(stamp, estimate.link, estimate.place, estimate.force))
+        if estimate.in_contact is not self._in_contact:
+            self._in_contact = estimate.in_contact
+            ports.publish("contact/in_contact", Bool(data=bool(estimate.in_contact)))
+
+
+def hypotheses(stamp: int, estimate: ContactEstimate) -> DiagnosticArray:
+    """Every explanation of the external torques, the most probable first."""
+    array = DiagnosticArray(header=header(stamp))
+    array.status = [_status(hypothesis) for hypothesis in estimate.hypotheses]
+    return array
+
+
+def _status(hypothesis: Hypothesis) -> DiagnosticStatus:
+    facts = hypothesis._asdict()
+    cover, reason = str(facts.pop("cover")), str(facts.pop("reason"))
+    values = [KeyValue(key=key, value=_text(value)) for key, value in facts.items()]
+    level = DiagnosticStatus.WARN if reason else DiagnosticStatus.OK
+    return DiagnosticStatus(name=cover, level=level, message=reason, values=values)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, tuple):
+        return " ".join(_text(element) for element in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def main() -> None:
+    """Run the node as this process."""
+    run(ContactEstimatorNode)
+
+
+if __name__ == "__main__":
+    main()

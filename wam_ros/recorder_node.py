@@ -1,0 +1,184 @@
+"""Node `recorder`: every topic of the interface table into a bag, with the parameters of all nodes."""
+
+import inspect
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+
+from wam_description.parameters import ParameterError, parameter, values
+from wam_ros.bag import BagWriter, RecordingError
+from wam_ros.parameters import declare
+from wam_ros.ports import READY, message_type
+from wam_ros.qos import DEPTH, qos
+from wam_ros.recorder import Recorder, summary
+from wam_ros.remote_parameters import RemoteParameters, as_yaml
+from wam_ros.run import run
+from wam_ros.topics import BY_NAME, TOPICS, Topic
+
+
+@dataclass(frozen=True)
+class RecorderParameters:
+    """Where the bag goes."""
+
+    directory: str = parameter("directory in which the bag is made; made where it is missing")
+    name: str = parameter("name of the bag, a new directory; empty for arm, date and time of the start")
+
+    def __post_init__(self) -> None:
+        if self.name != Path(self.name).name or self.name == "..":
+            raise ParameterError(f"parameter 'name' is '{self.name}'; allowed: a name without directories")
+
+
+class RecorderNode(Node):
+    """Records from construction to `destroy_node`, which closes the bag."""
+
+    def __init__(self, **ros: Any) -> None:
+        super().__init__("recorder", **ros)
+        shared, own = declare(self, RecorderParameters)
+        self._own_parameters = {**values(shared), **values(own)}
+        self._arm = shared.arm.name
+        name = own.name or f"{shared.arm.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+        try:
+            self.bag = BagWriter(Path(own.directory) / name)
+        except RecordingError as error:
+            raise ParameterError(f"node 'recorder': {error} (parameters 'directory' and 'name')") from None
+        topics = {self.resolve_topic_name(topic.name): topic for topic in TOPICS}
+        offered = {full_name: qos(topic) for full_name, topic in topics.items()}
+        self.recorder = Recorder(self.bag, topics, shared.timing.mode, offered)
+        self._inlets = {name: self._listen(name, topic) for name, topic in topics.items()}
+        others = [node for node in shared.nodes if node != self.get_name()]
+        self._expected = {
+            full_name: sum(node in topic.publisher for node in others) for full_name, topic in topics.items()
+        }
+        self.parameters_of_nodes = RemoteParameters(self, others)
+        self._status = self.create_publisher(DiagnosticStatus, "status", qos(BY_NAME["status"]))
+        diagnostics = BY_NAME["/diagnostics"]
+        self._diagnostics = self.create_publisher(DiagnosticArray, diagnostics.name, qos(diagnostics))
+        self.ready = False
+        self._dropped = 0
+        self._failed = False
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(0.1, self.attend, clock=steady)
+        if shared.timing.mode == "realtime":  # in lockstep nothing is sent by the wall clock
+            self.create_timer(1.0, self._report, clock=steady)
+        self.get_logger().info(f"recording to {self.bag.path}")
+
+    def destroy_node(self) -> None:
+        """Take what has arrived, write parameters and counts, close the bag."""
+        if not self.bag.closed:
+            self._drain()
+            self._close()
+        super().destroy_node()
+
+    def _listen(self, name: str, topic: Topic) -> Any:
+        profile = qos(topic)
+        profile.depth = DEPTH
+        receiver = _Receiver(self.recorder, name)
+        return self.create_subscription(message_type(topic), name, receiver, profile, raw=True)
+
+    def attend(self) -> None:
+        """What is due ten times a second: flush, warn, ask for parameters, say when all is ready."""
+        self.recorder.flush()
+        self._warn()
+        self.parameters_of_nodes.ask()
+        if not self.ready and not self.parameters_of_nodes.missing and not self._unmatched():
+            self.ready = True
+            self._status.publish(self._state(READY))
+
+    def _unmatched(self) -> list[str]:
+        return [
+            name
+            for name, subscription in self._inlets.items()
+            if subscription.get_publisher_count() < self._expected[name]
+        ]
+
+    def _warn(self) -> None:
+        if self.recorder.failure and not self._failed:
+            self._failed = True
+            self.get_logger().error(self.recorder.failure)
+            self._status.publish(self._state(self.recorder.failure))
+        dropped = self.recorder.dropped()
+        if dropped > self._dropped:
+            self._dropped = dropped
+            self.get_logger().warning(f"the recorder was too slow: {summary(self.recorder.counts())}")
+
+    def _report(self) -> None:
+        message = DiagnosticArray(status=[self._state("recording")])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def _state(self, text: str) -> DiagnosticStatus:
+        counts = self.recorder.counts()
+        facts = {
+            "bag": str(self.bag.path),
+            "received": str(sum(count.received for count in counts)),
+            "dropped": str(sum(count.dropped for count in counts)),
+            "lost_at_disk": str(self.recorder.lost_at_disk),
+        }
+        return DiagnosticStatus(
+            level=DiagnosticStatus.ERROR if self.recorder.failure else DiagnosticStatus.OK,
+            name=self.get_name(),
+            message=text,
+            hardware_id=self._arm,
+            values=[] if text == READY else [KeyValue(key=key, value=value) for key, value in facts.items()],
+        )
+
+    def _drain(self) -> None:
+        for subscription in self._inlets.values():
+            with subscription.handle:
+                for _ in range(DEPTH):
+                    taken = subscription.handle.take_message(subscription.msg_type, True)
+                    if taken is None:
+                        break
+                    subscription.callback(*taken)
+
+    def _close(self) -> None:
+        found = self.parameters_of_nodes.found
+        parameters = {self.resolve_service_name(node): given for node, given in found.items()}
+        parameters[self.get_fully_qualified_name()] = self._own_parameters
+        try:
+            self.bag.attach("parameters.yaml", "application/yaml", as_yaml(parameters).encode())
+            self.recorder.finish()
+            self.bag.close()
+        except OSError as error:
+            self.get_logger().error(f"bag {self.bag.path} is not complete: {error}")
+        else:
+            self.get_logger().info(f"{self.bag.path}: {summary(self.recorder.counts())}")
+
+
+class _Receiver:
+    """Callback of one topic.
+
+    Its signature asks for the message info.  The events executor of rclpy 7.1 then passes message and
+    info as one tuple, the other executors as two arguments.
+    """
+
+    __signature__ = inspect.signature(lambda data, info: None)
+
+    def __init__(self, recorder: Recorder, name: str) -> None:
+        self._receive = recorder.receive
+        self._name = name
+
+    def __call__(self, *taken: Any) -> None:
+        data, info = taken if len(taken) == 2 else taken[0]
+        self._receive(
+            self._name,
+            data,
+            info["received_timestamp"] or time.time_ns(),
+            info["source_timestamp"],
+            info["publication_sequence_number"] or 0,
+        )
+
+
+def main() -> None:
+    """Run the recorder as this process."""
+    run(RecorderNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""The parameters of other nodes, asked for over the standard services."""
+
+import time
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import Any, Final
+
+import yaml
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+
+_PATIENCE: Final = 2.0  # s; an answer can be lost while services are still being discovered
+
+
+class RemoteParameters:
+    """Collects all parameters of some nodes, one question each, without ever waiting.
+
+    Parameters
+    ----------
+    node : node that asks.
+    names : nodes to ask, relative to the namespace of `node`.
+    """
+
+    def __init__(self, node: Node, names: Iterable[str]) -> None:
+        self.found: dict[str, dict[str, Any]] = {}
+        self._clients = {
+            name: (
+                node.create_client(ListParameters, f"{name}/list_parameters"),
+                node.create_client(GetParameters, f"{name}/get_parameters"),
+            )
+            for name in names
+        }
+        self._asked = dict.fromkeys(self._clients, -_PATIENCE)
+
+    @property
+    def missing(self) -> list[str]:
+        """Nodes that have not answered yet."""
+        return [name for name in self._clients if name not in self.found]
+
+    def ask(self) -> None:
+        """Ask the nodes that are there and have not answered; call it again until none is missing."""
+        now = time.monotonic()
+        for name in self.missing:
+            lister, getter = self._clients[name]
+            if now - self._asked[name] < _PATIENCE:
+                continue
+            if not (lister.service_is_ready() and getter.service_is_ready()):
+                continue
+            self._asked[name] = now
+            lister.call_async(ListParameters.Request()).add_done_callback(partial(self._listed, name))
+
+    def _listed(self, name: str, future: Any) -> None:
+        names = list(future.result().result.names)
+        question = self._clients[name][1].call_async(GetParameters.Request(names=names))
+        question.add_done_callback(partial(self._got, name, names))
+
+    def _got(self, name: str, names: list[str], future: Any) -> None:
+        values = (parameter_value_to_python(value) for value in future.result().values)
+        self.found[name] = dict(zip(names, values, strict=True))
+
+
+def as_yaml(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+    """Parameters as a ROS parameter file.
+
+    Parameters
+    ----------
+    parameters : values by dotted name, by full node name.
+    """
+    tree = {node: {"ros__parameters": _nested(values)} for node, values in sorted(parameters.items())}
+    return str(yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110))
+
+
+def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for name, value in sorted(values.items()):
+        if value is None:
+            continue
+        *groups, leaf = name.split(".")
+        branch = tree
+        for group in groups:
+            branch = branch.setdefault(group, {})
+        branch[leaf] = value if isinstance(value, (bool, int, float, str)) else list(value)
+    return tree
