@@ -62,9 +62,7 @@ def wrench(stamp: int, frame: str, *values: float) -> bytes:
 
 
 def point(stamp: int, frame: str, *values: float) -> bytes:
-    message = STORE.types["geometry_msgs/msg/PointStamped"](
-        header(stamp, frame), vector(*values, kind="Point")
-    )
+    message = STORE.types["geometry_msgs/msg/PointStamped"](header(stamp, frame), vector(*values, kind="Point"))
     return bytes(STORE.serialize_cdr(message, "geometry_msgs/msg/PointStamped"))
 
 
@@ -135,13 +133,9 @@ def test_metadata_yaml_has_every_field_that_rosbag2_writes(tmp_path: Path) -> No
     with Writer(tmp_path / "theirs", version=9, storage_plugin=StoragePlugin.MCAP) as theirs:
         connection = theirs.add_connection("/a", "std_msgs/msg/Bool", typestore=STORE)
         theirs.write(connection, 1, b"\0\1\0\0\1")
-    reference = yaml.safe_load((tmp_path / "theirs" / "metadata.yaml").read_text())[
-        "rosbag2_bagfile_information"
-    ]
+    reference = yaml.safe_load((tmp_path / "theirs" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert information.keys() == reference.keys()
-    assert (
-        topic["topic_metadata"].keys() == reference["topics_with_message_count"][0]["topic_metadata"].keys()
-    )
+    assert topic["topic_metadata"].keys() == reference["topics_with_message_count"][0]["topic_metadata"].keys()
     assert information["files"][0].keys() == reference["files"][0].keys()
     assert topic["topic_metadata"]["offered_qos_profiles"] == [QOS]
     assert information["version"] == 9

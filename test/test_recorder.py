@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +39,7 @@ CONFIG = Path(__file__).parents[1] / "config" / "wam.yaml"
 ROOT = Path(__file__).parents[1]
 
 
-def parameters(
-    directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: str
-) -> Any:
+def parameters(directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: str) -> Any:
     shared = flatten(yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"])
     changed = {"timing.mode": mode, "nodes": list(nodes), "directory": str(directory), "name": "bag", **own}
     return {**shared, **changed}
@@ -61,26 +59,30 @@ def matched(*publishers: Any, count: int = 1) -> Callable[[], bool]:
 
 
 def state(stamp: int, value: float) -> JointState:
-    return JointState(
-        header=header(stamp), name=["motor1", "motor2"], position=[value, -value], effort=[0.0, value]
-    )
+    return JointState(header=header(stamp), name=["motor1", "motor2"], position=[value, -value], effort=[0.0, value])
 
 
 def received(node: RecorderNode, topic: str) -> int:
     return sum(count.received for count in node.recorder.counts() if count.topic == topic)
 
 
-def start_process(ros: Any, directory: Path, **choices: Any) -> subprocess.Popen[str]:
+@contextlib.contextmanager
+def recorder_process(ros: Any, directory: Path, **choices: Any) -> Iterator[subprocess.Popen[str]]:
     file = directory / "recorder.yaml"
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters(directory, **choices)}}))
     command = [sys.executable, "-m", "wam_ros.recorder_node", "--ros-args", "-r", "__ns:=/wam"]
-    return subprocess.Popen(
+    process = subprocess.Popen(
         [*command, "--params-file", str(file)],
         env=ros.environment,
         cwd=ROOT,
         text=True,
         stderr=subprocess.PIPE,
     )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def recovered(file: Path) -> list[Message]:
@@ -104,9 +106,7 @@ def test_every_message_of_every_topic_is_in_the_bag(ros: Any, tmp_path: Path) ->
                     publishers[topic.name].publish(message_type(topic)())
     ros.wait(lambda: received(node, "/wam/motor_states") == 300 and received(node, "/clock") == 60)
     ros.remove(node)
-    expected = {
-        n if n[0] == "/" else f"/wam/{n}": 60 for n in publishers if n not in ("/diagnostics", "status")
-    }
+    expected = {n if n[0] == "/" else f"/wam/{n}": 60 for n in publishers if n not in ("/diagnostics", "status")}
     with AnyReader([tmp_path / "bag"]) as reader:
         counts = {c.topic: c.msgcount for c in reader.connections}
         assert counts | expected | {"/wam/motor_states": 300} == counts
@@ -116,9 +116,7 @@ def test_every_message_of_every_topic_is_in_the_bag(ros: Any, tmp_path: Path) ->
         for connection in reader.connections:
             (offered,) = connection.ext.offered_qos_profiles
             latched = BY_NAME[connection.topic.removeprefix("/wam/")].latched
-            assert offered.durability == (
-                QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE
-            )
+            assert offered.durability == (QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE)
             assert (offered.reliability, offered.depth) == (QosReliability.RELIABLE, 1 if latched else 1000)
         last = 0
         states = [c for c in reader.connections if c.topic == "/wam/motor_states"]
@@ -157,6 +155,16 @@ def test_latched_messages_sent_before_the_recorder_started_are_recorded(ros: Any
     ros.remove(node)
     (message,) = read(tmp_path / "bag").topics["/wam/robot_description"].messages
     assert message.data == "<robot/>"
+
+
+def test_what_has_arrived_when_it_is_stopped_is_recorded(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    for k in range(200):
+        sender.publish(state(k, 0.0))
+    ros.remove(node)
+    assert len(read(tmp_path / "bag").topics["/wam/motor_states"].log_time_ns) == 200
 
 
 def test_bytes_left_behind_by_serialize_message_are_cut(ros: Any, tmp_path: Path) -> None:
@@ -208,7 +216,8 @@ def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any
     )
     ros.add(other)
     ros.wait(lambda: not node.parameters_of_nodes.missing)
-    assert not states, "ready before the topics of gravity were there"
+    node.attend()
+    assert not node.ready, "ready before the topics of gravity were there"
     kept = [publisher(other, topic.name) for topic in TOPICS if "gravity" in topic.publisher]
     ros.wait(lambda: states)
     assert kept
@@ -223,7 +232,7 @@ def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path, stop: signal.Signals) -> None:
     sender = publisher(ros.node("driver"), "motor_states")
-    with start_process(ros, tmp_path) as process:
+    with recorder_process(ros, tmp_path) as process:
         ros.wait(matched(sender), timeout=20.0)
         for k in range(1, 501):
             sender.publish(state(k, 0.0))
@@ -240,7 +249,7 @@ def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path, st
 def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Path) -> None:
     sender = publisher(ros.node("driver"), "motor_states")
     file = tmp_path / "bag" / "bag_0.mcap"
-    with start_process(ros, tmp_path) as process:
+    with recorder_process(ros, tmp_path) as process:
         ros.wait(matched(sender), timeout=20.0)
         sent: list[int] = []
 
@@ -253,7 +262,6 @@ def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Pat
         killed = time.time_ns()
         process.kill()
         process.wait()
-        process.stderr.close()
     found = [m for m in recovered(file) if m.publish_time >= sent[0] - 1_000_000]
     states = [m for m in found if len(m.data) > 60 and m.publish_time <= killed]
     assert len([t for t in sent if t < killed - 1_000_000_000]) >= 100
@@ -292,9 +300,7 @@ def test_an_unnamed_bag_is_named_after_arm_and_time(ros: Any, tmp_path: Path) ->
         ([0, 0], 2, 0, 0),  # a middleware that does not number
     ],
 )
-def test_gaps_in_the_numbering_are_drops(
-    numbers: list[int], received: int, dropped: int, missed: int
-) -> None:
+def test_gaps_in_the_numbering_are_drops(numbers: list[int], received: int, dropped: int, missed: int) -> None:
     numbering = Numbering()
     for number in numbers:
         numbering.add(number)

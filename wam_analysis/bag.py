@@ -3,6 +3,7 @@
 Reads what `wam_ros.bag` and rosbag2 write: MCAP of profile ros2, a directory or a single file.
 """
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -86,12 +87,13 @@ class Bag(NamedTuple):
     metadata: dict[str, dict[str, str]]
 
 
-def read(path: str | Path) -> Bag:
-    """Read a whole bag.
+def read(path: str | Path, topics: Collection[str] | None = None) -> Bag:
+    """Read a bag, the whole of it or some topics.
 
     Parameters
     ----------
     path : bag directory or .mcap file.
+    topics : names of the topics to read, one without a leading '/' in every namespace; None reads all.
 
     Raises
     ------
@@ -107,16 +109,24 @@ def read(path: str | Path) -> Bag:
     for file in files(Path(path)):
         with Opened(file) as reader:
             for channel in channels(reader, file):
+                if not _is_asked(channel.topic, topics):
+                    continue
                 times.setdefault(channel.topic, [])
                 messages.setdefault(channel.topic, [])
                 types[channel.topic] = schemas(reader)[channel.schema_id].name
-            for schema, channel, message in reader.iter_messages():
+            for schema, channel, message in reader.iter_messages(topics=None if topics is None else list(types)):
                 times[channel.topic].append(message.log_time)
                 messages[channel.topic].append(decoders(schema, channel, message.data))
             attachments.update({item.name: item.data for item in reader.iter_attachments()})
             metadata.update({item.name: item.metadata for item in reader.iter_metadata()})
-    topics = {name: _columns(types[name], times[name], messages[name]) for name in messages}
-    return Bag(Path(path), topics, types, attachments, metadata)
+    columns = {name: _columns(types[name], times[name], messages[name]) for name in messages}
+    return Bag(Path(path), columns, types, attachments, metadata)
+
+
+def _is_asked(name: str, topics: Collection[str] | None) -> bool:
+    if topics is None or name in topics:
+        return True
+    return any(name.endswith(f"/{topic}") for topic in topics if not topic.startswith("/"))
 
 
 def _columns(kind: str, times: list[int], messages: list[Any]) -> Columns:
@@ -134,9 +144,7 @@ def _columns(kind: str, times: list[int], messages: list[Any]) -> Columns:
     if kind == _POINT:
         return PointColumns(log_times, stamps, frames, _vectors([m.point for m in messages]))
     names = tuple(dict.fromkeys(name for message in messages for name in message.name))
-    position, velocity, effort = (
-        _by_name(names, messages, field) for field in ("position", "velocity", "effort")
-    )
+    position, velocity, effort = (_by_name(names, messages, field) for field in ("position", "velocity", "effort"))
     return JointColumns(log_times, stamps, frames, names, position, velocity, effort)
 
 

@@ -36,9 +36,7 @@ class Decoders:
         if decode is None:
             decode = self._factory.decoder_for(channel.message_encoding, schema)
             if decode is None:
-                raise BagError(
-                    f"topic {channel.topic} has its schema in '{schema.encoding}'; only ros2msg is read"
-                )
+                raise BagError(f"topic {channel.topic} has its schema in '{schema.encoding}'; only ros2msg is read")
             self._known[key] = decode
         return decode(data)
 
@@ -55,9 +53,7 @@ class Opened:
             reader = make_reader(self._stream)
             profile = reader.get_header().profile
             if profile != "ros2":
-                raise BagError(
-                    f"{self._path} has MCAP profile '{profile}'; only bags of ROS 2 ('ros2') are read"
-                )
+                raise BagError(f"{self._path} has MCAP profile '{profile}'; only bags of ROS 2 ('ros2') are read")
             return reader
         except BaseException as error:
             self._stream.close()

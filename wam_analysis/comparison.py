@@ -12,9 +12,7 @@ from mcap.records import Channel, Message, Schema
 from wam_analysis.bag_file import Decoders, Opened, channels, files
 
 
-def compare(
-    a: str | Path, b: str | Path, log_times: bool = False, without: tuple[str, ...] = ()
-) -> list[str]:
+def compare(a: str | Path, b: str | Path, log_times: bool = False, without: tuple[str, ...] = ()) -> list[str]:
     """Differences of two bags, field by field and bit for bit; NaN equals NaN.
 
     Messages of a topic are compared in the order in which each publisher sent them; padding bytes

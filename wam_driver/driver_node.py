@@ -75,7 +75,8 @@ class DriverNode(Node):
         ):
             self.create_service(kind, f"~/{name}", self._served(answer))
         ports.publish("robot_description", String(data=urdf(shared.arm)))
-        self._announce()
+        if shared.timing.mode == "realtime":  # in lockstep all that is said is said to everybody
+            self._announce()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._watching = self.create_timer(0.02, self._look_for_start, clock=steady)
         self._now = time.perf_counter

@@ -222,9 +222,7 @@ def _make(path: Path) -> None:
             raise RecordingError(
                 f"bag {path} exists already; nothing was written. Give another name or move it away"
             ) from None
-        raise RecordingError(
-            f"{path.parent} is a file; give a directory to make bag {path.name} in"
-        ) from None
+        raise RecordingError(f"{path.parent} is a file; give a directory to make bag {path.name} in") from None
     except NotADirectoryError:
         raise RecordingError(f"a parent of bag {path} is a file; give another directory") from None
     except OSError as error:

@@ -115,6 +115,4 @@ def _share(package: str) -> Path:
         for parent in Path(location).parents:
             if (parent / "share" / package).is_dir():
                 return parent / "share" / package
-    raise DefinitionError(
-        f"package {package} has no message definitions here; install ros-jazzy-common-interfaces"
-    )
+    raise DefinitionError(f"package {package} has no message definitions here; install ros-jazzy-common-interfaces")

@@ -96,9 +96,7 @@ class Recorder:
     qos : what each topic's publishers offer, by full name.
     """
 
-    def __init__(
-        self, bag: BagWriter, topics: Mapping[str, Topic], mode: str, qos: Mapping[str, object]
-    ) -> None:
+    def __init__(self, bag: BagWriter, topics: Mapping[str, Topic], mode: str, qos: Mapping[str, object]) -> None:
         self.failure = ""
         self.lost_at_disk = 0
         self._bag = bag

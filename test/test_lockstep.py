@@ -1,0 +1,196 @@
+"""Lockstep: the same scenario gives the same numbers, bit for bit, wherever and however it runs."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from wam_analysis.bag import Bag, JointColumns, PointColumns, WrenchColumns, read
+from wam_analysis.comparison import compare
+from wam_analysis.direct import DirectRun, Rows
+from wam_control.scenario import load
+from wam_description.arm import Timing
+from wam_description.configuration import Configuration, packaged
+from wam_ros.lockstep import Gate, Need
+
+STEPS = [
+    {"name": "release", "seconds": 0.1, "request": "enable"},
+    {
+        "name": "move and be pushed",
+        "seconds": 0.5,
+        "posture": [0.1, -0.7, 0.05, 0.4],
+        "push": {"cover": "outer_link", "place": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.1, "end": 0.4},
+    },
+    {"name": "press on nothing", "seconds": 0.1, "force": {"frame": "outer_link", "newtons": [0.0, -3.0, 0.0]}},
+    {"name": "brake", "seconds": 0.1, "request": "disable"},
+]
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Path:
+    path = tmp_path / "script.yaml"
+    path.write_text(yaml.safe_dump({"steps": STEPS}))
+    return path
+
+
+def configuration(script: Path, directory: Path, name: str, **values: object) -> Configuration:
+    base = Configuration.load(packaged("wam"))
+    return base.with_values(
+        {
+            "nodes": [*base.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.timeout": 60.0,
+            "scenario:script": str(script),
+            "recorder:directory": str(directory),
+            "recorder:name": name,
+            **values,
+        }
+    )
+
+
+def record_composed(configured: Configuration, domain_id: int) -> None:
+    from wam_ros.bring_up import Composition
+
+    with Composition(configured, domain_id=domain_id) as composition:
+        scenario = composition.nodes["scenario"]
+        composition.spin(lambda: scenario.done)  # type: ignore[attr-defined]
+        assert scenario.failure == ""  # type: ignore[attr-defined]
+
+
+def record_in_processes(configured: Configuration) -> None:
+    from wam_ros.bring_up import Processes
+
+    with Processes(configured) as processes:
+        assert processes.wait(bool) == {"scenario": 0}
+
+
+def play_directly(configured: Configuration, script: Path) -> DirectRun:
+    run = DirectRun(configured, load(script, configured.shared.arm))
+    assert run.play() == ""
+    return run
+
+
+def differences(rows: Rows, bag: Bag) -> list[str]:
+    """Topics of a direct run whose numbers are not those of the bag, bit for bit."""
+    found = []
+    for topic, said in rows.items():
+        columns = bag.topics[f"/wam/{topic}"]
+        if isinstance(columns, JointColumns):
+            numbers = np.hstack([columns.position, columns.velocity, columns.effort])
+        elif isinstance(columns, WrenchColumns):
+            numbers = np.hstack([columns.force, columns.torque])
+        else:
+            assert isinstance(columns, PointColumns)
+            numbers = columns.point
+        here = np.array([row.values for row in said])
+        if here.shape != numbers.shape or here.tobytes() != np.ascontiguousarray(numbers).tobytes():
+            found.append(f"{topic}: {here.shape} and {numbers.shape}")
+        if [row.stamp for row in said] != columns.stamp_ns.tolist():
+            found.append(f"{topic}: stamps")
+        if said[0].frame and [row.frame for row in said] != list(columns.frames):
+            found.append(f"{topic}: frames")
+    return found
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_lockstep_over_topics_equals_the_loop_without_ros(
+    delay: int, script: Path, tmp_path: Path, domain_id: int
+) -> None:
+    configured = configuration(script, tmp_path, "composed", **{"timing.outer_delay": delay})
+    record_composed(configured, domain_id)
+    run = play_directly(configured, script)
+    bag = read(tmp_path / "composed")
+    assert len(run.rows) == 22
+    assert len(run.rows["motor_states"]) == 801
+    assert differences(run.rows, bag) == []
+
+
+def test_one_period_of_delay_changes_the_numbers(script: Path, tmp_path: Path) -> None:
+    """The comparison above would notice an outer command that is used a period too late."""
+    runs = [
+        play_directly(configuration(script, tmp_path, "none", **{"timing.outer_delay": delay}), script)
+        for delay in (0, 1)
+    ]
+    assert runs[0].rows["motor_states"] != runs[1].rows["motor_states"]
+
+
+def test_processes_under_load_say_what_one_process_says(script: Path, tmp_path: Path, domain_id: int) -> None:
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    try:
+        record_in_processes(configuration(script, tmp_path, "loaded"))
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    record_in_processes(configuration(script, tmp_path, "quiet"))
+    record_composed(configuration(script, tmp_path, "composed"), domain_id)
+    assert compare(tmp_path / "loaded", tmp_path / "quiet") == []
+    assert compare(tmp_path / "quiet", tmp_path / "composed") == []
+    bag = read(tmp_path / "loaded")
+    assert "/wam/status" in bag.topics
+    assert len(bag.topics["/wam/motor_states"].log_time_ns) == 801
+
+
+def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys, json, hashlib\n"
+        "from pathlib import Path\n"
+        "from wam_analysis.direct import DirectRun\n"
+        "from wam_control.scenario import load\n"
+        "from wam_description.configuration import Configuration, packaged\n"
+        "c = Configuration.load(packaged('wam'))\n"
+        "run = DirectRun(c, load(Path(sys.argv[1]), c.shared.arm))\n"
+        "run.play()\n"
+        "print(json.dumps({t: hashlib.sha256(repr(r).encode()).hexdigest() for t, r in run.rows.items()}))\n"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": "1"}
+    outputs = []
+    for seed in ("1", "2"):
+        environment["PYTHONHASHSEED"] = seed
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(script)], capture_output=True, text=True, check=True, env=environment
+        )
+        outputs.append(json.loads(done.stdout))
+    assert outputs[0] == outputs[1]
+
+
+TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0)
+
+
+def test_gate_waits_for_the_command_that_belongs_to_the_state() -> None:
+    gate = Gate(TIMING, "state", {"command": Need(outer=True, delay=1)})
+    ms = 1_000_000
+    assert list(gate.put("state", 1 * ms, "s1")) == [(1 * ms, {"state": "s1", "command": None})]
+    assert list(gate.put("state", 2 * ms, "s2")) == []
+    assert gate.missing(2 * ms) == ["command"]
+    assert list(gate.put("command", 1 * ms, "c1")) == [(2 * ms, {"state": "s2", "command": "c1"})]
+    assert list(gate.put("command", 6 * ms, "c6")) == []
+    assert list(gate.put("state", 6 * ms, "s6")) == [(6 * ms, {"state": "s6", "command": "c1"})]
+    assert list(gate.put("state", 7 * ms, "s7")) == [(7 * ms, {"state": "s7", "command": "c6"})]
+
+
+def test_gate_in_realtime_takes_the_newest_and_never_waits() -> None:
+    gate = Gate(TIMING.__class__(**{**vars(TIMING), "mode": "realtime"}), "state", {"command": Need(outer=True)})
+    assert list(gate.put("state", 1_000_000, "s1")) == [(1_000_000, {"state": "s1", "command": None})]
+    list(gate.put("command", 1_000_000, "old"))
+    list(gate.put("command", 6_000_000, "new"))
+    assert list(gate.put("state", 9_000_000, "s9")) == [(9_000_000, {"state": "s9", "command": "new"})]
+
+
+def test_gate_ignores_a_state_that_comes_twice() -> None:
+    gate = Gate(TIMING, "state", {})
+    assert len(list(gate.put("state", 1_000_000, "a"))) == 1
+    assert list(gate.put("state", 1_000_000, "b")) == []
+
+
+def test_stamps_of_outer_periods() -> None:
+    ms = 1_000_000
+    assert [TIMING.outer_stamp(k * ms) // ms for k in (1, 2, 5, 6, 10, 11)] == [1, 1, 1, 6, 6, 11]
+    assert [k for k in range(1, 12) if TIMING.is_outer(k * ms)] == [1, 6, 11]
+    assert math.isclose(TIMING.outer_period_ns, 5e6)
