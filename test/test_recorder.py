@@ -17,6 +17,7 @@ import yaml
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
@@ -155,6 +156,18 @@ def test_latched_messages_sent_before_the_recorder_started_are_recorded(ros: Any
     ros.remove(node)
     (message,) = read(tmp_path / "bag").topics["/wam/robot_description"].messages
     assert message.data == "<robot/>"
+
+
+def test_it_records_on_the_single_threaded_executor_too(ros: Any, tmp_path: Path) -> None:
+    ros.executor.shutdown()
+    ros.executor = SingleThreadedExecutor(context=ros.context)
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    for k in range(20):
+        sender.publish(state(k, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 20)
+    assert {c.dropped for c in node.recorder.counts()} == {0}
 
 
 def test_what_has_arrived_when_it_is_stopped_is_recorded(ros: Any, tmp_path: Path) -> None:

@@ -1,0 +1,152 @@
+"""Cables as springs and as power lines: stiffness, slack, tension, loss and creep (4.1, chapter 6).
+
+A circuit has two strands under a pretension T0; torque makes one tighter and the other looser.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def stage_compliance(ea: ArrayLike, length: ArrayLike, radius: ArrayLike, circuits: ArrayLike, ratio: ArrayLike) -> Array:
+    """Compliance of one pretensioned stage, seen at the motor, rad/(N m).
+
+    1/k = L/(2 EA r^2 c) / n^2: both strands carry, k_tr at the stage's own shaft is 2 (EA/L) r^2 for
+    each of c parallel circuits, and the motor turns n times for one turn of that shaft (section 4.3.2).
+
+    Parameters
+    ----------
+    ea : E A of one cable, N.
+    length : free length of a strand, m; zero for a stage that does not give.
+    radius : of the stage's driving pulley, m.
+    circuits : parallel circuits.
+    ratio : motor turns per turn of the driving pulley.
+    """
+    ea, length, radius, circuits, ratio = _positive(
+        ea=(ea, False), length=(length, True), radius=(radius, False), circuits=(circuits, False), ratio=(ratio, False)
+    )
+    return length / (2.0 * ea * radius**2 * circuits * ratio**2)
+
+
+def stiffness_with_reducer(ea: ArrayLike, length: ArrayLike, ratio: ArrayLike, distance: ArrayLike) -> Array:
+    """Stiffness seen at the joint of a line of constant stress with its reducer part of the way, (4.1).
+
+    k_eff = N^2 EA/(N L + C (1 - N)), per squared length unit of the pulley's radius; greatest for
+    C = L, the reducer at the joint.
+
+    Parameters
+    ----------
+    ea : E A of the part between motor and reducer, N.
+    length : L, m.
+    ratio : N.
+    distance : C, of the reducer from the motor, m, 0 to L.
+    """
+    ea, length, ratio, distance = _positive(
+        ea=(ea, False), length=(length, False), ratio=(ratio, False), distance=(distance, True)
+    )
+    if np.any(distance > length):
+        raise ValueError(f"distance is {distance.tolist()!r} m; it must not be above length, {length.tolist()!r} m")
+    return ratio**2 * ea / (ratio * length + distance * (1.0 - ratio))
+
+
+def circuit_torque(stretch: ArrayLike, stiffness: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> Array:
+    """Torque of a circuit at its motor, N m, with the loose strand going slack.
+
+    Each strand is a spring of k/2 that cannot push, stretched by x0 = T0 r/(k/2) beforehand: the
+    torque is k x up to |x| = x0 and (k/2)(|x| + x0) beyond.
+
+    Parameters
+    ----------
+    stretch : theta_m minus the angle that belongs to the joints, rad.
+    stiffness : k, both strands, N m/rad.
+    pretension : T0, N.
+    radius : of the pinion, m.
+    """
+    x = np.asarray(stretch, dtype=float)
+    stiffness, pretension, radius = _positive(
+        stiffness=(stiffness, False), pretension=(pretension, True), radius=(radius, False)
+    )
+    half = stiffness / 2.0
+    offset = slack_stretch(stiffness, pretension, radius)
+    return half * (np.maximum(x + offset, 0.0) - np.maximum(offset - x, 0.0))
+
+
+def slack_stretch(stiffness: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> Array:
+    """Stretch at which the loose strand goes slack, x0 = 2 T0 r/k, rad; arguments as in `circuit_torque`."""
+    stiffness, pretension, radius = _positive(
+        stiffness=(stiffness, False), pretension=(pretension, True), radius=(radius, False)
+    )
+    return 2.0 * pretension * radius / stiffness
+
+
+def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tuple[Array, Array]:
+    """Tension of the tight and of the loose strand, N, under a torque at the pinion, N m.
+
+    T0 +- tau/(2 r), and tau/r and zero once the loose strand is slack (section 6.5: no strand goes
+    slack where T0 is half of the full-torque tension).
+    """
+    pretension, radius = _positive(pretension=(pretension, True), radius=(radius, False))
+    difference = np.abs(np.asarray(torque, dtype=float)) / radius
+    slack = difference > 2.0 * pretension
+    return (
+        np.where(slack, difference, pretension + difference / 2.0),
+        np.where(slack, 0.0, pretension - difference / 2.0),
+    )
+
+
+def stage_loss(torque: ArrayLike, radius: ArrayLike, ea: ArrayLike, circuits: ArrayLike, ratio: ArrayLike) -> Array:
+    """Share of the speed, and of the power, that a stage loses, (T2 - T1)/EA of (6.4) and (6.14).
+
+    Parameters
+    ----------
+    torque : at the motor, N m; the stage's own driving shaft carries `ratio` times as much.
+    radius, ea, circuits, ratio : of the stage as in `stage_compliance`.
+    """
+    radius, ea, circuits, ratio = _positive(
+        radius=(radius, False), ea=(ea, False), circuits=(circuits, False), ratio=(ratio, False)
+    )
+    return np.abs(np.asarray(torque, dtype=float)) * ratio / (radius * ea * circuits)
+
+
+def efficiency(losses: ArrayLike) -> float:
+    """Upper bound of the efficiency of stages in series, the product of 1 - loss, (6.15).
+
+    Parameters
+    ----------
+    losses : (stages,), `stage_loss` of each.
+    """
+    loss = np.asarray(losses, dtype=float)
+    if np.any(loss < 0.0) or np.any(loss >= 1.0):
+        raise ValueError(f"losses are {loss.tolist()!r}; each must be at least 0 and below 1")
+    return float(np.prod(1.0 - loss))
+
+
+def creep(travel: ArrayLike, torque: ArrayLike, radius: ArrayLike, ea: ArrayLike) -> Array:
+    """Angle that the driven pulley gives way to the torque on it, at the motor, rad, (6.19) corrected.
+
+    The integral of (T2 - T1)/EA over the absolute travel of the driving pulley: going out and back
+    under the same torque adds up.
+
+    Parameters
+    ----------
+    travel : absolute travel of the driving pulley, rad.
+    torque : of the load on it, N m, with its sign.
+    radius : of the driving pulley, m.
+    ea : E A, N.
+    """
+    travel, radius, ea = _positive(travel=(travel, True), radius=(radius, False), ea=(ea, False))
+    return travel * np.asarray(torque, dtype=float) / (radius * ea)
+
+
+def _positive(**arguments: tuple[ArrayLike, bool]) -> tuple[Array, ...]:
+    """Arguments as arrays; each above zero, or at least zero where so marked."""
+    arrays = []
+    for name, (value, zero_allowed) in arguments.items():
+        array = np.asarray(value, dtype=float)
+        allowed = np.all(array >= 0.0) if zero_allowed else np.all(array > 0.0)
+        if not (allowed and np.all(np.isfinite(array))):
+            bound = "at least" if zero_allowed else "above"
+            raise ValueError(f"{name} is {value!r}; it must be {bound} zero")
+        arrays.append(array)
+    return tuple(arrays)
