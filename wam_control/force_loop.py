@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
-from wam_description.parameters import parameter, require
+from wam_description.parameters import lengths, parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, State
 
@@ -33,7 +33,9 @@ class ForceLoopParameters:
         choices=("hybrid", "joint_torque", "open_loop"),
         live=True,
     )
-    feedback: str = parameter("where F_c comes from", choices=("joint_sensors", "contact_estimate"), live=True)
+    feedback: str = parameter(
+        "where F_c comes from", choices=("joint_sensors", "contact_estimate", "joint_position"), live=True
+    )
     force_gain: float = parameter("G_I, velocity per force error", "m/s/N", low=0.0, live=True)
     force_error_limit: float = parameter("saturation of F_error", "N", low=0.0, live=True)
     torque_gain: float = parameter("G_I of the joint_torque mode", "rad/s/(N m)", low=0.0, live=True)
@@ -41,6 +43,10 @@ class ForceLoopParameters:
     posture_gain: float = parameter("joint velocity per posture error", "1/s", low=0.0, live=True)
     posture_speed_limit: float = parameter("largest joint speed that the posture asks for", "rad/s", low=0.0, live=True)
     force_filter: float = parameter("time constant of the low pass on the measured force", "s", low=0.0, live=True)
+    spring_stiffness: tuple[float, ...] = parameter(
+        "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", low=0.0, live=True
+    )
+    spring_rest: tuple[float, ...] = parameter("joint angle at which that spring is not pressed", "rad", live=True)
     contact_cover: str = parameter("cover that is taken to touch while no contact is felt", live=True)
     contact_place: float = parameter("place on it", "m", live=True)
 
@@ -92,9 +98,11 @@ class ForceLoop:
             f"contact_cover is '{parameters.contact_cover}'; allowed: {', '.join(covers)}",
         )
         require(
-            parameters.feedback != "joint_sensors" or self._arm.joint_sensors,
-            "feedback is 'joint_sensors' but arm.joint_sensors is false; use 'contact_estimate'",
+            parameters.feedback == "contact_estimate" or self._arm.joint_sensors,
+            f"feedback is '{parameters.feedback}' but arm.joint_sensors is false; use 'contact_estimate'",
         )
+        springs = {"spring_stiffness": parameters.spring_stiffness, "spring_rest": parameters.spring_rest}
+        lengths("force_loop", self._arm.joints.names, springs)
         self.parameters = parameters
 
     def tare(self) -> None:
@@ -155,11 +163,18 @@ class ForceLoop:
         )
 
     def _external_torque(self, sensors: State | None, estimated: Sequence[float] | None) -> Array:
-        """Torque of the world on the joints: estimated, or at rest what carries the links and is not strain."""
-        if self.parameters.feedback == "contact_estimate":
+        """Torque of the world on the joints, by the feedback that is chosen.
+
+        joint_sensors: at rest, what carries the links and is not strain.  joint_position: the
+        deflection of a known spring, as in section 5.6.
+        """
+        parameters = self.parameters
+        if parameters.feedback == "contact_estimate":
             return np.zeros(self._n) if estimated is None else np.array(estimated)
         if sensors is None:
             return np.zeros(self._n)
+        if parameters.feedback == "joint_position":
+            return np.array(parameters.spring_stiffness) * (np.array(parameters.spring_rest) - sensors.position)
         return self._body.gravity_torque(sensors.position) - np.array(sensors.effort)
 
     def _direction(self, q: Sequence[float], command: ForceCommand | None) -> tuple[Array | None, Array, float]:

@@ -6,15 +6,8 @@ arrays are flattened row by row because ROS parameters know no others.
 
 from dataclasses import dataclass
 
-from wam_description.parameters import parameter, require
-
-
-def _lengths(group: str, names: tuple[str, ...], arrays: dict[str, tuple[object, ...]], width: int = 1) -> None:
-    for name, array in arrays.items():
-        require(
-            len(array) == width * len(names),
-            f"parameter '{group}.{name}' has {len(array)} values; {len(names)} names need {width * len(names)}",
-        )
+from wam_description.cables import Cables, Circuit, circuits
+from wam_description.parameters import lengths, parameter, require
 
 
 def _distinct(group: str, names: tuple[str, ...]) -> None:
@@ -37,21 +30,13 @@ class Motors:
 
     def __post_init__(self) -> None:
         _distinct("arm.motors", self.names)
-        _lengths("arm.motors", self.names, {k: v for k, v in vars(self).items() if k != "names"})
+        lengths("arm.motors", self.names, {k: v for k, v in vars(self).items() if k != "names"})
         _friction("arm.motors", self.names, self.static_friction, self.dynamic_friction)
         for name, peak, continuous in zip(self.names, self.peak_torque, self.continuous_torque, strict=True):
             require(
                 continuous <= peak,
                 f"{name}: arm.motors.continuous_torque {continuous:g} N m is above peak_torque {peak:g} N m",
             )
-
-
-@dataclass(frozen=True)
-class Cables:
-    """The elastic cable circuit of each motor, seen at the motor shaft."""
-
-    stiffness: tuple[float, ...] = parameter("k_tr, both strands, motor side", "N m/rad", low=1e-6)
-    damping: tuple[float, ...] = parameter("material damping of the circuit, motor side", "N m s/rad", low=0.0)
 
 
 @dataclass(frozen=True)
@@ -73,7 +58,7 @@ class Joints:
 
     def __post_init__(self) -> None:
         _distinct("arm.joints", self.names)
-        _lengths("arm.joints", self.names, {k: v for k, v in vars(self).items() if k != "names"})
+        lengths("arm.joints", self.names, {k: v for k, v in vars(self).items() if k != "names"})
         _friction("arm.joints", self.names, self.static_friction, self.dynamic_friction)
         for name, low, start, high in zip(self.names, self.lower, self.start, self.upper, strict=True):
             require(low < high, f"{name}: arm.joints.lower {low:g} rad is not below upper {high:g} rad")
@@ -99,8 +84,8 @@ class Links:
 
     def __post_init__(self) -> None:
         _distinct("arm.links", self.names)
-        _lengths("arm.links", self.names, {"mass": self.mass})
-        _lengths("arm.links", self.names, {"centre": self.centre, "inertia": self.inertia}, width=3)
+        lengths("arm.links", self.names, {"mass": self.mass})
+        lengths("arm.links", self.names, {"centre": self.centre, "inertia": self.inertia}, width=3)
 
 
 @dataclass(frozen=True)
@@ -123,9 +108,9 @@ class Covers:
 
     def __post_init__(self) -> None:
         _distinct("arm.covers", self.names)
-        _lengths("arm.covers", self.names, {"links": self.links, "length": self.length, "radius": self.radius})
+        lengths("arm.covers", self.names, {"links": self.links, "length": self.length, "radius": self.radius})
         spatial = {key: getattr(self, key) for key in ("origin", "rotation", "start", "end")}
-        _lengths("arm.covers", self.names, spatial, width=3)
+        lengths("arm.covers", self.names, spatial, width=3)
 
 
 @dataclass(frozen=True)
@@ -154,11 +139,18 @@ class Arm:
             len(self.links.names) == joints,
             f"parameter 'arm.links.names' has {len(self.links.names)} links; {joints} joints need {joints}",
         )
-        _lengths("arm.cables", self.motors.names, vars(self.cables))
+        for key in ("pretension", "breaking_strength", "damping", "reducer"):
+            lengths("arm.cables", self.motors.names, {key: getattr(self.cables, key)})
+        self.circuits  # noqa: B018 - refuses stages that make no circuit
         for name, vector in (("tool", self.tool), ("gravity", self.gravity)):
             require(len(vector) == 3, f"parameter 'arm.{name}' has {len(vector)} values; it needs x y z")
         for link in self.covers.links:
             require(link in self.links.names, f"arm.covers.links names '{link}'; links: {', '.join(self.links.names)}")
+
+    @property
+    def circuits(self) -> tuple[Circuit, ...]:
+        """The cable circuit of each motor, its stages in series."""
+        return circuits(self.motors.names, self.joint_from_motor, self.cables)
 
 
 @dataclass(frozen=True)

@@ -7,55 +7,29 @@ that its spring is the transmission stiffness k_tr on the motor side.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.parameters import parameter, require
+from wam_description.effects import Effects, Ripples
+from wam_description.world import SHAPES, Obstacles, Springs, World
 
+NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, where slack is switched off
+FAR = 1e6  # rad or m, farther than any tendon gets
+NEVER_YIELDS = 1e9  # a yield torque, which only makes room for the creep in MuJoCo's state
 ROTOR_MASS = 1e-3  # kg; a rotor turns about its centre, so that its mass moves nothing
-SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
 
 
-@dataclass(frozen=True)
-class Obstacles:
-    """Surfaces that the covers can touch, fixed in the base frame."""
-
-    names: tuple[str, ...] = parameter("names of the obstacles")
-    shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(SHAPES))
-    positions: tuple[float, ...] = parameter("centre in the base frame, x y z of each", "m")
-    rotations: tuple[float, ...] = parameter("turn from the base frame, roll pitch yaw of each", "rad")
-    sizes: tuple[float, ...] = parameter(
-        "three numbers each: box half lengths; cylinder radius, half length, 0; plane half lengths, 0", "m", low=0.0
-    )
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
-    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0)
-
-    def __post_init__(self) -> None:
-        for key in ("shapes", "stiffness", "damping", "friction"):
-            self._length(key, 1)
-        for key in ("positions", "rotations", "sizes"):
-            self._length(key, 3)
-
-    def _length(self, key: str, width: int) -> None:
-        expected, found = width * len(self.names), len(getattr(self, key))
-        require(
-            expected == found,
-            f"parameter 'obstacles.{key}' has {found} values; {len(self.names)} obstacles need {expected}",
-        )
-
-
-def mjcf(arm: Arm, step: float, obstacles: Obstacles) -> str:
-    """MJCF of the arm among obstacles.
+def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
+    """MJCF of the arm in its world.
 
     Parameters
     ----------
     arm : the arm.
     step : simulation step, s.
-    obstacles : the environment, each paired with every cover and with nothing else.
+    world : obstacles, each paired with every cover and with nothing else, and springs at joints.
+    effects : slack, torque ripple of motors and pulleys.
 
     Returns
     -------
@@ -66,13 +40,16 @@ def mjcf(arm: Arm, step: float, obstacles: Obstacles) -> str:
     root = ElementTree.Element("mujoco", model=arm.name)
     _add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", eulerseq="XYZ")
     _add_solver(root, arm, step)
-    world = _add(root, "worldbody")
-    _add_rotors(world, arm)
-    _add_links(world, arm)
-    for i, name in enumerate(obstacles.names):
-        _add_obstacle(world, obstacles, i, name)
-    _add_pairs(root, arm, obstacles)
-    _add_cables(root, arm)
+    bodies = _add(root, "worldbody")
+    _add_rotors(bodies, arm)
+    _add_links(bodies, arm)
+    for i, name in enumerate(world.obstacles.names):
+        _add_obstacle(bodies, world.obstacles, i, name)
+    _add_pairs(root, arm, world.obstacles)
+    tendons = _add(root, "tendon")
+    _add_cables(tendons, arm, effects.slack)
+    _add_springs(tendons, world.springs)
+    _add_actuators(root, arm, effects.ripples)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode")
 
@@ -229,21 +206,60 @@ def _add_pairs(root: ElementTree.Element, arm: Arm, obstacles: Obstacles) -> Non
             )
 
 
-def _add_cables(root: ElementTree.Element, arm: Arm) -> None:
-    tendon, actuator = _add(root, "tendon"), _add(root, "actuator")
+def _add_cables(tendons: ElementTree.Element, arm: Arm, slack: bool) -> None:
+    """Two strands per circuit, each half the stiffness, stretched beforehand, unable to push."""
     size = len(arm.motors.names)
     motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(size, size))
-    for i, motor in enumerate(arm.motors.names):
-        circuit = _add(
-            tendon,
+    for i, (motor, circuit) in enumerate(zip(arm.motors.names, arm.circuits, strict=True)):
+        stretch = circuit.slack_stretch if slack else NEVER_SLACK
+        for strand, springlength in (("tight", (-FAR, -stretch)), ("loose", (stretch, FAR))):
+            tendon = _add(
+                tendons,
+                "fixed",
+                name=f"{motor}_{strand}",
+                stiffness=repr(circuit.stiffness / 2.0),
+                damping=repr(circuit.damping / 2.0),
+                springlength=_numbers(springlength),
+                springyield=repr(NEVER_YIELDS),
+            )
+            _add(tendon, "joint", joint=motor, coef="1")
+            for joint, ratio in zip(arm.joints.names, motor_from_joint[i], strict=True):
+                if abs(ratio) > 1e-12:
+                    _add(tendon, "joint", joint=joint, coef=repr(-float(ratio)))
+
+
+def _add_springs(tendons: ElementTree.Element, springs: Springs) -> None:
+    for i, joint in enumerate(springs.joints):
+        if springs.stiffness[i] == 0.0:
+            continue
+        lever = springs.lever[i]
+        rest = lever * springs.rest[i]
+        tendon = _add(
+            tendons,
             "fixed",
-            name=motor,
-            stiffness=repr(arm.cables.stiffness[i]),
-            damping=repr(arm.cables.damping[i]),
-            springlength="0",
+            name=f"{joint}_spring",
+            stiffness=repr(springs.stiffness[i]),
+            springlength=_numbers((rest, rest) if springs.bilateral[i] else (rest, FAR)),
         )
-        _add(circuit, "joint", joint=motor, coef="1")
-        for joint, ratio in zip(arm.joints.names, motor_from_joint[i], strict=True):
-            if abs(ratio) > 1e-12:
-                _add(circuit, "joint", joint=joint, coef=repr(-float(ratio)))
+        _add(tendon, "joint", joint=joint, coef=repr(lever))
+
+
+def _add_actuators(root: ElementTree.Element, arm: Arm, ripples: Ripples) -> None:
+    actuator = _add(root, "actuator")
+    for motor in arm.motors.names:
         _add(actuator, "motor", name=motor, joint=motor)
+    for i, shaft in enumerate(ripples.shafts):
+        if ripples.amplitude[i] == 0.0:
+            continue
+        _add(
+            actuator,
+            "dcmotor",
+            name=f"ripple{i}",
+            joint=shaft,
+            input="none",
+            gear=repr(ripples.ratio[i]),
+            # MuJoCo asks for a winding; without input no current flows through it
+            resistance="1",
+            motorconst="0",
+            cogging=_numbers((ripples.amplitude[i], ripples.cycles[i], ripples.phase[i])),
+        )

@@ -172,6 +172,22 @@ def require(condition: bool, message: str) -> None:
         raise ParameterError(message)
 
 
+def lengths(group: str, names: tuple[str, ...], arrays: Mapping[str, tuple[Any, ...]], width: int = 1) -> None:
+    """Refuse arrays that do not have `width` values for each of the names.
+
+    Parameters
+    ----------
+    group : dotted name of the parameter class, for the message.
+    names : what the arrays run over.
+    arrays : arrays by the name of their field.
+    """
+    for name, array in arrays.items():
+        require(
+            len(array) == width * len(names),
+            f"parameter '{group}.{name}' has {len(array)} values; {len(names)} names need {width * len(names)}",
+        )
+
+
 @dataclasses.dataclass(frozen=True)
 class Nothing:
     """The parameters of a node that has none of its own."""

@@ -2,18 +2,23 @@
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from wam_description.arm import Shared
-from wam_description.mjcf import Obstacles
-from wam_description.parameters import parameter
+from wam_description.effects import Effects
+from wam_description.parameters import lengths, parameter
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State
 from wam_description.transmission_map import TransmissionMap
-from wam_driver.amplifier import Amplifier
+from wam_description.world import World
+from wam_driver.amplifier import Amplifier, AmplifierParameters
 from wam_driver.plant import Plant
 from wam_driver.safety import Answer, Mode, Safety
+from wam_driver.sensors import SensorParameters, Sensors
 
 WARNING = 0.9  # of a limit
 
@@ -22,9 +27,12 @@ WARNING = 0.9  # of a limit
 class DriverParameters:
     """The simulated hardware and its limits."""
 
-    obstacles: Obstacles
+    world: World
+    effects: Effects
+    amplifier: AmplifierParameters
+    sensors: SensorParameters
+    seed: int = parameter("of all noise", low=0)
     watchdog: float = parameter("age of the last command at which the driver stops", "s", low=0.002, high=0.05)
-    thermal_time: float = parameter("time constant of the motors' windings", "s", low=0.1)
     elbow_speed_limit: float = parameter("speed of the last joint's origin that faults the driver", "m/s", low=0.0)
     tip_speed_limit: float = parameter("speed of the tool that faults the driver", "m/s", low=0.0)
     post_mortem_samples: int = parameter("samples kept for the time before a fault", low=1, high=100_000)
@@ -45,13 +53,23 @@ class Driver:
     """Steps the plant with the last good command, as long as it is safe to do so.
 
     Time is counted in periods from 1; `stamp` is the time of the present state in nanoseconds.
+
+    Attributes
+    ----------
+    motor_state : angle, velocity and torque of each motor, as measured.
+    joint_sensors : joint-side encoder and strain torque, where they are mounted.
+    currents : what flows, A, (n,).
     """
 
     def __init__(self, shared: Shared, parameters: DriverParameters) -> None:
         arm, timing = shared.arm, shared.timing
         self.safety = Safety()
-        self.plant = Plant(arm, parameters.obstacles, timing.substep)
-        self.amplifier = Amplifier(arm.motors, parameters.thermal_time)
+        lengths("effects", arm.motors.names, {"tension_friction": parameters.effects.tension_friction})
+        lengths("effects", arm.joints.names, {"rubbing_friction": parameters.effects.rubbing_friction})
+        random = np.random.Generator(np.random.PCG64(parameters.seed))
+        self.plant = Plant(arm, parameters.world, parameters.effects, timing.substep)
+        self.amplifier = Amplifier(arm.motors, parameters.amplifier, random)
+        self._sensors = Sensors(arm, parameters.sensors, random)
         self.recent: deque[Sample] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str] = []
         self._arm, self._timing, self._parameters = arm, timing, parameters
@@ -60,6 +78,7 @@ class Driver:
         self._zero = [0.0] * len(arm.motors.names)
         self._tick = 1
         self._release()
+        self._measure()
 
     def _release(self) -> None:
         """Discard every command; nothing flows until a new one comes."""
@@ -101,10 +120,11 @@ class Driver:
                 enabled = False
         self.plant.brake(not enabled)
         self.currents = self.amplifier.step(self._command if enabled else self._zero, self._timing.period)
-        torque = self.amplifier.torque(self.currents)
+        torque = self.amplifier.torque(self.currents, self.plant.theta)
         for _ in range(self._timing.substeps):
             self.plant.step(torque)
         self._tick += 1
+        self._measure()
         self.recent.append(Sample(self.stamp, self.plant.theta, self.plant.thetad, self._command, self.currents))
         if enabled and self.is_outer:
             self._watch_limits()
@@ -117,6 +137,12 @@ class Driver:
         checks = [
             ("speed of the elbow", math.hypot(*elbow), self._parameters.elbow_speed_limit, "m/s"),
             ("speed of the tip", math.hypot(*tip), self._parameters.tip_speed_limit, "m/s"),
+        ]
+        checks += [
+            (f"cable tension of {name}", tight, circuit.breaking_strength, "N")
+            for name, (tight, _), circuit in zip(
+                self._arm.motors.names, self.plant.tensions, self._arm.circuits, strict=True
+            )
         ]
         checks += [
             (f"speed of {name}", abs(speed), limit, "rad/s")
@@ -134,7 +160,7 @@ class Driver:
         ]
         for what, value, limit, unit in checks:
             if value > limit:
-                self._trip(f"{what} {value:.2f} {unit} is above its limit {limit:g}; command slower motions")
+                self._trip(f"{what} {value:.2f} {unit} is above its limit {limit:g}; command less")
                 return
 
     def _trip(self, reason: str) -> None:
@@ -144,6 +170,11 @@ class Driver:
     def fault(self, reason: str) -> None:
         """Stop for a reason seen outside the machine; brakes on, latched."""
         self._trip(reason)
+
+    def rub(self, friction: Sequence[float]) -> None:
+        """Let something rub on the joints, extra dry friction (n,), N m, like the Teflon rod of section 5.6."""
+        lengths("effects", self._arm.joints.names, {"rubbing_friction": tuple(friction)})
+        self.plant.rub(friction)
 
     def enable(self, obstacle: str) -> Answer:
         """Release the brakes; every command received before is discarded."""
@@ -173,15 +204,12 @@ class Driver:
         self.amplifier.reset()
         return Answer(True, f"{self.safety.mode.value}: arm back at its start pose")
 
-    @property
-    def motor_state(self) -> State:
-        """Angle, velocity and torque of each motor."""
-        return State(self.plant.theta, self.plant.thetad, self.amplifier.torque(self.currents))
-
-    @property
-    def joint_sensors(self) -> State:
-        """Joint-side encoder and strain torque."""
-        return State(self.plant.q, self.plant.qd, self.plant.strain_torque)
+    def _measure(self) -> None:
+        plant, period = self.plant, self._timing.period
+        torque = self.amplifier.nominal_torque(self.currents)
+        self.motor_state = self._sensors.motors(plant.theta, plant.thetad, torque, period)
+        if self._arm.joint_sensors:
+            self.joint_sensors = self._sensors.joints(plant.q, plant.qd, plant.strain_torque, period)
 
     @property
     def true_joint_state(self) -> State:

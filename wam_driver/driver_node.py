@@ -31,7 +31,7 @@ from wam_ros.messages import (
     stamp_of,
     wrench_stamped,
 )
-from wam_ros.parameters import declare
+from wam_ros.parameters import declare, follow
 from wam_ros.ports import ERROR, OK, WARN, Ports
 from wam_ros.run import raise_priority, run
 
@@ -50,6 +50,7 @@ class DriverNode(Node):
         super().__init__("driver", **ros)
         shared, own = declare(self, PARAMETERS)
         self.driver = Driver(shared, own)
+        follow(self, own, lambda new: self.driver.rub(new.effects.rubbing_friction))
         self._ports = ports = Ports(self, shared)
         self._arm, self._timing = shared.arm, shared.timing
         self._directory = own.post_mortem_directory

@@ -1,18 +1,24 @@
 """The simulated arm, true to the motor shafts: rotors, elastic cables, friction with true stick, contact.
 
-State: angle and velocity of each rotor and each joint.  Cable circuit i pulls with
-tau = k_tr l + d l', l = theta_i - (row i of the inverse of (A.5)) q, at the rotor and, through the
-same row, at the joints.  Dry friction is MuJoCo's friction constraint, made stiff, its level
+State: angle and velocity of each rotor and each joint, and the creep of each circuit.  Cable circuit
+i pulls with tau = k_tr (l - c) + d l', l = theta_i - (row i of the inverse of (A.5)) q, c its creep,
+at the rotor and, through the same row, at the joints, until its loose strand is slack.  Dry friction is MuJoCo's friction constraint, made stiff, its level
 switched before every step: F_static while stuck, F_dynamic once moving until the velocity changes
 its sign (section 5.1, figure 5.1.b).
 """
+
+import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.mjcf import Obstacles, mjcf
+from wam_description.cables import Circuit
+from wam_description.effects import Effects
+from wam_description.mjcf import mjcf
 from wam_description.signals import Contact
+from wam_description.world import World
 
 STUCK_ROTOR = 1e-5  # rad/s; below it a rotor counts as stuck: far under one step of any real motion
 STUCK_JOINT = 1e-6  # rad/s; 1e-3 would make the limit cycle of (5.8) vanish
@@ -25,21 +31,37 @@ class Plant:
     Parameters
     ----------
     arm : the arm; the plant is built from these parameters alone.
-    obstacles : surfaces to touch.
+    world : surfaces and springs to touch.
+    effects : which effects of the transmission are on.
     step : length of a step, s.
     """
 
-    def __init__(self, arm: Arm, obstacles: Obstacles, step: float) -> None:
-        self.model = mujoco.MjModel.from_xml_string(mjcf(arm, step, obstacles))
+    def __init__(self, arm: Arm, world: World, effects: Effects, step: float) -> None:
+        self.model = mujoco.MjModel.from_xml_string(mjcf(arm, step, world, effects))
         self.data = mujoco.MjData(self.model)
         n = len(arm.motors.names)
         self._n = n
         self._start = arm.joints.start
-        self._static = [*arm.motors.static_friction, *arm.joints.static_friction]
-        self._dynamic = [*arm.motors.dynamic_friction, *arm.joints.dynamic_friction]
+        self._arm = arm
         self._threshold = [STUCK_ROTOR] * n + [STUCK_JOINT] * n
         self._direction = [0] * (2 * n)
         self._braked = True
+        self._velocity = [0.0] * (2 * n)
+        self._levels: list[float] = []
+        # views into MuJoCo's memory: asking for them anew in each step costs more than the step's own work
+        self._ctrl, self._qvel = self.data.ctrl, self.data.qvel
+        self._rotor_speed, self._rotor_pull = self.data.qvel[:n], self.data.qfrc_spring[:n]
+        self._frictionloss = self.model.dof_frictionloss
+        self._circuits = arm.circuits
+        self._slack = effects.slack
+        self._creeps = effects.creep
+        self._strands = self.data.plastic[: 4 * n].reshape(n, 4)  # two strands, two ends of their slack each
+        self._creep_rate = np.array([step * circuit.loss_per_torque for circuit in arm.circuits])
+        self._creep_step = np.zeros(n)
+        self._creep_column = self._creep_step[:, None]
+        self._tension_friction = effects.tension_friction
+        self._grips = effects.slack and any(effects.tension_friction)
+        self.rub(effects.rubbing_friction)
         self._motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(n, n))
         self._pushes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._wrench = np.zeros(6)
@@ -52,11 +74,9 @@ class Plant:
             frozenset((int(self.model.pair_geom1[i]), int(self.model.pair_geom2[i]))): i
             for i in range(self.model.npair)
         }
-        self._surface = [
-            (obstacles.stiffness[i], obstacles.damping[i])
-            for _ in arm.covers.names
-            for i in range(len(obstacles.names))
-        ]
+        obstacles = world.obstacles
+        surfaces = zip(obstacles.stiffness, obstacles.damping, obstacles.hardening, strict=True)
+        self._surface = list(surfaces) * len(arm.covers.names)
         self._rest()
 
     def _rest(self) -> None:
@@ -64,9 +84,13 @@ class Plant:
         data, n = self.data, self._n
         mujoco.mj_resetData(self.model, data)
         data.qpos[n:] = self._start
+        data.qpos[:n] = self._motor_from_joint @ data.qpos[n:]
         mujoco.mj_forward(self.model, data)
-        tension = np.linalg.solve(self._motor_from_joint.T, data.qfrc_bias[n:])
-        data.qpos[:n] = self._motor_from_joint @ data.qpos[n:] + tension / self.model.tendon_stiffness
+        load = data.qfrc_bias[n:] - data.qfrc_spring[n:]
+        torque = np.linalg.solve(self._motor_from_joint.T, load)
+        data.qpos[:n] = self._motor_from_joint @ data.qpos[n:] + [
+            _stretch(tau, circuit, self._slack) for tau, circuit in zip(torque.tolist(), self._circuits, strict=True)
+        ]
         self._direction = [0] * (2 * n)
         self._braked = True
         self._set_friction()
@@ -113,7 +137,7 @@ class Plant:
         torque : torque of each motor on its rotor, N m.
         """
         model, data = self.model, self.data
-        data.ctrl[:] = torque
+        self._ctrl[:] = torque
         self._set_friction()
         if self._pushes:
             mujoco.mj_step1(model, data)
@@ -124,11 +148,32 @@ class Plant:
             mujoco.mj_step(model, data)
         if data.ncon:
             self._match_surfaces()
+        if self._creeps and any(self._direction[: self._n]):
+            self._creep()
+
+    def rub(self, friction: Sequence[float]) -> None:
+        """Let something rub: extra dry friction at each joint (n,), N m, static and dynamic alike."""
+        motors, joints = self._arm.motors, self._arm.joints
+        tension = [2.0 * c.pretension * share for c, share in zip(self._circuits, self._tension_friction, strict=True)]
+        extra = [*tension, *friction]
+        static = [*motors.static_friction, *joints.static_friction]
+        dynamic = [*motors.dynamic_friction, *joints.dynamic_friction]
+        self._static = [level + more for level, more in zip(static, extra, strict=True)]
+        self._dynamic = [level + more for level, more in zip(dynamic, extra, strict=True)]
+
+    def _creep(self) -> None:
+        """Let the cables creep on their pulleys: dc = loss |d theta| tau, (6.19) corrected."""
+        rate = self._creep_step
+        np.abs(self._rotor_speed, out=rate)
+        rate *= self._creep_rate
+        rate *= self._rotor_pull  # the torque on the rotor, minus that of the circuit
+        self._strands -= self._creep_column
 
     def _set_friction(self) -> None:
         """Friction level of every dof for the next step: static while stuck, dynamic while moving."""
         direction, levels = self._direction, self._static.copy()
-        for i, velocity in enumerate(self.data.qvel.tolist()):
+        self._velocity = self._qvel.tolist()
+        for i, velocity in enumerate(self._velocity):
             way = direction[i]
             if way == 0:
                 if abs(velocity) > self._threshold[i]:
@@ -138,9 +183,20 @@ class Plant:
                 direction[i] = 0
             else:
                 levels[i] = self._dynamic[i]
+        if self._grips:
+            self._grip_of_slack(levels)
         if self._braked:
             levels[: self._n] = [BRAKE_TORQUE] * self._n
-        self.model.dof_frictionloss[:] = levels
+        if levels != self._levels:
+            self._levels = levels
+            self._frictionloss[:] = levels
+
+    def _grip_of_slack(self, levels: list[float]) -> None:
+        """Raise the friction where a strand is slack: only then is the sum of both tensions more than 2 T_0."""
+        for i, (pull, circuit) in enumerate(zip(self._rotor_pull.tolist(), self._circuits, strict=True)):
+            excess = abs(pull) / circuit.radius - 2.0 * circuit.pretension
+            if excess > 0.0:
+                levels[i] += self._tension_friction[i] * excess
 
     def _apply_pushes(self) -> None:
         data = self.data
@@ -165,9 +221,12 @@ class Plant:
         """
         model, data = self.model, self.data
         pairs = [self._pair[frozenset(geoms)] for geoms in data.contact.geom.tolist()]
-        for pair, address in zip(pairs, data.contact.efc_address.tolist(), strict=True):
+        depths = data.contact.dist.tolist()
+        for i, (pair, address) in enumerate(zip(pairs, data.contact.efc_address.tolist(), strict=True)):
             if address >= 0:
-                stiffness, damping = self._surface[pair]
+                stiffness, damping, hardening = self._surface[pair]
+                if hardening:
+                    stiffness *= 1.0 + hardening * max(0.0, -depths[i])
                 scale = data.efc_diagA[address] / pairs.count(pair)
                 model.pair_solref[pair] = (-stiffness * scale, -damping * scale)
 
@@ -192,26 +251,49 @@ class Plant:
         return self.data.qvel[self._n :].tolist()
 
     @property
+    def circuit_torque(self) -> list[float]:
+        """Torque of each cable circuit at its motor, N m, (n,), where the last step began."""
+        data = self.data
+        speeds = data.ten_velocity[: 2 * self._n : 2].tolist()
+        return [
+            circuit.damping * speed - pull
+            for circuit, speed, pull in zip(self._circuits, speeds, data.qfrc_spring[: self._n].tolist(), strict=True)
+        ]
+
+    @property
+    def tensions(self) -> list[tuple[float, float]]:
+        """Tension of the tight and of the loose strand of each first stage, N, where the last step began."""
+        result = []
+        for circuit, pull in zip(self._circuits, self.data.qfrc_spring[: self._n].tolist(), strict=True):
+            difference = abs(pull) / circuit.radius
+            if self._slack and difference > 2.0 * circuit.pretension:
+                result.append((difference, 0.0))
+            else:
+                result.append((circuit.pretension + difference / 2.0, circuit.pretension - difference / 2.0))
+        return result
+
+    @property
     def cable_torque(self) -> list[float]:
-        """Torque of the cables on the joints, N m, where the last step began."""
-        data, model = self.data, self.model
-        tension = model.tendon_stiffness * data.ten_length + model.tendon_damping[:] * data.ten_velocity
-        return (tension @ self._motor_from_joint).tolist()
+        """Torque of the cables on the joints, N m, (n,), where the last step began."""
+        torque: list[float] = (self.circuit_torque @ self._motor_from_joint).tolist()
+        return torque
 
     @property
     def strain_torque(self) -> list[float]:
-        """Torque on the link side of the joints' friction, N m, where the last step began.
+        """Torque on the link side of the joints' friction, N m, (n,), where the last step began.
 
         Cables and friction together, inertia of the pulleys taken off: what a strain gauge at the
         root of the link reads, M qdd + c(q, qd) + g - tau_ext of the links alone.
         """
         data, n = self.data, self._n
-        torque = data.qfrc_passive[n:] - self.model.dof_armature[n:] * data.qacc[n:]
+        viscous = self.model.dof_damping[n:] * self._velocity[n:]
+        torque = self.circuit_torque @ self._motor_from_joint - viscous - self.model.dof_armature[n:] * data.qacc[n:]
         dry = slice(data.ne, data.ne + data.nf)
         for dof, friction in zip(data.efc_id[dry].tolist(), data.efc_force[dry].tolist(), strict=True):
             if dof >= n:
                 torque[dof - n] += friction
-        return torque.tolist()
+        result: list[float] = torque.tolist()
+        return result
 
     def loads(self) -> list[Contact]:
         """What the world does to each touched or pushed cover, in the order of the arm's covers."""
@@ -238,3 +320,12 @@ class Plant:
                 force = np.sum([force for force, _ in shares], axis=0)
                 result.append(Contact(cover, place, tuple(force.tolist())))
         return result
+
+
+def _stretch(torque: float, circuit: Circuit, slack: bool) -> float:
+    """Stretch at which a circuit gives a torque, rad."""
+    stretch = torque / circuit.stiffness
+    limit = circuit.slack_stretch
+    if slack and abs(stretch) > limit:
+        stretch += math.copysign(abs(stretch) - limit, stretch)
+    return stretch

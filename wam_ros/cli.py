@@ -168,19 +168,24 @@ def _analysis(name: str, *arguments: Any) -> int:
 
 
 def _model(given: argparse.Namespace) -> int:
-    from wam_description.mjcf import Obstacles, mjcf
+    from wam_description.effects import Effects
+    from wam_description.mjcf import mjcf
     from wam_description.parameters import build
     from wam_description.urdf import urdf
+    from wam_description.world import World
 
     configuration = _configuration(given)
     shared = configuration.shared
     if given.format == "urdf":
         print(urdf(shared.arm))
         return 0
-    prefix = "obstacles."
-    section = configuration.sections["driver"]
-    obstacles = {key.removeprefix(prefix): value for key, value in section.items() if key.startswith(prefix)}
-    print(mjcf(shared.arm, shared.timing.substep, build(Obstacles, obstacles)))
+
+    def part(prefix: str) -> dict[str, Any]:
+        section = configuration.sections["driver"]
+        return {key.removeprefix(prefix): value for key, value in section.items() if key.startswith(prefix)}
+
+    world, effects = build(World, part("world.")), build(Effects, part("effects."))
+    print(mjcf(shared.arm, shared.timing.substep, world, effects))
     return 0
 
 

@@ -9,10 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
-def stage_compliance(ea: ArrayLike, length: ArrayLike, radius: ArrayLike, circuits: ArrayLike, ratio: ArrayLike) -> Array:
+def stage_compliance(
+    ea: ArrayLike, length: ArrayLike, radius: ArrayLike, circuits: ArrayLike, ratio: ArrayLike
+) -> Array:
     """Compliance of one pretensioned stage, seen at the motor, rad/(N m).
 
-    1/k = L/(2 EA r^2 c) / n^2: both strands carry, k_tr at the stage's own shaft is 2 (EA/L) r^2 for
+    1/k = n^2 L/(2 EA r^2 c): both strands carry, so that the stage's own shaft feels 2 (EA/L) r^2 for
     each of c parallel circuits, and the motor turns n times for one turn of that shaft (section 4.3.2).
 
     Parameters
@@ -26,7 +28,7 @@ def stage_compliance(ea: ArrayLike, length: ArrayLike, radius: ArrayLike, circui
     ea, length, radius, circuits, ratio = _positive(
         ea=(ea, False), length=(length, True), radius=(radius, False), circuits=(circuits, False), ratio=(ratio, False)
     )
-    return length / (2.0 * ea * radius**2 * circuits * ratio**2)
+    return length * ratio**2 / (2.0 * ea * radius**2 * circuits)
 
 
 def stiffness_with_reducer(ea: ArrayLike, length: ArrayLike, ratio: ArrayLike, distance: ArrayLike) -> Array:

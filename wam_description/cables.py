@@ -1,0 +1,92 @@
+"""The cable circuits as parameters, stage by stage, and what they come to at the motors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_description.parameters import lengths, parameter, require
+from wam_theory.cable import slack_stretch, stage_compliance, stage_loss
+
+
+@dataclass(frozen=True)
+class Cables:
+    """The cable circuit of each motor: pretension and limits per motor, then its stages one by one.
+
+    The first stage of a circuit spans the distance from the motor; it runs fast where the reducer
+    is at the joint and slow, with N times the section for the same stress, where it is at the motor.
+    """
+
+    pretension: tuple[float, ...] = parameter("T_0 of the first stage", "N", low=0.0)
+    breaking_strength: tuple[float, ...] = parameter("tension at which a first-stage cable breaks", "N", low=1.0)
+    damping: tuple[float, ...] = parameter("material damping of the circuit, motor side", "N m s/rad", low=0.0)
+    reducer: tuple[str, ...] = parameter("where the speed reducer sits", choices=("joint", "motor"))
+    stage_motors: tuple[str, ...] = parameter("motor of each stage, from the motor towards the joint")
+    stage_ea: tuple[float, ...] = parameter("E A of one cable of the stage", "N", low=1.0)
+    stage_length: tuple[float, ...] = parameter("free length of a strand", "m", low=0.0)
+    stage_radius: tuple[float, ...] = parameter("radius of the stage's driving pulley", "m", low=1e-4)
+    stage_circuits: tuple[float, ...] = parameter("parallel circuits of the stage", low=1.0)
+    stage_ratio: tuple[float, ...] = parameter("motor turns per turn of the driving pulley", low=1e-3)
+
+    def __post_init__(self) -> None:
+        stages = ("stage_ea", "stage_length", "stage_radius", "stage_circuits", "stage_ratio")
+        lengths("arm.cables", self.stage_motors, {key: getattr(self, key) for key in stages})
+
+
+class Circuit(NamedTuple):
+    """What the stages of one motor's circuit come to, seen at the motor."""
+
+    stiffness: float  # k_tr, N m/rad
+    radius: float  # of the motor's pinion, m
+    loss_per_torque: float  # share of the speed lost per torque at the motor, 1/(N m), (6.4) over all stages
+    pretension: float  # N
+    breaking_strength: float  # N
+    damping: float  # N m s/rad
+
+    @property
+    def slack_stretch(self) -> float:
+        """Stretch at which the loose strand goes slack, rad."""
+        return float(slack_stretch(self.stiffness, self.pretension, self.radius))
+
+
+def circuits(motors: Sequence[str], joint_from_motor: Sequence[float], cables: Cables) -> tuple[Circuit, ...]:
+    """The circuit of each motor.
+
+    Parameters
+    ----------
+    motors : names of the motors.
+    joint_from_motor : the matrix of (A.5), row by row.
+    cables : the stages of all circuits.
+
+    Raises
+    ------
+    ParameterError
+        where a stage belongs to no motor, a motor has no stage, or a circuit gives no way at all.
+    """
+    for name in cables.stage_motors:
+        require(name in motors, f"arm.cables.stage_motors names '{name}'; motors: {', '.join(motors)}")
+    inverse = np.linalg.inv(np.reshape(joint_from_motor, (len(motors), len(motors))))
+    return tuple(_circuit(cables, i, name, float(np.abs(inverse[i]).max())) for i, name in enumerate(motors))
+
+
+def _circuit(cables: Cables, i: int, motor: str, reduction: float) -> Circuit:
+    stages = [k for k, name in enumerate(cables.stage_motors) if name == motor]
+    require(len(stages) > 0, f"{motor} has no cable stage; name it in arm.cables.stage_motors")
+    compliance = loss = 0.0
+    for k in stages:
+        ea, ratio = cables.stage_ea[k], cables.stage_ratio[k]
+        if k == stages[0] and cables.reducer[i] == "motor":
+            ea, ratio = ea * reduction, ratio * reduction
+        radius, parallel = cables.stage_radius[k], cables.stage_circuits[k]
+        compliance += float(stage_compliance(ea, cables.stage_length[k], radius, parallel, ratio))
+        loss += float(stage_loss(1.0, radius, ea, parallel, ratio))
+    require(compliance > 0.0, f"{motor}: its cable stages give no way at all; give one a stage_length above zero")
+    return Circuit(
+        stiffness=1.0 / compliance,
+        radius=cables.stage_radius[stages[0]],
+        loss_per_torque=loss,
+        pretension=cables.pretension[i],
+        breaking_strength=cables.breaking_strength[i],
+        damping=cables.damping[i],
+    )

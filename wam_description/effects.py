@@ -1,0 +1,41 @@
+"""Effects of the transmission beyond its stiffness, each of which can be switched off."""
+
+from dataclasses import dataclass
+
+from wam_description.parameters import lengths, parameter
+
+
+@dataclass(frozen=True)
+class Ripples:
+    """Torque that depends on a shaft's angle: cogging of a motor, eccentric pulleys (6.23).
+
+    tau = ratio amplitude sin(cycles ratio theta + phase) on the shaft.  An eccentric pulley has
+    amplitude 2 epsilon T_0, (6.23), and one cycle.
+    """
+
+    shafts: tuple[str, ...] = parameter("motor or joint that each ripple sits on, directly or geared")
+    ratio: tuple[float, ...] = parameter("turns of the pulley per turn of that shaft")
+    amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley, zero for none", "N m", low=0.0)
+    cycles: tuple[int, ...] = parameter("cycles per turn of the pulley", low=1)
+    phase: tuple[float, ...] = parameter("phase at angle zero", "rad")
+
+    def __post_init__(self) -> None:
+        keys = ("ratio", "amplitude", "cycles", "phase")
+        lengths("effects.ripples", self.shafts, {key: getattr(self, key) for key in keys})
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Which effects the plant shows, and how strongly."""
+
+    ripples: Ripples
+    creep: bool = parameter("whether cables creep on their pulleys, (6.19), which is also their loss, (6.15)")
+    slack: bool = parameter("whether the loose strand can go slack; else the pretension counts as endless")
+    tension_friction: tuple[float, ...] = parameter(
+        "static friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
+        "N m/N",
+        low=0.0,
+    )
+    rubbing_friction: tuple[float, ...] = parameter(
+        "extra dry friction at each joint, like the Teflon rod of section 5.6", "N m", low=0.0, live=True
+    )

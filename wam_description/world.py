@@ -1,0 +1,55 @@
+"""What the arm can touch: surfaces, and springs under a joint's lever."""
+
+from dataclasses import dataclass
+
+from wam_description.parameters import lengths, parameter
+
+SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """Surfaces that the covers can touch, fixed in the base frame."""
+
+    names: tuple[str, ...] = parameter("names of the obstacles")
+    shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(SHAPES))
+    positions: tuple[float, ...] = parameter("centre in the base frame, x y z of each", "m")
+    rotations: tuple[float, ...] = parameter("turn from the base frame, roll pitch yaw of each", "rad")
+    sizes: tuple[float, ...] = parameter(
+        "three numbers each: box half lengths; cylinder radius, half length, 0; plane half lengths, 0", "m", low=0.0
+    )
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
+    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0)
+    hardening: tuple[float, ...] = parameter(
+        "F = k_c x (1 + hardening x), x the depth: zero for a linear surface", "1/m", low=0.0
+    )
+    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0)
+
+    def __post_init__(self) -> None:
+        one = ("shapes", "stiffness", "damping", "hardening", "friction")
+        lengths("obstacles", self.names, {key: getattr(self, key) for key in one})
+        three = ("positions", "rotations", "sizes")
+        lengths("obstacles", self.names, {key: getattr(self, key) for key in three}, width=3)
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Springs that push on the lever of a joint, like the one under the tip of the testbed (section 5.6)."""
+
+    joints: tuple[str, ...] = parameter("joint of each spring")
+    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever, zero for no spring", "N/m", low=0.0)
+    lever: tuple[float, ...] = parameter("distance of the spring from the joint's axis", "m", low=1e-3)
+    rest: tuple[float, ...] = parameter("joint angle at which the spring is not pressed", "rad")
+    bilateral: tuple[bool, ...] = parameter("whether it also pulls; else it pushes towards larger angles only")
+
+    def __post_init__(self) -> None:
+        keys = ("stiffness", "lever", "rest", "bilateral")
+        lengths("springs", self.joints, {key: getattr(self, key) for key in keys})
+
+
+@dataclass(frozen=True)
+class World:
+    """Everything around the arm."""
+
+    obstacles: Obstacles
+    springs: Springs

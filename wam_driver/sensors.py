@@ -1,0 +1,72 @@
+"""What the sensors make of the plant's true state: resolution and noise, seeded."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wam_description.arm import Arm
+from wam_description.parameters import lengths, parameter
+from wam_description.signals import State
+
+
+@dataclass(frozen=True)
+class SensorParameters:
+    """Imperfections of the sensors, all zero for true values."""
+
+    encoder_resolution: tuple[float, ...] = parameter(
+        "step of the motor angle; above zero the velocity is a difference over one period", "rad", low=0.0
+    )
+    encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", low=0.0)
+    joint_encoder_noise: tuple[float, ...] = parameter("standard deviation of the joint angle", "rad", low=0.0)
+    strain_noise: tuple[float, ...] = parameter("standard deviation of the strain torque", "N m", low=0.0)
+
+
+class Encoders:
+    """Angles and velocities of shafts, as read.
+
+    Where there is resolution or noise, the velocity is the difference of two readings over a
+    period, because that is all that a real counter offers; else it is true.
+    """
+
+    def __init__(self, resolution: Sequence[float], noise: Sequence[float], random: np.random.Generator) -> None:
+        self._resolution, self._noise, self._random = list(resolution), list(noise), random
+        self._is_perfect = not any(resolution) and not any(noise)
+        self._last: list[float] | None = None
+
+    def read(self, angle: list[float], velocity: list[float], dt: float) -> tuple[list[float], list[float]]:
+        """Angles, rad, and velocities, rad/s, read `dt` seconds after the last reading."""
+        if self._is_perfect:
+            return angle, velocity
+        draws = self._random.standard_normal(len(angle)).tolist()
+        read = [a + sd * draw for a, sd, draw in zip(angle, self._noise, draws, strict=True)]
+        read = [round(a / step) * step if step else a for a, step in zip(read, self._resolution, strict=True)]
+        before = self._last
+        self._last = read
+        return read, [0.0] * len(read) if before is None else [(b - a) / dt for a, b in zip(before, read, strict=True)]
+
+
+class Sensors:
+    """Motor encoders, joint encoders and strain gauges of an arm."""
+
+    def __init__(self, arm: Arm, parameters: SensorParameters, random: np.random.Generator) -> None:
+        lengths("sensors", arm.motors.names, {key: getattr(parameters, key) for key in vars(parameters)})
+        perfect = [0.0] * len(arm.joints.names)
+        self._motors = Encoders(parameters.encoder_resolution, parameters.encoder_noise, random)
+        self._joints = Encoders(perfect, parameters.joint_encoder_noise, random)
+        self._strain_noise = parameters.strain_noise
+        self._is_strain_noisy = any(parameters.strain_noise)
+        self._random = random
+
+    def motors(self, theta: list[float], thetad: list[float], torque: list[float], dt: float) -> State:
+        """Reading of the motor side, (n,) each: rad, rad/s, and the torque by the current, N m."""
+        angle, velocity = self._motors.read(theta, thetad, dt)
+        return State(angle, velocity, torque)
+
+    def joints(self, q: list[float], qd: list[float], strain: list[float], dt: float) -> State:
+        """Reading of the joint side, (n,) each: rad, rad/s, strain torque N m."""
+        angle, velocity = self._joints.read(q, qd, dt)
+        if self._is_strain_noisy:
+            draws = self._random.standard_normal(len(strain)).tolist()
+            strain = [t + sd * draw for t, sd, draw in zip(strain, self._strain_noise, draws, strict=True)]
+        return State(angle, velocity, strain)
