@@ -5,16 +5,17 @@ import math
 import pytest
 
 from wam_description.configuration import Configuration, packaged
-from wam_description.constants import CONSTANTS, Constant
+from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, CONSTANTS, TESTBED, Constant
 from wam_description.parameters import values
 from wam_description.units import FACTORS, si
 
-CARRIED = [row for row in CONSTANTS if row.parameter]
+TABLES = {"wam": ARM_PRINTED + ARM_ASSUMED, "testbed": TESTBED}
+CARRIED = [(name, row) for name, table in TABLES.items() for row in table if row.parameter]
 
 
-def arm_numbers() -> dict[str, tuple[float, ...]]:
-    """Every number below `arm` in config/wam.yaml, arrays as tuples."""
-    flat = values(Configuration.load(packaged("wam")).shared.arm, "arm.")
+def arm_numbers(configuration: str = "wam") -> dict[str, tuple[float, ...]]:
+    """Every number below `arm` in a configuration, arrays as tuples."""
+    flat = values(Configuration.load(packaged(configuration)).shared.arm, "arm.")
     arrays = {name: value if isinstance(value, tuple) else (value,) for name, value in flat.items()}
     return {
         name: array for name, array in arrays.items() if not any(isinstance(x, str | bool) for x in array)
@@ -29,21 +30,35 @@ def elements(row: Constant, length: int) -> list[tuple[int, float]]:
     return list(zip(places, numbers, strict=True))
 
 
-@pytest.mark.parametrize("row", CARRIED, ids=lambda row: f"{row.parameter}{list(row.index) or ''}")
-def test_configuration_carries_the_constant_in_si_units(row: Constant) -> None:
-    carried = arm_numbers()[row.parameter]
+@pytest.mark.parametrize(
+    ("name", "row"), CARRIED, ids=lambda x: x if isinstance(x, str) else f"{x.parameter}{list(x.index) or ''}"
+)
+def test_configuration_carries_the_constant_in_si_units(name: str, row: Constant) -> None:
+    carried = arm_numbers(name)[row.parameter]
     tolerance = 1e-7 if row.mark == "thesis" else 1e-3
     for place, number in elements(row, len(carried)):
         assert carried[place] == pytest.approx(number, rel=tolerance, abs=1e-12), f"{row.parameter}[{place}]"
 
 
-def test_every_number_of_the_arm_has_exactly_one_row() -> None:
-    numbers = arm_numbers()
+@pytest.mark.parametrize("name", TABLES)
+def test_every_number_of_the_arm_has_exactly_one_row(name: str) -> None:
+    numbers = arm_numbers(name)
     covered = [
-        (row.parameter, place) for row in CARRIED for place, _ in elements(row, len(numbers[row.parameter]))
+        (row.parameter, place)
+        for carrier, row in CARRIED
+        if carrier == name
+        for place, _ in elements(row, len(numbers[row.parameter]))
     ]
     asked = [(name, place) for name, array in numbers.items() for place in range(len(array))]
     assert sorted(covered) == sorted(asked)
+
+
+def test_cable_stages_come_to_the_stiffness_that_was_measured_with() -> None:
+    """plant-notes of the project: 34 and 11.8 N m/rad; the testbed's 8.33 gives the 638 lb/in of (4.9)."""
+    stiffness = [circuit.stiffness for circuit in Configuration.load(packaged("wam")).shared.arm.circuits]
+    assert stiffness == pytest.approx([34.0, 34.0, 34.0, 11.8], rel=1e-4)
+    (testbed,) = Configuration.load(packaged("testbed")).shared.arm.circuits
+    assert testbed.stiffness == pytest.approx(2 * 262 * 0.375**2 * 0.1129848290276167, rel=1e-6)
 
 
 def test_rows_say_where_they_come_from_or_why_they_are_assumed() -> None:
@@ -99,7 +114,7 @@ def test_joint_friction_is_the_printed_part_of_peak_torque() -> None:
 
 
 def test_assumed_pretension_leaves_no_strand_slack_at_peak_torque() -> None:
-    (pretension,) = (row for row in CONSTANTS if row.symbol == "T_0")
+    (pretension,) = (row for row in ARM_ASSUMED if row.symbol == "T_0")
     assert 2 * pretension.si[0] == pytest.approx(si(43, "in-lb") / si(0.375, "in"), rel=0.01)
 
 

@@ -34,6 +34,8 @@ FACTORS: dict[str, float] = {
     "in-lb": POUND * INCH,
     "lb-in": POUND * INCH,
     "lb-in/rad": POUND * INCH,
+    "lb-in-s/rad": POUND * INCH,
+    "lb-s^2/in": POUND / INCH,
     "lb-in-s^2": POUND * INCH,
     "oz-in-s^2": OUNCE * INCH,
 }
