@@ -11,13 +11,13 @@ from wam_analysis.demo_summary import (
     NO_LINK,
     NOT_RECORDED,
     STEADY,
-    TOPICS_READ,
     DemoSummary,
     Loop,
     Press,
     Touch,
     summarize,
 )
+from wam_analysis.demo_traces import TOPICS_READ
 
 FORCE_TOLERANCE = 10.0  # % of the force asked for
 PLACE_TOLERANCE = 0.04  # m
@@ -62,11 +62,11 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     notes : what else has to be said.
     """
     lines = _wrapped(f"Demonstration of {summary.namespace or '/'}: {_played(summary)}")
-    lines += ["", *_presses(summary.presses), "", *_touches(summary.touches)]
+    lines += ["", *_presses(summary.presses), "", *_touches(summary.touches, summary.period)]
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
     lines += [line for note in (*summary.notes, *notes) for line in _wrapped(f"Note     {note}")]
-    return "\n".join([*lines, "", *_wrapped(f"VERDICT  {verdict(summary)}")])
+    return "\n".join([*lines, "", "Verdict, the worst in brackets", f"  {verdict(summary)}"])
 
 
 def verdict(summary: DemoSummary) -> str:
@@ -77,28 +77,29 @@ def verdict(summary: DemoSummary) -> str:
 def _force_verdict(presses: Sequence[Press]) -> str:
     question = f"force within {FORCE_TOLERANCE:g} %"
     errors = [abs(press.error(press.applied)) for press in presses]
-    return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, lambda worst: f"worst {worst:.1f} %")
+    return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, lambda worst: f"{worst:.1f} %")
 
 
 def _link_verdict(summary: DemoSummary) -> str:
-    wrong = [
-        math.nan if NOT_RECORDED in (touch.link_true, touch.link_felt) else float(touch.link_true != touch.link_felt)
-        for touch in summary.touches
-    ]
-    wrong = [
-        1.0 if touch.link_true == NO_LINK else value for touch, value in zip(summary.touches, wrong, strict=True)
-    ]
+    def wrong(touch: Touch) -> float:
+        if NOT_RECORDED in (touch.link_true, touch.link_felt):
+            return math.nan
+        return float(touch.link_true == NO_LINK or touch.link_true != touch.link_felt)
+
     least = min((touch.right for touch in summary.touches if not math.isnan(touch.right)), default=0.0)
-    return _answer("right link", wrong, lambda value: not value, lambda _: f"{100.0 * least:.0f} % of the time")
+    return _answer(
+        "right link",
+        [wrong(touch) for touch in summary.touches],
+        lambda value: not value,
+        lambda _: f"{100.0 * least:.0f} %",
+    )
 
 
 def _place_verdict(summary: DemoSummary) -> str:
     """Places that the estimator says it cannot observe are not judged; all others are."""
     errors = [abs(touch.place_felt - touch.place_true) for touch in summary.touches if not touch.reason]
     question = f"place within {100.0 * PLACE_TOLERANCE:g} cm"
-    return _answer(
-        question, errors, lambda error: error <= PLACE_TOLERANCE, lambda worst: f"worst {100.0 * worst:.1f} cm"
-    )
+    return _answer(question, errors, lambda error: error <= PLACE_TOLERANCE, lambda worst: f"{100.0 * worst:.1f} cm")
 
 
 def _answer(
@@ -126,34 +127,43 @@ def _presses(presses: Sequence[Press]) -> list[str]:
         return [title, "  no step that presses was recorded"]
     head = ["step", "asked", "applied", "+-", "error", "measured", "error", "estimated", "error"]
     rows = [
-        [press.step, _number(press.asked, 2), _number(press.applied, 2), _number(press.spread, 2)]
-        + [_per_cent(press, press.applied), _number(press.measured, 2), _per_cent(press, press.measured)]
-        + [_number(press.felt, 2), _per_cent(press, press.felt)]
+        [
+            press.step,
+            *(_number(force, 2) for force in (press.asked, press.applied, press.spread)),
+            _per_cent(press, press.applied),
+            *(_number(press.measured, 2), _per_cent(press, press.measured)),
+            *(_number(press.felt, 2), _per_cent(press, press.felt)),
+        ]
         for press in presses
     ]
     return [
         title,
         *_table(head, rows, [25, 6, 8, 6, 8, 9, 8, 10, 8]),
-        "  applied: by the simulator, +- half its range; measured: by the force loop; estimated: contact/wrench",
+        "  applied: by the simulator, +- half its range; measured: by the force loop",
     ]
 
 
-def _touches(touches: Sequence[Touch]) -> list[str]:
+def _touches(touches: Sequence[Touch], period: float) -> list[str]:
     title = "Contacts, medians while they lasted"
     if not touches:
         return [title, "  no step with a push or a press was recorded"]
     first = ["", "link", "", "right", "place", "[cm]", "force", "[N]", "felt"]
     head = ["step", "true", "felt", "[%]", "true", "felt", "true", "felt", "after"]
     rows = [
-        [touch.step, touch.link_true, touch.link_felt, _number(100.0 * touch.right, 0)]
-        + [_number(100.0 * touch.place_true, 1), "?*" if touch.reason else _number(100.0 * touch.place_felt, 1)]
-        + [_number(touch.force_true, 2), _number(touch.force_felt, 2), _delay(touch.delay)]
+        [
+            *(touch.step, touch.link_true, touch.link_felt, _number(100.0 * touch.right, 0)),
+            _number(100.0 * touch.place_true, 1),
+            "?*" if touch.reason else _number(100.0 * touch.place_felt, 1),
+            *(_number(touch.force_true, 2), _number(touch.force_felt, 2), _delay(touch.delay, period)),
+        ]
         for touch in touches
     ]
     lines = [title, *_table(head, rows, [25, 12, 12, 6, 6, 7, 7, 7, 8], first)]
     for reason in dict.fromkeys(touch.reason for touch in touches if touch.reason):
         lines += _wrapped(f"  * {reason}", "    ")
-    return [*lines, *_wrapped("  right: part of the contact's time in which the right link was felt", "    ")]
+    right = "right: part of the contact's time in which the right link was felt"
+    after = f"after: the truth has a value every {1e3 * period:.0f} ms"
+    return [*lines, *_wrapped(f"  {right}; {after}", "    ")]
 
 
 def _false_contacts(summary: DemoSummary) -> str:
@@ -168,7 +178,7 @@ def _false_contacts(summary: DemoSummary) -> str:
 def _loop(loop: Loop) -> str:
     if loop.mode == "lockstep":
         return "lockstep: the arm waits for every answer, there is no timing"
-    if loop.periods < 0:
+    if math.isnan(loop.rate):
         return "no timing was recorded (driver in /diagnostics)"
     share = 100.0 * loop.missed / max(loop.periods, 1)
     return (
@@ -192,10 +202,12 @@ def _per_cent(press: Press, force: float) -> str:
     return "-" if math.isnan(error) else f"{error:+.1f} %"
 
 
-def _delay(delay: float | None) -> str:
+def _delay(delay: float | None, period: float) -> str:
     if delay is None:
         return "held"
-    return "never" if math.isnan(delay) else f"{1e3 * delay:.0f} ms"
+    if math.isnan(delay):
+        return "never"
+    return "before" if delay < 0.0 else f"<{1e3 * (delay + period):.0f} ms"
 
 
 def _table(

@@ -1,104 +1,32 @@
 """What a recording of the demonstration shows, in numbers; taken from the bag alone."""
 
 from collections import Counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wam_analysis.bag import Bag, JointColumns, Messages, PointColumns, WrenchColumns
-from wam_ros.topics import TOPICS
+from wam_analysis.bag import Bag, JointColumns
+from wam_analysis.demo_traces import (
+    NAN,
+    RECORDED,
+    Mask,
+    Names,
+    Numbers,
+    Step,
+    Traces,
+    find_namespace,
+    length,
+    messages_of,
+    node_of,
+    steps_of,
+    traces_of,
+    values_of,
+)
 
-Numbers = NDArray[np.float64]
-Names = NDArray[np.str_]
-Times = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-
-NAN = float("nan")
 NO_LINK = "none"
 NOT_RECORDED = "not recorded"
 STEADY = 1.0  # s at the end of a step that count as steady state
-HELD = 100_000_000  # ns that a message stands for; older, the signal counts as unknown
 BOUNCE = 100_000_000  # ns without contact that do not end a contact
-
-TOPICS_READ = (
-    "status", "force_command", "force_measured", "contact/wrench", "contact/point", "contact/hypotheses",
-    "sim/contact/wrench", "sim/contact/point", "sim/disturbance", "sim/joint_states", "joint_states", "/diagnostics",
-)  # fmt: skip
-
-
-class Step(NamedTuple):
-    """A step of the scenario and when it was played, ns of the arm's time."""
-
-    name: str
-    begin: int
-    end: int
-
-
-class Signal(NamedTuple):
-    """Forces over the k instants of a time base; NaN where nothing was recorded.
-
-    Attributes
-    ----------
-    frame : (k,), frame of each force.
-    force : (k, 3), N.
-    place : (k,), distance along the frame's x, m; NaN also where it is not known.
-    """
-
-    frame: Names
-    force: Numbers
-    place: Numbers
-
-    @property
-    def size(self) -> Numbers:
-        """Magnitude of each force, (k,), N."""
-        return np.linalg.norm(self.force, axis=1)
-
-    @property
-    def acts(self) -> Mask:
-        """Where there is a force, (k,)."""
-        return self.size > 0.0
-
-    @property
-    def is_known(self) -> Mask:
-        """Where it was recorded, (k,)."""
-        return ~np.isnan(self.size)
-
-
-class Traces(NamedTuple):
-    """The demonstration over time: k instants, ns of the arm's time.
-
-    Attributes
-    ----------
-    asked, measured : force of the arm on the world.
-    true, felt : contact according to the simulator and to the estimator, force of the world on the arm.
-    push : push that the scenario asked of the simulator.
-    """
-
-    stamp: Times
-    asked: Signal
-    measured: Signal
-    true: Signal
-    felt: Signal
-    push: Signal
-
-    def along(self, signal: Signal, sign: float = 1.0) -> Numbers:
-        """Component along the force asked for, (k,), N; NaN where none is asked or on another link.
-
-        Parameters
-        ----------
-        signal : one of these traces.
-        sign : -1 turns a force of the world on the arm into one of the arm on the world.
-        """
-        size = self.asked.size
-        direction = self.asked.force / np.where(size > 0.0, size, NAN)[:, np.newaxis]
-        component: Numbers = sign * np.sum(signal.force * direction, axis=1)
-        component[signal.acts & (signal.frame != self.asked.frame)] = NAN
-        return component
-
-    def during(self, begin: int, end: int) -> Mask:
-        """The instants from begin up to end, ns."""
-        return (self.stamp >= begin) & (self.stamp < end)
 
 
 class Press(NamedTuple):
@@ -126,6 +54,7 @@ class Touch(NamedTuple):
 
     Attributes
     ----------
+    begin, end : of the step, ns.
     right : part of the contact's time in which the right link was felt.
     delay : s from the begin of the true contact to the first estimate, below zero where something
         was felt before; NaN where nothing was felt, None where the contact began in a step before.
@@ -133,6 +62,8 @@ class Touch(NamedTuple):
     """
 
     step: str
+    begin: int
+    end: int
     link_true: str
     link_felt: str
     right: float
@@ -174,6 +105,7 @@ class DemoSummary(NamedTuple):
     Attributes
     ----------
     namespace : of the arm, '/wam'.
+    period : time between two instants of the traces, s.
     outcome : 'done', why the scenario failed, or that the recording ended before it.
     false_contact, longest_false_contact, free : s felt without contact, the longest such time, s without contact.
     received, dropped : messages according to the recorder, -1 where it did not say.
@@ -181,6 +113,7 @@ class DemoSummary(NamedTuple):
     """
 
     namespace: str
+    period: float
     outcome: str
     steps: tuple[Step, ...]
     traces: Traces
@@ -198,12 +131,12 @@ class DemoSummary(NamedTuple):
 
 def summarize(bag: Bag) -> DemoSummary:
     """Everything that the report says about a bag, whatever part of the demonstration is in it."""
-    namespace, notes = _namespace(bag)
-    steps, outcome = _steps(bag, namespace)
-    traces = _traces(bag, namespace)
+    namespace, notes = find_namespace(bag)
+    steps, outcome = steps_of(bag, namespace)
+    traces = traces_of(bag, namespace)
     if not steps:
         notes.append("no step of a scenario was recorded (status of node scenario)")
-    missing = [name for name in TOPICS_READ[1:9] if not _length(bag, namespace, name)]
+    missing = [name for name in RECORDED if not length(bag, namespace, name)]
     if missing:
         notes.append(f"not recorded: {', '.join(missing)}")
     presses = tuple(press for step in steps if (press := _press(traces, step)))
@@ -213,105 +146,21 @@ def summarize(bag: Bag) -> DemoSummary:
     received, dropped = _counts(bag.metadata.get("recording", {}))
     return DemoSummary(
         namespace=namespace,
+        period=period,
         outcome=outcome,
         steps=steps,
         traces=traces,
         presses=presses,
         touches=_touches(bag, namespace, traces, steps),
-        false_contact=np.count_nonzero(false) * period,
+        false_contact=int(np.sum(false)) * period,
         longest_false_contact=max((end - begin for begin, end in _runs(false)), default=0) * period,
-        free=np.count_nonzero(known & ~traces.true.acts) * period,
+        free=int(np.sum(known & ~traces.true.acts)) * period,
         loop=_loop(bag),
         received=received,
         dropped=dropped,
         moment=_moment(bag, namespace, traces, presses),
         notes=(*notes, *_faults(bag, namespace)),
     )
-
-
-def _namespace(bag: Bag) -> tuple[str, list[str]]:
-    counts: Counter[str] = Counter()
-    for topic in TOPICS:
-        if not topic.name.startswith("/"):
-            ending = f"/{topic.name}"
-            counts.update(name.removesuffix(ending) for name in sorted(bag.topics) if name.endswith(ending))
-    arms = [name for name in sorted(counts) if f"{name}/status" in bag.topics]
-    found = counts.most_common(1)[0][0] if counts else ""
-    return found, [f"arms in this bag: {', '.join(arms)}; this is {found}"] if len(arms) > 1 else []
-
-
-def _length(bag: Bag, namespace: str, name: str) -> int:
-    columns = bag.topics.get(f"{namespace}/{name}")
-    return 0 if columns is None else len(columns.log_time_ns)
-
-
-def _messages(bag: Bag, topic: str) -> tuple[Any, ...]:
-    columns = bag.topics.get(topic)
-    return columns.messages if isinstance(columns, Messages) else ()
-
-
-def _values(status: Any) -> dict[str, str]:
-    return {item.key: item.value for item in status.values}
-
-
-def _node(status: Any) -> str:
-    return str(status.name).rsplit("/", 1)[-1]
-
-
-def _steps(bag: Bag, namespace: str) -> tuple[tuple[Step, ...], str]:
-    said = [
-        (int(_values(status)["stamp"]), str(status.message), int(status.level))
-        for status in _messages(bag, f"{namespace}/status")
-        if _node(status) == "scenario" and "stamp" in _values(status)
-    ]
-    ends = [i for i, (_, message, level) in enumerate(said) if message == "done" or level]
-    outcome = said[ends[0]][1] if ends else "not finished: the recording ends before the scenario does"
-    commands = bag.topics.get(f"{namespace}/force_command")
-    last = int(commands.stamp_ns[-1]) if isinstance(commands, WrenchColumns) and len(commands.stamp_ns) else 0
-    if not ends and said:
-        said.append((max(last, said[-1][0]), "", 0))
-    elif ends:
-        said = said[: ends[0] + 1]
-    steps = [Step(now[1], now[0], then[0]) for now, then in zip(said, said[1:], strict=False)]
-    return tuple(steps), outcome
-
-
-def _traces(bag: Bag, namespace: str) -> Traces:
-    def signal(wrench: str, point: str = "") -> Signal:
-        forces, points = (bag.topics.get(f"{namespace}/{name}") for name in (wrench, point))
-        if not isinstance(forces, WrenchColumns) or not len(forces.stamp_ns):
-            return Signal(np.full(len(base), ""), np.full((len(base), 3), NAN), np.full(len(base), NAN))
-        row, known = _held(forces.stamp_ns, base)
-        force = np.where(known[:, np.newaxis], forces.force[row], NAN)
-        place = np.full(len(base), NAN)
-        if isinstance(points, PointColumns) and len(points.stamp_ns):
-            at, is_there = _held(points.stamp_ns, base)
-            same = is_there & known & (points.stamp_ns[at] == forces.stamp_ns[row])
-            place[same] = points.point[at[same], 0]
-        return Signal(np.array(forces.frames)[row], force, place)
-
-    base = np.empty(0, np.int64)
-    for name in ("sim/contact/wrench", "force_command", "contact/wrench"):
-        columns = bag.topics.get(f"{namespace}/{name}")
-        if isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
-            base = columns.stamp_ns
-            break
-    return Traces(
-        stamp=base,
-        asked=signal("force_command"),
-        measured=signal("force_measured"),
-        true=signal("sim/contact/wrench", "sim/contact/point"),
-        felt=signal("contact/wrench", "contact/point"),
-        push=signal("sim/disturbance"),
-    )
-
-
-def _held(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
-    """Row of the last message at or before each instant, and whether there is one that is not too old."""
-    row = np.searchsorted(stamps, base, side="right") - 1
-    known = row >= 0
-    row = np.maximum(row, 0)
-    return row, known & (base - stamps[row] <= HELD)
 
 
 def _press(traces: Traces, step: Step) -> Press | None:
@@ -386,9 +235,11 @@ def _touch(traces: Traces, step: Step, rows: Mask, told: set[int], reasons: Coun
     known = [reason for (link, reason), _ in reasons.most_common() if link == link_felt and reason]
     return Touch(
         step=step.name,
+        begin=step.begin,
+        end=step.end,
         link_true=link_true,
         link_felt=link_felt,
-        right=np.count_nonzero(right) / np.count_nonzero(touching) if np.any(touching & true.acts) else NAN,
+        right=float(np.mean(right[touching])) if np.any(touching & true.acts) else NAN,
         place_true=_median(true.place[touching & (true.frame == link_true)]),
         place_felt=place_felt,
         force_true=_median(true.size[touching & true.acts]),
@@ -425,7 +276,7 @@ def _delay(traces: Traces, rows: Mask, told: set[int]) -> float | None:
 def _reasons(bag: Bag, namespace: str, step: Step) -> Counter[tuple[str, str]]:
     """(link, reason) of the most probable hypothesis in each message of a step."""
     found: Counter[tuple[str, str]] = Counter()
-    for array in _messages(bag, f"{namespace}/contact/hypotheses"):
+    for array in messages_of(bag, f"{namespace}/contact/hypotheses"):
         stamp = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
         if array.status and step.begin <= stamp < step.end:
             found[str(array.status[0].name), str(array.status[0].message).split(";")[0]] += 1
@@ -434,20 +285,19 @@ def _reasons(bag: Bag, namespace: str, step: Step) -> Counter[tuple[str, str]]:
 
 def _loop(bag: Bag) -> Loop:
     reports = [
-        _values(status)
-        for array in _messages(bag, "/diagnostics")
+        values_of(status)
+        for array in messages_of(bag, "/diagnostics")
         for status in array.status
-        if _node(status) == "driver"
+        if node_of(status) == "driver"
     ]
     timed = [facts for facts in reports if "rate [Hz]" in facts]
     mode = bag.metadata.get("recording", {}).get("mode", "realtime" if timed else "unknown")
     if not timed:
         return Loop(mode, NAN, NAN, NAN, NAN, -1, -1)
-    p50 = np.array([float(facts["latency p50 [us]"]) for facts in timed])
-    p99 = np.array([float(facts["latency p99 [us]"]) for facts in timed])
+    p50, p99 = (np.array([float(facts.get(f"latency {p} [us]", NAN)) for facts in timed]) for p in ("p50", "p99"))
     worst = float(np.nanmax(p99)) if not np.all(np.isnan(p99)) else NAN
     last = timed[-1]
-    missed, periods = int(last["missed periods"]), int(last["periods"])
+    missed, periods = (int(last.get(key, -1)) for key in ("missed periods", "periods"))
     return Loop(mode, float(last["rate [Hz]"]), _median(p50), _median(p99), worst, missed, periods)
 
 
@@ -464,8 +314,8 @@ def _counts(recording: dict[str, str]) -> tuple[int, int]:
 def _faults(bag: Bag, namespace: str) -> list[str]:
     said = [
         f"driver fault at {int(values['stamp']) / 1e9:.2f} s: {values['fault']}"
-        for status in _messages(bag, f"{namespace}/status")
-        if _node(status) == "driver" and (values := _values(status)).get("fault") and "stamp" in values
+        for status in messages_of(bag, f"{namespace}/status")
+        if node_of(status) == "driver" and (values := values_of(status)).get("fault") and "stamp" in values
     ]
     return list(dict.fromkeys(said))
 

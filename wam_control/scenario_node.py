@@ -58,8 +58,11 @@ class ScenarioNode(Node):
         ports.feed(gate, "contact/point", lambda m: read_contact(m, frames), self._work)
 
     def _work(self, stamp: int, inputs: dict[str, Any]) -> None:
-        if self._scenario.done or (self._is_realtime and self._ports.absent):
+        if self.done or self._scenario.done or (self._is_realtime and self._ports.absent):
             return  # in lockstep the arm does not move before all are there
+        if fault := self._ports.faults.get("driver"):
+            self._end(stamp, f"the driver stopped in step '{self._step}': {fault}")
+            return
         dt = self._outer_period if self._last is None else stamp - self._last
         self._last = stamp
         contact = contact_of(inputs["contact/wrench"], inputs["contact/point"])

@@ -13,6 +13,7 @@ import numpy as np
 
 from wam_description.arm import Arm
 from wam_description.effects import Effects, Ripples
+from wam_description.parameters import require
 from wam_description.world import SHAPES, Obstacles, Springs, World
 
 NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, where slack is switched off
@@ -36,7 +37,14 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     str
         XML with joints named as motors and joints, tendons and actuators named as motors, bodies
         as links, geoms as covers and obstacles, a site ``tool``.
+
+    Raises
+    ------
+    ParameterError
+        where an obstacle is named like a cover.
     """
+    for name in world.obstacles.names:
+        require(name not in arm.covers.names, f"obstacle '{name}' is named like a cover of the arm; rename it")
     root = ElementTree.Element("mujoco", model=arm.name)
     _add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", eulerseq="XYZ")
     _add_solver(root, arm, step)
@@ -200,7 +208,7 @@ def _add_pairs(root: ElementTree.Element, arm: Arm, obstacles: Obstacles) -> Non
                 geom2=obstacle,
                 condim="3" if friction > 0.0 else "1",
                 friction=_numbers((friction, friction, 0.0, 0.0, 0.0)),
-                # with this small impedance the force is stiffness x depth, see plant.py
+                # so small an impedance lets the plant set the force itself, see plant.py
                 solimp="0.001 0.001 0.001 0.5 2",
                 solref=_numbers((-obstacles.stiffness[i], -obstacles.damping[i])),
             )

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import lengths, parameter, require
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
 
@@ -30,6 +30,19 @@ class Obstacles:
         lengths("obstacles", self.names, {key: getattr(self, key) for key in one})
         three = ("positions", "rotations", "sizes")
         lengths("obstacles", self.names, {key: getattr(self, key) for key in three}, width=3)
+        require("" not in self.names, "parameter 'obstacles.names' has an empty name; name every obstacle")
+        require(
+            len(set(self.names)) == len(self.names),
+            f"parameter 'obstacles.names' has a name twice: {', '.join(self.names)}",
+        )
+        for i, (name, shape) in enumerate(zip(self.names, self.shapes, strict=True)):
+            require(shape in SHAPES, f"{name}: obstacles.shapes is '{shape}'; allowed: {', '.join(SHAPES)}")
+            needed = self.sizes[3 * i : 3 * i + SHAPES[shape]]
+            require(
+                shape == "plane" or min(needed) > 0.0,
+                f"{name}: obstacles.sizes of a {shape} begins with {', '.join(f'{s:g}' for s in needed)} m; "
+                "each must be above 0",
+            )
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ class Driver:
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random)
         self._sensors = Sensors(arm, parameters.sensors, random)
         self.recent: deque[Sample] = deque(maxlen=parameters.post_mortem_samples)
-        self.warnings: list[str] = []
+        self.warnings: list[str]
         self._arm, self._timing, self._parameters = arm, timing, parameters
         self._map = TransmissionMap.of(arm)
         self._body = RigidBody(arm)
@@ -85,6 +85,7 @@ class Driver:
         self._command = self._zero
         self._command_tick = self._tick
         self.currents = self._zero
+        self.warnings = []
 
     @property
     def stamp(self) -> int:
@@ -97,10 +98,15 @@ class Driver:
         return self._timing.is_outer(self.stamp)
 
     def command(self, stamp: int, currents: list[float]) -> None:
-        """Take the currents, A (n,), that answer the state of time `stamp`, ns; ignored unless enabled."""
-        if self.safety.mode is Mode.ENABLED:
-            self._command = currents
-            self._command_tick = stamp // self._timing.period_ns
+        """Take the currents, A (n,), that answer the state of time `stamp`, ns.
+
+        Ignored unless enabled, and where the state is older than the one last answered or than the
+        release of the brakes, or has not been yet.
+        """
+        tick = stamp // self._timing.period_ns
+        if self.safety.mode is Mode.ENABLED and self._command_tick <= tick <= self._tick:
+            self._command = list(currents)
+            self._command_tick = tick
 
     def advance(self, arrival_age: float) -> None:
         """Advance by one period.
@@ -112,7 +118,7 @@ class Driver:
         enabled = self.safety.mode is Mode.ENABLED
         if enabled:
             age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
-            if age > self._parameters.watchdog:
+            if age >= self._parameters.watchdog:
                 self._trip(
                     f"command stale: {age * 1e3:.0f} ms old, allowed {self._parameters.watchdog * 1e3:.0f} ms; "
                     "check that velocity_loop runs"
@@ -124,8 +130,13 @@ class Driver:
         for _ in range(self._timing.substeps):
             self.plant.step(torque)
         self._tick += 1
+<<<<<<< ours
         self._measure()
         self.recent.append(Sample(self.stamp, self.plant.theta, self.plant.thetad, self._command, self.currents))
+=======
+        if self.safety.mode is not Mode.FAULT:  # what led to a fault is kept until its reset
+            self.recent.append(Sample(self.stamp, self.plant.theta, self.plant.thetad, self._command, self.currents))
+>>>>>>> theirs
         if enabled and self.is_outer:
             self._watch_limits()
 

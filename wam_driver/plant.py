@@ -94,7 +94,10 @@ class Plant:
         self._direction = [0] * (2 * n)
         self._braked = True
         self._set_friction()
-        mujoco.mj_forward(self.model, data)
+        mujoco.mj_step1(self.model, data)
+        if data.ncon:
+            self._match_surfaces()
+        mujoco.mj_forwardSkip(self.model, data, mujoco.mjtStage.mjSTAGE_VEL, 1)
 
     def reset(self) -> None:
         """Return to power-up: start pose, at rest, brakes on, no pushes."""
@@ -139,15 +142,14 @@ class Plant:
         model, data = self.model, self.data
         self._ctrl[:] = torque
         self._set_friction()
+        mujoco.mj_step1(model, data)
         if self._pushes:
-            mujoco.mj_step1(model, data)
             self._apply_pushes()
-            mujoco.mj_step2(model, data)
-            data.qfrc_applied[:] = 0.0
-        else:
-            mujoco.mj_step(model, data)
         if data.ncon:
             self._match_surfaces()
+        mujoco.mj_step2(model, data)
+        if self._pushes:
+            data.qfrc_applied[:] = 0.0
         if self._creeps and any(self._direction[: self._n]):
             self._creep()
 
@@ -214,21 +216,25 @@ class Plant:
             )
 
     def _match_surfaces(self) -> None:
-        """Scale each contact so that its force is k_c depth + b_c speed, whatever mass is behind it.
+        """Make each contact's force k_c depth + b_c speed, and let it stick within its friction cone.
 
-        With an impedance d << 1 MuJoCo's contact force is d/(A (1 - d)) (k/d) depth, A the inverse of the mass
-        that the contact feels.  Several contacts of one pair share its stiffness.
+        MuJoCo's contact force is (a_ref - a)/R with R far above the inverse of the mass behind the contact, so
+        that a_ref = R f gives f.  Several contacts of one pair share its stiffness.  Along the surface a_ref stops
+        the slip in one step, as for the joints; MuJoCo's own, 1/d times the damping, makes friction alternate
+        between its limits from step to step.
         """
-        model, data = self.model, self.data
-        pairs = [self._pair[frozenset(geoms)] for geoms in data.contact.geom.tolist()]
-        depths = data.contact.dist.tolist()
-        for i, (pair, address) in enumerate(zip(pairs, data.contact.efc_address.tolist(), strict=True)):
-            if address >= 0:
+        data, contact = self.data, self.data.contact
+        pairs = [self._pair[frozenset(geoms)] for geoms in contact.geom.tolist()]
+        rows, sizes, distances = contact.efc_address.tolist(), contact.dim.tolist(), contact.dist.tolist()
+        reference, regularisation, velocity = data.efc_aref, data.efc_R, data.efc_vel
+        for pair, row, size, distance in zip(pairs, rows, sizes, distances, strict=True):
+            if row >= 0:
                 stiffness, damping, hardening = self._surface[pair]
-                if hardening:
-                    stiffness *= 1.0 + hardening * max(0.0, -depths[i])
-                scale = data.efc_diagA[address] / pairs.count(pair)
-                model.pair_solref[pair] = (-stiffness * scale, -damping * scale)
+                if hardening and distance < 0.0:
+                    stiffness *= 1.0 - hardening * distance
+                force = -(stiffness * distance + damping * velocity[row]) / pairs.count(pair)
+                reference[row] = force * regularisation[row]
+                reference[row + 1 : row + size] = -velocity[row + 1 : row + size] / self.model.opt.timestep
 
     @property
     def theta(self) -> list[float]:

@@ -38,6 +38,7 @@ class Ports:
         self.counts: Counter[str] = Counter()
         self.refusals: Counter[str] = Counter()
         self.facts: dict[str, str] = {}
+        self.faults: dict[str, str] = {}
         self._name = node.get_name()
         self._publishers: dict[str, Publisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
@@ -117,7 +118,7 @@ class Ports:
             self._publishers["status"].publish(status)
 
     def watch_peers(self) -> None:
-        """Listen to the status of the other nodes, for `absent`."""
+        """Listen to the status of the other nodes, for `absent` and `faults`."""
         self._absent = set(self.shared.nodes) - {self._name}
         self.listen("status", self._peer_said)
 
@@ -129,6 +130,7 @@ class Ports:
     def _peer_said(self, status: DiagnosticStatus) -> None:
         if status.message == READY or CONNECTED in status.values:
             self._absent.discard(status.name)
+        self.faults[status.name] = next((item.value for item in status.values if item.key == "fault"), "")
 
     @property
     def ready(self) -> bool:

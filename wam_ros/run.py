@@ -27,9 +27,13 @@ MakeNode = Callable[..., Node]
 
 
 def raise_priority(niceness: int) -> None:
-    """Ask the system to prefer this process; most grant it to privileged users only."""
-    with contextlib.suppress(PermissionError):
-        os.setpriority(os.PRIO_PROCESS, 0, niceness)
+    """Ask the system to prefer this process; most grant it to privileged users only.
+
+    On Linux priority belongs to the thread, and those of the middleware are there already.
+    """
+    with contextlib.suppress(PermissionError, FileNotFoundError):
+        for thread in os.listdir("/proc/self/task"):
+            os.setpriority(os.PRIO_PROCESS, int(thread), niceness)
 
 
 def die_with_parent() -> None:

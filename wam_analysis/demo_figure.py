@@ -1,0 +1,291 @@
+"""The picture of a demonstration: the arm while it presses, forces and places over time."""
+
+import math
+import os
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import matplotlib as mpl
+import numpy as np
+import yaml
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from wam_analysis import arm_picture
+from wam_analysis.bag import Bag
+from wam_analysis.demo_summary import DemoSummary, Touch
+from wam_analysis.demo_traces import Numbers, Signal, Step
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration, packaged
+from wam_description.mjcf import Obstacles
+from wam_description.parameters import ParameterError, build, flatten
+from wam_description.signals import Contact
+
+T = TypeVar("T")
+
+DPI = 200
+SIZE = (10.0, 4.3)  # inches
+INK = "#222222"
+ASKED, TRUE, MEASURED, FELT = "#222222", "#0072b2", "#009e73", "#d55e00"  # told apart by the colour-blind too
+METRES_PER_NEWTON = 0.015
+STYLE: Any = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 10.0,
+    "axes.linewidth": 0.7,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "legend.frameon": False,
+}
+
+
+class RecordedArm(NamedTuple):
+    """The arm and its surroundings as they were when the bag was recorded, and what has to be said about them."""
+
+    arm: Arm
+    obstacles: Obstacles
+    note: str
+
+
+def recorded_arm(bag: Bag, namespace: str) -> RecordedArm:
+    """Take the arm from the parameters in the bag, or from the configuration of the package.
+
+    Parameters
+    ----------
+    bag : with the attachment ``parameters.yaml`` as the recorder writes it.
+    namespace : of the arm.
+    """
+    try:
+        flat = _driver_parameters(bag, namespace)
+        return RecordedArm(_group(Arm, flat, "arm."), _group(Obstacles, flat, "obstacles."), "")
+    except (ParameterError, yaml.YAMLError, UnicodeDecodeError) as error:
+        reason = str(error).partition("\n")[0]
+    configuration = Configuration.load(packaged("wam"))
+    obstacles = _group(Obstacles, configuration.sections["driver"], "obstacles.")
+    note = f"the arm is drawn from configuration 'wam' of the package, not from the bag: {reason}"
+    return RecordedArm(configuration.shared.arm, obstacles, note)
+
+
+def _driver_parameters(bag: Bag, namespace: str) -> Mapping[str, Any]:
+    attached = bag.attachments.get("parameters.yaml")
+    if attached is None:
+        raise ParameterError("it has no attachment parameters.yaml")
+    tree = yaml.safe_load(attached.decode())
+    section = tree.get(f"{namespace}/driver") if isinstance(tree, dict) else None
+    if not isinstance(section, dict) or not isinstance(section.get("ros__parameters"), dict):
+        raise ParameterError(f"its parameters.yaml has no parameters of {namespace}/driver")
+    return flatten(section["ros__parameters"])
+
+
+def _group(cls: type[T], flat: Mapping[str, Any], prefix: str) -> T:
+    return build(cls, {key.removeprefix(prefix): value for key, value in flat.items() if key.startswith(prefix)})
+
+
+def save(path: Path, summary: DemoSummary, bag: Bag, gl: Sequence[str] | None = None) -> tuple[str, ...]:
+    """Draw the picture into a PNG file.
+
+    Parameters
+    ----------
+    path : file to write.
+    summary : what the bag shows.
+    bag : for the parameters of the arm.
+    gl : values of MUJOCO_GL to try; () draws with matplotlib; None stands for all that need no display.
+
+    Returns
+    -------
+    tuple of str
+        what has to be said about the picture.
+    """
+    if gl is None:
+        asked = os.environ.get("MUJOCO_GL", "").lower()
+        gl = sorted(arm_picture.GL, key=lambda name: name != asked)
+    recorded = recorded_arm(bag, summary.namespace)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=SIZE, dpi=DPI)
+        FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(
+            2, 2, width_ratios=(1.1, 1.3), height_ratios=(1.5, 1.0),
+            left=0.005, right=0.985, bottom=0.11, top=0.93, wspace=0.15, hspace=0.09,
+        )  # fmt: skip
+        _draw_arm(figure.add_subplot(grid[:, 0]), summary, recorded, gl)
+        above = figure.add_subplot(grid[0, 1])
+        below = figure.add_subplot(grid[1, 1], sharex=above)
+        _draw_forces(above, summary)
+        _draw_places(below, summary, recorded.arm)
+        figure.savefig(path, metadata={"Software": None})
+    return (recorded.note,) if recorded.note else ()
+
+
+# the arm
+
+
+def _draw_arm(axes: Axes, summary: DemoSummary, recorded: RecordedArm, gl: Sequence[str]) -> None:
+    axes.set_axis_off()
+    arm, obstacles, moment = recorded.arm, recorded.obstacles, summary.moment
+    if moment is None or set(arm.joints.names) - set(moment.names):
+        axes.text(0.5, 0.5, "no pose of the arm was recorded", ha="center", transform=axes.transAxes)
+        return
+    q = [float(moment.q[moment.names.index(name)]) for name in arm.joints.names]
+    if not np.all(np.isfinite(q)):
+        axes.text(0.5, 0.5, "the recorded pose is not finite", ha="center", transform=axes.transAxes)
+        return
+    box = axes.get_position()
+    view = arm_picture.side_view(arm, q, obstacles, aspect=box.width * SIZE[0] / (box.height * SIZE[1]))
+    axes.set_xlim(-view.width / 2.0, view.width / 2.0)
+    axes.set_ylim(-view.height / 2.0, view.height / 2.0)
+    axes.set_aspect("equal")
+    pixels = arm_picture.render(arm, q, obstacles, view, gl) if gl else None
+    if pixels is None:
+        arm_picture.draw(axes, arm, q, obstacles, view)
+    else:
+        axes.imshow(pixels, extent=(*axes.get_xlim(), *axes.get_ylim()), interpolation="lanczos", zorder=0)
+    _draw_contacts(axes, summary, arm, q, view)
+    seconds = (moment.stamp - _zero(summary)) / 1e9
+    title = f"(a) the arm at {seconds:.1f} s and the force on it"
+    axes.text(0.02, 0.985, title, va="top", transform=axes.transAxes, fontsize=11)
+
+
+def _draw_contacts(axes: Axes, summary: DemoSummary, arm: Arm, q: Sequence[float], view: arm_picture.View) -> None:
+    """Arrows of the force on the arm where it acts, and beyond their tips how large it is."""
+    assert summary.moment is not None
+    traces, row = summary.traces, summary.moment.row
+    arrows = []
+    for signal, colour, label in ((traces.true, TRUE, "applied"), (traces.felt, FELT, "estimated")):
+        contact = _contact(signal, row)
+        if contact.cover in arm.covers.names and math.isfinite(contact.place):
+            point, force = arm_picture.contact_on_surface(arm, q, contact)
+            start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
+            arrows.append((start, end, colour, f"{label} {np.linalg.norm(force):.1f} N"))
+    for i, (start, end, colour, _) in enumerate(arrows):
+        width = 4.2 if colour is TRUE else 1.3  # the truth is seen under an estimate that is right
+        head = f"-|>,head_width={0.14 + 0.05 * width:.2f},head_length={0.4 + 0.07 * width:.2f}"
+        style = {"arrowstyle": head, "color": colour, "linewidth": width, "joinstyle": "miter"}
+        arrow = axes.annotate("", end, start, arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=20 + i)
+        if arrow.arrow_patch is not None:
+            arrow.arrow_patch.set_path_effects([patheffects.withStroke(linewidth=width + 1.4, foreground="white")])
+        axes.plot(
+            *start,
+            "o",
+            color=colour,
+            markersize=3.0 + width,
+            markeredgecolor="white",
+            markeredgewidth=0.8,
+            zorder=20 + i,
+        )
+    if not arrows:
+        return
+    tips = np.array([end for _, end, _, _ in arrows])
+    is_up = bool(tips[:, 1].mean() >= np.mean([start[1] for start, *_ in arrows]))
+    x = min(float(tips[:, 0].max()) + 0.15, view.width / 2.0 - 0.01)
+    y = float(tips[:, 1].max()) + 0.03 if is_up else float(tips[:, 1].min()) - 0.03
+    for i, (_, _, colour, label) in enumerate(arrows):
+        line = (len(arrows) - 1 - i if is_up else -i) * 13.0  # points
+        axes.annotate(
+            label, (x, y), (0.0, line), textcoords="offset points", color=colour, ha="right", zorder=40,
+            va="bottom" if is_up else "top", path_effects=[patheffects.withStroke(linewidth=3.0, foreground="white")],
+        )  # fmt: skip
+
+
+def _contact(signal: Signal, row: int) -> Contact:
+    x, y, z = signal.force[row].tolist()
+    return Contact(str(signal.frame[row]) if signal.acts[row] else "", float(signal.place[row]), (x, y, z))
+
+
+# time
+
+
+def _zero(summary: DemoSummary) -> int:
+    """Begin of the scenario, or of what was recorded, ns."""
+    if summary.steps:
+        return summary.steps[0].begin
+    return int(summary.traces.stamp[0]) if len(summary.traces.stamp) else 0
+
+
+def _seconds(summary: DemoSummary) -> Numbers:
+    seconds: Numbers = (summary.traces.stamp - _zero(summary)) / 1e9
+    return seconds
+
+
+def _draw_forces(axes: Axes, summary: DemoSummary) -> None:
+    """Along the force asked for, and magnitudes where none is asked for."""
+    traces, time = summary.traces, _seconds(summary)
+    pressed = traces.asked.acts
+
+    def shown(signal: Signal, sign: float) -> Numbers:
+        values: Numbers = np.where(pressed, traces.along(signal, sign), signal.size)
+        return values
+
+    asked = np.where(pressed, traces.asked.size, np.nan)
+    axes.plot(time, shown(traces.true, -1.0), color=TRUE, lw=1.6, label="applied (simulator)", zorder=3)
+    measured = np.where(pressed, traces.along(traces.measured), np.nan)
+    axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured by the loop", zorder=6)
+    axes.plot(time, shown(traces.felt, -1.0), color=FELT, lw=1.0, label="estimated", zorder=5)
+    axes.plot(time, asked, color=ASKED, lw=1.1, ls=(0, (1.2, 1.2)), label="asked", zorder=7)
+    axes.set_ylabel("force [N]")
+    axes.tick_params(labelbottom=False)
+    highest = [np.nanmax(values, initial=1.0) for values in (shown(traces.true, -1.0), shown(traces.felt, -1.0), asked)]
+    axes.set_ylim(min(0.0, -0.02 * max(highest)), 1.6 * float(max(highest)))
+    handles, labels = axes.get_legend_handles_labels()
+    order = [3, 0, 1, 2]
+    axes.legend(
+        [handles[i] for i in order], [labels[i] for i in order], loc="lower center", bbox_to_anchor=(0.5, 1.0),
+        ncols=4, fontsize=9, handlelength=1.8, columnspacing=1.2, borderaxespad=0.2,
+    )  # fmt: skip
+    _frame(axes, summary, "(b)")
+    _name_steps(axes, summary)
+
+
+def _draw_places(axes: Axes, summary: DemoSummary, arm: Arm) -> None:
+    traces, time = summary.traces, _seconds(summary)
+    length = max(arm.covers.length) * 100.0
+    for signal, colour, width in ((traces.true, TRUE, 1.6), (traces.felt, FELT, 1.0)):
+        place = np.where(signal.acts, 100.0 * signal.place, np.nan)
+        axes.plot(time, place, color=colour, lw=width, zorder=4)
+    for touch in summary.touches:
+        if touch.reason:
+            middle = _middle(summary, touch)
+            axes.text(middle, 0.07 * length, "not\nobservable", ha="center", fontsize=8, color=FELT, linespacing=0.95)
+    axes.set_ylim(0.0, 1.12 * length)
+    axes.set_ylabel("place on link [cm]")
+    axes.set_xlabel("time [s]")
+    _frame(axes, summary, "(c)")
+
+
+def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
+    zero = _zero(summary)
+    if summary.steps:
+        axes.set_xlim(0.0, max((summary.steps[-1].end - zero) / 1e9, 1e-3))
+    busy = {touch.begin: "#e7f0f7" for touch in summary.touches}
+    busy |= {step.begin: "#faeee2" for step in summary.steps for press in summary.presses if press.end == step.end}
+    for step in summary.steps:
+        begin, end = (step.begin - zero) / 1e9, (step.end - zero) / 1e9
+        axes.axvspan(begin, end, facecolor=busy.get(step.begin, "white"), edgecolor="none", zorder=0)
+        axes.axvline(begin, color="#b9bfc6", lw=0.5, zorder=1)
+    axes.text(-0.085, 1.0, letter, transform=axes.transAxes, va="top", ha="center", fontsize=11)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _middle(summary: DemoSummary, step: Step | Touch) -> float:
+    return ((step.begin + step.end) / 2.0 - _zero(summary)) / 1e9
+
+
+def _name_steps(axes: Axes, summary: DemoSummary) -> None:
+    """Names of the steps at the top, wrapped to the width of each; too narrow ones go without."""
+    whole = summary.steps[-1].end - summary.steps[0].begin if summary.steps else 0
+    for step in summary.steps:
+        room = round(105 * (step.end - step.begin) / max(whole, 1))
+        if room >= 6:
+            lines = textwrap.wrap(step.name, room, break_long_words=False)
+            axes.text(
+                _middle(summary, step), 0.985, "\n".join(lines), transform=axes.get_xaxis_transform(), ha="center",
+                va="top", fontsize=7.5, linespacing=1.0, color="#555555", zorder=7,
+            )  # fmt: skip
