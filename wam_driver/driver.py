@@ -130,13 +130,9 @@ class Driver:
         for _ in range(self._timing.substeps):
             self.plant.step(torque)
         self._tick += 1
-<<<<<<< ours
         self._measure()
-        self.recent.append(Sample(self.stamp, self.plant.theta, self.plant.thetad, self._command, self.currents))
-=======
         if self.safety.mode is not Mode.FAULT:  # what led to a fault is kept until its reset
             self.recent.append(Sample(self.stamp, self.plant.theta, self.plant.thetad, self._command, self.currents))
->>>>>>> theirs
         if enabled and self.is_outer:
             self._watch_limits()
 
