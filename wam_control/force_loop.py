@@ -146,10 +146,10 @@ class ForceLoop:
             self._filtered = None
             velocity = [] if self.parameters.mode == "open_loop" else self._posture_velocity(q)
             return ForceOutput(velocity, [0.0] * self._n, *_ZERO_FORCES)
-        jacobian, cover_rotation = self._contact_jacobian(q, contact)
+        jacobian = self._contact_jacobian(q, contact)
         along = direction @ jacobian
         effort = along * asked
-        measured = self._low_pass(self._measured(jacobian, cover_rotation, contact, direction), dt)
+        measured = self._low_pass(self._measured(q, jacobian, contact, direction), dt)
         error = asked - measured
         limit = self.parameters.force_error_limit
         limited = min(max(error, -limit), limit)
@@ -186,16 +186,18 @@ class ForceLoop:
         rotation = np.eye(3) if command.frame == "base" else self._body.cover_pose(q, command.frame).rotation
         return rotation @ (np.array(command.force) / asked), rotation, asked
 
-    def _contact_jacobian(self, q: Sequence[float], contact: Contact) -> tuple[Array, Array]:
+    def _contact_jacobian(self, q: Sequence[float], contact: Contact) -> Array:
         cover, place = contact.cover, contact.place
         if not cover or math.isnan(place):
             cover, place = self.parameters.contact_cover, self.parameters.contact_place
-        return self._body.point_jacobian(q, cover, (place, 0.0, 0.0)), self._body.cover_pose(q, cover).rotation
+        return self._body.point_jacobian(q, cover, (place, 0.0, 0.0))
 
-    def _measured(self, jacobian: Array, rotation: Array, contact: Contact, direction: Array) -> float:
+    def _measured(self, q: Sequence[float], jacobian: Array, contact: Contact, direction: Array) -> float:
         """F_c: force of the arm on the world along the direction, N."""
         if self.parameters.feedback == "contact_estimate":
-            return -float(direction @ (rotation @ np.array(contact.force))) if contact.cover else 0.0
+            if not contact.cover:
+                return 0.0
+            return -float(direction @ (self._body.cover_pose(q, contact.cover).rotation @ np.array(contact.force)))
         force = np.linalg.pinv(jacobian.T, rcond=SMALLEST_LEVER) @ self._external
         return -float(direction @ force)
 

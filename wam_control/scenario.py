@@ -15,6 +15,7 @@ from wam_description.signals import Contact
 
 REQUESTS = ("", "enable", "disable")
 NO_FORCE = ForceCommand("base", (0.0, 0.0, 0.0))
+ROUNDING = 1e-9  # s, of a sum of periods
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ class Scenario:
         if step.posture and not self.done:
             self._posture = self._on_path(step)
         push = step.push
-        pushing = push is not None and push.begin <= self._elapsed < push.end and not self.done
+        pushing = push is not None and push.begin <= self._elapsed + ROUNDING < push.end and not self.done
         force = push.force if push and pushing else (0.0, 0.0, 0.0)
         lever = push.place if push and pushing else 0.0
         request = "disable" if self.failure else step.request
@@ -116,7 +117,8 @@ class Scenario:
     def _begin(self, index: int, q: Sequence[float]) -> None:
         pressed = self._index >= 0 and self._steps[self._index].force != NO_FORCE
         self._index, self._elapsed = index, 0.0
-        if pressed and self._steps[index].posture:
+        step = self._steps[index]
+        if pressed and (step.posture or step.force == NO_FORCE):
             self._posture = list(q)  # the arm has moved along the force, off the posture
         self._from = list(self._posture)
 
@@ -126,12 +128,14 @@ class Scenario:
         if self.done:
             return False
         felt = bool(contact.cover) and math.hypot(*contact.force) >= step.until_force > 0.0
-        if not felt and self._elapsed < step.seconds - 1e-9:
+        if not felt and self._elapsed < step.seconds - ROUNDING:
             return False
         if step.until_force > 0.0 and not felt:
             self.failure = f"step '{step.name}': no contact of {step.until_force:g} N felt in {step.seconds:g} s"
             self.done = True
             return True
+        if step.posture and not felt:
+            self._posture = list(step.posture)
         if self._index + 1 == len(self._steps):
             self.done = True
             return False
@@ -156,10 +160,12 @@ def load(path: Path, arm: Arm) -> list[Step]:
         raise ParameterError(f"scenario {path} is not a file; give the path of a YAML file with 'steps'")
     try:
         tree = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ParameterError(f"scenario {path} is not YAML: {error}") from error
     if not isinstance(tree, dict) or not isinstance(tree.get("steps"), list):
         raise ParameterError(f"scenario {path} has no list 'steps'")
+    _known(f"scenario {path}", tree, ("steps",), ("steps",))
+    require(len(tree["steps"]) > 0, f"scenario {path} has no steps; give at least one")
     return [_step(f"{path}, step {i + 1}", body, arm) for i, body in enumerate(tree["steps"])]
 
 
@@ -167,27 +173,38 @@ def _step(where: str, body: Any, arm: Arm) -> Step:
     if not isinstance(body, dict):
         raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
     _known(where, body, ("name", "seconds", "posture", "until_force", "force", "push", "request"), ("name", "seconds"))
-    posture = _floats(where, "posture", body.get("posture", []), (0, len(arm.joints.names)))
+    name = body["name"]
+    require(isinstance(name, str) and name != "", f"{where}: name is {name!r}; it must be a text (quote it)")
     request = body.get("request", "")
     require(request in REQUESTS, f"{where}: request is {request!r}; allowed: enable, disable")
     seconds = _float(where, "seconds", body["seconds"])
     require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
+    until_force = _float(where, "until_force", body.get("until_force", 0.0))
+    require(until_force >= 0.0, f"{where}: until_force is {until_force:g}; it must be 0 (no contact awaited) or above")
     return Step(
-        name=str(body["name"]),
+        name=name,
         seconds=seconds,
-        posture=posture,
-        until_force=_float(where, "until_force", body.get("until_force", 0.0)),
+        posture=_posture(where, body["posture"], arm) if "posture" in body else (),
+        until_force=until_force,
         force=_force(where, body["force"], arm) if "force" in body else NO_FORCE,
         push=_push(where, body["push"], arm) if "push" in body else None,
         request=request,
     )
 
 
+def _posture(where: str, body: Any, arm: Arm) -> tuple[float, ...]:
+    joints = arm.joints
+    posture = _floats(where, "posture", body, len(joints.names))
+    for name, low, angle, high in zip(joints.names, joints.lower, posture, joints.upper, strict=True):
+        require(low <= angle <= high, f"{where}: posture of {name} is {angle:g} rad; allowed: {low:g} to {high:g} rad")
+    return posture
+
+
 def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
     _known(where + ", force", body, ("frame", "newtons"), ("frame", "newtons"))
     frames = ("base", *arm.covers.names)
     require(body["frame"] in frames, f"{where}: frame is {body['frame']!r}; allowed: {', '.join(frames)}")
-    x, y, z = _floats(where, "newtons", body["newtons"], (3,))
+    x, y, z = _floats(where, "newtons", body["newtons"], 3)
     return ForceCommand(body["frame"], (x, y, z))
 
 
@@ -198,8 +215,11 @@ def _push(where: str, body: Any, arm: Arm) -> Push:
         body["cover"] in arm.covers.names,
         f"{where}: cover is {body['cover']!r}; allowed: {', '.join(arm.covers.names)}",
     )
-    x, y, z = _floats(where, "newtons", body["newtons"], (3,))
+    x, y, z = _floats(where, "newtons", body["newtons"], 3)
     place, begin, end = (_float(where, key, body[key]) for key in ("place", "begin", "end"))
+    length = arm.covers.length[arm.covers.names.index(body["cover"])]
+    require(0.0 <= place <= length, f"{where}: place is {place:g} m; {body['cover']} reaches from 0 to {length:g} m")
+    require(0.0 <= begin < end, f"{where}: begin is {begin:g} s, end {end:g} s; end must be later, begin 0 or later")
     return Push(body["cover"], place, (x, y, z), begin, end)
 
 
@@ -218,7 +238,7 @@ def _float(where: str, key: str, value: Any) -> float:
     return float(value)
 
 
-def _floats(where: str, key: str, value: Any, lengths: tuple[int, ...]) -> tuple[float, ...]:
-    if not isinstance(value, list) or len(value) not in lengths:
-        raise ParameterError(f"{where}: {key} is {value!r}; it must be a list of {lengths[-1]} numbers")
+def _floats(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) != length:
+        raise ParameterError(f"{where}: {key} is {value!r}; it must be a list of {length} numbers")
     return tuple(_float(where, key, element) for element in value)

@@ -24,7 +24,7 @@ class ScenarioNode(Node):
     """Streams postures, forces and pushes; asks the driver to enable and to brake.
 
     While a request is on its way nothing is streamed, so that in lockstep the arm stands still
-    until the driver has answered.
+    until the driver has answered; where it refuses, the scenario has failed and is over.
 
     Attributes
     ----------
@@ -88,7 +88,8 @@ class ScenarioNode(Node):
             answer = future.result()
             self._asking = False
             if not answer.success:
-                self._fail(stamp, answer.message)
+                self._end(stamp, answer.message)
+                return
             if client is self._pause:
                 self._stream(stamp, out)
                 self._end(stamp, out.failure)

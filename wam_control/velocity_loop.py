@@ -14,7 +14,9 @@ class VelocityLoopParameters:
     proportional_gain: tuple[float, ...] = parameter("torque per velocity error", "N m s/rad", low=0.0, live=True)
     integral_gain: tuple[float, ...] = parameter("torque per angle error", "N m/rad", low=0.0, live=True)
     command_timeout: float = parameter(
-        "age at which a velocity command no longer counts and the motors are held still", "s", low=0.001
+        "age at which a velocity command, also an empty one, no longer counts and the motors are held still",
+        "s",
+        low=0.001,
     )
 
     def __post_init__(self) -> None:
@@ -66,7 +68,8 @@ class VelocityLoop:
         thetad : measured motor velocities (n,), rad/s.
         tau_motor : torques that the motors gave in the last period (n,), N m.
         command : motor velocities asked for (n,), rad/s; empty for torque only.
-        command_age : time since the state that the command answers, s; an old command counts as zero.
+        command_age : time since the state that the command answers, s; an old command, also one for torque
+            only, counts as zero velocity.
         feedforward : torques (n,), N m.
         dt : time since the last measurement, s.
 
@@ -75,7 +78,7 @@ class VelocityLoop:
         list of float
             currents (n,), A.
         """
-        if command and command_age > self._timeout:
+        if command_age > self._timeout:
             command = [0.0] * len(self._peak)
         currents = []
         for i, peak in enumerate(self._peak):

@@ -31,7 +31,8 @@ MODULES: Final = {
     "scenario": "wam_control.scenario_node",
     "recorder": "wam_ros.recorder_node",
 }
-LAST: Final = ("driver", "recorder")  # stopped after the others: brakes on, then the bag closed
+FIRST: Final = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
+LAST: Final = "recorder"  # to be stopped: it closes the bag
 PATIENCE: Final = 1.5  # s, for a node to end by itself
 
 
@@ -74,11 +75,9 @@ class Processes:
 
     def stop(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself."""
-        others = [name for name in self._processes if name not in LAST]
-        _stop([self._processes[name] for name in others])
-        for name in LAST:
-            if name in self._processes:
-                _stop([self._processes[name]])
+        others = [name for name in self._processes if name not in (FIRST, LAST)]
+        for names in ([FIRST], others, [LAST]):
+            _stop([self._processes[name] for name in names if name in self._processes])
         self._stack.close()
 
 
@@ -94,7 +93,7 @@ def _start(name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
 def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
     for process in processes:
         if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+            process.terminate()  # SIGINT would make a node that is still being imported print a traceback
     deadline = time.monotonic() + PATIENCE
     for process in processes:
         try:
@@ -155,8 +154,8 @@ class Composition:
         spin(self.executor, until)
 
     def close(self) -> None:
-        """Destroy the nodes, driver and recorder last."""
-        for name in sorted(self.nodes, key=lambda name: LAST.index(name) + 1 if name in LAST else 0):
+        """Destroy the nodes, driver first, recorder last."""
+        for name in sorted(self.nodes, key=lambda name: (name == LAST) - (name == FIRST)):
             node = self.nodes.pop(name)
             self.executor.remove_node(node)
             node.destroy_node()

@@ -3,6 +3,7 @@
 import argparse
 import importlib
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +20,10 @@ BASE_CONFIGURATION = "wam"
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; exits with 0 where all went well."""
     parser = _parser()
-    given = parser.parse_args(arguments)
+    given, rest = parser.parse_known_args(arguments)
+    if rest and given.run is not _node:
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    given.ros = rest
     try:
         code = given.run(given)
     except (ParameterError, ValueError, OSError) as error:
@@ -50,7 +54,8 @@ def _parser() -> argparse.ArgumentParser:
 
     node = _command(commands, "node", _node, "start one node by hand, with ROS arguments if need be")
     node.add_argument("name", help="driver, transform, velocity_loop, gravity, force_loop, contact_estimator, ...")
-    node.add_argument("ros", nargs=argparse.REMAINDER, help="for example: -p timing.mode:=lockstep -r __ns:=/left")
+    node.usage = "wam node [-h] [--config CONFIG] name [ROS argument ...]"
+    node.epilog = "ROS arguments are for example: -p timing.mode:=lockstep -r __ns:=/left"
     _configured(node)
 
     record = _command(commands, "record", _record, "record every topic of a running stack until Ctrl-C")
@@ -149,11 +154,18 @@ def _node(given: argparse.Namespace) -> int:
 
 
 def _record(given: argparse.Namespace) -> int:
-    given.ros = ["-p", f"name:={given.name or chr(39) * 2}"]
+    from wam_ros.bring_up import node_class
+    from wam_ros.run import run
+
+    values = {"recorder:name": given.name}
     if given.directory:
-        given.ros += ["-p", f"directory:={given.directory}"]
-    given.name = "recorder"
-    return _node(given)
+        values["recorder:directory"] = given.directory
+    configuration = _configuration(given).with_values(values)
+    with tempfile.TemporaryDirectory(prefix="wam_stack_") as folder:
+        file = Path(folder) / "parameters.yaml"
+        file.write_text(configuration.text, encoding="utf-8")
+        run(node_class("recorder"), ["wam", "--ros-args", "--params-file", str(file)])
+    return 0
 
 
 def _report(given: argparse.Namespace) -> int:

@@ -45,7 +45,7 @@ def joint_state(stamp: int, names: Sequence[str], state: State) -> JointState:
 
 
 def read_joint_state(message: JointState, names: list[str], fields: str) -> State:
-    """Values of a JointState in the order of `names`.
+    """Values of a JointState in the order of `names`; arrays that were not asked for stay empty.
 
     Parameters
     ----------
@@ -62,17 +62,19 @@ def read_joint_state(message: JointState, names: list[str], fields: str) -> Stat
     if message.name != names:
         order = _order(list(message.name), names)
     count = len(names)
-    arrays: dict[str, list[float]] = {"position": [], "velocity": [], "effort": []}
-    for field in fields.split():
-        name = field.rstrip("?")
+    asked = fields.split()
+    arrays: list[list[float]] = []
+    for name in State._fields:
         array = getattr(message, name).tolist()
-        if len(array) != count and (array or field == name):
+        if len(array) != count and (array or name in asked):
             raise Refused(f"{name} has {len(array)} values; send {count}, one for each of {', '.join(names)}")
         for value, owner in zip(array, message.name, strict=False):
             if not isfinite(value):
                 raise Refused(f"{name} of {owner} is {value}; send finite numbers")
-        arrays[name] = [array[i] for i in order] if order and array else array
-    return State(**arrays)
+        if not (name in asked or name + "?" in asked):
+            array = []
+        arrays.append([array[i] for i in order] if order and array else array)
+    return State(*arrays)
 
 
 def _order(found: list[str], names: list[str]) -> list[int]:

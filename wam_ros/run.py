@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from wam_description.parameters import ParameterError
 
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
+LONGEST_END = 0.5  # s, for what has arrived before the end
 PR_SET_PDEATHSIG = 1
 MakeNode = Callable[..., Node]
 
@@ -32,8 +34,8 @@ def raise_priority(niceness: int) -> None:
     On Linux priority belongs to the thread, and those of the middleware are there already.
     """
     with contextlib.suppress(PermissionError, FileNotFoundError):
-        for thread in os.listdir("/proc/self/task"):
-            os.setpriority(os.PRIO_PROCESS, int(thread), niceness)
+        for thread in Path("/proc/self/task").iterdir():
+            os.setpriority(os.PRIO_PROCESS, int(thread.name), niceness)
 
 
 def die_with_parent() -> None:
@@ -68,23 +70,33 @@ class Stop:
 
 
 def spin(executor: Any, until: Callable[[], bool]) -> None:
-    """Spin until `until` is true.
+    """Spin until `until` is true, which is asked after each callback; then take what has arrived until then.
 
-    The events executor's own spin() hangs in the wheels built against old C libraries; spinning
-    for a future with a time-out works everywhere.
+    The events executor's own spin() hangs in the wheels built against old C libraries, and its
+    spin_until_future_complete() sees its time-out only when no message waits: that is what the end
+    wants, and what never comes in a lockstep that goes on, hence the limit.
     """
-    future: rclpy.Future[None] = rclpy.Future()
     while not until():
-        executor.spin_until_future_complete(future, timeout_sec=0.1)
+        executor.spin_once(timeout_sec=0.1)
+    future: rclpy.Future[None] = rclpy.Future()
+    limit = threading.Timer(LONGEST_END, executor.create_task, [future.set_result, None])
+    limit.start()
+    executor.spin_until_future_complete(future, timeout_sec=0.1)
+    limit.cancel()
+    limit.join()
 
 
 def prepare_logging_directory() -> None:
     """Let rclpy log somewhere even where HOME is missing or cannot be written."""
     if "ROS_LOG_DIR" in os.environ or "ROS_HOME" in os.environ:
         return
-    home = Path(os.environ.get("HOME", "/nonexistent"))
-    if not os.access(home, os.W_OK):
-        os.environ["ROS_LOG_DIR"] = str(Path(tempfile.gettempdir()) / f"wam_stack_log_{os.getuid()}")
+    if home := os.environ.get("HOME"):
+        directory = Path(home, ".ros", "log")
+        with contextlib.suppress(OSError):
+            directory.mkdir(parents=True, exist_ok=True)
+            if os.access(directory, os.W_OK):
+                return
+    os.environ["ROS_LOG_DIR"] = str(Path(tempfile.gettempdir()) / f"wam_stack_log_{os.getuid()}")
 
 
 def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
@@ -98,17 +110,18 @@ def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
     Raises
     ------
     SystemExit
-        with code 1 where the parameters are refused or the node has a `failure`.
+        with code 1 where the ROS arguments or the parameters are refused or the node has a `failure`.
     """
     prepare_logging_directory()
     die_with_parent()
     stop = Stop()
     context = Context()
-    rclpy.init(
-        args=list(sys.argv if arguments is None else arguments),
-        context=context,
-        signal_handler_options=SignalHandlerOptions.NO,
-    )
+    given = list(sys.argv if arguments is None else arguments)
+    try:
+        rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        reason = str(error).split(", at /")[0]
+        raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
     executor = make_executor(context)
     node = None
     try:

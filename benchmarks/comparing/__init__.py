@@ -1,0 +1,87 @@
+"""What the benchmarks share: rounds, medians with their range, one table, one line of JSON.
+
+Speeds of machines differ, and those of one machine change from hour to hour; what stays is the
+ratio of two things measured in turns in the same run.  Only ratios are to be compared.
+"""
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import time
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+RESULTS = Path(__file__).resolve().parents[1] / "results"
+
+
+class Spread(NamedTuple):
+    """Median of some rounds, and the two values between which the middle half of them lies."""
+
+    median: float
+    low: float
+    high: float
+
+    def __format__(self, spec: str) -> str:
+        return f"{self.median:{spec}} ({self.low:{spec}}..{self.high:{spec}})"
+
+
+def spread(values: Sequence[float]) -> Spread:
+    """Median and middle half of the rounds."""
+    low, median, high = statistics.quantiles(values, n=4, method="inclusive") if len(values) > 1 else [values[0]] * 3
+    return Spread(median, low, high)
+
+
+def ratios(values: Sequence[float], references: Sequence[float]) -> Spread:
+    """Each round against the reference of the same round."""
+    return spread([value / reference for value, reference in zip(values, references, strict=True)])
+
+
+def arguments(text: str, rounds: int, quick_rounds: int) -> argparse.Namespace:
+    """The options of every benchmark: `rounds`, `quick`."""
+    parser = argparse.ArgumentParser(description=text)
+    parser.add_argument("--rounds", type=int, help=f"how often each is measured; default: {rounds}")
+    parser.add_argument("--quick", action="store_true", help="short, to see that it works; nothing is written")
+    given = parser.parse_args()
+    given.rounds = given.rounds or (quick_rounds if given.quick else rounds)
+    return given
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns as wide as they need, the first one to the left, the others to the right."""
+    lines = [list(head), *map(list, rows)]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+    return "\n".join(
+        "  ".join([line[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(line[1:], widths[1:], strict=True))])
+        for line in lines
+    )
+
+
+def machine() -> str:
+    """Kind of this machine, in a line."""
+    cpu = ""
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        names = [line.partition(":")[2].strip() for line in info.read_text().splitlines() if "model name" in line]
+        cpu = names[0] if names else ""
+    python = f"Python {platform.python_version()}"
+    return f"{os.cpu_count()} cores, {cpu or platform.machine()}, {platform.system()}, {python}"
+
+
+def save(name: str, given: argparse.Namespace, measured: Mapping[str, Any]) -> None:
+    """Append the run to results/`name`.jsonl; a quick run is not kept."""
+    if given.quick:
+        return
+    RESULTS.mkdir(exist_ok=True)
+    line = {
+        "time": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "machine": machine(),
+        "mujoco": version("mujoco"),
+        "rounds": given.rounds,
+        **measured,
+    }
+    with (RESULTS / f"{name}.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps(line) + "\n")

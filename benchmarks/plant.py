@@ -1,0 +1,114 @@
+"""A substep of the plant against a bare mj_step of the same model in the same state."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+from comparing import Spread, arguments, machine, ratios, save, spread, table
+
+from wam_control.scenario import load
+from wam_description.configuration import Configuration, packaged
+from wam_description.mjcf import mjcf
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.driver import DriverParameters
+from wam_driver.plant import Plant
+
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+FREE = (0.0, -0.6, 0.0, 0.5)  # rad
+PUSH = (np.array([0.0, 12.0, 0.0]), np.array([0.0, 0.0, 12.0 * 0.28]))  # N, N m
+
+
+class Case:
+    """The plant, and the bare model that it consists of, in one state.
+
+    Parameters
+    ----------
+    q : pose at the start, rad.
+    extra : torque of each motor on top of what carries the links, N m.
+    pushed : whether a disturbance pushes on the outer link.
+    """
+
+    def __init__(self, q: tuple[float, ...], extra: float, pushed: bool = False) -> None:
+        configuration = Configuration.load(packaged("wam")).with_values({"arm.joints.start": q})
+        arm, step = configuration.shared.arm, configuration.shared.timing.substep
+        obstacles = configuration.node("driver", DriverParameters).obstacles
+        self.plant = Plant(arm, obstacles, step)
+        self.bare = mujoco.MjModel.from_xml_string(mjcf(arm, step, obstacles))
+        self.data = mujoco.MjData(self.bare)
+        gravity = RigidBody(arm).gravity_torque(q).tolist()
+        self.torque = [tau + extra for tau in TransmissionMap.of(arm).motor_torques(gravity)]
+        self.plant.brake(False)
+        if pushed:
+            self.plant.push(arm.covers.names[-1], *PUSH)
+        self._steps(20)
+        self._state = np.empty(mujoco.mj_stateSize(self.bare, STATE))
+        mujoco.mj_getState(self.plant.model, self.plant.data, self._state, STATE)
+
+    def _steps(self, count: int) -> None:
+        for _ in range(count):
+            self.plant.step(self.torque)
+
+    def _bare_steps(self, count: int) -> None:
+        for _ in range(count):
+            mujoco.mj_step(self.bare, self.data)
+
+    def measure(self, count: int) -> tuple[float, float]:
+        """Seconds a step, of the plant and of the bare model, from the same state."""
+        mujoco.mj_setState(self.plant.model, self.plant.data, self._state, STATE)
+        self.bare.dof_frictionloss[:] = self.plant.model.dof_frictionloss
+        self.bare.pair_solref[:] = self.plant.model.pair_solref
+        mujoco.mj_setState(self.bare, self.data, self._state, STATE)
+        return _seconds(self._steps, count), _seconds(self._bare_steps, count)
+
+
+def _seconds(steps: Callable[[int], None], count: int) -> float:
+    begin = time.perf_counter()
+    steps(count)
+    return (time.perf_counter() - begin) / count
+
+
+def pose_in_contact() -> tuple[float, ...]:
+    """Where the outer link just touches the box on the demonstration's way down, rad."""
+    steps = load(packaged("demo_scenario"), Configuration.load(packaged("wam")).shared.arm)
+    i = next(i for i, step in enumerate(steps) if step.until_force > 0.0)
+    above, below = np.array(steps[i - 1].posture), np.array(steps[i].posture)
+    for share in np.linspace(0.0, 1.0, 51):
+        pose = tuple((above + share * (below - above)).tolist())
+        if Case(pose, 0.0).plant.data.ncon:
+            return pose
+    raise SystemExit("the demonstration's way down does not touch the box; look at config/demo_scenario.yaml")
+
+
+def main() -> None:
+    """Measure in turns, print the table."""
+    given = arguments(__doc__, rounds=200, quick_rounds=5)
+    count = 40  # steps; short, so that the state stays what it is
+    cases = {
+        "arm free, moving": Case(FREE, extra=0.2),
+        "arm free, pushed": Case(FREE, extra=0.2, pushed=True),
+        "in contact": Case(pose_in_contact(), extra=0.0),
+    }
+    seconds: dict[str, tuple[list[float], list[float]]] = {name: ([], []) for name in cases}
+    for _ in range(given.rounds):
+        for name, case in cases.items():
+            for kept, one in zip(seconds[name], case.measure(count), strict=True):
+                kept.append(one)
+    rows, measured = [], dict[str, Any]()
+    for name, (plant, bare) in seconds.items():
+        ratio = ratios(plant, bare)
+        micro = [Spread(*(1e6 * value for value in spread(part))) for part in (plant, bare)]
+        best = min(plant) / min(bare)
+        contacts = cases[name].plant.data.ncon
+        rows.append([name, str(contacts), *(f"{part.median:.1f}" for part in micro), f"{ratio:.2f}", f"{best:.2f}"])
+        measured[name] = {"ratio": ratio, "best": best, "plant_us": micro[0], "bare_us": micro[1]}
+    print(machine())
+    head = ["substep", "contacts", "plant [us]", "mj_step [us]", "ratio (middle half)", "of the best"]
+    print(table(head, rows))
+    save("plant", given, measured)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""A second of the arm against a second of the wall: lockstep over topics, and the loop without ROS.
+
+The scenario is the demonstration's beginning, shortened: enable, move, a push on the outer link, brake.
+"""
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import yaml
+from comparing import arguments, machine, ratios, save, spread, table
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from wam_analysis.direct import DirectRun
+from wam_control.scenario import load
+from wam_description.configuration import Configuration, packaged
+from wam_ros.bring_up import Composition
+
+STEADY = ClockType.STEADY_TIME
+LOOK = 0.02  # s between two looks at the arm's time
+ROWS = ("direct run", "lockstep", "lockstep, recorded")
+
+
+def scenario(seconds: float) -> dict[str, Any]:
+    """Steps that take `seconds` in all."""
+    push = {"cover": "outer_link", "place": 0.28, "newtons": [0.0, 12.0, 0.0], "begin": 0.1, "end": 0.3 * seconds}
+    return {
+        "steps": [
+            {"name": "release", "seconds": 0.1 * seconds, "request": "enable"},
+            {"name": "move", "seconds": 0.4 * seconds, "posture": [0.0, -0.8, 0.0, 0.3]},
+            {"name": "be pushed", "seconds": 0.4 * seconds, "posture": [0.1, -0.9, 0.0, 0.5], "push": push},
+            {"name": "brake", "seconds": 0.1 * seconds, "request": "disable"},
+        ]
+    }
+
+
+def direct(configuration: Configuration, script: Path) -> float:
+    """Seconds of the arm per second of the wall, without ROS."""
+    run = DirectRun(configuration, load(script, configuration.shared.arm))
+    begin = time.perf_counter()
+    if failure := run.play():
+        raise SystemExit(failure)
+    return run.driver.stamp / 1e9 / (time.perf_counter() - begin)
+
+
+def lockstep(configuration: Configuration, *recorder: str) -> float:
+    """The same over topics in one process; starting and matching the nodes is not counted."""
+    nodes = {"nodes": [*configuration.shared.nodes, "scenario", *recorder]}
+    seen: list[tuple[float, int]] = []
+    with Composition(configuration.with_values(nodes)) as composition:
+        driver: Any = composition.nodes["driver"]
+        player: Any = composition.nodes["scenario"]
+        watch = Node("stopwatch", context=composition.context)
+        watch.create_timer(
+            LOOK, lambda: seen.append((time.perf_counter(), driver.driver.stamp)), clock=Clock(clock_type=STEADY)
+        )
+        composition.executor.add_node(watch)
+        composition.spin(lambda: player.done)
+        composition.executor.remove_node(watch)
+        watch.destroy_node()
+        if player.failure:
+            raise SystemExit(player.failure)
+    first, last = seen[0][1], seen[-1][1]
+    running = [(at, stamp) for at, stamp in seen if first < stamp < last]
+    (begin, start), (end, stop) = running[0], running[-1]
+    return (stop - start) / 1e9 / (end - begin)
+
+
+def main() -> None:
+    """Measure in turns, print the table."""
+    given = arguments(__doc__, rounds=5, quick_rounds=1)
+    speeds: dict[str, list[float]] = {row: [] for row in ROWS}
+    with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
+        script = Path(folder) / "script.yaml"
+        script.write_text(yaml.safe_dump(scenario(2.0 if given.quick else 5.0)), encoding="utf-8")
+        configuration = Configuration.load(packaged("wam")).with_values(
+            {"timing.mode": "lockstep", "scenario:script": str(script), "recorder:directory": folder}
+        )
+        for i in range(given.rounds):
+            recorded = configuration.with_values({"recorder:name": f"round_{i}"})
+            speeds["direct run"].append(direct(configuration, script))
+            speeds["lockstep"].append(lockstep(configuration))
+            speeds["lockstep, recorded"].append(lockstep(recorded, "recorder"))
+    rows, measured = [], dict[str, Any]()
+    for name, values in speeds.items():
+        real, least = spread(values), ratios(speeds["direct run"], values)
+        rows.append([name, f"{real:.2f}", f"{least:.2f}"])
+        measured[name] = {"real_time_ratio": real, "direct_ratio": least}
+    print(machine())
+    print(table(["scenario", "times real time (middle half)", "direct run is faster by"], rows))
+    save("speed", given, measured)
+
+
+if __name__ == "__main__":
+    main()

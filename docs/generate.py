@@ -1,0 +1,201 @@
+"""Writes what the documentation takes from the code: tables, listings, the demonstration's picture.
+
+A page is written by hand, but for its blocks between `<!-- generated: NAME -->` and
+`<!-- end -->`; this program fills those.  `make docs` runs it; a test fails where a block is stale.
+"""
+
+import argparse
+import importlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from wam_description.arm import Shared, Timing
+from wam_description.configuration import Configuration
+from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
+from wam_description.parameters import fields
+from wam_ros.bring_up import MODULES
+from wam_ros.topics import TOPICS
+
+ROOT = Path(__file__).resolve().parents[1]
+CONFIGURATION = ROOT / "config" / "wam.yaml"
+BLOCK = re.compile(r"(<!-- generated: (?P<name>[^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def cell(text: str) -> str:
+    """A text that stands in a table."""
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(cell(text) for text in line) + " |" for line in lines) + "\n"
+
+
+def number(value: Any) -> str:
+    """A value as it is read best; seven digits are more than any of them has."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (tuple, list)):
+        return ", ".join(map(number, value))
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
+
+
+# topics
+
+
+def rate(name: str, timing: Timing) -> str:
+    """How often a topic comes, with the periods of config/wam.yaml."""
+    periods = {"inner": 1, "outer": timing.outer_divisor, "display": timing.outer_divisor * timing.display_divisor}
+    if name not in periods:
+        return name
+    return f"{name}, {1.0 / (timing.period * periods[name]):g} Hz"
+
+
+def topics(configuration: Configuration) -> str:
+    """The interface table."""
+    every = set(MODULES)
+
+    def nodes(names: Sequence[str]) -> str:
+        return "every node" if set(names) == every else ", ".join(names) or "–"
+
+    timing = configuration.shared.timing
+    rows = [
+        [
+            f"`{topic.name}`",
+            topic.type.replace("/msg/", "/"),
+            nodes(topic.publisher),
+            nodes(topic.subscribers),
+            rate(topic.rate, timing),
+            topic.doc,
+        ]
+        for topic in TOPICS
+    ]
+    return table(["topic", "type", "from", "to", "rate", "content"], rows)
+
+
+# parameters
+
+
+def parameter_rows(cls: type, given: Mapping[str, Any]) -> Iterator[list[str]]:
+    """One row for each parameter of a class."""
+    for field in fields(cls):
+        kind = f"list of {field.kind.__name__}" if field.is_array else field.kind.__name__
+        value = number(given[field.name])
+        live = "yes" if field.live else ""
+        yield [f"`{field.name}`", kind, field.unit, field.allowed, live, field.doc, f"`{value}`" if value else "empty"]
+
+
+def parameters_of(node: str) -> type:
+    """The parameter class of a node."""
+    module = importlib.import_module(MODULES[node])
+    found: type = getattr(module, "PARAMETERS", None) or module.RecorderParameters
+    return found
+
+
+def parameters(configuration: Configuration) -> str:
+    """Every parameter of every node."""
+    head = ["parameter", "type", "unit", "allowed", "live", "meaning", "in config/wam.yaml"]
+    shared = list(parameter_rows(Shared, configuration.sections["/**"]))
+    parts = ["## Shared by all nodes, section `/**`\n", table(head, shared)]
+    for node in MODULES:
+        rows = list(parameter_rows(parameters_of(node), configuration.sections[node]))
+        parts += [f"## `{node}`\n", table(head, rows) if rows else "None of its own.\n"]
+    return "\n".join(parts)
+
+
+# constants
+
+
+def constants(rows: Sequence[Constant]) -> str:
+    """A part of the table of constants."""
+    head = ["", "meaning", "value", "unit", "SI", "from", "parameter", "remark"]
+    return table(head, [constant_row(row) for row in rows])
+
+
+def constant_row(row: Constant) -> list[str]:
+    """One constant, as printed and in SI units."""
+    value = number(row.value)
+    converted = ", ".join(f"{v:.5g}" for v in row.si)
+    index = f" [{', '.join(map(str, row.index))}]" if row.index else ""
+    return [
+        row.symbol,
+        row.meaning,
+        value,
+        row.unit,
+        converted if row.si != (row.value if isinstance(row.value, tuple) else (row.value,)) else "",
+        row.source if row.mark == "thesis" else "assumed",
+        f"`{row.parameter}`{index}" if row.parameter else "",
+        row.reason or row.erratum,
+    ]
+
+
+# pages
+
+
+def listing(name: str) -> str:
+    """A file of this repository as a block of code."""
+    return f"```python\n{(ROOT / name).read_text(encoding='utf-8')}```\n"
+
+
+def blocks() -> dict[str, Callable[[], str]]:
+    """What can stand in a page, by name."""
+    configuration = Configuration.load(CONFIGURATION)
+    return {
+        "topics": lambda: topics(configuration),
+        "parameters": lambda: parameters(configuration),
+        "constants of the arm, printed": lambda: constants(ARM_PRINTED),
+        "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
+        "constants of the testbed": lambda: constants(TESTBED),
+        "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
+    }
+
+
+def filled(text: str) -> str:
+    """A page with its generated blocks as they should be."""
+    known = blocks()
+    return BLOCK.sub(lambda found: f"{found[1]}\n{known[found['name']]()}\n{found[3]}", text)
+
+
+def pages() -> dict[Path, str]:
+    """Every page that has generated blocks, as it should be."""
+    texts = {path: path.read_text(encoding="utf-8") for path in [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]}
+    return {path: filled(text) for path, text in texts.items() if BLOCK.search(text)}
+
+
+def draw_demonstration() -> None:
+    """Play the demonstration in lockstep and keep its picture and its report."""
+    with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
+        configuration = Configuration.load(CONFIGURATION).with_values({"recorder:directory": folder})
+        file = Path(folder) / "wam.yaml"
+        file.write_text(configuration.text, encoding="utf-8")
+        command = [sys.executable, "-m", "wam_ros.cli", "demo", "--lockstep", "--name", "demo", "--config", str(file)]
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+        if done.returncode:
+            raise SystemExit("the demonstration failed, docs/demo.* stay as they were; what it said stands above")
+        report = done.stdout.partition("\nbag ")[0].rstrip()
+        (ROOT / "docs" / "demo.txt").write_text(report + "\n", encoding="utf-8")
+        shutil.copyfile(Path(folder) / "demo" / "demo.png", ROOT / "docs" / "demo.png")
+
+
+def main() -> None:
+    """Write the pages, then the picture."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pages", action="store_true", help="pages only, without playing the demonstration")
+    given = parser.parse_args()
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")
+        print(path.relative_to(ROOT))
+    if not given.pages:
+        draw_demonstration()
+        print("docs/demo.png\ndocs/demo.txt")
+
+
+if __name__ == "__main__":
+    main()

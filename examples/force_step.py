@@ -1,0 +1,107 @@
+"""A node of your own: touch the foam box, press 5 N, then 10 N, say what was measured, brake.
+
+Start the stack in one shell, `wam up`, and this in another, `python3 examples/force_step.py`.
+It needs nothing of this package: topics and one service are the whole contract (docs/topics.md).
+"""
+
+import sys
+from collections.abc import Iterator
+
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool
+
+ABOVE = [0.0, -1.8, 0.0, 1.45]  # rad, joint1..joint4, as in config/demo_scenario.yaml
+BELOW = [0.0, -2.1, 0.0, 1.45]
+FELT = 1.5  # N
+PERIOD = 0.005  # s, of joint_states
+
+
+class ForceStep(Node):
+    """Answers each joint state with a posture and a force; the task is a generator, a yield a period."""
+
+    def __init__(self) -> None:
+        super().__init__("force_step", namespace="wam")
+        self.q: list[float] = []
+        self.felt = self.measured = 0.0
+        self.posture = self.create_publisher(JointState, "joint_posture_command", 10)
+        self.force = self.create_publisher(WrenchStamped, "force_command", 10)
+        self.enable = self.create_client(SetBool, "driver/enable")
+        self.create_subscription(WrenchStamped, "contact/wrench", self.take_contact, 10)
+        self.create_subscription(WrenchStamped, "force_measured", self.take_measured, 10)
+        self.create_subscription(JointState, "joint_states", self.take_joints, 10)
+        self.wanted, self.newtons = [0.0] * 4, 0.0
+        self.task = self.play()
+        self.is_done = False
+
+    def take_contact(self, message: WrenchStamped) -> None:
+        force = message.wrench.force  # of the world on the link
+        self.felt = (force.x**2 + force.y**2 + force.z**2) ** 0.5
+
+    def take_measured(self, message: WrenchStamped) -> None:
+        self.measured = -message.wrench.force.y  # of the arm on the world
+
+    def take_joints(self, message: JointState) -> None:
+        place = dict(zip(message.name, message.position, strict=True))
+        self.q = [place[f"joint{i}"] for i in (1, 2, 3, 4)]  # by name, never by index
+        if next(self.task, "done") == "done":
+            self.is_done = True
+            return
+        posture = JointState(name=["joint1", "joint2", "joint3", "joint4"], position=self.wanted)
+        force = WrenchStamped()
+        posture.header.stamp = force.header.stamp = message.header.stamp  # the state that caused them
+        force.header.frame_id = "outer_link"
+        force.wrench.force.y = -self.newtons
+        self.posture.publish(posture)
+        self.force.publish(force)
+
+    def play(self) -> Iterator[None]:
+        self.wanted = list(self.q)
+        yield from self.ask(True)
+        yield from self.move(ABOVE, 2.0)
+        yield from self.move(BELOW, 4.0)
+        if self.felt < FELT:
+            sys.exit("no contact was felt; is the box where config/wam.yaml has it?")
+        for newtons in (5.0, 10.0):
+            self.newtons, sum_of_all = newtons, 0.0
+            for _ in range(300):
+                yield
+            for _ in range(200):
+                sum_of_all += self.measured / 200
+                yield
+            print(f"asked {newtons:5.2f} N, measured {sum_of_all:5.2f} N", flush=True)
+        self.newtons, self.wanted = 0.0, list(self.q)
+        yield from self.move(ABOVE, 2.0)
+        yield from self.ask(False)
+
+    def ask(self, on: bool) -> Iterator[None]:
+        while not self.enable.service_is_ready():
+            yield
+        answer = self.enable.call_async(SetBool.Request(data=on))
+        while not answer.done():
+            yield
+        if not answer.result().success:
+            sys.exit(answer.result().message)
+
+    def move(self, goal: list[float], seconds: float) -> Iterator[None]:
+        """Along a straight line; ends early where a contact is felt on the way down."""
+        start, count = list(self.wanted), int(seconds / PERIOD)
+        for i in range(1, count + 1):
+            self.wanted = [a + (b - a) * i / count for a, b in zip(start, goal, strict=True)]
+            yield
+            if goal is BELOW and self.felt >= FELT:
+                return
+
+
+def main() -> None:
+    rclpy.init()
+    node = ForceStep()
+    while not node.is_done:
+        rclpy.spin_once(node)
+    rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()

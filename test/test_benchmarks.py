@@ -1,0 +1,45 @@
+"""Each benchmark runs and prints its ratios; how fast is for people to judge."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = sorted(path.name for path in ROOT.glob("benchmarks/*.py"))
+ROWS = {
+    "plant.py": ["arm free, moving", "arm free, pushed", "in contact"],
+    "round_trip.py": ["one process, p50", "one process, p99", "two processes, p50", "two processes, p99"],
+    "speed.py": ["direct run", "lockstep", "lockstep, recorded"],
+}
+RATIO = re.compile(r"(\d+\.\d\d) \(\d+\.\d\d\.\.\d+\.\d\d\)")
+
+
+def test_every_benchmark_is_looked_at() -> None:
+    assert sorted(ROWS) == SCRIPTS
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_benchmark_prints_a_ratio_in_every_row(script: str, domain_id: int) -> None:
+    results = ROOT / "benchmarks" / "results" / script.replace(".py", ".jsonl")
+    before = results.read_bytes() if results.exists() else None
+    done = subprocess.run(
+        [sys.executable, ROOT / "benchmarks" / script, "--quick"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    machine, _, *rows = done.stdout.splitlines()
+    assert "cores" in machine
+    assert [re.split(r"\s{2,}", row)[0] for row in rows] == ROWS[script]
+    for row in rows:
+        found = RATIO.search(row)
+        assert found, row
+        assert float(found[1]) > 0.0, row
+    assert (results.read_bytes() if results.exists() else None) == before, "a quick run must not be kept"

@@ -1,0 +1,312 @@
+"""The outer loop on a world that is computed here: the arm goes where it is told, springs push back."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError, build, values
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import NO_CONTACT, Contact, State
+
+CONFIGURATION = Configuration.load(packaged("wam"))
+ARM = CONFIGURATION.shared.arm
+BODY = RigidBody(ARM)
+GAIN, LIMIT = 0.015, 20.0
+OWN = replace(
+    CONFIGURATION.node("force_loop", ForceLoopParameters), force_gain=GAIN, force_error_limit=LIMIT, force_filter=0.0
+)
+COVER, PLACE = OWN.contact_cover, OWN.contact_place
+POSE = [0.3, -1.2, 0.2, 1.0]
+DOWN = (0.0, 0.0, -1.0)
+DT = 5e-3
+STILL = [0.0] * 4
+
+
+def lever(q: list[float], n: Any = DOWN, cover: str = COVER, place: float = PLACE) -> np.ndarray:
+    """Joint torques per newton along n at a point, from finite differences of where the point is."""
+    h = 1e-6
+    columns = []
+    for i in range(4):
+        more, less = list(q), list(q)
+        more[i] += h
+        less[i] -= h
+        columns.append((BODY.point(more, cover, (place, 0, 0)) - BODY.point(less, cover, (place, 0, 0))) / (2 * h))
+    return np.array(n) @ np.array(columns).T
+
+
+class World:
+    """Arm with ideal velocity servos in front of a spring of stiffness k, N/m, along n, base frame."""
+
+    def __init__(self, stiffness: float, n: Any = DOWN, q: list[float] = POSE, force: float = 0.0) -> None:
+        self.stiffness, self.n, self.q = stiffness, np.array(n), list(q)
+        self._surface = self.n @ BODY.point(self.q, COVER, (PLACE, 0, 0)) - force / stiffness
+
+    @property
+    def force(self) -> float:
+        """Force of the arm on the world along n, N."""
+        return float(self.stiffness * (self.n @ BODY.point(self.q, COVER, (PLACE, 0, 0)) - self._surface))
+
+    @property
+    def sensors(self) -> State:
+        strain = BODY.gravity_torque(self.q) + lever(self.q, self.n) * self.force
+        return State(self.q, STILL, strain.tolist())
+
+    @property
+    def joints(self) -> State:
+        return State(list(self.q), STILL, STILL)
+
+    def move(self, velocity: list[float], dt: float = DT) -> None:
+        self.q = [a + b * dt for a, b in zip(self.q, velocity, strict=True)]
+
+
+def ask(loop: ForceLoop, world: World, force: Any, dt: float = DT, **more: Any) -> ForceOutput:
+    command = None if force is None else ForceCommand("base", tuple(float(f) for f in force))
+    given: dict[str, Any] = {"contact": NO_CONTACT, "external": None, "posture": None, "torque": None, **more}
+    return loop.step(
+        world.joints,
+        world.sensors,
+        given["contact"],
+        given["external"],
+        given.get("command", command),
+        given["posture"],
+        given["torque"],
+        dt,
+    )
+
+
+def down(newtons: float) -> tuple[float, float, float]:
+    return (0.0, 0.0, -newtons)
+
+
+@pytest.mark.parametrize("stiffness", [200.0, 800.0])
+def test_force_comes_with_the_time_constant_of_equation_5_2(stiffness: float) -> None:
+    loop, world, dt = ForceLoop(ARM, OWN), World(stiffness, force=1.0), 2e-4
+    time_constant = 1.0 / (GAIN * stiffness)
+    worst = 0.0
+    for k in range(round(3.0 * time_constant / dt)):
+        expected = 8.0 - 7.0 * math.exp(-k * dt / time_constant)
+        worst = max(worst, abs(world.force - expected))
+        world.move(ask(loop, world, down(8.0), dt).velocity, dt)
+    assert worst < 0.01 * 7.0
+    assert world.force == pytest.approx(8.0 - 7.0 * math.exp(-3.0), rel=0.005)
+
+
+def test_force_converges_to_the_one_that_is_asked_for() -> None:
+    loop, world = ForceLoop(ARM, replace(OWN, force_filter=0.02)), World(400.0)
+    for newtons in (5.0, 10.0, 5.0):
+        for _ in range(600):
+            out = ask(loop, world, down(newtons))
+            world.move(out.velocity)
+        assert world.force == pytest.approx(newtons, abs=1e-4)
+        assert out.measured == pytest.approx(down(newtons), abs=1e-4)
+        assert out.error == pytest.approx((0.0, 0.0, 0.0), abs=1e-4)
+
+
+@pytest.mark.parametrize(("asked", "limited"), [(100.0, LIMIT), (-90.0, -LIMIT), (7.0, 7.0), (20.0, 20.0)])
+def test_saturation_limits_the_commanded_speed_exactly(asked: float, limited: float) -> None:
+    out = ask(ForceLoop(ARM, OWN), World(400.0), down(asked))
+    along = lever(POSE)
+    assert along @ out.velocity == pytest.approx(GAIN * limited, rel=1e-7)
+    assert out.error == pytest.approx(down(asked), rel=1e-7)
+    assert out.limited == pytest.approx(down(limited), rel=1e-7)
+    unlimited = ask(ForceLoop(ARM, replace(OWN, force_error_limit=1e9)), World(400.0), down(asked))
+    assert along @ unlimited.velocity == pytest.approx(GAIN * asked, rel=1e-7)
+
+
+def test_posture_moves_nothing_along_the_force() -> None:
+    along = lever(POSE)
+    for posture in (POSE, [0.5, -1.0, 0.0, 1.2], [-2.0, 1.0, 1.0, -1.0]):
+        out = ask(ForceLoop(ARM, OWN), World(400.0), down(6.0), posture=posture)
+        assert along @ out.velocity == pytest.approx(GAIN * 6.0, rel=1e-7)
+
+
+def test_posture_is_reached_in_the_complement_of_the_force() -> None:
+    posture = [0.35, -1.15, 0.25, 1.1]
+    loop, world = ForceLoop(ARM, OWN), World(400.0)
+    for _ in range(1500):
+        world.move(ask(loop, world, down(6.0), posture=posture).velocity)
+    assert world.force == pytest.approx(6.0, abs=1e-3)
+    missing = np.subtract(posture, world.q)
+    along = lever(world.q)
+    along /= np.linalg.norm(along)
+    assert np.linalg.norm(missing) > 0.01, "the force has moved the arm off the posture"
+    assert np.linalg.norm(missing - along * (along @ missing)) < 1e-6
+
+
+def test_posture_alone_is_reached_no_faster_than_allowed() -> None:
+    loop, world = ForceLoop(ARM, OWN), World(1e-9)
+    posture = [0.3, -0.2, 0.2, 1.3]
+    speeds = []
+    for _ in range(600):
+        velocity = ask(loop, world, None, posture=posture).velocity
+        speeds.append(max(map(abs, velocity)))
+        world.move(velocity)
+    assert world.q == pytest.approx(posture, abs=1e-6)
+    assert max(speeds) == OWN.posture_speed_limit
+
+
+def test_zero_force_releases_the_axis() -> None:
+    posture = [0.3, -1.1, 0.2, 1.0]
+    outs = [
+        ask(ForceLoop(ARM, OWN), World(400.0, force=3.0), force, posture=posture)
+        for force in ((0.0, 0.0, 0.0), None, down(3.0))
+    ]
+    released, none, pressing = outs
+    assert released == none
+    assert released.velocity == pytest.approx([OWN.posture_gain * (a - b) for a, b in zip(posture, POSE, strict=True)])
+    assert released.effort == [0.0] * 4
+    assert pressing.velocity != pytest.approx(released.velocity)
+
+
+def test_no_motion_is_asked_for_at_the_start() -> None:
+    assert ask(ForceLoop(ARM, OWN), World(400.0), None).velocity == [0.0] * 4
+    out = ask(ForceLoop(ARM, OWN), World(400.0, force=4.0), down(4.0))
+    assert out.velocity == pytest.approx([0.0] * 4, abs=1e-9), "the filter starts at what is measured"
+    slow = ForceLoop(ARM, replace(OWN, force_filter=10.0))
+    assert ask(slow, World(400.0, force=4.0), down(4.0)).measured == pytest.approx(down(4.0), rel=1e-6)
+
+
+def test_the_filter_is_a_first_order_lag() -> None:
+    loop = ForceLoop(ARM, replace(OWN, force_filter=0.1))
+    ask(loop, World(400.0, force=0.0), down(1.0), dt=1e-3)
+    for _ in range(100):
+        out = ask(loop, World(400.0, force=4.0), down(1.0), dt=1e-3)
+    assert -out.measured[2] == pytest.approx(4.0 * (1.0 - math.exp(-1.0)), rel=0.01)
+
+
+def test_open_loop_feeds_the_torque_of_the_force_forward_and_no_velocity() -> None:
+    loop, force = ForceLoop(ARM, replace(OWN, mode="open_loop")), np.array([2.0, -3.0, 6.0])
+    for feeling in (0.0, 5.0):
+        out = ask(loop, World(400.0, force=feeling), force)
+        assert out.velocity == []
+        expected = sum(component * lever(POSE, axis) for component, axis in zip(force, np.eye(3), strict=True))
+        assert out.effort == pytest.approx(expected, abs=1e-6)
+    assert ask(loop, World(400.0), None).velocity == []
+
+
+def test_the_feedback_loop_feeds_the_same_torque_forward() -> None:
+    outs = [
+        ask(ForceLoop(ARM, replace(OWN, mode=mode)), World(400.0, force=2.0), (1.0, 2.0, 3.0))
+        for mode in ("hybrid", "open_loop")
+    ]
+    assert outs[0].effort == outs[1].effort
+
+
+def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
+    loop = ForceLoop(ARM, replace(OWN, mode="joint_torque"))
+    stiffness, asked = np.array([40.0, 60.0, 30.0, 20.0]), [1.0, -2.0, 0.5, 0.8]
+    world = World(1e-9)
+    for _ in range(4000):
+        external = -stiffness * np.subtract(world.q, POSE)
+        sensors = State(world.q, STILL, (BODY.gravity_torque(world.q) - external).tolist())
+        out = loop.step(world.joints, sensors, NO_CONTACT, None, None, None, asked, DT)
+        assert out.effort == asked
+        world.move(out.velocity)
+    assert stiffness * np.subtract(world.q, POSE) == pytest.approx(asked, rel=1e-3)
+
+
+def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -> None:
+    loop = ForceLoop(ARM, replace(OWN, mode="joint_torque"))
+    assert ask(loop, World(1e-9), None).velocity == [0.0] * 4
+    out = ask(loop, World(1e-9), None, torque=[100.0, -100.0, 1.0, 0.0])
+    limit, gain = OWN.torque_error_limit, OWN.torque_gain
+    assert out.velocity == pytest.approx([gain * limit, -gain * limit, gain, 0.0], abs=1e-9)
+
+
+def rotation(cover: str, q: list[float] = POSE) -> np.ndarray:
+    return BODY.cover_pose(q, cover).rotation
+
+
+def test_the_estimate_is_fed_back_where_it_is_asked_for() -> None:
+    loop, world = ForceLoop(ARM, replace(OWN, feedback="contact_estimate")), World(400.0, force=9.0)
+    felt = rotation(COVER).T @ np.array([0.0, 0.0, 4.0])  # of the world on the arm: upwards
+    out = ask(loop, world, down(6.0), contact=Contact(COVER, PLACE, tuple(felt)))
+    assert out.measured == pytest.approx(down(4.0), abs=1e-9)
+    assert out.error == pytest.approx(down(2.0), abs=1e-9)
+    assert ask(loop, world, down(6.0)).error == pytest.approx(down(6.0)), "nothing felt is no force"
+
+
+def test_an_estimate_without_a_place_is_still_a_force_in_its_own_frame() -> None:
+    loop = ForceLoop(ARM, replace(OWN, feedback="contact_estimate"))
+    felt = rotation("inner_link").T @ np.array([0.0, 0.0, 4.0])
+    out = ask(loop, World(400.0), down(6.0), contact=Contact("inner_link", math.nan, tuple(felt)))
+    assert out.measured == pytest.approx(down(4.0), abs=1e-9)
+
+
+def test_the_force_acts_where_contact_is_felt() -> None:
+    loop = ForceLoop(ARM, OWN)
+    out = ask(loop, World(400.0), down(2.0), contact=Contact("inner_link", 0.4, (0.0, 0.0, 1.0)))
+    assert out.effort == pytest.approx(2.0 * lever(POSE, DOWN, "inner_link", 0.4), abs=1e-6)
+    elsewhere = ask(loop, World(400.0), down(2.0))
+    assert elsewhere.effort == pytest.approx(2.0 * lever(POSE), abs=1e-6)
+
+
+@pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
+@pytest.mark.parametrize("mode", ["hybrid", "open_loop"])
+def test_a_force_in_a_cover_frame_is_the_same_force_in_the_base_frame(feedback: str, mode: str) -> None:
+    own = replace(OWN, feedback=feedback, mode=mode)
+    in_cover = np.array([1.0, -4.0, 2.0])
+    in_base = rotation("outer_link") @ in_cover
+    touch = Contact("outer_link", 0.2, (0.3, 1.0, -0.2))
+    commands = [ForceCommand(frame, tuple(force)) for frame, force in (("outer_link", in_cover), ("base", in_base))]
+    outs = [
+        ask(ForceLoop(ARM, own), World(400.0, force=2.0), None, contact=touch, command=command) for command in commands
+    ]
+    assert outs[0].velocity == pytest.approx(outs[1].velocity, abs=1e-12)
+    assert outs[0].effort == pytest.approx(outs[1].effort, abs=1e-12)
+    for here, there in ((outs[0].measured, outs[1].measured), (outs[0].limited, outs[1].limited)):
+        assert rotation("outer_link") @ here == pytest.approx(there, abs=1e-12)
+
+
+def test_tare_takes_what_is_felt_as_zero() -> None:
+    loop = ForceLoop(ARM, OWN)
+    assert ask(loop, World(400.0, force=3.0), down(5.0)).measured == pytest.approx(down(3.0), abs=1e-6)
+    loop.tare()
+    assert ask(loop, World(400.0, force=3.0), down(5.0)).measured == pytest.approx(down(0.0), abs=1e-9)
+    loop.tare()
+    assert ask(loop, World(400.0, force=7.0), down(5.0)).measured == pytest.approx(down(4.0), abs=1e-6)
+
+
+def test_a_force_without_a_lever_asks_for_no_motion_along_it() -> None:
+    stretched = [0.0, 0.0, 0.0, math.pi / 2]  # arm straight up
+    out = ask(ForceLoop(ARM, OWN), World(400.0, q=stretched), down(5.0))
+    assert out.velocity == pytest.approx([0.0] * 4, abs=1e-12)
+    assert np.all(np.isfinite(out.effort))
+
+
+def test_sensors_that_have_not_come_yet_count_as_nothing_felt() -> None:
+    loop = ForceLoop(ARM, OWN)
+    command = ForceCommand("base", (0.0, 0.0, -5.0))
+    out = loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, command, None, None, DT)
+    assert out.measured == pytest.approx((0.0, 0.0, 0.0))
+    assert all(math.isfinite(value) for value in (*out.velocity, *out.effort))
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
+        ({"mode": "soft"}, "'mode' is 'soft'; allowed: one of hybrid, joint_torque, open_loop"),
+        ({"feedback": "eyes"}, "'feedback' is 'eyes'; allowed: one of joint_sensors, contact_estimate"),
+        ({"force_gain": -0.1}, "'force_gain' is -0.1 m/s/N; allowed: at least 0"),
+        ({"force_filter": math.nan}, "'force_filter' is nan s"),
+        ({"contact_place": "tip"}, "'contact_place' is 'tip' m; allowed: a number"),
+    ],
+)
+def test_a_parameter_set_that_does_not_fit_is_refused_by_name(change: dict[str, Any], text: str) -> None:
+    loop = ForceLoop(ARM, OWN)
+    with pytest.raises(ParameterError, match=text):
+        loop.tune(build(ForceLoopParameters, {**values(OWN), **change}))
+    assert loop.parameters == OWN
+
+
+def test_feedback_of_sensors_that_are_not_mounted_is_refused() -> None:
+    bare = CONFIGURATION.with_values({"arm.joint_sensors": False}).shared.arm
+    with pytest.raises(ParameterError, match=r"arm\.joint_sensors is false; use 'contact_estimate'"):
+        ForceLoop(bare, OWN)
+    ForceLoop(bare, replace(OWN, feedback="contact_estimate"))

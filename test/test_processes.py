@@ -1,0 +1,338 @@
+"""Processes and signals: whatever ends the stack, the brakes go on, the bag is closed, nothing is left behind."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wam_analysis.bag import read
+from wam_description.configuration import Configuration, packaged
+from wam_ros.cli import main
+
+ROOT = Path(__file__).parents[1]
+PATIENCE = 2.0  # s, what the stack may take to end
+NODES = 7  # six and the recorder
+
+
+def wait(until: Callable[[], Any], timeout: float, what: str) -> float:
+    """Seconds until something is true; the test fails where it takes too long."""
+    begin = time.monotonic()
+    while not until():
+        assert time.monotonic() - begin < timeout, f"not within {timeout} s: {what}"
+        time.sleep(0.02)
+    return time.monotonic() - begin
+
+
+class Stack:
+    """A command of ours in a process of its own, found again with all it started by a word in its environment."""
+
+    def __init__(self, folder: Path, *command: str, **environment: str) -> None:
+        self.mark = f"WAM_STACK_TEST={folder}"
+        self.output = folder / "output.txt"
+        everything = {**os.environ, "PYTHONPATH": str(ROOT), "WAM_STACK_TEST": str(folder), **environment}
+        with self.output.open("w") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, *command], stdout=output, stderr=output, cwd=folder, env=everything
+            )
+
+    def alive(self) -> list[int]:
+        """Processes that carry the mark, zombies left out."""
+        found = []
+        for entry in Path("/proc").iterdir():
+            with contextlib.suppress(OSError):
+                if (
+                    entry.name.isdigit()
+                    and self.mark.encode() in (entry / "environ").read_bytes().split(b"\0")
+                    and (entry / "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+                ):
+                    found.append(int(entry.name))
+        return found
+
+    def said(self) -> str:
+        return self.output.read_text()
+
+    def end(self) -> None:
+        """Kill what a failed test has left."""
+        for pid in self.alive():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        self.process.wait()
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Callable[..., Stack]]:
+    stacks: list[Stack] = []
+
+    def start(*command: str, **environment: str) -> Stack:
+        stacks.append(Stack(tmp_path, *command, **environment))
+        return stacks[-1]
+
+    yield start
+    for stack in stacks:
+        stack.end()
+
+
+def up(started: Callable[..., Stack], *arguments: str) -> Stack:
+    """The whole stack and a recorder, running, with a bag that grows."""
+    stack = started("-m", "wam_ros.cli", "up", "--record", *arguments)
+    wait(lambda: recorded(stack) > 100_000, 30.0, f"a bag that grows; {stack.said()}")
+    assert len(stack.alive()) == NODES + 1
+    return stack
+
+
+def recorded(stack: Stack) -> int:
+    return sum(file.stat().st_size for file in stack.output.parent.glob("bags/*/*.mcap"))
+
+
+def statuses(folder: Path, node: str) -> list[str]:
+    """What a node said of its state, from the only bag of a folder."""
+    (bag,) = (folder / "bags").iterdir()
+    assert (bag / "metadata.yaml").is_file(), "the bag is closed"
+    status: Any = read(bag).topics["/wam/status"]
+    return [message.message for message in status.messages if message.name == node]
+
+
+def enable(ros: Any, stack: Stack) -> None:
+    from std_srvs.srv import SetBool
+
+    client = ros.node("asker").create_client(SetBool, "driver/enable")
+    ros.wait(client.service_is_ready)
+    while True:
+        future = client.call_async(SetBool.Request(data=True))
+        ros.wait(future.done, what=f"an answer; {stack.said()}")
+        if future.result().success:
+            return
+        assert "no motor_current_command comes in" in future.result().message
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
+    number: signal.Signals, started: Any, tmp_path: Path, ros: Any
+) -> None:
+    stack = up(started)
+    enable(ros, stack)
+    stack.process.send_signal(number)
+    wait(lambda: stack.process.poll() is not None, PATIENCE, f"the end of wam up; {stack.said()}")
+    assert stack.alive() == []
+    assert stack.process.returncode == 0
+    assert "Traceback" not in stack.said()
+    assert statuses(tmp_path, "driver")[-2:] == ["enabled", "braked"]
+
+
+def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path, domain_id: int) -> None:
+    stack = started("-m", "wam_ros.cli", "demo", "--lockstep", "--name", "stopped")
+    wait(lambda: recorded(stack) > 100_000, 30.0, f"a bag that grows; {stack.said()}")
+    stack.process.send_signal(signal.SIGINT)
+    wait(lambda: stack.process.poll() is not None, PATIENCE, f"the end; {stack.said()}")
+    assert stack.process.returncode == 130
+    assert "Traceback" not in stack.said()
+    assert statuses(tmp_path, "driver")[-1] == "braked"
+
+
+def test_children_of_a_killed_parent_end_by_themselves(started: Any, tmp_path: Path, domain_id: int) -> None:
+    stack = up(started)
+    stack.process.kill()
+    stack.process.wait()
+    wait(lambda: not stack.alive(), PATIENCE, "the end of the children")
+    (bag,) = (tmp_path / "bags").iterdir()
+    assert (bag / "metadata.yaml").is_file(), "the recorder closed its bag"
+
+
+def test_a_node_that_ends_takes_the_stack_with_it(started: Any, tmp_path: Path, domain_id: int) -> None:
+    stack = up(started)
+    (victim,) = (pid for pid in stack.alive() if b"velocity_loop" in Path(f"/proc/{pid}/cmdline").read_bytes())
+    os.kill(victim, signal.SIGKILL)
+    wait(lambda: stack.process.poll() is not None, PATIENCE + 0.5, f"the end; {stack.said()}")
+    assert stack.alive() == []
+    assert "node velocity_loop ended with code -9; all were stopped" in stack.said()
+    assert stack.process.returncode == 9
+    assert statuses(tmp_path, "driver")[-1] == "braked"
+
+
+def test_a_signal_during_start_up_leaves_nothing_behind(started: Any, domain_id: int) -> None:
+    for delay in (0.3, 0.8):
+        stack = started("-m", "wam_ros.cli", "up")
+        time.sleep(delay)  # the moment is what is tested
+        stack.process.send_signal(signal.SIGINT)
+        wait(lambda stack=stack: stack.process.poll() is not None, PATIENCE, f"the end; {stack.said()}")
+        assert stack.alive() == []
+        assert "Traceback" not in stack.said()
+
+
+@pytest.mark.parametrize("name", ["driver", "velocity_loop"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_node_alone_ends_on_a_signal(name: str, number: signal.Signals, ros: Any, started: Any) -> None:
+    listener = ros.node("listener")
+    stack = started("-m", "wam_ros.cli", "node", name)
+    ros.wait(lambda: name in listener.get_node_names() or stack.process.poll() is not None, 20.0)
+    stack.process.send_signal(number)
+    wait(lambda: stack.process.poll() is not None, PATIENCE, f"the end of {name}; {stack.said()}")
+    assert stack.process.returncode == 0
+    assert "Traceback" not in stack.said()
+
+
+def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any) -> None:
+    from diagnostic_msgs.msg import DiagnosticStatus
+    from sensor_msgs.msg import JointState
+
+    from wam_ros.qos import qos
+    from wam_ros.topics import BY_NAME
+
+    said: list[str] = []
+    states: list[Any] = []
+    listener = ros.node("listener")
+    listener.create_subscription(
+        DiagnosticStatus, "status", lambda m: said.append(m.message), qos(BY_NAME["status"])
+    )
+    listener.create_subscription(JointState, "motor_states", states.append, qos(BY_NAME["motor_states"]))
+    stack = started("-m", "wam_ros.cli", "node", "driver")
+    ros.wait(lambda: said and len(states) > 100, 20.0, "states of a driver that is alone")
+    assert said == ["braked"]
+    stack.process.terminate()
+    wait(lambda: stack.process.poll() is not None, PATIENCE, "the end")
+
+
+@pytest.mark.parametrize("environment", ["unset", "not a directory", "read-only"])
+def test_nodes_start_without_a_home_to_write_to(environment: str, started: Any, ros: Any, tmp_path: Path) -> None:
+    home = {"not a directory": "/dev/null", "read-only": "/proc"}.get(environment)
+    arguments = ["-m", "wam_ros.cli", "node", "gravity"]
+    script = (
+        "import os, sys; os.environ.pop('ROS_LOG_DIR', None); os.environ.pop('HOME', None)\n"
+        f"if {home!r}: os.environ['HOME'] = {home!r}\n"
+        f"os.execv(sys.executable, [sys.executable, *{arguments!r}])"
+    )
+    stack = started("-c", script)
+    node = ros.node("listener")
+    ros.wait(lambda: "gravity" in node.get_node_names() or stack.process.poll() is not None, 20.0)
+    assert stack.process.poll() is None, stack.said()
+    stack.process.terminate()
+    wait(lambda: stack.process.poll() is not None, PATIENCE, "the end")
+    assert stack.process.returncode == 0
+
+
+def command(capsys: Any, *arguments: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    output = capsys.readouterr()
+    code = end.value.code
+    return (code if isinstance(code, int) else 1, output.out, output.err if isinstance(code, int) else str(code))
+
+
+SUBCOMMANDS = ["demo", "up", "node", "record", "report", "model"]
+
+
+@pytest.mark.parametrize("subcommand", [None, *SUBCOMMANDS])
+def test_help_of_every_command_says_what_it_does(subcommand: str | None, capsys: Any) -> None:
+    code, out, _ = command(capsys, *filter(None, [subcommand, "--help"]))
+    assert code == 0
+    assert out.startswith(f"usage: wam {subcommand or ''}".rstrip())
+    if subcommand is None:
+        assert all(name in out for name in SUBCOMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["up", "--config", "nope"], "no configuration 'nope' comes with wam_stack; there are: "),
+        (["node", "driver", "--config", "nope"], "no configuration 'nope' comes with wam_stack; there are: "),
+        (["demo", "--config", "/nope/x.yaml"], "configuration /nope/x.yaml is not a file; give the path"),
+        (["model", "urdf", "--config", "/nope/x.yaml"], "configuration /nope/x.yaml is not a file; give the path"),
+        (["node", "elbow"], "no node is named 'elbow'; nodes: driver, transform, velocity_loop"),
+    ],
+)
+def test_what_does_not_exist_is_said_in_one_line(arguments: list[str], text: str, capsys: Any) -> None:
+    code, out, err = command(capsys, *arguments)
+    assert code == 1
+    assert err.startswith(f"wam {arguments[0]}: {text}")
+    assert err.count("\n") == 1
+    assert out == ""
+
+
+@pytest.mark.parametrize("arguments", [[], ["dmeo"], ["up", "--fast"], ["model", "sdf"], ["up", "extra"]])
+def test_a_wrong_command_line_shows_the_usage(arguments: list[str], capsys: Any) -> None:
+    code, _, err = command(capsys, *arguments)
+    assert code == 2
+    assert err.startswith("usage: wam")
+
+
+@pytest.mark.parametrize(
+    ("ros_arguments", "text"),
+    [(["-p", "x"], "-p x"), (["-p"], "trailing -p flag"), (["--nonsense"], "--nonsense")],
+)
+def test_wrong_ros_arguments_are_said_without_a_traceback(
+    ros_arguments: list[str], text: str, started: Any, domain_id: int
+) -> None:
+    stack = started("-m", "wam_ros.cli", "node", "gravity", *ros_arguments)
+    wait(lambda: stack.process.poll() is not None, 20.0, "the end")
+    assert stack.process.returncode == 1
+    assert text in stack.said().splitlines()[-1]
+    assert "Traceback" not in stack.said()
+
+
+def test_record_writes_the_bag_that_was_asked_for(started: Any, tmp_path: Path, ros: Any) -> None:
+    stack = started("-m", "wam_ros.cli", "record", "--name", "mine", "--directory", str(tmp_path / "here"))
+    wait(lambda: list(tmp_path.glob("here/mine/*.mcap")), 20.0, f"the bag; {stack.said()}")
+    stack.process.send_signal(signal.SIGINT)
+    wait(lambda: stack.process.poll() is not None, PATIENCE, "the end")
+    assert (tmp_path / "here" / "mine" / "metadata.yaml").is_file(), stack.said()
+
+
+@pytest.mark.parametrize("form", ["urdf", "mjcf"])
+def test_model_is_written_to_standard_output(form: str, capsys: Any) -> None:
+    code, out, _ = command(capsys, "model", form)
+    assert code == 0
+    assert {"urdf": "<robot", "mjcf": "<mujoco"}[form] in out
+
+
+def test_a_refused_enable_ends_the_scenario_with_the_reason(tmp_path: Path, domain_id: int) -> None:
+    from wam_ros.bring_up import Composition
+
+    script = tmp_path / "script.yaml"
+    script.write_text("steps: [{name: wait, seconds: 0.05}, {name: release, seconds: 100.0, request: enable}]")
+    configured = Configuration.load(packaged("wam")).with_values(
+        {"nodes": ["driver", "transform", "scenario"], "scenario:script": str(script)}
+    )
+    with Composition(configured, domain_id=domain_id) as composition:
+        scenario: Any = composition.nodes["scenario"]
+        begin = time.monotonic()
+        composition.spin(lambda: scenario.done or time.monotonic() - begin > 10.0)
+        assert scenario.done
+        assert scenario.failure.startswith("refused: no motor_current_command comes in; start velocity_loop")
+
+
+def test_a_composition_in_lockstep_can_be_left_at_any_moment(domain_id: int) -> None:
+    from wam_ros.bring_up import Composition
+
+    configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep"})
+    begin = time.monotonic()
+    with Composition(configured, domain_id=domain_id) as composition:
+        driver: Any = composition.nodes["driver"]
+        composition.spin(lambda: driver.driver.stamp > 50_000_000 or time.monotonic() - begin > 10.0)
+        assert driver.driver.stamp > 50_000_000
+        begin = time.monotonic()
+        composition.spin(lambda: time.monotonic() - begin > 0.2)
+        assert time.monotonic() - begin < 1.5
+
+
+def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: Any, tmp_path: Path) -> None:
+    from std_srvs.srv import Trigger
+
+    script = tmp_path / "script.yaml"
+    script.write_text("steps: [{name: wait, seconds: 100.0}]")
+    stack = started("-m", "wam_ros.cli", "up", "--scenario", str(script))
+    client = ros.node("asker").create_client(Trigger, "driver/estop")
+    wait_for = 30.0
+    ros.wait(client.service_is_ready, wait_for)
+    wait(lambda: "wait" in stack.said(), wait_for, f"the first step; {stack.said()}")
+    future = client.call_async(Trigger.Request())
+    ros.wait(future.done)
+    wait(lambda: stack.process.poll() is not None, PATIENCE + 1.0, f"the end; {stack.said()}")
+    assert stack.process.returncode == 1
+    assert "error: the driver stopped in step 'wait': emergency stop" in stack.said()

@@ -1,0 +1,260 @@
+"""Scenarios: paths without jerks, pushes, waiting for a contact, and files that are refused with a reason."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from wam_control.force_loop import ForceCommand
+from wam_control.scenario import NO_FORCE, Push, Scenario, ScenarioOutput, Step, load
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import NO_CONTACT, Contact
+
+ARM = Configuration.load(packaged("wam")).shared.arm
+DT = 0.005
+START, GOAL = [0.0, -0.6, 0.0, 0.5], [0.2, -1.0, 0.1, 0.7]
+PRESS = ForceCommand("base", (0.0, 0.0, -5.0))
+
+
+def play(scenario: Scenario, periods: int, q: Any = START, contact: Contact = NO_CONTACT) -> list[ScenarioOutput]:
+    return [scenario.step(q, contact, DT) for _ in range(periods)]
+
+
+def touching(newtons: float) -> Contact:
+    return Contact("outer_link", 0.3, (0.0, newtons, 0.0))
+
+
+def test_path_begins_where_the_arm_is_and_ends_at_the_posture() -> None:
+    outs = play(Scenario([Step("go", 1.0, tuple(GOAL)), Step("stay", 1.0)]), 202)
+    assert outs[0].posture == START
+    assert outs[200].posture == GOAL
+    assert outs[201].posture == GOAL
+    assert outs[201].step == "stay"
+
+
+def test_path_has_the_smallest_jerk() -> None:
+    outs = play(Scenario([Step("go", 1.0, tuple(GOAL)), Step("stay", 1.0)]), 300)
+    for joint in range(4):
+        path = np.array([out.posture[joint] for out in outs])
+        reach = GOAL[joint] - START[joint]
+        assert np.all(np.diff(path) * np.sign(reach) >= -1e-15), "it never goes back"
+        speed = np.gradient(path, DT)
+        assert np.max(np.abs(speed)) == pytest.approx(15.0 / 8.0 * abs(reach), rel=1e-3)
+        acceleration = np.gradient(speed, DT)
+        assert np.max(np.abs(acceleration)) == pytest.approx(10.0 / math.sqrt(3.0) * abs(reach), rel=0.01)
+        assert np.max(np.abs(np.diff(acceleration))) < 70.0 * DT * abs(reach), "no step, at the ends too"
+
+
+def test_the_next_path_goes_on_where_the_last_one_ended_even_if_the_arm_is_elsewhere() -> None:
+    scenario = Scenario([Step("there", 0.1, tuple(GOAL)), Step("back", 0.1, tuple(START))])
+    outs = play(scenario, 20) + play(scenario, 1, q=[9.0] * 4) + play(scenario, 20)
+    assert outs[20].step == "back"
+    assert outs[20].posture == GOAL
+    steps = np.abs(np.diff([out.posture for out in outs], axis=0))
+    assert np.max(steps) < 0.04, "no jump anywhere"
+
+
+def test_a_step_without_posture_keeps_the_last_one() -> None:
+    outs = play(Scenario([Step("wait", 0.1), Step("go", 0.1, tuple(GOAL)), Step("wait", 0.1)]), 60)
+    assert [outs[k].posture for k in (0, 19, 59)] == [START, START, GOAL]
+
+
+@pytest.mark.parametrize("last", [Step("lift off", 1.0, tuple(START)), Step("rest", 1.0)])
+def test_after_pressing_the_path_starts_from_the_measured_pose(last: Step) -> None:
+    scenario = Scenario([Step("go", 0.1, tuple(GOAL)), Step("press", 0.1, force=PRESS), last])
+    play(scenario, 40)
+    sunk = [0.21, -1.07, 0.1, 0.75]
+    out = play(scenario, 1, q=sunk)[0]
+    assert out.step == last.name
+    assert out.posture == sunk
+    assert out.force == NO_FORCE
+
+
+def test_between_two_forces_the_posture_stays() -> None:
+    harder = ForceCommand("base", (0.0, 0.0, -9.0))
+    steps = [Step("go", 0.1, tuple(GOAL)), Step("press", 0.1, force=PRESS), Step("more", 0.1, force=harder)]
+    scenario = Scenario(steps)
+    outs = play(scenario, 40) + play(scenario, 1, q=[9.0] * 4)
+    assert [outs[k].force for k in (0, 20, 40)] == [NO_FORCE, PRESS, harder]
+    assert outs[40].posture == GOAL
+
+
+def test_a_step_until_a_force_ends_when_it_is_felt() -> None:
+    scenario = Scenario([Step("lower", 1.0, tuple(GOAL), until_force=2.0), Step("then", 1.0)])
+    assert play(scenario, 20, contact=touching(1.9))[-1].step == "lower"
+    out = play(scenario, 1, contact=touching(-2.0))[0]
+    assert out.step == "then"
+    assert out.failure == ""
+    assert out.posture != GOAL, "it stays where the path was left"
+    assert play(scenario, 10)[-1].posture == out.posture
+
+
+def test_a_contact_that_does_not_come_fails_and_asks_for_the_brakes() -> None:
+    scenario = Scenario([Step("lower", 0.1, until_force=2.0), Step("never", 1.0)])
+    outs = play(scenario, 20)
+    assert not any(out.done or out.request for out in outs)
+    failed, after = play(scenario, 2)
+    assert failed.done
+    assert failed.request == "disable"
+    assert failed.failure == "step 'lower': no contact of 2 N felt in 0.1 s"
+    assert after.done
+    assert after.request == "", "asked once"
+    assert failed.force == NO_FORCE
+
+
+def test_requests_are_made_once_when_their_step_begins() -> None:
+    scenario = Scenario([Step("on", 0.02, request="enable"), Step("wait", 0.02), Step("off", 0.02, request="disable")])
+    outs = play(scenario, 14)
+    assert [(k, out.request) for k, out in enumerate(outs) if out.request] == [(0, "enable"), (8, "disable")]
+    assert [out.done for out in outs] == [False] * 12 + [True] * 2
+    assert outs[-1].failure == ""
+
+
+def test_a_push_is_the_wrench_about_the_origin_of_the_cover() -> None:
+    force, place = (1.0, -7.0, 4.0), 0.3
+    push = Push("outer_link", place, force, 0.05, 0.1)
+    outs = play(Scenario([Step("pushed", 0.2, push=push), Step("free", 0.1)]), 50)
+    pushed = [k for k, out in enumerate(outs) if any(out.push_force)]
+    assert pushed == list(range(10, 20)), "from begin until before end"
+    assert outs[10].push_force == force
+    assert outs[10].push_torque == pytest.approx(np.cross([place, 0.0, 0.0], force), abs=1e-15)
+    assert outs[0].push_cover == "outer_link"
+    assert outs[45].push_cover == ""
+
+
+def test_a_push_does_at_the_joints_what_a_force_at_its_place_does() -> None:
+    out = play(Scenario([Step("pushed", 0.2, push=Push("outer_link", 0.3, (1.0, -7.0, 4.0), 0.0, 1.0))]), 1)[0]
+    body = RigidBody(ARM)
+    rotation = body.cover_pose(GOAL, "outer_link").rotation
+    at_origin = body.point_jacobian(GOAL, "outer_link", (0.0, 0.0, 0.0))
+    h = 1e-3
+    turned = [body.point_jacobian(GOAL, "outer_link", tuple(h * axis)) - at_origin for axis in np.eye(3)]
+    # v(p) = v(0) + w x p: the angular part of the Jacobian from three points
+    skews = [rotation @ (h * axis) for axis in np.eye(3)]
+    angular = np.linalg.lstsq(
+        np.vstack([-np.array([[0, -p[2], p[1]], [p[2], 0, -p[0]], [-p[1], p[0], 0]]) for p in skews]),
+        np.vstack(turned),
+        rcond=None,
+    )[0]
+    wrench = at_origin.T @ rotation @ out.push_force + angular.T @ rotation @ out.push_torque
+    place = body.point_jacobian(GOAL, "outer_link", (0.3, 0.0, 0.0))
+    assert wrench == pytest.approx(place.T @ rotation @ [1.0, -7.0, 4.0], abs=1e-9)
+
+
+def test_a_scenario_without_steps_is_refused() -> None:
+    with pytest.raises(ParameterError, match="no steps"):
+        Scenario([])
+
+
+def test_every_scenario_that_comes_with_the_package_can_be_loaded() -> None:
+    found = sorted(packaged("wam").parent.glob("*scenario*.yaml"))
+    assert found
+    for path in found:
+        assert load(path, ARM)
+
+
+def test_a_scenario_file_says_what_the_steps_are(tmp_path: Path) -> None:
+    path = write(tmp_path, {"steps": [{"name": "a", "seconds": 1}, {**WHOLE, "request": "disable"}]})
+    first, second = load(path, ARM)
+    assert first == Step("a", 1.0)
+    assert second == Step(
+        "b",
+        2.5,
+        (0.1, -0.7, 0.05, 0.4),
+        1.5,
+        ForceCommand("outer_link", (0.0, -3.0, 1.0)),
+        Push("inner_link", 0.3, (0.0, 9.0, 2.0), 0.1, 0.4),
+        "disable",
+    )
+
+
+WHOLE: dict[str, Any] = {
+    "name": "b",
+    "seconds": 2.5,
+    "posture": [0.1, -0.7, 0.05, 0.4],
+    "until_force": 1.5,
+    "force": {"frame": "outer_link", "newtons": [0, -3, 1]},
+    "push": {"cover": "inner_link", "place": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.1, "end": 0.4},
+}
+
+
+def write(directory: Path, tree: Any) -> Path:
+    path = directory / "script.yaml"
+    path.write_text(tree if isinstance(tree, str) else yaml.safe_dump(tree))
+    return path
+
+
+def without(body: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in body.items() if name != key}
+
+
+@pytest.mark.parametrize(
+    ("step", "text"),
+    [
+        ("go", "is 'go'; it must be a mapping with name and seconds"),
+        ({**WHOLE, "secnods": 1.0}, "unknown key 'secnods'; allowed: name, seconds, posture"),
+        (without(WHOLE, "name"), "'name' is missing"),
+        (without(WHOLE, "seconds"), "'seconds' is missing"),
+        ({**WHOLE, "name": None}, "name is None; it must be a text"),
+        ({**WHOLE, "name": ""}, "name is ''; it must be a text"),
+        ({**WHOLE, "seconds": 0}, "seconds is 0; it must be above 0"),
+        ({**WHOLE, "seconds": "1 s"}, "seconds is '1 s'; it must be a finite number"),
+        ({**WHOLE, "seconds": True}, "seconds is True; it must be a finite number"),
+        ({**WHOLE, "seconds": math.nan}, "seconds is nan; it must be a finite number"),
+        ({**WHOLE, "posture": [0.0] * 3}, r"posture is \[0.0, 0.0, 0.0\]; it must be a list of 4 numbers"),
+        ({**WHOLE, "posture": 0.4}, "posture is 0.4; it must be a list of 4 numbers"),
+        ({**WHOLE, "posture": [0.0, "up", 0.0, 0.0]}, "posture is 'up'; it must be a finite number"),
+        ({**WHOLE, "posture": [0.0, -9.0, 0.0, 0.0]}, "posture of joint2 is -9 rad; allowed: -2.35619 to 2.35619 rad"),
+        ({**WHOLE, "until_force": -1.0}, "until_force is -1; it must be 0"),
+        ({**WHOLE, "until_force": math.inf}, "until_force is inf; it must be a finite number"),
+        ({**WHOLE, "request": "start"}, "request is 'start'; allowed: enable, disable"),
+        ({**WHOLE, "request": ["enable"]}, r"request is \['enable'\]; allowed: enable, disable"),
+        ({**WHOLE, "force": 5.0}, "force is 5.0; it must be a mapping with frame, newtons"),
+        ({**WHOLE, "force": {"frame": "base"}}, "force: 'newtons' is missing"),
+        ({**WHOLE, "force": {"frame": "hand", "newtons": [0, 0, 1]}}, "frame is 'hand'; allowed: base, inner_link"),
+        ({**WHOLE, "force": {"frame": "base", "newtons": [0, 1]}}, r"newtons is \[0, 1\]; it must be a list of 3"),
+        ({**WHOLE, "force": {"frame": "base", "newtons": [0, 0, math.nan]}}, "newtons is nan; it must be a finite"),
+        ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, place"),
+        ({**WHOLE, "push": without(WHOLE["push"], "end")}, "push: 'end' is missing"),
+        ({**WHOLE, "push": {**WHOLE["push"], "cover": "base"}}, "cover is 'base'; allowed: inner_link, outer_link"),
+        ({**WHOLE, "push": {**WHOLE["push"], "place": 0.6}}, "place is 0.6 m; inner_link reaches from 0 to 0.5588 m"),
+        ({**WHOLE, "push": {**WHOLE["push"], "end": 0.1}}, "begin is 0.1 s, end 0.1 s; end must be later"),
+    ],
+)
+def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, text: str, tmp_path: Path) -> None:
+    path = write(tmp_path, {"steps": [{"name": "fine", "seconds": 1.0}, step]})
+    with pytest.raises(ParameterError, match=text) as refusal:
+        load(path, ARM)
+    assert str(refusal.value).startswith(f"{path}, step 2")
+
+
+@pytest.mark.parametrize(
+    ("tree", "text"),
+    [
+        ("steps: [", "is not YAML"),
+        ("- 1", "has no list 'steps'"),
+        ("", "has no list 'steps'"),
+        ({"steps": {"name": "a"}}, "has no list 'steps'"),
+        ({"steps": []}, "has no steps; give at least one"),
+        ({"steps": [{"name": "a", "seconds": 1}], "loops": 3}, "unknown key 'loops'; allowed: steps"),
+    ],
+)
+def test_a_file_that_is_no_scenario_is_refused_by_name(tree: Any, text: str, tmp_path: Path) -> None:
+    path = write(tmp_path, tree)
+    with pytest.raises(ParameterError, match=text) as refusal:
+        load(path, ARM)
+    assert str(path) in str(refusal.value)
+
+
+def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=rf"scenario {tmp_path}/none\.yaml is not a file"):
+        load(tmp_path / "none.yaml", ARM)
+    path = tmp_path / "binary.yaml"
+    path.write_bytes(b"\xff\xfe\x00\x81")
+    with pytest.raises(ParameterError, match=f"scenario {path} is not YAML"):
+        load(path, ARM)

@@ -1,0 +1,490 @@
+"""The exact stick-slip integrator against small Runge-Kutta steps, energy, and the errata's numbers."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from wam_theory.stick_slip import (
+    ForceLoop,
+    FrictionNode,
+    Kind,
+    Motion,
+    Trajectory,
+    Verdict,
+    assess,
+    inertialess_staircase,
+    largest_stable_step,
+    simulate,
+)
+
+# the testbed of 5.6 on the joint side, b for zeta = 0.05; lb-in and rad
+TESTBED = (4.0, 2.0 * 0.05 * math.sqrt(4.0 * (14443.0 + 12960.0)), 14443.0, 12960.0)
+TESTBED_MARGIN = {0: 1.73093e-3, 1: 4.8876e-3}  # linear limits at 50 Hz; growth_at_50_hz confirms them
+
+
+def unit_node(dynamic: float = 1.0, static: float | None = None) -> FrictionNode:
+    """A node of zeta = 0.25 with K = J = b = 1: gamma is the gain."""
+    return FrictionNode(1.0, 1.0, 2.0, 2.0, dynamic, dynamic if static is None else static)
+
+
+def peaks(trajectory: Trajectory, force: float) -> list[float]:
+    """Magnitude of the error at the start and at each standstill, repeats left out."""
+    kinds = (Kind.START, Kind.STICK, Kind.REVERSE)
+    return [abs(force - event.contact_force) for event in trajectory.events if event.kind in kinds]
+
+
+# ------------------------------------------------------------------------------ a second integrator
+State = tuple[float, float, float]
+
+
+@dataclass
+class SmallSteps:
+    """Runge-Kutta steps with set-valued friction; shares nothing with the module but its parameters.
+
+    The last step of a slip is bisected to the standstill, breakaway is interpolated in its step.
+    """
+
+    node: FrictionNode
+    loop: ForceLoop
+    force: float
+    held: float | None = None  # speed of the motor from the last sample, None in a continuous loop
+
+    def contact(self, x: float) -> float:
+        force = self.node.contact_stiffness * x
+        return max(0.0, force) if self.node.unilateral else force
+
+    def command(self, x: float) -> float:
+        e = max(-self.loop.error_limit, min(self.loop.error_limit, self.force - self.contact(x)))
+        return self.loop.gain * (e - max(-self.loop.deadband, min(self.loop.deadband, e)))
+
+    def net(self, s: State) -> float:
+        return self.node.transmission_stiffness * (s[2] - s[0]) - self.contact(s[0])
+
+    def flow(self, s: State, sign: float) -> State:
+        drag = self.node.damping * s[1] + self.node.dynamic_friction * sign
+        speed = self.command(s[0]) if self.held is None else self.held
+        return s[1], (self.net(s) - drag) / self.node.inertia, speed
+
+    def kutta(self, s: State, h: float, sign: float) -> State:
+        def along(d: State, part: float) -> State:
+            return s[0] + part * d[0], s[1] + part * d[1], s[2] + part * d[2]
+
+        k1 = self.flow(s, sign)
+        k2 = self.flow(along(k1, h / 2), sign)
+        k3 = self.flow(along(k2, h / 2), sign)
+        k4 = self.flow(along(k3, h), sign)
+        x, v, m = (a + h / 6 * (p + 2 * q + 2 * r + u) for a, p, q, r, u in zip(s, k1, k2, k3, k4, strict=True))
+        return x, v, m
+
+    def rest_sign(self, s: State) -> float:
+        net = self.net(s)
+        return 0.0 if abs(net) <= self.node.static_friction * (1 + 1e-12) else math.copysign(1.0, net)
+
+    def stick(self, s: State, h: float) -> tuple[State, float, float]:
+        """State, what is left of the step, and sign after it."""
+        speed = self.flow(s, 0.0)[2]
+        net, rate = self.net(s), self.node.transmission_stiffness * speed
+        if abs(net + rate * h) <= self.node.static_friction:
+            return (s[0], 0.0, s[2] + speed * h), 0.0, 0.0
+        used = max(0.0, (math.copysign(self.node.static_friction, rate) - net) / rate)
+        return (s[0], 0.0, s[2] + speed * used), h - used, math.copysign(1.0, rate)
+
+    def slip(self, s: State, h: float, sign: float) -> tuple[State, float, float]:
+        after = self.kutta(s, h, sign)
+        if after[1] * sign >= 0.0:
+            return after, 0.0, sign
+        first, last = 0.0, h
+        for _ in range(50):
+            middle = (first + last) / 2
+            if self.kutta(s, middle, sign)[1] * sign >= 0.0:
+                first = middle
+            else:
+                last = middle
+        used = h if first == 0.0 and s[1] == 0.0 else last  # it may not leave the standstill at all
+        x, _, m = self.kutta(s, first, sign)
+        return (x, 0.0, m), h - used, self.rest_sign((x, 0.0, m))
+
+    def run(self, times: Sequence[float], step: float, start: State) -> np.ndarray:
+        """x, v, x_m at the times, (n, 3)."""
+        s, out, commands = start, [], [0.0] * self.loop.delay_samples
+        sign = math.copysign(1.0, s[1]) if s[1] else self.rest_sign(s)
+        each, now = round(self.loop.sample_period / step), 0
+        for mark in [round(t / step) for t in times]:
+            for count in range(now, mark):
+                if each and count % each == 0:
+                    commands.append(self.command(s[0]))
+                    self.held = commands.pop(0)
+                left = step
+                while left > 1e-15:
+                    s, left, sign = self.slip(s, left, sign) if sign else self.stick(s, left)
+            now = mark
+            out.append(s)
+        return np.array(out)
+
+
+REST = (0.0, 0.0, 0.0)
+CASES = {
+    "coulomb": (unit_node(), ForceLoop(1.5), 4.0, REST),
+    "stiction": (unit_node(0.7, 1.2), ForceLoop(0.9), 3.0, REST),
+    "frictionless from speed": (unit_node(0.0), ForceLoop(0.6), -2.0, (0.3, -1.0, 0.1)),
+    "saturated, with deadband": (unit_node(1.0, 1.3), ForceLoop(2.6, 1.1, 0.05), 4.0, REST),
+    "hold": (unit_node(0.4, 0.5), ForceLoop(0.8, sample_period=0.35), 3.0, REST),
+    "hold, two samples late, limited": (unit_node(0.4), ForceLoop(0.5, 1.5, 0.1, 0.2, 2), 3.0, REST),
+    "overdamped": (FrictionNode(1.0, 9.0, 2.0, 2.0, 0.3, 0.5), ForceLoop(0.5, 1.0, 0.02), 2.0, (0.0, 1.0, 0.0)),
+    "overdamped hold": (FrictionNode(1.0, 9.0, 2.0, 2.0, 0.3, 0.5), ForceLoop(2.0, sample_period=1.0), 2.0, REST),
+    "critical hold": (FrictionNode(1.0, 4.0, 2.0, 2.0, 0.3, 0.3), ForceLoop(2.0, sample_period=0.5), 2.0, REST),
+    "impact": (FrictionNode(1.0, 0.3, 2.0, 5.0, 0.1, 0.15, True), ForceLoop(0.5), 1.0, (-1.0, 2.0, -1.0)),
+    "rattle": (FrictionNode(1.0, 0.3, 2.0, 5.0, 0.02, 0.03, True), ForceLoop(1.2, 2.0, 0.1), 0.6, REST),
+    "rattle, held": (FrictionNode(1.0, 0.3, 2.0, 5.0, 0.02, 0.03, True), ForceLoop(1.2, sample_period=0.1), 0.6, REST),
+    "triple root": (FrictionNode(1.0, math.sqrt(12.0), 2.0, 2.0, 0.2, 0.2), ForceLoop(12**0.5 / 9), 2.0, REST),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_exact_motion_is_that_of_small_steps(name: str) -> None:
+    node, loop, force, start = CASES[name]
+    times = [0.5 * n for n in range(1, 41)]
+    exact = simulate(node, loop, force, 20.0, start).at(times)
+    rough = SmallSteps(node, loop, force).run(times, 0.001 if loop.sample_period else 1.0 / 1024, start)
+    # a kink of the law or of the contact inside a step costs Runge-Kutta its order
+    close = 1e-5 if loop.error_limit < math.inf or node.unilateral else 1e-8
+    for exact_row, rough_row in zip((exact.x, exact.v, exact.x_m), rough.T, strict=True):
+        np.testing.assert_allclose(exact_row, rough_row, rtol=0, atol=close)
+
+
+def test_cases_reach_every_kind_of_event() -> None:
+    seen = {event.kind for case in CASES.values() for event in simulate(*case[:3], 20.0, case[3]).events}
+    assert seen == set(Kind)
+
+
+# ---------------------------------------------------------------------------------------- properties
+def random_cases(count: int) -> list[tuple[FrictionNode, ForceLoop, float]]:
+    rng = np.random.default_rng(3)
+    cases = []
+    for _ in range(count):
+        ktr, kc, inertia = rng.uniform(0.5, 4.0, 3)
+        zeta = rng.choice([0.02, 0.3, 0.8, 1.5]) * rng.uniform(0.7, 1.3)
+        damping = 2.0 * zeta * math.sqrt(inertia * (ktr + kc))
+        dynamic = rng.uniform(0.1, 1.0)
+        static = dynamic * rng.choice([1.0, 1.3])
+        gain = rng.uniform(0.1, 2.0) * damping / inertia * (1.0 / ktr + 1.0 / kc)
+        limit = rng.choice([math.inf, 1.0])
+        deadband = rng.choice([0.0, 0.05])
+        period = rng.choice([0.0, 0.0, 0.3])
+        node = FrictionNode(inertia, damping, ktr, kc, dynamic, static, bool(rng.integers(2)))
+        loop = ForceLoop(gain, limit, deadband, period, int(rng.integers(3)) if period else 0)
+        cases.append((node, loop, rng.uniform(0.2, 6.0)))
+    return cases
+
+
+def test_no_event_is_missed() -> None:
+    for node, loop, force in random_cases(40):
+        trajectory = simulate(node, loop, force, 40.0)
+        times = np.linspace(0.0, 40.0, 2001)
+        motion = trajectory.at(times)
+        events = trajectory.events
+        index = np.searchsorted([event.time for event in events], times, side="right") - 1
+        signs = np.array([event.sign for event in events])[index]
+        scale = 1e-9 * (1.0 + np.abs(motion.v).max())
+        assert np.all(motion.v * signs >= -scale)
+        assert np.all(np.abs(motion.v[signs == 0]) == 0.0)
+        springs = node.transmission_stiffness * (motion.x_m - motion.x) - motion.contact_force
+        assert np.all(np.abs(springs[signs == 0]) <= node.static_friction * (1.0 + 1e-9))
+
+
+def test_state_is_continuous_over_every_event() -> None:
+    for node, loop, force in random_cases(40):
+        trajectory = simulate(node, loop, force, 20.0)
+        events = trajectory.events
+        for before, after in pairwise(events):
+            index = events.index(before)
+            reached = trajectory._at(index, after.time)[:3]
+            assert reached == pytest.approx((after.x, after.v, after.x_m), rel=1e-9, abs=1e-9)
+
+
+def test_motion_goes_on_from_any_state_as_if_never_stopped() -> None:
+    for node, loop, force in random_cases(30):
+        if loop.sample_period:
+            continue
+        whole = simulate(node, loop, force, 12.0)
+        for event in whole.events[1:8]:
+            if event.time > 6.0 or event.kind in (Kind.SLIP, Kind.REVERSE):
+                continue  # at breakaway the state alone does not tell slip from stick
+            rest = simulate(node, loop, force, 6.0, (event.x, event.v, event.x_m))
+            ahead = [0.7, 2.1, 5.9]
+            np.testing.assert_allclose(rest.at(ahead), whole.at([event.time + t for t in ahead]), atol=1e-6)
+
+
+def test_energy_put_in_is_energy_stored_and_dissipated() -> None:
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    for name in ("coulomb", "stiction", "saturated, with deadband", "impact", "overdamped", "hold"):
+        node, loop, force, start = CASES[name]
+        until = 20.0
+        trajectory = simulate(node, loop, force, until, start)
+        edges = [event.time for event in trajectory.events] + [until]
+        put_in = lost = 0.0
+        for left, right in pairwise(edges):
+            if right - left < 1e-14:
+                continue
+            fine = np.linspace(left, right, 5)
+            for a, b in pairwise(fine):
+                times = np.clip((a + b) / 2 + (b - a) / 2 * nodes, left, np.nextafter(right, 0.0))
+                m = trajectory.at(times)
+                weight = weights * (b - a) / 2
+                shaped = np.clip(force - m.contact_force, -loop.error_limit, loop.error_limit)
+                speed = loop.gain * (shaped - np.clip(shaped, -loop.deadband, loop.deadband))
+                if loop.sample_period:
+                    near = trajectory.at([left, (left + right) / 2])
+                    speed = (near.x_m[1] - near.x_m[0]) / ((right - left) / 2)
+                put_in += np.sum(weight * node.transmission_stiffness * (m.x_m - m.x) * speed)
+                lost += np.sum(weight * (node.damping * m.v**2 + node.dynamic_friction * np.abs(m.v)))
+        first, last = (stored(node, trajectory.at([t])) for t in (0.0, until))
+        assert put_in - lost == pytest.approx(last - first, abs=1e-9)
+        assert lost > 0.01
+
+
+def stored(node: FrictionNode, motion: Motion) -> float:
+    """Energy in inertia and both springs."""
+    contact = 0.0 if node.unilateral and motion.x[0] < 0.0 else node.contact_stiffness
+    stretch = motion.x_m[0] - motion.x[0]
+    return 0.5 * (
+        node.inertia * motion.v[0] ** 2 + contact * motion.x[0] ** 2 + node.transmission_stiffness * stretch**2
+    )
+
+
+def test_frictionless_response_is_the_matrix_exponential() -> None:
+    system = np.array([[0.0, 1.0, 0.0], [-4.0, -1.0, 2.0], [-2.0 * 0.8, 0.0, 0.0]])
+    values, vectors = np.linalg.eig(system)
+    rest = -np.linalg.solve(system, [0.0, 0.0, 0.8 * 3.0])
+    times = np.linspace(0.0, 30.0, 61)
+    modes = np.linalg.solve(vectors, -rest)
+    expected = [(rest + vectors @ (np.exp(values * t) * modes)).real for t in times]
+    motion = simulate(unit_node(0.0), ForceLoop(0.8), 3.0, 30.0).at(times)
+    np.testing.assert_allclose(np.transpose([motion.x, motion.v, motion.x_m]), expected, atol=1e-12)
+
+
+# --------------------------------------------------------------------------- the errata's numbers
+def test_first_peaks_shrink_and_the_response_still_diverges() -> None:
+    trajectory = simulate(unit_node(), ForceLoop(1.5), 4.0, 400.0)
+    assert peaks(trajectory, 4.0)[:5] == pytest.approx([4.00, 2.70, 2.94, 3.06, 3.24], abs=0.006)
+    assert max(peaks(trajectory, 4.0)) > 1e4
+    assert assess(unit_node(), ForceLoop(1.5), 4.0).verdict is Verdict.DIVERGED
+
+
+@pytest.mark.parametrize(("gamma", "largest"), [(1.1, 25.3), (1.5, 3.45), (2.0, 1.17)])
+def test_largest_stable_step_of_domain_two(gamma: float, largest: float) -> None:
+    node, loop = unit_node(), ForceLoop(gamma)
+    found = largest_stable_step(node, loop)
+    assert found == pytest.approx(largest, rel=0.005)
+    # small steps alone, just on either side: what is left of the error at the end of a long run
+    for step, stable in ((0.99 * found, True), (1.01 * found, False)):
+        ends = SmallSteps(node, loop, step).run([60.0, 120.0, 180.0, 240.0, 300.0], 1.0 / 64, REST)
+        spans = np.abs(step - 2.0 * ends[:, 0])
+        assert bool(spans[-1] < 0.2 * step) is stable, spans
+    assert largest_stable_step(unit_node(0.3), loop) == pytest.approx(0.3 * found, rel=1e-5)
+
+
+def test_domain_one_takes_every_step_and_domain_three_none() -> None:
+    for step in (1e-2, 1.0, 30.0, 1e3):
+        assert assess(unit_node(), ForceLoop(0.97), step).verdict is Verdict.SETTLED
+        assert assess(unit_node(), ForceLoop(2.20), step).verdict is Verdict.DIVERGED
+    assert largest_stable_step(unit_node(), ForceLoop(0.97)) == math.inf
+    assert largest_stable_step(unit_node(), ForceLoop(2.20)) == 0.0
+
+
+def test_early_verdicts_are_those_of_long_runs() -> None:
+    rng = np.random.default_rng(11)
+    seen = set()
+    for _ in range(60):
+        gamma, step = rng.uniform(0.2, 2.5), 10.0 ** rng.uniform(-1.0, 1.7)
+        zeta = 10.0 ** rng.uniform(-1.3, 0.2)
+        static = rng.choice([1.0, 1.0, 1.4])
+        damping = 4.0 * zeta
+        node, loop = FrictionNode(1.0, damping, 2.0, 2.0, 1.0, static), ForceLoop(gamma * damping)
+        outcome = assess(node, loop, step)
+        long = simulate(node, loop, step, 1e300, max_events=800)
+        late = peaks(long, step)[-2:]
+        seen.add(outcome.verdict)
+        if outcome.verdict is Verdict.DIVERGED:
+            assert max(late) > 100.0 * step, (gamma, zeta, step)
+        elif outcome.verdict is Verdict.SETTLED:
+            assert long.ended or max(late) < 1e-2 * step, (gamma, zeta, step)
+        else:
+            assert outcome.verdict is Verdict.LIMIT_CYCLE
+            assert static > 1.0
+            span = max(e.contact_force for e in long.events[-40:]) - min(e.contact_force for e in long.events[-40:])
+            assert span == pytest.approx(outcome.peak_to_peak, rel=1e-6)
+    assert seen == {Verdict.DIVERGED, Verdict.SETTLED, Verdict.LIMIT_CYCLE}
+
+
+def test_a_response_that_outgrows_friction_is_given_up_early() -> None:
+    early = assess(unit_node(), ForceLoop(1.5), 40.0)
+    assert early.verdict is Verdict.DIVERGED
+    assert early.events < 10
+
+
+def test_routh_limit_without_friction() -> None:
+    assert assess(unit_node(0.0), ForceLoop(0.99), 1.0).verdict is Verdict.SETTLED
+    assert assess(unit_node(0.0), ForceLoop(1.01), 1.0).verdict is Verdict.DIVERGED
+
+
+def test_slip_slower_than_gamma_a_never_ends() -> None:
+    slow = simulate(unit_node(), ForceLoop(0.30), 4.0, 1e4)
+    assert slow.ended
+    assert [event.kind for event in slow.events] == [Kind.START, Kind.SLIP]
+    assert slow.at([1e4]).contact_force[0] == pytest.approx(4.0, abs=1e-12)
+    fast = simulate(unit_node(), ForceLoop(0.33), 4.0, 1e4)
+    assert Kind.STICK in [event.kind for event in fast.events]
+
+
+# ---------------------------------------------------------------------------- stiction limit cycle
+@pytest.mark.parametrize(("damping", "overshoot"), [(1.0, 1.4443), (2.0, 1.1630), (0.2, 1.8540)])
+def test_slow_loop_has_the_stiction_cycle_of_5_8_and_5_9(damping: float, overshoot: float) -> None:
+    # k_tr = k_c = 2, dF = 0.3, F_s = 1.3: jump of F_c = overshoot * 0.15, period by hand
+    gain = 5e-4
+    outcome = assess(FrictionNode(1.0, damping, 2.0, 2.0, 1.0, 1.3), ForceLoop(gain), 0.5, REST, 1e-6)
+    assert outcome.verdict is Verdict.LIMIT_CYCLE
+    assert outcome.peak_to_peak == pytest.approx(overshoot * 0.15, rel=1e-3)
+    assert outcome.period == pytest.approx(4.0 / (gain * 2.0) * 2.0 * (2.6 / (overshoot * 0.3) - 1.0), rel=2e-3)
+
+
+def test_exact_cycle_comes_nearer_to_the_formula_as_the_loop_slows() -> None:
+    jump = (1.0 + math.exp(-math.pi * 0.25 / math.sqrt(1.0 - 0.0625))) * 0.15
+    off = [
+        abs(assess(unit_node(1.0, 1.3), ForceLoop(gain), 0.5, REST, 1e-7).peak_to_peak / jump - 1.0)
+        for gain in (1e-1, 1e-2, 2e-3)
+    ]
+    assert off[0] > 5.0 * off[1] > 15.0 * off[2]
+
+
+def test_inertialess_staircase_is_the_limit_of_the_exact_response() -> None:
+    node = unit_node(1.0, 1.3)
+    stairs = inertialess_staircase(node, 1e-5, 0.5, 12)
+    kept = [e for e in simulate(node, ForceLoop(1e-5), 0.5, 1e8).events if e.kind is Kind.STICK][:12]
+    np.testing.assert_allclose(stairs.times[:6], [e.time for e in kept[:6]], rtol=2e-3)
+    np.testing.assert_allclose(stairs.contact_forces, [e.contact_force for e in kept], atol=1e-4)
+    # its cycle: up and down by one jump, and the times of (5.3) from one to the next
+    late = np.diff(stairs.contact_forces)[-4:]
+    assert late == pytest.approx(np.array([1, -1, 1, -1]) * late[0], rel=1e-12)
+    jump = abs(late[0])
+    ups = 0.5 - stairs.contact_forces[-2]
+    wait = (2.6 - 2.0 * jump) / (2e-5 * abs(ups))  # net spring force from +-(1.3 - 2 jump) to -+1.3
+    assert stairs.times[-1] - stairs.times[-2] == pytest.approx(wait, rel=1e-9)
+
+
+def test_deadband_of_half_the_stiction_cycle_ends_it_from_every_step_and_a_smaller_one_does_not() -> None:
+    node = unit_node(1.0, 1.3)
+    steps = [0.5 + 0.02 * n for n in range(12)]
+    half = assess(node, ForceLoop(0.02), 0.5).peak_to_peak / 2.0
+    for share, cycles in ((0.0, True), (0.5, True), (1.05, False)):
+        verdicts = {assess(node, ForceLoop(0.02, deadband=share * half), step).verdict for step in steps}
+        assert (Verdict.LIMIT_CYCLE in verdicts) is cycles
+        assert verdicts <= {Verdict.LIMIT_CYCLE, Verdict.SETTLED}
+
+
+def test_saturation_lets_a_destabilising_step_survive() -> None:
+    for step in (4.0, 40.0):
+        assert assess(unit_node(), ForceLoop(1.5), step).verdict is Verdict.DIVERGED
+        assert assess(unit_node(), ForceLoop(1.5, error_limit=1.0), step).verdict is Verdict.SETTLED
+
+
+def test_peak_and_period_of_the_cycle_are_those_of_the_sampled_motion() -> None:
+    node, loop = unit_node(1.0, 1.3), ForceLoop(1.5)
+    outcome = assess(node, loop, 3.0)
+    late = outcome.time + np.linspace(0.0, outcome.period, 20001)
+    force = simulate(node, loop, 3.0, late[-1] + 1.0).at(late).contact_force
+    assert np.ptp(force) == pytest.approx(outcome.peak_to_peak, rel=1e-6)
+    assert force[0] == pytest.approx(force[-1], abs=1e-7)
+
+
+# ------------------------------------------------------------------------------ the testbed of 5.6
+def testbed(friction: float) -> FrictionNode:
+    return FrictionNode(*TESTBED, friction, friction)
+
+
+testbed.__test__ = False  # type: ignore[attr-defined]
+
+
+def growth_at_50_hz(gain: float, delay: int) -> float:
+    """Largest modulus of a pole of the sampled loop, by a fine Runge-Kutta map of its states."""
+    j, b, ktr, kc = TESTBED
+    size = 4 + delay
+
+    def period(state: np.ndarray) -> np.ndarray:
+        line = [*state[3:], -gain * kc * state[0]]  # commands under way, and the one of this sample
+        s, h = state[:3].copy(), 0.02 / 200
+
+        def flow(s: np.ndarray) -> np.ndarray:
+            return np.array([s[1], (ktr * (s[2] - s[0]) - kc * s[0] - b * s[1]) / j, line[1]])
+
+        for _ in range(200):
+            k1 = flow(s)
+            k2 = flow(s + h / 2 * k1)
+            k3 = flow(s + h / 2 * k2)
+            s = s + h / 6 * (k1 + 2 * k2 + 2 * k3 + flow(s + h * k3))
+        return np.array([*s, *line[1:]])
+
+    matrix = np.transpose([period(row) for row in np.eye(size)])
+    return max(abs(np.linalg.eigvals(matrix)))
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_sampled_loop_without_friction_diverges_beyond_its_linear_limit(delay: int) -> None:
+    margin = TESTBED_MARGIN[delay]
+    assert growth_at_50_hz(0.999 * margin, delay) < 1.0 < growth_at_50_hz(1.001 * margin, delay)
+    for factor, verdict in ((0.98, Verdict.SETTLED), (1.02, Verdict.DIVERGED)):
+        assert assess(testbed(0.0), ForceLoop(factor * margin, math.inf, 0.0, 0.02, delay), 36.0).verdict is verdict
+
+
+def test_friction_raises_the_gain_that_takes_small_steps_about_3_2_times() -> None:
+    def verdict(factor: float) -> Verdict:
+        return assess(testbed(8.4), ForceLoop(factor * TESTBED_MARGIN[0], sample_period=0.02), 4.0).verdict
+
+    assert verdict(3.1) is Verdict.SETTLED
+    assert verdict(3.6) is Verdict.DIVERGED
+
+
+def test_friction_at_one_and_a_half_times_the_margin_takes_small_steps_and_not_8_2_lb() -> None:
+    loop = ForceLoop(1.5 * TESTBED_MARGIN[0], sample_period=0.02)
+    assert assess(testbed(8.4), loop, 8.0 * 36.0).verdict is Verdict.SETTLED
+    assert assess(testbed(8.4), loop, 8.2 * 36.0).verdict is Verdict.DIVERGED
+
+
+def test_one_sample_more_reverses_what_friction_does() -> None:
+    late = ForceLoop(0.9 * TESTBED_MARGIN[1], sample_period=0.02, delay_samples=1)
+    assert assess(testbed(0.0), late, 4.0).verdict is Verdict.SETTLED
+    assert assess(testbed(8.4), late, 4.0).verdict is Verdict.LIMIT_CYCLE
+    prompt = ForceLoop(1.5 * TESTBED_MARGIN[0], sample_period=0.02)
+    assert assess(testbed(0.0), prompt, 4.0).verdict is Verdict.DIVERGED
+    assert assess(testbed(8.4), prompt, 4.0).verdict is Verdict.SETTLED
+
+
+# ------------------------------------------------------------------------------------------ refusals
+@pytest.mark.parametrize(
+    ("build", "names"),
+    [
+        (lambda: FrictionNode(0.0, 1, 1, 1, 1, 1), "inertia is 0"),
+        (lambda: FrictionNode(1, -1.0, 1, 1, 1, 1), "damping is -1"),
+        (lambda: FrictionNode(1, 1, math.nan, 1, 1, 1), "transmission_stiffness is nan"),
+        (lambda: FrictionNode(1, 1, 1, math.inf, 1, 1), "contact_stiffness is inf"),
+        (lambda: FrictionNode(1, 1, 1, 1, 1, 0.9), "static_friction is 0.9"),
+        (lambda: ForceLoop(0.0), "gain is 0"),
+        (lambda: ForceLoop(1.0, 0.5, 0.5), "error_limit is 0.5"),
+        (lambda: ForceLoop(1.0, deadband=-0.1), "deadband is -0.1"),
+        (lambda: ForceLoop(1.0, delay_samples=1), "without a sample_period"),
+        (lambda: ForceLoop(1.0, sample_period=0.1, delay_samples=-1), "delay_samples is -1"),
+        (lambda: simulate(unit_node(), ForceLoop(1.0), math.nan, 1.0), "force is nan"),
+        (lambda: simulate(unit_node(), ForceLoop(1.0), 1.0, 0.0), "until is 0"),
+        (lambda: simulate(unit_node(), ForceLoop(1.0), 1.0, 1.0, (0.0, math.nan, 0.0)), "start is"),
+        (lambda: simulate(unit_node(), ForceLoop(1.0), 1.0, 1.0).at([2.0]), "times go from 2"),
+        (lambda: inertialess_staircase(unit_node(), 1.0, 1.0, 5), "nothing jumps"),
+        (lambda: largest_stable_step(unit_node(0.0), ForceLoop(1.0)), "static_friction is 0"),
+    ],
+)
+def test_a_refusal_names_the_value(build: object, names: str) -> None:
+    with pytest.raises(ValueError, match=names):
+        build()  # type: ignore[operator]
