@@ -34,9 +34,9 @@ class Case:
     def __init__(self, q: tuple[float, ...], extra: float, pushed: bool = False) -> None:
         configuration = Configuration.load(packaged("wam")).with_values({"arm.joints.start": q})
         arm, step = configuration.shared.arm, configuration.shared.timing.substep
-        obstacles = configuration.node("driver", DriverParameters).obstacles
-        self.plant = Plant(arm, obstacles, step)
-        self.bare = mujoco.MjModel.from_xml_string(mjcf(arm, step, obstacles))
+        parameters = configuration.node("driver", DriverParameters)
+        self.plant = Plant(arm, parameters.world, parameters.effects, step)
+        self.bare = mujoco.MjModel.from_xml_string(mjcf(arm, step, parameters.world, parameters.effects))
         self.data = mujoco.MjData(self.bare)
         gravity = RigidBody(arm).gravity_torque(q).tolist()
         self.torque = [tau + extra for tau in TransmissionMap.of(arm).motor_torques(gravity)]

@@ -38,7 +38,6 @@ class RosWorld:
         self.context = Context()
         rclpy.init(args=[], context=self.context, domain_id=domain_id)
         self.executor = make_executor(self.context)
-        self._future: Any = rclpy.Future()
         self._nodes: list[Any] = []
 
     def add(self, node: Any) -> Any:
@@ -64,7 +63,7 @@ class RosWorld:
         end = time.monotonic() + timeout
         while not until():
             assert time.monotonic() < end, f"not within {timeout} s: {what or until}"
-            self.executor.spin_until_future_complete(self._future, timeout_sec=0.01)
+            self.executor.spin_once(timeout_sec=0.01)
 
     def close(self) -> None:
         import rclpy

@@ -12,11 +12,12 @@ from contact_truth import motor_from_joint
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
-from wam_description.mjcf import Obstacles
+from wam_description.effects import no_effects
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
+from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
 
 CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
@@ -25,7 +26,7 @@ SENSORS = dataclasses.replace(
     CONFIGURATION.node("contact_estimator", ContactEstimatorParameters), use_joint_sensors=True
 )
 MOTORS = dataclasses.replace(SENSORS, use_joint_sensors=False)
-NO_OBSTACLES = Obstacles((), (), (), (), (), (), (), ())
+NOTHING = World(Obstacles((), (), (), (), (), (), (), (), ()), NO_SPRINGS)
 ZERO = [0.0] * 4
 DT, SUBSTEPS, OUTER = 1e-3, 2, 5
 
@@ -44,7 +45,7 @@ def plant(start: tuple[float, ...], friction: float = 1.0) -> Plant:
         motors=dataclasses.replace(ARM.motors, **scaled(ARM.motors)),
         joints=dataclasses.replace(ARM.joints, start=start, **scaled(ARM.joints)),
     )
-    return Plant(arm, NO_OBSTACLES, DT / SUBSTEPS)
+    return Plant(arm, NOTHING, no_effects(arm), DT / SUBSTEPS)
 
 
 def push(arm: Plant, cover: str, x: float, force: tuple[float, float, float]) -> None:

@@ -147,7 +147,7 @@ def test_posture_alone_is_reached_no_faster_than_allowed() -> None:
         speeds.append(max(map(abs, velocity)))
         world.move(velocity)
     assert world.q == pytest.approx(posture, abs=1e-6)
-    assert max(speeds) == OWN.posture_speed_limit
+    assert max(speeds) == OWN.joint_speed_limit
 
 
 def test_zero_force_releases_the_axis() -> None:

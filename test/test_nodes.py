@@ -2,7 +2,6 @@
 
 import math
 import sys
-import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -39,20 +38,6 @@ def checked_fields(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, module in list(sys.modules.items()):
         if ".msg._" in name and hasattr(module, "ros_python_check_fields"):
             monkeypatch.setattr(module, "ros_python_check_fields", "1")
-
-
-@pytest.fixture
-def ros(ros: Any) -> Any:
-    """The network of this test; `wait` ends on time even where messages never cease, as in lockstep."""
-
-    def wait(until: Callable[[], Any], timeout: float = 10.0, what: str = "") -> None:
-        end = time.monotonic() + timeout
-        while not until():
-            assert time.monotonic() < end, f"not within {timeout} s: {what or until}"
-            ros.executor.spin_once(timeout_sec=0.01)
-
-    ros.wait = wait
-    return ros
 
 
 def start(ros: Any, folder: Path, nodes: list[str], namespace: str = "/wam", **values: Any) -> dict[str, Any]:

@@ -253,7 +253,6 @@ def test_a_wrong_parameter_stops_the_process_with_its_name(
     assert "Traceback" not in done.stdout + done.stderr
 
 
-@pytest.mark.xfail(reason="ROS lets '/**/driver' win over -p as long as '/**' stands first in the file", strict=True)
 def test_a_parameter_on_the_command_line_wins_over_the_file(domain_id: int) -> None:
     done = run_node("driver", "--ros-args", "--params-file", str(packaged("wam")), "-p", "watchdog:=0.5", timeout=5.0)
     assert "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05" in done.stderr

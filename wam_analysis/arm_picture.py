@@ -21,9 +21,11 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
-from wam_description.mjcf import Obstacles, mjcf, rotation_xyz
+from wam_description.effects import no_effects
+from wam_description.mjcf import mjcf, rotation_xyz
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
+from wam_description.world import NO_SPRINGS, Obstacles, World
 
 Array = NDArray[np.float64]
 
@@ -187,7 +189,7 @@ def render(
         RGB; None where none of them works.
     """
     scene = {
-        "xml": mjcf(arm, 0.001, obstacles),
+        "xml": mjcf(arm, 0.001, World(obstacles, NO_SPRINGS), no_effects(arm)),
         "joints": dict(zip(arm.joints.names, map(float, q), strict=True)),
         "azimuth": view.azimuth,
         "elevation": view.elevation,

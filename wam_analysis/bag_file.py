@@ -16,7 +16,7 @@ _BROKEN = (
 )  # fmt: skip
 
 
-class BagError(Exception):
+class BagError(ValueError):
     """A bag that cannot be read; the message names the path and what to do."""
 
 

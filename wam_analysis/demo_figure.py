@@ -21,9 +21,9 @@ from wam_analysis.demo_summary import DemoSummary, Touch
 from wam_analysis.demo_traces import Numbers, Signal, Step
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
-from wam_description.mjcf import Obstacles
 from wam_description.parameters import ParameterError, build, flatten
 from wam_description.signals import Contact
+from wam_description.world import Obstacles
 
 T = TypeVar("T")
 
@@ -66,11 +66,11 @@ def recorded_arm(bag: Bag, namespace: str) -> RecordedArm:
     """
     try:
         flat = _driver_parameters(bag, namespace)
-        return RecordedArm(_group(Arm, flat, "arm."), _group(Obstacles, flat, "obstacles."), "")
+        return RecordedArm(_group(Arm, flat, "arm."), _group(Obstacles, flat, "world.obstacles."), "")
     except (ParameterError, yaml.YAMLError, UnicodeDecodeError) as error:
         reason = str(error).partition("\n")[0]
     configuration = Configuration.load(packaged("wam"))
-    obstacles = _group(Obstacles, configuration.sections["driver"], "obstacles.")
+    obstacles = _group(Obstacles, configuration.sections["driver"], "world.obstacles.")
     note = f"the arm is drawn from configuration 'wam' of the package, not from the bag: {reason}"
     return RecordedArm(configuration.shared.arm, obstacles, note)
 

@@ -41,7 +41,9 @@ class ForceLoopParameters:
     torque_gain: float = parameter("G_I of the joint_torque mode", "rad/s/(N m)", low=0.0, live=True)
     torque_error_limit: float = parameter("saturation of the torque error", "N m", low=0.0, live=True)
     posture_gain: float = parameter("joint velocity per posture error", "1/s", low=0.0, live=True)
-    posture_speed_limit: float = parameter("largest joint speed that the posture asks for", "rad/s", low=0.0, live=True)
+    joint_speed_limit: float = parameter(
+        "largest joint speed that posture and force ask for", "rad/s", low=0.0, live=True
+    )
     force_filter: float = parameter("time constant of the low pass on the measured force", "s", low=0.0, live=True)
     spring_stiffness: tuple[float, ...] = parameter(
         "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", low=0.0, live=True
@@ -209,7 +211,7 @@ class ForceLoop:
         return self._filtered
 
     def _posture_velocity(self, q: Sequence[float]) -> list[float]:
-        gain, limit = self.parameters.posture_gain, self.parameters.posture_speed_limit
+        gain, limit = self.parameters.posture_gain, self.parameters.joint_speed_limit
         assert self._hold is not None
         return [min(max(gain * (a - b), -limit), limit) for a, b in zip(self._hold, q, strict=True)]
 
@@ -219,7 +221,8 @@ class ForceLoop:
         square = float(along @ along)
         if square > REACH * REACH:
             velocity += along * ((speed - float(along @ velocity)) / square)
-        return _list(velocity)
+        fastest, limit = float(np.abs(velocity).max()), self.parameters.joint_speed_limit
+        return _list(velocity if fastest <= limit else velocity * (limit / fastest))
 
     def _joint_torque(self, q: Sequence[float], torque: Sequence[float] | None) -> ForceOutput:
         if torque is None:

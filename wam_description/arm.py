@@ -23,7 +23,7 @@ class Motors:
     inertia: tuple[float, ...] = parameter("rotor inertia", "kg m^2", low=1e-9)
     torque_constant: tuple[float, ...] = parameter("torque per current", "N m/A", low=1e-6)
     peak_torque: tuple[float, ...] = parameter("torque at which the amplifier clips", "N m", low=0.0)
-    continuous_torque: tuple[float, ...] = parameter("torque that can be held for ever", "N m", low=0.0)
+    continuous_torque: tuple[float, ...] = parameter("torque that can be held for ever", "N m", low=1e-6)
     static_friction: tuple[float, ...] = parameter("breakaway torque of rotor and first pinion", "N m", low=0.0)
     dynamic_friction: tuple[float, ...] = parameter("Coulomb torque while turning", "N m", low=0.0)
     viscous_friction: tuple[float, ...] = parameter("torque per velocity", "N m s/rad", low=0.0)

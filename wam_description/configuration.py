@@ -44,10 +44,11 @@ class Configuration(NamedTuple):
         """
         path = Path(path)
         if not path.is_file():
-            raise ParameterError(
-                f"configuration {path} is not a file; give the path of a ROS parameter file (YAML)"
-            )
-        text = path.read_text(encoding="utf-8")
+            raise ParameterError(f"configuration {path} is not a file; give the path of a ROS parameter file (YAML)")
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise ParameterError(f"configuration {path} is not a text file: {error}") from error
         return cls(path, text, _sections(path, text))
 
     @property
@@ -92,9 +93,7 @@ class Configuration(NamedTuple):
     def _section(self, node: str) -> str:
         if node == SHARED or node not in self.sections:
             known = ", ".join(name for name in self.sections if name != SHARED)
-            raise ParameterError(
-                f"{self.path}: no section '/**/{node}' for node '{node}'; sections: {known or 'none'}"
-            )
+            raise ParameterError(f"{self.path}: no section '/**/{node}' for node '{node}'; sections: {known or 'none'}")
         return node
 
     def _build(self, section: str, cls: type[T]) -> T:
@@ -142,16 +141,17 @@ def _sections(path: Path, text: str) -> Mapping[str, Mapping[str, Any]]:
     except yaml.YAMLError as error:
         raise ParameterError(f"{path} is not YAML: {error}") from error
     if not isinstance(tree, dict) or SHARED not in tree:
+        raise ParameterError(f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top")
+    if list(tree)[-1] != SHARED:
         raise ParameterError(
-            f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top"
+            f"{path}: section '{list(tree)[-1]}' stands after '{SHARED}'; let '{SHARED}' be the last one, "
+            "else ROS lets the file win over what is given on a command line"
         )
     sections = {}
     for key, body in tree.items():
         name = SHARED if key == SHARED else str(key).removeprefix(SHARED + "/")
         if name == key != SHARED or "/" in name.replace(SHARED, ""):
-            raise ParameterError(
-                f"{path}: section {key!r} is not allowed; write '{SHARED}' or '{SHARED}/<node name>'"
-            )
+            raise ParameterError(f"{path}: section {key!r} is not allowed; write '{SHARED}' or '{SHARED}/<node name>'")
         if not isinstance(body, dict) or list(body) != [PARAMETERS] or not isinstance(body[PARAMETERS], dict):
             raise ParameterError(
                 f"{path}: section '{key}' needs '{PARAMETERS}:' and below it names and values, no more"
@@ -166,8 +166,7 @@ def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[s
 
 def _text(sections: Mapping[str, Mapping[str, Any]]) -> str:
     tree = {
-        (name if name == SHARED else f"{SHARED}/{name}"): {PARAMETERS: _nested(flat)}
-        for name, flat in sections.items()
+        (name if name == SHARED else f"{SHARED}/{name}"): {PARAMETERS: _nested(flat)} for name, flat in sections.items()
     }
     return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
 

@@ -58,9 +58,7 @@ def _printed(
     index: tuple[int, ...] = (),
     erratum: str = "",
 ) -> Constant:
-    return Constant(
-        symbol, meaning, value, unit, "thesis", source, parameter, index, reason="", erratum=erratum
-    )
+    return Constant(symbol, meaning, value, unit, "thesis", source, parameter, index, reason="", erratum=erratum)
 
 
 def _assumed(
@@ -185,9 +183,10 @@ ARM_ASSUMED: tuple[Constant, ...] = (
         "where the fast stages alone have 37.7 and 13.7", parameter="arm.cables.stage_length", index=(1, 3, 5, 7)),
     _assumed("r", "radius of the pinions", 0.375, "in", "not printed; that of the testbed",
         parameter="arm.cables.stage_radius"),
-    _assumed("", "parallel circuits", 1.0, "1", "what runs in parallel is in EA", parameter="arm.cables.stage_circuits"),
-    _assumed("n", "motor turns per turn of the stage's pinion", (1.0, _STAGE[0], 1.0, _STAGE[1], 1.0, _STAGE[2], 1.0, _STAGE[3]),
-        "1", "two equal reductions", parameter="arm.cables.stage_ratio"),
+    _assumed("", "parallel circuits", 1.0, "1", "what runs in parallel is in EA",
+        parameter="arm.cables.stage_circuits"),
+    _assumed("n", "motor turns per turn of the stage's pinion",
+        (1.0, _STAGE[0], 1.0, _STAGE[1], 1.0, _STAGE[2], 1.0, _STAGE[3]), "1", "two equal reductions", parameter="arm.cables.stage_ratio"),
     _assumed("", "breaking strength of a fast cable", 170.0, "lb", "not printed; the cable of 6.4.5",
         parameter="arm.cables.breaking_strength"),
     _assumed("b_tr", "damping of the cable circuits, at the motor", (3.72e-3, 3.72e-3, 3.72e-3, 2.19e-3),
@@ -313,7 +312,8 @@ TESTBED: tuple[Constant, ...] = (
     _assumed("L", "free length of the slow stage", 0.0, "in",
         "at the joint, several cables in parallel; k_tr of the fast stage alone gives the 638 lb/in of (4.9)",
         parameter="arm.cables.stage_length", index=(1,)),
-    _assumed("", "parallel circuits", 1.0, "1", "what runs in parallel is in EA", parameter="arm.cables.stage_circuits"),
+    _assumed("", "parallel circuits", 1.0, "1", "what runs in parallel is in EA",
+        parameter="arm.cables.stage_circuits"),
     _assumed("n", "motor turns per turn of the stage's pinion", (1.0, math.sqrt(14.0)), "1", "two equal reductions",
         parameter="arm.cables.stage_ratio"),
     _assumed("m", "mass of the link", 3.0 * 4.0 / 36.0**2, "lb-s^2/in", "a uniform rod of this J_l about its end",
@@ -327,7 +327,8 @@ TESTBED: tuple[Constant, ...] = (
         parameter="arm.joints.twist"),
     _assumed("", "joint on the base's origin", 0.0, "in", "convention", parameter="arm.joints.length"),
     _assumed("", "joint on the base's origin, along the axis", 0.0, "in", "convention", parameter="arm.joints.offset"),
-    _assumed("", "lower stop", -0.7, "rad", "not printed; far from what a spring is pressed", parameter="arm.joints.lower"),
+    _assumed("", "lower stop", -0.7, "rad", "not printed; far from what a spring is pressed",
+        parameter="arm.joints.lower"),
     _assumed("", "upper stop", 0.7, "rad", "not printed; as the lower one", parameter="arm.joints.upper"),
     _assumed("", "angle at power-up", 0.0, "rad", "5.6: the link lies horizontally", parameter="arm.joints.start"),
     _assumed("", "joint speed that faults the driver", 20.0, "rad/s",

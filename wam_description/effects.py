@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from wam_description.arm import Arm
 from wam_description.parameters import lengths, parameter
 
 
@@ -38,4 +39,15 @@ class Effects:
     )
     rubbing_friction: tuple[float, ...] = parameter(
         "extra dry friction at each joint, like the Teflon rod of section 5.6", "N m", low=0.0, live=True
+    )
+
+
+def no_effects(arm: Arm) -> Effects:
+    """An ideal transmission: elastic, and nothing else."""
+    return Effects(
+        ripples=Ripples((), (), (), (), ()),
+        creep=False,
+        slack=False,
+        tension_friction=(0.0,) * len(arm.motors.names),
+        rubbing_friction=(0.0,) * len(arm.joints.names),
     )

@@ -159,7 +159,7 @@ def _checked_scalar(field: Field, value: Any) -> bool | int | float | str:
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise refuse("a number")
-    if field.kind is int and value != int(value):
+    if field.kind is int and math.isfinite(value) and value != int(value):
         raise refuse("a whole number")
     if not math.isfinite(value) or not field.low <= value <= field.high:
         raise refuse(field.allowed or "a finite number")

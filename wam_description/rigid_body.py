@@ -113,9 +113,7 @@ class RigidBody:
 
     def _known(self, cover: str) -> int:
         if cover not in self._frame:
-            raise ValueError(
-                f"cover '{cover}' is not on arm '{self.arm.name}'; covers: {', '.join(self.covers)}"
-            )
+            raise ValueError(f"cover '{cover}' is not on arm '{self.arm.name}'; covers: {', '.join(self.covers)}")
         return self._frame[cover]
 
     def _placement(self, q: ArrayLike, frame: int) -> pin.SE3:

@@ -60,6 +60,9 @@ class Springs:
         lengths("springs", self.joints, {key: getattr(self, key) for key in keys})
 
 
+NO_SPRINGS = Springs((), (), (), (), ())
+
+
 @dataclass(frozen=True)
 class World:
     """Everything around the arm."""

@@ -316,8 +316,9 @@ class Plant:
             place = rotation[:, 0] @ (data.contact.pos[i] - data.site_xpos[self._site[cover]])
             parts[cover].append((rotation.T @ force, float(place)))
         for cover, (force, torque) in self._pushes.items():
-            square = float(force @ force)
-            parts[cover].append((force, float(np.cross(force, torque)[0] / square) if square > 0.0 else np.nan))
+            square = float(force[1] ** 2 + force[2] ** 2)  # a force along x goes through every place
+            moment = float(force[1] * torque[2] - force[2] * torque[1])
+            parts[cover].append((force, moment / square if square > 0.0 else np.nan))
         result = []
         for cover, shares in parts.items():
             weights = [float(np.linalg.norm(force)) for force, _ in shares]

@@ -1,0 +1,82 @@
+"""Every transition of the driver's safety."""
+
+import pytest
+
+from wam_driver.safety import Mode, Safety
+
+
+def in_mode(mode: Mode) -> Safety:
+    safety = Safety()
+    if mode is Mode.ENABLED:
+        assert safety.enable("").success
+    elif mode is Mode.FAULT:
+        safety.trip("first")
+    assert safety.mode is mode
+    return safety
+
+
+def test_starts_braked_without_a_fault() -> None:
+    assert Safety().mode is Mode.BRAKED
+    assert not Safety().fault
+
+
+@pytest.mark.parametrize(
+    ("mode", "request_name", "after", "success"),
+    [
+        (Mode.BRAKED, "enable", Mode.ENABLED, True),
+        (Mode.ENABLED, "enable", Mode.ENABLED, True),
+        (Mode.FAULT, "enable", Mode.FAULT, False),
+        (Mode.BRAKED, "disable", Mode.BRAKED, True),
+        (Mode.ENABLED, "disable", Mode.BRAKED, True),
+        (Mode.FAULT, "disable", Mode.FAULT, True),
+        (Mode.BRAKED, "reset_fault", Mode.BRAKED, True),
+        (Mode.ENABLED, "reset_fault", Mode.ENABLED, True),
+        (Mode.FAULT, "reset_fault", Mode.BRAKED, True),
+    ],
+)
+def test_request_leads_where_it_should(mode: Mode, request_name: str, after: Mode, success: bool) -> None:
+    safety = in_mode(mode)
+    answer = getattr(safety, request_name)(*([""] if request_name == "enable" else []))
+    assert safety.mode is after
+    assert answer.success is success
+    assert answer.message.startswith("refused" if not success else after.value)
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_trip_stops_in_every_state(mode: Mode) -> None:
+    safety = in_mode(mode)
+    safety.trip("second")
+    assert safety.mode is Mode.FAULT
+
+
+def test_first_fault_is_kept_until_reset() -> None:
+    safety = in_mode(Mode.FAULT)
+    safety.trip("second")
+    safety.disable()
+    assert safety.fault == "first"
+    safety.reset_fault()
+    assert not safety.fault
+    safety.trip("third")
+    assert safety.fault == "third"
+
+
+def test_enable_with_a_latched_fault_says_what_to_do() -> None:
+    answer = in_mode(Mode.FAULT).enable("")
+    assert not answer.success
+    assert "'first'" in answer.message
+    assert "reset_fault first, then enable" in answer.message
+
+
+def test_enable_is_refused_while_something_speaks_against_it() -> None:
+    safety = Safety()
+    answer = safety.enable("two publishers; stop one")
+    assert (answer.success, answer.message) == (False, "refused: two publishers; stop one")
+    assert safety.mode is Mode.BRAKED
+    assert safety.enable("").success
+
+
+def test_reset_never_enables() -> None:
+    safety = in_mode(Mode.ENABLED)
+    safety.trip("while enabled")
+    assert "call enable" in safety.reset_fault().message
+    assert safety.mode is Mode.BRAKED
