@@ -2,9 +2,9 @@
 
 State: angle and velocity of each rotor and each joint, and the creep of each circuit.  Cable circuit
 i pulls with tau = k_tr (l - c) + d l', l = theta_i - (row i of the inverse of (A.5)) q, c its creep,
-at the rotor and, through the same row, at the joints, until its loose strand is slack.  Dry friction is MuJoCo's friction constraint, made stiff, its level
-switched before every step: F_static while stuck, F_dynamic once moving until the velocity changes
-its sign (section 5.1, figure 5.1.b).
+at the rotor and, through the same row, at the joints, until its loose strand is slack.  Dry
+friction is MuJoCo's friction constraint, made stiff, its level switched before every step: F_static
+while stuck, F_dynamic once moving until the velocity changes its sign (section 5.1, figure 5.1.b).
 """
 
 import math
