@@ -29,7 +29,7 @@ LOOP = "/**/loop:\n  ros__parameters:\n    gain: 2.5\n    names: [a, b]\n"
 def file(tmp_path: Path) -> Path:
     """The WAM's configuration with one more node."""
     path = tmp_path / "mine.yaml"
-    path.write_text(packaged("wam").read_text() + LOOP)
+    path.write_text(LOOP + packaged("wam").read_text())
     return path
 
 
@@ -91,11 +91,11 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
         ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
         ("/**: {ros__parameters: 3}", r"section '/\*\*' needs 'ros__parameters:'"),
         (
-            "/**: {ros__parameters: {}}\ndriver: {ros__parameters: {}}",
+            "driver: {ros__parameters: {}}\n/**: {ros__parameters: {}}",
             r"section 'driver' is not allowed; write",
         ),
         (
-            "/**: {ros__parameters: {}}\n/**/a/b: {ros__parameters: {}}",
+            "/**/a/b: {ros__parameters: {}}\n/**: {ros__parameters: {}}",
             r"section '/\*\*/a/b' is not allowed; write",
         ),
     ],
@@ -127,12 +127,17 @@ def test_misspelt_parameter_is_refused_with_file_section_and_name(file: Path) ->
         configuration.node("pool", Loop)
 
 
-def test_packaged_configuration_is_found_in_the_source_tree_and_unknown_names_are_refused() -> None:
-    assert packaged("wam") == Path(__file__).resolve().parents[1] / "config" / "wam.yaml"
-    with pytest.raises(
-        ParameterError, match=r"no configuration 'wum' comes with wam_stack; there are: .*wam"
-    ):
+def test_unknown_packaged_configuration_is_refused_with_those_that_exist() -> None:
+    assert packaged("wam").name == "wam.yaml"
+    with pytest.raises(ParameterError, match=r"no configuration 'wum' comes with wam_stack; there are: .*wam"):
         packaged("wum")
+
+
+def test_a_file_that_would_win_over_the_command_line_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(packaged("wam").read_text() + LOOP)
+    with pytest.raises(ParameterError, match=r"section '/\*\*/loop' stands after '/\*\*'"):
+        Configuration.load(path)
 
 
 @pytest.mark.parametrize("way", ["own prefix", "ament prefix"])
@@ -140,7 +145,8 @@ def test_packaged_configuration_is_found_when_installed(tmp_path: Path, way: str
     source = Path(__file__).resolve().parents[1]
     prefix = tmp_path / "prefix"
     packages = prefix / "lib" / "site-packages" if way == "own prefix" else tmp_path / "elsewhere"
-    shutil.copytree(source / "wam_description", packages / "wam_description")
+    for package in ("wam_description", "wam_theory"):
+        shutil.copytree(source / package, packages / package)
     share = prefix / "share" / "wam_stack" / "config"
     share.mkdir(parents=True)
     shutil.copy(source / "config" / "wam.yaml", share)

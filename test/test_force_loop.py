@@ -114,8 +114,22 @@ def test_saturation_limits_the_commanded_speed_exactly(asked: float, limited: fl
     assert along @ out.velocity == pytest.approx(GAIN * limited, rel=1e-7)
     assert out.error == pytest.approx(down(asked), rel=1e-7)
     assert out.limited == pytest.approx(down(limited), rel=1e-7)
-    unlimited = ask(ForceLoop(ARM, replace(OWN, force_error_limit=1e9)), World(400.0), down(asked))
+    free = replace(OWN, force_error_limit=1e9, joint_speed_limit=1e9)
+    unlimited = ask(ForceLoop(ARM, free), World(400.0), down(asked))
     assert along @ unlimited.velocity == pytest.approx(GAIN * asked, rel=1e-7)
+
+
+def test_a_short_lever_does_not_make_a_joint_race() -> None:
+    """Straight up, a force along the arm has hardly a lever on any joint."""
+    upright = [0.0, -2e-3, 0.0, math.pi / 2 - 2e-3]
+    loop = ForceLoop(ARM, replace(OWN, contact_place=0.4))
+    fast = ForceLoop(ARM, replace(OWN, contact_place=0.4, joint_speed_limit=1e9))
+    for machine, most in ((loop, OWN.joint_speed_limit), (fast, math.inf)):
+        state = State(upright, [0.0] * 4, [0.0] * 4)
+        sensed = State(upright, [0.0] * 4, BODY.gravity_torque(upright).tolist())
+        out = machine.step(state, sensed, NO_CONTACT, None, ForceCommand("base", (0.0, 0.0, -20.0)), upright, None, 0.005)
+        assert max(map(abs, out.velocity)) <= most * (1.0 + 1e-12)
+    assert max(map(abs, out.velocity)) > 10.0 * OWN.joint_speed_limit
 
 
 def test_posture_moves_nothing_along_the_force() -> None:

@@ -217,12 +217,15 @@ class ForceLoop:
 
     def _hybrid_velocity(self, q: Sequence[float], along: Array, speed: float) -> list[float]:
         """Joint velocities with `speed` along the force and the posture's part that does not move along it."""
-        velocity = np.array(self._posture_velocity(q))
+        posture = np.array(self._posture_velocity(q))
         square = float(along @ along)
-        if square > REACH * REACH:
-            velocity += along * ((speed - float(along @ velocity)) / square)
-        fastest, limit = float(np.abs(velocity).max()), self.parameters.joint_speed_limit
-        return _list(velocity if fastest <= limit else velocity * (limit / fastest))
+        if square <= REACH * REACH:
+            return _list(posture)
+        force = along * (speed / square)
+        fastest, limit = float(np.abs(force).max()), self.parameters.joint_speed_limit
+        if fastest > limit:  # a short lever would turn a small speed into a wild one
+            force *= limit / fastest
+        return _list(force + posture - along * (float(along @ posture) / square))
 
     def _joint_torque(self, q: Sequence[float], torque: Sequence[float] | None) -> ForceOutput:
         if torque is None:
