@@ -127,7 +127,8 @@ def test_a_short_lever_does_not_make_a_joint_race() -> None:
     for machine, most in ((loop, OWN.joint_speed_limit), (fast, math.inf)):
         state = State(upright, [0.0] * 4, [0.0] * 4)
         sensed = State(upright, [0.0] * 4, BODY.gravity_torque(upright).tolist())
-        out = machine.step(state, sensed, NO_CONTACT, None, ForceCommand("base", (0.0, 0.0, -20.0)), upright, None, 0.005)
+        press = ForceCommand("base", (0.0, 0.0, -20.0))
+        out = machine.step(state, sensed, NO_CONTACT, None, press, upright, None, 0.005)
         assert max(map(abs, out.velocity)) <= most * (1.0 + 1e-12)
     assert max(map(abs, out.velocity)) > 10.0 * OWN.joint_speed_limit
 

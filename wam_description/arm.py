@@ -5,6 +5,7 @@ arrays are flattened row by row because ROS parameters know no others.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from wam_description.cables import Cables, Circuit, circuits
 from wam_description.parameters import lengths, parameter, require
@@ -147,7 +148,7 @@ class Arm:
         for link in self.covers.links:
             require(link in self.links.names, f"arm.covers.links names '{link}'; links: {', '.join(self.links.names)}")
 
-    @property
+    @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
         """The cable circuit of each motor, its stages in series."""
         return circuits(self.motors.names, self.joint_from_motor, self.cables)

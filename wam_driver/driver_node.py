@@ -91,10 +91,11 @@ class DriverNode(Node):
             self._started = True
             self._latencies: list[float] = []
             self._published: deque[tuple[int, float]] = deque(maxlen=100)
-            self._begin = self._now()
             self._done = self._missed = 0
-            self._publish()
             self.create_timer(shared.timing.period, self._tick, clock=steady)
+            # half a period of slack, so that a timer that comes a little early or late misses nothing
+            self._begin = self._now() - 0.5 * shared.timing.period
+            self._publish()
 
     def destroy_node(self) -> None:
         """Put on the brakes and say so."""
