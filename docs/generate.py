@@ -12,9 +12,11 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from wam_analysis.plant_figure import figure
 from wam_description.arm import Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
@@ -24,6 +26,7 @@ from wam_ros.topics import TOPICS
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGURATION = ROOT / "config" / "wam.yaml"
+WRITES_PICTURES = __name__ == "__main__"
 BLOCK = re.compile(r"(<!-- generated: (?P<name>[^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -144,6 +147,17 @@ def listing(name: str) -> str:
     return f"```python\n{(ROOT / name).read_text(encoding='utf-8')}```\n"
 
 
+@cache
+def plant_study() -> str:
+    """Differences between plant and theory; draws docs/plant.png on the way."""
+    with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
+        picture = Path(folder) / "plant.png"
+        text = figure(picture)
+        if WRITES_PICTURES:
+            shutil.copyfile(picture, ROOT / "docs" / "plant.png")
+    return text
+
+
 def blocks() -> dict[str, Callable[[], str]]:
     """What can stand in a page, by name."""
     configuration = Configuration.load(CONFIGURATION)
@@ -153,6 +167,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the arm, printed": lambda: constants(ARM_PRINTED),
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
+        "plant": plant_study,
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
 

@@ -13,7 +13,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 
 # commands that need no ROS; named here and imported when called, because ROS glue knows no analysis
-ANALYSES = {"report": "wam_analysis.demo_report:report"}
+ANALYSES = {"report": "wam_analysis.demo_report:report", "plant": "wam_analysis.plant_figure:figure"}
 BASE_CONFIGURATION = "wam"
 
 
@@ -65,6 +65,9 @@ def _parser() -> argparse.ArgumentParser:
 
     report = _command(commands, "report", _report, "say what a recording of the demonstration shows")
     report.add_argument("bag", help="directory of the bag")
+
+    plant = _command(commands, "plant", _plant, "draw the plant's effects beside the theory, print the differences")
+    plant.add_argument("file", help="picture to write, for example plant.png")
 
     model = _command(commands, "model", _model, "write the arm's model")
     model.add_argument("format", choices=("urdf", "mjcf"))
@@ -166,6 +169,10 @@ def _record(given: argparse.Namespace) -> int:
         file.write_text(configuration.text, encoding="utf-8")
         run(node_class("recorder"), ["wam", "--ros-args", "--params-file", str(file)])
     return 0
+
+
+def _plant(given: argparse.Namespace) -> int:
+    return _analysis("plant", Path(given.file))
 
 
 def _report(given: argparse.Namespace) -> int:

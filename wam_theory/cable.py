@@ -141,6 +141,19 @@ def creep(travel: ArrayLike, torque: ArrayLike, radius: ArrayLike, ea: ArrayLike
     return travel * np.asarray(torque, dtype=float) / (radius * ea)
 
 
+def eccentric_ripple(eccentricity: ArrayLike, pretension: ArrayLike, angle: ArrayLike) -> Array:
+    """Torque of an eccentric pulley, 2 epsilon T sin theta, N m, (6.23): 2 epsilon T is its amplitude.
+
+    Parameters
+    ----------
+    eccentricity : epsilon, m.
+    pretension : T, N.
+    angle : theta of the pulley, rad.
+    """
+    eccentricity, pretension = _positive(eccentricity=(eccentricity, True), pretension=(pretension, True))
+    return 2.0 * eccentricity * pretension * np.sin(np.asarray(angle, dtype=float))
+
+
 def _positive(**arguments: tuple[ArrayLike, bool]) -> tuple[Array, ...]:
     """Arguments as arrays; each above zero, or at least zero where so marked."""
     arrays = []

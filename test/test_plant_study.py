@@ -1,0 +1,46 @@
+"""The study that docs/plant.md shows: its numbers stay within what the document promises."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wam_analysis.plant_figure import RATIOS, figure
+from wam_analysis.plant_study import STUDIES, cycle, resonances, stiction_cycle
+
+
+@pytest.mark.parametrize(
+    ("name", "most"),
+    [
+        ("slack", 1e-6),
+        ("creep", 1e-3),  # (6.19) 0.1 %: the damper of the circuit carries a little of the load while it creeps
+        ("efficiency", 1e-3),  # (6.15) 0.1 %: creep is first order in the strain
+        ("ripple", 1e-6),
+        ("linear surface", 2e-3),  # k_c 0.2 %: the tip accelerates, which takes 0.1 % of the force
+        ("hardening surface", 2e-3),
+    ],
+)
+def test_effect_is_as_near_to_theory_as_promised(name: str, most: float) -> None:
+    assert STUDIES[name]().error < most
+
+
+def test_stiction_cycle_is_within_two_percent_of_the_exact_one() -> None:
+    curve = stiction_cycle()
+    plant, exact = cycle(curve.x, curve.plant), cycle(curve.x, curve.theory)
+    assert plant.peak_to_peak == pytest.approx(exact.peak_to_peak, rel=0.02)
+    assert plant.period == pytest.approx(exact.period, rel=0.02)
+    assert exact.peak_to_peak > 1.0
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_both_resonances_are_those_of_4_4(ratio: float) -> None:
+    found = resonances(ratio, np.geomspace(1e2, 1e5, 5))
+    np.testing.assert_allclose(found.lower.plant, found.lower.theory, rtol=3e-3)
+    np.testing.assert_allclose(found.upper.plant, found.upper.theory, rtol=3e-3)
+
+
+def test_figure_is_drawn_and_its_table_names_every_effect(tmp_path: Path) -> None:
+    text = figure(tmp_path / "plant.png")
+    assert (tmp_path / "plant.png").stat().st_size > 50_000
+    for name in (*STUDIES, "lower resonance", "upper resonance"):
+        assert name in text

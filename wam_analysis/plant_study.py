@@ -1,0 +1,288 @@
+"""The plant's effects, measured from the stepped plant, beside what the theory says of each.
+
+One link on one motor, the testbed of section 5.6 with the effect in question alone.  Where a motor
+has to turn at a given speed, its rotor is given an inertia that nothing can slow.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration, packaged
+from wam_description.effects import Ripples, no_effects
+from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
+from wam_driver.plant import Plant
+from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, stage_loss
+from wam_theory.resonance import force_resonances
+from wam_theory.stick_slip import ForceLoop, FrictionNode, simulate
+
+Numbers = NDArray[np.float64]
+STEP = 2.5e-4  # s
+UNSTOPPABLE = 1e9  # kg m^2
+NOTHING = Obstacles((), (), (), (), (), (), (), (), ())
+EMPTY = World(NOTHING, NO_SPRINGS)
+LEVER = 0.9144  # m, from the joint to the tip
+
+
+class Curve(NamedTuple):
+    """What the plant does and what the theory says, over x."""
+
+    x: Numbers
+    plant: Numbers
+    theory: Numbers
+
+    @property
+    def error(self) -> float:
+        """Greatest difference as a share of the greatest theoretical value."""
+        return float(np.abs(self.plant - self.theory).max() / np.abs(self.theory).max())
+
+
+class Resonance(NamedTuple):
+    """Both resonances over contact stiffness, for one transmission ratio, rad/s."""
+
+    ratio: float
+    lower: Curve
+    upper: Curve
+
+
+def ideal_testbed(
+    ratio: float = 14.0, rotor: float | None = None, damping: float = 0.0, friction: tuple[float, float] = (0.0, 0.0)
+) -> Arm:
+    """The testbed without gravity, with what is asked for alone.
+
+    Parameters
+    ----------
+    ratio : N.
+    rotor : inertia of the rotor, kg m^2; None for that of the motor.
+    damping : of the cable circuit, N m s/rad.
+    friction : static and dynamic, at the joint, N m.
+    """
+    arm = Configuration.load(packaged("testbed")).shared.arm
+    none = (0.0,)
+    motors = replace(
+        arm.motors,
+        inertia=(rotor or arm.motors.inertia[0],),
+        static_friction=none,
+        dynamic_friction=none,
+        viscous_friction=none,
+    )
+    joints = replace(
+        arm.joints,
+        static_friction=(friction[0],),
+        dynamic_friction=(friction[1],),
+        viscous_friction=none,
+        lower=(-1e3,),
+        upper=(1e3,),
+    )
+    cables = replace(arm.cables, damping=(damping,))
+    return replace(
+        arm, motors=motors, joints=joints, cables=cables, joint_from_motor=(1.0 / ratio,), gravity=(0.0, 0.0, 0.0)
+    )
+
+
+def _plant(arm: Arm, world: World = EMPTY, **effects: Any) -> Plant:
+    plant = Plant(arm, world, replace(no_effects(arm), **effects), STEP)
+    plant.brake(False)
+    return plant
+
+
+def _run(plant: Plant, seconds: float) -> None:
+    for _ in range(round(seconds / STEP)):
+        plant.step([0.0])
+
+
+def slack() -> Curve:
+    """Torque of a circuit over its stretch, past where the loose strand goes slack."""
+    arm = ideal_testbed()
+    plant = _plant(arm, slack=True)
+    (circuit,) = arm.circuits
+    stretch = np.linspace(-2.5, 2.5, 101) * circuit.slack_stretch
+    torques = []
+    for value in stretch:
+        plant.data.qpos[:] = (value, 0.0)
+        mujoco.mj_forward(plant.model, plant.data)
+        torques.append(plant.circuit_torque[0])
+    theory = circuit_torque(stretch, circuit.stiffness, circuit.pretension, circuit.radius)
+    return Curve(stretch, np.array(torques), theory)
+
+
+def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float = 10.0) -> Curve:
+    """Angle that the link gives way, while the motor turns out and back under a constant load.
+
+    Parameters
+    ----------
+    torque : load at the joint, N m.
+    speed : of the motor, rad/s.
+    seconds : each way.
+
+    Returns
+    -------
+    Curve
+        over the motor's absolute travel, rad; angles at the joint, rad.
+    """
+    plant = _loaded(torque)
+    arm = ideal_testbed()
+    rest = plant.q[0] - plant.theta[0] / 14.0
+    travel, given = [], []
+    done = 0.0
+    for way in (1.0, -1.0):
+        plant.data.qvel[:] = (way * speed, way * speed / 14.0)
+        for _ in range(round(seconds / STEP / 40)):
+            before = plant.theta[0]
+            _run(plant, 40 * STEP)
+            done += abs(plant.theta[0] - before)
+            travel.append(done)
+            given.append(plant.q[0] - plant.theta[0] / 14.0 - rest)
+    at_motor = torque / 14.0
+    stages = zip(arm.cables.stage_ratio, arm.cables.stage_radius, arm.cables.stage_ea, strict=True)
+    way_given = sum(n * creep(np.array(travel) / n, n * at_motor, r, ea) for n, r, ea in stages)
+    return Curve(np.array(travel), np.array(given), np.asarray(way_given) / 14.0)
+
+
+def _loaded(torque: float) -> Plant:
+    """The testbed at rest under a load at the joint, N m, with creep, its rotor unstoppable."""
+    arm = ideal_testbed(rotor=UNSTOPPABLE, damping=0.02)
+    plant = _plant(arm, creep=True)
+    plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+    plant.data.qpos[0] = -torque / 14.0 / arm.circuits[0].stiffness
+    _run(plant, 0.1)
+    return plant
+
+
+def efficiency_under_load() -> Curve:
+    """Power out over power in of slow turning under load, over the motor's torque, N m."""
+    torques = np.linspace(1.0, 6.779, 6)
+    shares = []
+    for torque in torques:
+        plant = _loaded(-14.0 * torque)
+        plant.data.qvel[:] = (5.0, 5.0 / 14.0)
+        _run(plant, 1.5)
+        q, work = plant.q[0], 0.0
+        for _ in range(round(1.0 / STEP)):
+            before = plant.theta[0]
+            plant.step([0.0])
+            work += plant.circuit_torque[0] * (plant.theta[0] - before)
+        shares.append(14.0 * torque * (plant.q[0] - q) / work)
+    cables = ideal_testbed().cables
+    theory = [
+        efficiency(stage_loss(torque, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio))
+        for torque in torques
+    ]
+    return Curve(torques, np.array(shares), np.array(theory))
+
+
+def ripple(eccentricity: float = 2.54e-4) -> Curve:
+    """Torque of an eccentric pulley at a third of the motor's speed, over the motor's angle, rad."""
+    arm = ideal_testbed(rotor=UNSTOPPABLE)
+    (circuit,) = arm.circuits
+    amplitude = 2.0 * eccentricity * circuit.pretension
+    ripples = Ripples(("motor1",), (1.0 / 3.0,), (amplitude,), (1,), (0.5,))
+    plant = _plant(arm, ripples=ripples)
+    angles, torques = [], []
+    plant.data.qvel[:] = (20.0, 20.0 / 14.0)
+    for _ in range(round(2.0 / STEP)):
+        angles.append(plant.theta[0])
+        plant.step([0.0])
+        torques.append(3.0 * plant.data.qfrc_actuator[0])
+    angle = np.array(angles)
+    return Curve(angle, np.array(torques), eccentric_ripple(eccentricity, circuit.pretension, angle / 3.0 + 0.5))
+
+
+def resonances(ratio: float, stiffness: Numbers) -> Resonance:
+    """Both resonances of (4.4) from the plant's own one-step map, over k_c at the joint, N m/rad."""
+    arm = ideal_testbed(ratio)
+    (circuit,) = arm.circuits
+    found = []
+    for k in stiffness:
+        world = World(NOTHING, Springs(("joint1",), (float(k),), (1.0,), (0.0,), (True,)))
+        angles = np.abs(np.angle(np.linalg.eigvals(_one_step_map(_plant(arm, world)))))
+        found.append(np.sort(angles)[[0, 2]] / STEP)
+    inertia = float(arm.motors.inertia[0]), arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
+    theory = force_resonances(*inertia, circuit.stiffness, stiffness, ratio)
+    lower, upper = np.array(found).T
+    return Resonance(ratio, Curve(stiffness, lower, theory.lower), Curve(stiffness, upper, theory.upper))
+
+
+def _one_step_map(plant: Plant) -> Numbers:
+    """Matrix that takes angles and velocities over one step, by stepping from each unit state."""
+    size, small = plant.model.nv, 1e-6
+    columns = []
+    for i in range(2 * size):
+        state = np.zeros(2 * size)
+        state[i] = small
+        plant.data.qpos[:], plant.data.qvel[:] = state[:size], state[size:]
+        plant.step([0.0])
+        columns.append(np.concatenate([plant.data.qpos, plant.data.qvel]) / small)
+    return np.array(columns).T
+
+
+def surface(hardening: float) -> Curve:
+    """Force of a surface of 4000 N/m over the depth of the tip in it, m, force in N."""
+    depths = np.linspace(1e-4, 0.01, 25)
+    below = 0.01  # m below the link, which then touches with its tip alone
+    place = (0.0, 0.0, -0.0254 - below)
+    floor = Obstacles(("floor",), ("plane",), place, (0.0,) * 3, (2.0, 2.0, 0.0), (4e3,), (0.0,), (hardening,), (0.0,))
+    plant = _plant(ideal_testbed(rotor=UNSTOPPABLE), World(floor, NO_SPRINGS))
+    forces = []
+    for depth in depths:
+        q = -np.arcsin((depth + below) / LEVER)
+        plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), 0.0
+        plant.step([0.0])
+        (load,) = plant.loads()
+        forces.append(float(np.linalg.norm(load.force)))
+    return Curve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
+
+
+class Cycle(NamedTuple):
+    """Peak-to-peak and period of a settled cycle."""
+
+    peak_to_peak: float
+    period: float
+
+
+def cycle(times: Numbers, values: Numbers) -> Cycle:
+    """The cycle of the second half of a signal, from its extremes and its rising crossings of the middle."""
+    half = values[len(values) // 2 :]
+    above = half > 0.5 * (half.max() + half.min())
+    rises = np.flatnonzero(above[1:] & ~above[:-1])
+    return Cycle(float(np.ptp(half)), float(np.diff(rises).mean() * (times[1] - times[0])))
+
+
+def stiction_cycle(seconds: float = 8.0) -> Curve:
+    """F_c of integral force control with stiction, over time, s; the exact motion beside it.
+
+    The motor is an ideal velocity source, the loop answers in every step.
+    """
+    stiffness, friction, asked, gain = 1464.28, (6.0, 4.0), 20.0, 2.0e-2
+    arm = ideal_testbed(rotor=UNSTOPPABLE, friction=friction)
+    damping = 12.0
+    arm = replace(arm, joints=replace(arm.joints, viscous_friction=(damping,)))
+    plant = _plant(arm, World(NOTHING, Springs(("joint1",), (stiffness,), (1.0,), (0.0,), (True,))))
+    times, forces = [], []
+    for i in range(round(seconds / STEP)):
+        force = stiffness * plant.q[0]
+        times.append(i * STEP)
+        forces.append(force)
+        plant.data.qvel[0] = 14.0 * gain * (asked - force)
+        plant.step([0.0])
+    (circuit,) = arm.circuits
+    inertia = arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
+    node = FrictionNode(inertia, damping, 14.0**2 * circuit.stiffness, stiffness, friction[1], friction[0])
+    exact = simulate(node, ForceLoop(gain=gain), asked, seconds)
+    return Curve(np.array(times), np.array(forces), exact.at(np.array(times)).contact_force)
+
+
+STUDIES: dict[str, Callable[[], Curve]] = {
+    "slack": slack,
+    "creep": creep_out_and_back,
+    "efficiency": efficiency_under_load,
+    "ripple": ripple,
+    "linear surface": lambda: surface(0.0),
+    "hardening surface": lambda: surface(50.0),
+    "stiction cycle": stiction_cycle,
+}
