@@ -26,7 +26,7 @@ STEPS = [
 ]
 
 
-def testbed(folder: Path, *extra: str, mode: str = "lockstep") -> Configuration:
+def configured_testbed(folder: Path, *extra: str, mode: str = "lockstep") -> Configuration:
     script = folder / "script.yaml"
     script.write_text(yaml.safe_dump({"steps": STEPS}))
     base = Configuration.load(packaged("testbed"))
@@ -43,13 +43,8 @@ def testbed(folder: Path, *extra: str, mode: str = "lockstep") -> Configuration:
     )
 
 
-testbed.__test__ = False  # type: ignore[attr-defined]
-
-
-def test_the_nodes_press_ten_pounds_on_the_spring_as_the_loop_without_ros_does(
-    tmp_path: Path, domain_id: int
-) -> None:
-    configured = testbed(tmp_path, "scenario", "recorder")
+def test_the_nodes_press_ten_pounds_on_the_spring_as_the_loop_without_ros_does(tmp_path: Path, domain_id: int) -> None:
+    configured = configured_testbed(tmp_path, "scenario", "recorder")
     record_composed(configured, domain_id)
     bag = read(tmp_path / "bag")
     assert differences(play_directly(configured, tmp_path / "script.yaml").rows, bag) == []
@@ -67,7 +62,7 @@ def test_the_outer_loop_runs_at_fifty_hertz_and_answers_in_the_same_period() -> 
 
 
 def test_the_teflon_rod_is_pressed_on_while_the_testbed_runs(tmp_path: Path, domain_id: int) -> None:
-    with Composition(testbed(tmp_path, mode="realtime"), domain_id=domain_id) as composition:
+    with Composition(configured_testbed(tmp_path, mode="realtime"), domain_id=domain_id) as composition:
         node = composition.nodes["driver"]
         plant = node.driver.plant  # type: ignore[attr-defined]
         (before,) = plant.model.dof_frictionloss[1:]
