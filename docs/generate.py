@@ -97,8 +97,7 @@ def parameter_rows(cls: type, given: Mapping[str, Any]) -> Iterator[list[str]]:
 
 def parameters_of(node: str) -> type:
     """The parameter class of a node."""
-    module = importlib.import_module(MODULES[node])
-    found: type = getattr(module, "PARAMETERS", None) or module.RecorderParameters
+    found: type = importlib.import_module(MODULES[node]).PARAMETERS
     return found
 
 

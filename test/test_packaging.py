@@ -1,5 +1,6 @@
 """The package installs twice from one tree: with pip into a prefix, with colcon into a workspace."""
 
+import ast
 import importlib.metadata
 import os
 import re
@@ -21,6 +22,8 @@ from catkin_pkg.package import parse_package
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from rclpy.node import Node
+
+from wam_ros import bring_up
 
 ROOT = Path(__file__).resolve().parents[1]
 SHIPPED = (
@@ -308,3 +311,10 @@ def test_constraints_pin_every_package_that_make_test_installs(prefix, monkeypat
     needed = {canonicalize_name(one.name) for one in reached("wam_stack", frozenset({"ros", "test"}), set())}
     installed = {name: importlib.metadata.version(name) for name in needed}
     assert installed == {name: pins.get(name) for name in needed}
+
+
+def test_setup_and_bring_up_name_the_same_nodes() -> None:
+    """setup.py cannot import the package that it installs, so the table stands there a second time."""
+    tree = ast.parse((ROOT / "setup.py").read_text(encoding="utf-8"))
+    (table,) = (n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "NODES")
+    assert ast.literal_eval(table) == bring_up.MODULES

@@ -1,7 +1,7 @@
 """Every constant of the MIT/WAM arm and of the testbed: as printed, or assumed and why.
 
 The only home of these numbers beside ``config/``, which carries them in SI units; a test holds the
-two against each other.  Corrections of printed numbers stand in `erratum` (docs/errata.md).
+two against each other.  Corrections of printed numbers stand in `erratum`.
 """
 
 import math

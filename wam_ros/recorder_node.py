@@ -34,6 +34,9 @@ class RecorderParameters:
             raise ParameterError(f"parameter 'name' is '{self.name}'; allowed: a name without directories")
 
 
+PARAMETERS = RecorderParameters
+
+
 class RecorderNode(Node):
     """Records from construction to `destroy_node`, which closes the bag."""
 

@@ -115,10 +115,10 @@ TOPICS: tuple[Topic, ...] = (
     Topic(
         "joint_torque_command",
         "sensor_msgs/msg/JointState",
-        ("scenario",),
+        (),
         ("force_loop",),
         "outer",
-        "joint torques asked for in the joint_torque mode, N m",
+        "joint torques asked for in the joint_torque mode, by a program of yours, N m",
     ),
     Topic(
         "force_command",
