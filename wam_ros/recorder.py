@@ -198,7 +198,7 @@ def _publisher_reader(topic: Topic) -> Callable[[bytes], str]:
         return lambda data: _node_name(data, 5)
     if topic.type == _NODE_DIAGNOSTICS and len(topic.publisher) > 1:
         return _first_status_name
-    sender = topic.publisher[0]
+    sender = topic.publisher[0] if topic.publisher else ""  # a program of the user's
     return lambda data: sender
 
 
