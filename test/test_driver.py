@@ -3,13 +3,16 @@
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from arms import CONFIGURATION, NOWHERE, WAM, changed
 from contact_truth import joint_torques
 
+from wam_description.arm import Shared
 from wam_description.effects import no_effects
+from wam_description.parameters import Field, ParameterError, fields
 from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, World
 from wam_driver.driver import Driver, DriverParameters
@@ -368,3 +371,209 @@ def test_true_contact_is_the_greatest_load() -> None:
     assert machine.true_contact.cover == "outer_link"
     assert machine.true_contact.place == pytest.approx(0.2)
     assert machine.true_contact.force == (0.0, 3.0, 0.0)
+
+
+# cables
+
+
+def machine_with_cables(parameters: DriverParameters = PARAMETERS, **cables: tuple[float, ...]) -> Driver:
+    machine = Driver(dataclasses.replace(SHARED, arm=changed(WAM, cables=cables)), parameters)
+    assert machine.enable("").success
+    return machine
+
+
+def tight_tensions() -> np.ndarray:
+    """T_0 + tau/(2 r) of each motor that carries the links, N; 57 lb and 0.375 in."""
+    torque = MOTOR_FROM_TORQUE @ BODY.gravity_torque(START)
+    return 57 * 4.4482216 + np.abs(torque) / (2 * 0.375 * 0.0254)
+
+
+@pytest.mark.parametrize("i", range(4))
+@pytest.mark.parametrize(("share", "warns", "faults"), [(0.89, False, False), (0.91, True, False), (1.01, True, True)])
+def test_cable_near_its_breaking_strength_is_a_warning_and_above_a_fault_that_names_it(
+    i: int, share: float, warns: bool, faults: bool
+) -> None:
+    strength = [1e6] * 4
+    strength[i] = tight_tensions()[i] / share
+    machine = machine_with_cables(breaking_strength=tuple(strength))
+    play(machine, 0.03)
+    what = f"cable tension of motor{i + 1} {tight_tensions()[i]:.0f}"
+    assert [warning for warning in machine.warnings if warning.startswith(what[:-2])] == machine.warnings
+    assert (machine.safety.mode is Mode.FAULT) is faults
+    if faults:
+        assert what[:-2] in machine.safety.fault
+        assert f"is above its limit {strength[i]:g}" in machine.safety.fault
+        assert machine.currents == [0.0] * 4
+    else:
+        assert bool(machine.warnings) is warns
+        assert machine.safety.mode is Mode.ENABLED
+
+
+def test_pull_of_one_period_breaks_a_cable_too() -> None:
+    """A blow between two looks at the speeds, 5 ms apart, is over when they come."""
+    machine = machine_with_cables(breaking_strength=(320.0,) * 4)
+    play(machine, 0.021)
+    assert machine.safety.mode is Mode.ENABLED
+    machine.plant.data.qpos[3] += 0.2  # as a blow on the link winds up its cable: 120 N more
+    play(machine, 0.001)
+    machine.plant.data.qpos[3] -= 0.2
+    play(machine, 0.02)
+    assert "cable tension of motor4" in machine.safety.fault
+
+
+# noise
+
+
+def noisy(**sensors: tuple[float, ...]) -> DriverParameters:
+    return dataclasses.replace(
+        PARAMETERS,
+        amplifier=dataclasses.replace(PARAMETERS.amplifier, current_noise=(0.05,) * 4, torque_ripple=(0.02,) * 4),
+        sensors=dataclasses.replace(PARAMETERS.sensors, **sensors),
+    )
+
+
+NOISY = noisy(
+    encoder_resolution=(1e-3,) * 4,
+    encoder_noise=(1e-3,) * 4,
+    joint_encoder_noise=(1e-3,) * 4,
+    strain_noise=(0.1,) * 4,
+)
+
+
+def told(parameters: DriverParameters) -> list[object]:
+    machine = machine_with_cables(parameters)
+    said: list[object] = []
+    for _ in range(200):
+        play(machine, PERIOD)
+        said += [machine.motor_state, machine.joint_sensors, machine.currents, machine.true_joint_state]
+    assert machine.safety.mode is Mode.ENABLED
+    return said
+
+
+def test_noisy_driver_says_the_same_again_bit_for_bit_and_another_seed_something_else() -> None:
+    assert told(NOISY) == told(NOISY)
+    assert told(NOISY) != told(dataclasses.replace(NOISY, seed=NOISY.seed + 1))
+    assert told(noisy()) != told(PARAMETERS)
+
+
+def test_no_noise_flows_while_the_brakes_are_on() -> None:
+    machine = Driver(SHARED, NOISY)
+    for _ in range(50):
+        machine.command(machine.stamp, [1.0] * 4)
+        machine.advance(0.0)
+        assert machine.currents == [0.0] * 4
+    np.testing.assert_allclose(machine.plant.q, START, atol=1e-9)
+
+
+def test_reset_of_an_arm_with_real_encoders_makes_no_speed() -> None:
+    machine = machine_with_cables(noisy(encoder_resolution=(1e-3,) * 4, joint_encoder_noise=(1e-9,) * 4))
+    play(machine, 0.2, (10.0, 0.0, 0.0, 0.0))
+    assert abs(machine.motor_state.position[0]) > 0.5
+    machine.reset()
+    machine.advance(0.0)
+    np.testing.assert_allclose(machine.motor_state.velocity, 0.0, atol=1.0)
+    np.testing.assert_allclose(machine.joint_sensors.velocity, 0.0, atol=1e-4)
+
+
+# parameters
+
+GROUPS = ("effects.", "world.", "amplifier.", "sensors.", "arm.cables.")
+EVERY = [
+    (prefix, field)
+    for prefix, cls in (("driver:", DriverParameters), ("", Shared))
+    for field in fields(cls)
+    if field.name.startswith(GROUPS)
+]
+
+
+def built(values: dict[str, Any]) -> Driver:
+    configuration = CONFIGURATION.with_values(values)
+    return Driver(configuration.shared, configuration.node("driver", DriverParameters))
+
+
+def present(prefix: str, field: Field) -> Any:
+    return CONFIGURATION.sections["driver" if prefix else "/**"][field.name]
+
+
+@pytest.mark.parametrize(("prefix", "field"), EVERY, ids=[field.name for _, field in EVERY])
+def test_wrong_value_is_refused_with_its_name_and_what_is_allowed(prefix: str, field: Field) -> None:
+    key, value = prefix + field.name, present(prefix, field)
+    bad: list[tuple[object, str]] = []
+    if field.kind is bool:
+        bad += [(1, "a bool"), ("yes", "a bool")]
+    elif field.kind is str:
+        bad += [(1, "a str")] + [("nonsense", "one of " + ", ".join(field.choices))] * bool(field.choices)
+    else:
+        bad += [("much", "a number"), (True, "a number"), (math.nan, ""), (math.inf, "")]
+        bad += [(field.low - 1, field.allowed)] * math.isfinite(field.low)
+        bad += [(field.high + 1, field.allowed)] * math.isfinite(field.high)
+        bad += [(field.low + 0.5, "a whole number")] * (field.kind is int)
+    for wrong, allowed in bad:
+        with pytest.raises(ParameterError) as refusal:
+            built({key: [wrong, *value[1:]] if field.is_array else wrong})
+        assert f"'{field.name}' is {wrong!r}" in str(refusal.value)
+        assert f"allowed: {allowed}" in str(refusal.value)
+
+
+ARRAYS = [(prefix, field) for prefix, field in EVERY if field.is_array]
+
+
+@pytest.mark.parametrize(("prefix", "field"), ARRAYS, ids=[field.name for _, field in ARRAYS])
+def test_wrong_number_of_values_is_refused_with_a_name(prefix: str, field: Field) -> None:
+    key, value = prefix + field.name, list(present(prefix, field))
+    runs_over = field.name.endswith((".names", ".shafts", ".joints", ".stage_motors"))
+    extra = "another" if field.name.endswith(".names") else value[0]
+    for wrong in (value[:-1], [*value, extra]):
+        with pytest.raises(ParameterError) as refusal:
+            built({key: wrong})
+        group, _, name = field.name.rpartition(".")
+        said = group.rpartition(".")[2] + "." + ("" if runs_over else name + "'")
+        assert said in str(refusal.value)
+        assert "values; " in str(refusal.value)
+        assert " need " in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        (
+            "driver:effects.ripples.shafts",
+            "effects.ripples.shafts names 'motor9'; motors and joints: motor1, .* joint4",
+        ),
+        ("driver:world.springs.joints", "world.springs.joints names 'motor9'; joints: joint1, joint2, joint3, joint4"),
+        ("arm.cables.stage_motors", "arm.cables.stage_motors names 'motor9'; motors: motor1, motor2, motor3, motor4"),
+    ],
+)
+def test_shaft_that_the_arm_does_not_have_is_refused_with_those_it_has(key: str, message: str) -> None:
+    node, _, name = key.rpartition(":")
+    values = list(CONFIGURATION.sections[node or "/**"][name])
+    with pytest.raises(ParameterError, match=message):
+        built({key: ["motor9", *values[1:]]})
+
+
+def test_motor_without_a_stage_and_circuit_that_gives_no_way_are_refused() -> None:
+    stages = list(CONFIGURATION.sections["/**"]["arm.cables.stage_motors"])
+    with pytest.raises(ParameterError, match=r"motor1 has no cable stage; name it in arm\.cables\.stage_motors"):
+        built({"arm.cables.stage_motors": ["motor2", "motor2", *stages[2:]]})
+    with pytest.raises(ParameterError, match="motor1: its cable stages give no way at all; give one a stage_length"):
+        built({"arm.cables.stage_length": [0.0, 0.0, *CONFIGURATION.sections["/**"]["arm.cables.stage_length"][2:]]})
+
+
+def test_two_springs_may_stand_under_one_joint() -> None:
+    """One pushes from each side, so that both together hold the joint: 1000 N/m on 1 m, pressed by 0.1 rad each."""
+    springs: dict[str, list[Any]] = {
+        "joints": ["joint1", "joint1"],
+        "stiffness": [1000.0, 1000.0],
+        "lever": [1.0, 1.0],
+        "rest": [0.1, -0.1],
+        "bilateral": [True, True],
+    }
+    machine = built({f"driver:world.springs.{key}": value for key, value in springs.items()})
+    machine.plant.brake(True)
+    assert abs(machine.plant.cable_torque[0]) < 1e-9
+
+
+def test_rubbing_on_the_wrong_number_of_joints_is_refused() -> None:
+    machine = driver()
+    with pytest.raises(ParameterError, match=r"'effects\.rubbing_friction' has 1 values; 4 names need 4"):
+        machine.rub([0.1])

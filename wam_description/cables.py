@@ -15,7 +15,8 @@ class Cables:
     """The cable circuit of each motor: pretension and limits per motor, then its stages one by one.
 
     The first stage of a circuit spans the distance from the motor; it runs fast where the reducer
-    is at the joint and slow, with N times the section for the same stress, where it is at the motor.
+    is at the joint and slow, with N such cables side by side for the same stress, where it is at
+    the motor.  Pretension and breaking strength are those of one cable.
     """
 
     pretension: tuple[float, ...] = parameter("T_0 of the first stage", "N", low=0.0)
@@ -38,7 +39,7 @@ class Circuit(NamedTuple):
     """What the stages of one motor's circuit come to, seen at the motor."""
 
     stiffness: float  # k_tr, N m/rad
-    radius: float  # of the motor's pinion, m
+    radius: float  # torque at the motor per tension difference of a first-stage cable, m: its pinion's radius
     loss_per_torque: float  # share of the speed lost per torque at the motor, 1/(N m), (6.4) over all stages
     pretension: float  # N
     breaking_strength: float  # N
@@ -73,10 +74,11 @@ def circuits(motors: Sequence[str], joint_from_motor: Sequence[float], cables: C
 def _circuit(cables: Cables, i: int, motor: str, reduction: float) -> Circuit:
     stages = [k for k, name in enumerate(cables.stage_motors) if name == motor]
     require(len(stages) > 0, f"{motor} has no cable stage; name it in arm.cables.stage_motors")
+    first = stages[0]
     compliance = loss = 0.0
     for k in stages:
         ea, ratio = cables.stage_ea[k], cables.stage_ratio[k]
-        if k == stages[0] and cables.reducer[i] == "motor":
+        if k == first and cables.reducer[i] == "motor":
             ea, ratio = ea * reduction, ratio * reduction
         radius, parallel = cables.stage_radius[k], cables.stage_circuits[k]
         compliance += float(stage_compliance(ea, cables.stage_length[k], radius, parallel, ratio))
@@ -84,7 +86,7 @@ def _circuit(cables: Cables, i: int, motor: str, reduction: float) -> Circuit:
     require(compliance > 0.0, f"{motor}: its cable stages give no way at all; give one a stage_length above zero")
     return Circuit(
         stiffness=1.0 / compliance,
-        radius=cables.stage_radius[stages[0]],
+        radius=cables.stage_radius[first] * cables.stage_circuits[first] / cables.stage_ratio[first],
         loss_per_torque=loss,
         pretension=cables.pretension[i],
         breaking_strength=cables.breaking_strength[i],

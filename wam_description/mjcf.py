@@ -13,7 +13,7 @@ import numpy as np
 
 from wam_description.arm import Arm
 from wam_description.effects import Effects, Ripples
-from wam_description.parameters import require
+from wam_description.parameters import lengths, require
 from wam_description.world import SHAPES, Obstacles, Springs, World
 
 NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, where slack is switched off
@@ -41,10 +41,9 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     Raises
     ------
     ParameterError
-        where an obstacle is named like a cover.
+        where an obstacle is named like a cover, or springs and effects do not fit the arm.
     """
-    for name in world.obstacles.names:
-        require(name not in arm.covers.names, f"obstacle '{name}' is named like a cover of the arm; rename it")
+    _refuse_misfits(arm, world, effects)
     root = ElementTree.Element("mujoco", model=arm.name)
     _add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", eulerseq="XYZ")
     _add_solver(root, arm, step)
@@ -60,6 +59,19 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     _add_actuators(root, arm, effects.ripples)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
+    motors, joints = arm.motors.names, arm.joints.names
+    for name in world.obstacles.names:
+        require(name not in arm.covers.names, f"obstacle '{name}' is named like a cover of the arm; rename it")
+    for name in world.springs.joints:
+        require(name in joints, f"world.springs.joints names '{name}'; joints: {', '.join(joints)}")
+    for name in effects.ripples.shafts:
+        shafts = (*motors, *joints)
+        require(name in shafts, f"effects.ripples.shafts names '{name}'; motors and joints: {', '.join(shafts)}")
+    lengths("effects", motors, {"tension_friction": effects.tension_friction})
+    lengths("effects", joints, {"rubbing_friction": effects.rubbing_friction})
 
 
 def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
@@ -247,7 +259,7 @@ def _add_springs(tendons: ElementTree.Element, springs: Springs) -> None:
         tendon = _add(
             tendons,
             "fixed",
-            name=f"{joint}_spring",
+            name=f"spring{i}",
             stiffness=repr(springs.stiffness[i]),
             springlength=_numbers((rest, rest) if springs.bilateral[i] else (rest, FAR)),
         )

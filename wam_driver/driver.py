@@ -64,8 +64,6 @@ class Driver:
     def __init__(self, shared: Shared, parameters: DriverParameters) -> None:
         arm, timing = shared.arm, shared.timing
         self.safety = Safety()
-        lengths("effects", arm.motors.names, {"tension_friction": parameters.effects.tension_friction})
-        lengths("effects", arm.joints.names, {"rubbing_friction": parameters.effects.rubbing_friction})
         random = np.random.Generator(np.random.PCG64(parameters.seed))
         self.plant = Plant(arm, parameters.world, parameters.effects, timing.substep)
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random)
@@ -85,6 +83,7 @@ class Driver:
         self._command = self._zero
         self._command_tick = self._tick
         self.currents = self._zero
+        self._tightest = self._zero  # N, of each cable since the limits were last looked at: a blow is soon over
         self.warnings = []
 
     @property
@@ -133,8 +132,11 @@ class Driver:
         self._measure()
         if self.safety.mode is not Mode.FAULT:  # what led to a fault is kept until its reset
             self.recent.append(Sample(self.stamp, self.plant.theta, self.plant.thetad, self._command, self.currents))
-        if enabled and self.is_outer:
-            self._watch_limits()
+        if enabled:
+            tight = [tension for tension, _ in self.plant.tensions]
+            self._tightest = [max(pair) for pair in zip(self._tightest, tight, strict=True)]
+            if self.is_outer:
+                self._watch_limits()
 
     def _watch_limits(self) -> None:
         theta, thetad = self.plant.theta, self.plant.thetad
@@ -147,10 +149,9 @@ class Driver:
         ]
         checks += [
             (f"cable tension of {name}", tight, circuit.breaking_strength, "N")
-            for name, (tight, _), circuit in zip(
-                self._arm.motors.names, self.plant.tensions, self._arm.circuits, strict=True
-            )
+            for name, tight, circuit in zip(self._arm.motors.names, self._tightest, self._arm.circuits, strict=True)
         ]
+        self._tightest = self._zero
         checks += [
             (f"speed of {name}", abs(speed), limit, "rad/s")
             for name, speed, limit in zip(self._arm.joints.names, qd, self._arm.joints.speed_limit, strict=True)
@@ -209,6 +210,7 @@ class Driver:
         self.disable()
         self.plant.reset()
         self.amplifier.reset()
+        self._sensors.reset()
         return Answer(True, f"{self.safety.mode.value}: arm back at its start pose")
 
     def _measure(self) -> None:

@@ -9,9 +9,12 @@ while stuck, F_dynamic once moving until the velocity changes its sign (section 
 
 import math
 from collections.abc import Sequence
+from functools import partial
+from struct import Struct
 
 import mujoco
 import numpy as np
+from mujoco import mj_step1, mj_step2
 
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
@@ -41,26 +44,38 @@ class Plant:
         self.data = mujoco.MjData(self.model)
         n = len(arm.motors.names)
         self._n = n
+        self._step = step
         self._start = arm.joints.start
         self._arm = arm
         self._threshold = [STUCK_ROTOR] * n + [STUCK_JOINT] * n
+        self._dofs = range(2 * n)
         self._direction = [0] * (2 * n)
         self._braked = True
         self._velocity = [0.0] * (2 * n)
-        self._levels: list[float] = []
+        self._levels = [0.0] * (2 * n)  # friction of each dof without brakes
+        self._is_set = False  # whether MuJoCo has these levels
         # views into MuJoCo's memory: asking for them anew in each step costs more than the step's own work
-        self._ctrl, self._qvel = self.data.ctrl, self.data.qvel
+        self._qvel = self.data.qvel
+        self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
         self._rotor_speed, self._rotor_pull = self.data.qvel[:n], self.data.qfrc_spring[:n]
-        self._frictionloss = self.model.dof_frictionloss
+        self._frictionloss, self._contact = self.model.dof_frictionloss, self.data.contact
         self._circuits = arm.circuits
         self._slack = effects.slack
-        self._creeps = effects.creep
-        self._strands = self.data.plastic[: 4 * n].reshape(n, 4)  # two strands, two ends of their slack each
-        self._creep_rate = np.array([step * circuit.loss_per_torque for circuit in arm.circuits])
-        self._creep_step = np.zeros(n)
-        self._creep_column = self._creep_step[:, None]
+        # stretches between which a strand is slack, two of each strand; the tight one reaches the upper, the loose
+        # one, which stands next to it, the lower
+        self._slack_ends = memoryview(self.data.plastic)
         self._tension_friction = effects.tension_friction
         self._grips = effects.slack and any(effects.tension_friction)
+        self._pulls = [
+            (
+                4 * i + 1,
+                step * circuit.loss_per_torque if effects.creep else 0.0,
+                2.0 * circuit.pretension * circuit.radius if self._grips else math.inf,
+            )
+            for i, circuit in enumerate(arm.circuits)
+        ]  # of each rotor: its first slack end, creep of a step per speed and torque, torque that makes a strand slack
+        self._is_gripping = False  # whether a strand is slack, so that the friction depends on the torque
+        self._depends_on_pull = effects.creep or self._grips
         self.rub(effects.rubbing_friction)
         self._motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(n, n))
         self._pushes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
@@ -70,13 +85,15 @@ class Plant:
         }
         self._site = {name: self.model.site(f"{name}_frame").id for name in arm.covers.names}
         self._cover_of_geom = {self.model.geom(name).id: name for name in arm.covers.names}
-        self._pair = {
-            frozenset((int(self.model.pair_geom1[i]), int(self.model.pair_geom2[i]))): i
-            for i in range(self.model.npair)
-        }
+        pairs = list(zip(self.model.pair_geom1.tolist(), self.model.pair_geom2.tolist(), strict=True))
+        # MuJoCo may name the two geoms of a contact in either order
+        self._pair = {geoms: i for i, pair in enumerate(pairs) for geoms in (pair, pair[::-1])}
         obstacles = world.obstacles
         surfaces = zip(obstacles.stiffness, obstacles.damping, obstacles.hardening, strict=True)
-        self._surface = list(surfaces) * len(arm.covers.names)
+        self._surface = [
+            (*surface, size)
+            for surface, size in zip(list(surfaces) * len(arm.covers.names), self.model.pair_dim.tolist(), strict=True)
+        ]
         self._rest()
 
     def _rest(self) -> None:
@@ -93,6 +110,9 @@ class Plant:
         ]
         self._direction = [0] * (2 * n)
         self._braked = True
+        self._levels = self._static.copy()
+        self._is_set = False
+        self._is_gripping = self._grips
         self._set_friction()
         mujoco.mj_step1(self.model, data)
         if data.ncon:
@@ -106,6 +126,7 @@ class Plant:
 
     def brake(self, on: bool) -> None:
         """Put on or release the brakes, which hold the rotors."""
+        self._is_set = self._is_set and on == self._braked
         self._braked = on
 
     def push(self, cover: str, force: np.ndarray, torque: np.ndarray) -> None:
@@ -140,18 +161,18 @@ class Plant:
         torque : torque of each motor on its rotor, N m.
         """
         model, data = self.model, self.data
-        self._ctrl[:] = torque
+        self._write_torque(0, *torque)
         self._set_friction()
-        mujoco.mj_step1(model, data)
+        mj_step1(model, data)
         if self._pushes:
             self._apply_pushes()
         if data.ncon:
             self._match_surfaces()
-        mujoco.mj_step2(model, data)
+        mj_step2(model, data)
         if self._pushes:
             data.qfrc_applied[:] = 0.0
-        if self._creeps and any(self._direction[: self._n]):
-            self._creep()
+        if self._depends_on_pull:
+            self._follow_pull()
 
     def rub(self, friction: Sequence[float]) -> None:
         """Let something rub: extra dry friction at each joint (n,), N m, static and dynamic alike."""
@@ -162,43 +183,53 @@ class Plant:
         dynamic = [*motors.dynamic_friction, *joints.dynamic_friction]
         self._static = [level + more for level, more in zip(static, extra, strict=True)]
         self._dynamic = [level + more for level, more in zip(dynamic, extra, strict=True)]
+        levels = zip(self._direction, self._static, self._dynamic, strict=True)
+        self._levels = [moving if way else stuck for way, stuck, moving in levels]
+        self._is_set = False
 
-    def _creep(self) -> None:
-        """Let the cables creep on their pulleys: dc = loss |d theta| tau, (6.19) corrected."""
-        rate = self._creep_step
-        np.abs(self._rotor_speed, out=rate)
-        rate *= self._creep_rate
-        rate *= self._rotor_pull  # the torque on the rotor, minus that of the circuit
-        self._strands -= self._creep_column
+    def _follow_pull(self) -> None:
+        """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; see who grips."""
+        ends = self._slack_ends
+        self._is_gripping = False
+        # the pull on the rotor is minus the torque of the circuit
+        speeds, pulls = self._rotor_speed.tolist(), self._rotor_pull.tolist()
+        for (i, rate, most), way, speed, pull in zip(self._pulls, self._direction, speeds, pulls):  # noqa: B905
+            if way:
+                crept = rate * abs(speed) * pull
+                ends[i] -= crept
+                ends[i + 1] -= crept
+            if abs(pull) > most:
+                self._is_gripping = True
 
     def _set_friction(self) -> None:
         """Friction level of every dof for the next step: static while stuck, dynamic while moving."""
-        direction, levels = self._direction, self._static.copy()
+        direction, levels = self._direction, self._levels
         self._velocity = self._qvel.tolist()
-        for i, velocity in enumerate(self._velocity):
-            way = direction[i]
-            if way == 0:
-                if abs(velocity) > self._threshold[i]:
-                    direction[i] = 1 if velocity > 0.0 else -1
-                    levels[i] = self._dynamic[i]
-            elif velocity * way <= 0.0:
+        for i, velocity, way in zip(self._dofs, self._velocity, direction):  # noqa: B905 - costs 1 % of a step
+            if velocity * way > 0.0:
+                continue
+            if way:
                 direction[i] = 0
-            else:
+                levels[i] = self._static[i]
+                self._is_set = False
+            elif abs(velocity) > self._threshold[i]:
+                direction[i] = 1 if velocity > 0.0 else -1
                 levels[i] = self._dynamic[i]
-        if self._grips:
-            self._grip_of_slack(levels)
-        if self._braked:
-            levels[: self._n] = [BRAKE_TORQUE] * self._n
-        if levels != self._levels:
-            self._levels = levels
-            self._frictionloss[:] = levels
+                self._is_set = False
+        if self._is_gripping:
+            levels = self._grip_of_slack()
+            self._is_set = False
+        if not self._is_set:
+            self._is_set = levels is self._levels
+            self._frictionloss[:] = [BRAKE_TORQUE] * self._n + levels[self._n :] if self._braked else levels
 
-    def _grip_of_slack(self, levels: list[float]) -> None:
-        """Raise the friction where a strand is slack: only then is the sum of both tensions more than 2 T_0."""
+    def _grip_of_slack(self) -> list[float]:
+        """Friction levels where a strand is slack: only then is the sum of both tensions more than 2 T_0."""
+        levels = self._levels.copy()
         for i, (pull, circuit) in enumerate(zip(self._rotor_pull.tolist(), self._circuits, strict=True)):
             excess = abs(pull) / circuit.radius - 2.0 * circuit.pretension
-            if excess > 0.0:
-                levels[i] += self._tension_friction[i] * excess
+            levels[i] += self._tension_friction[i] * max(excess, 0.0)
+        return levels
 
     def _apply_pushes(self) -> None:
         data = self.data
@@ -223,18 +254,19 @@ class Plant:
         the slip in one step, as for the joints; MuJoCo's own, 1/d times the damping, makes friction alternate
         between its limits from step to step.
         """
-        data, contact = self.data, self.data.contact
-        pairs = [self._pair[frozenset(geoms)] for geoms in contact.geom.tolist()]
-        rows, sizes, distances = contact.efc_address.tolist(), contact.dim.tolist(), contact.dist.tolist()
-        reference, regularisation, velocity = data.efc_aref, data.efc_R, data.efc_vel
-        for pair, row, size, distance in zip(pairs, rows, sizes, distances, strict=True):
+        data, contact = self.data, self._contact
+        pairs = [self._pair[first, second] for first, second in contact.geom.tolist()]
+        rows, distances = contact.efc_address.tolist(), contact.dist.tolist()
+        reference, regularisation, velocity = data.efc_aref, data.efc_R, data.efc_vel.tolist()
+        for pair, row, distance in zip(pairs, rows, distances):  # noqa: B905 - MuJoCo's, one of each for a contact
             if row >= 0:
-                stiffness, damping, hardening = self._surface[pair]
+                stiffness, damping, hardening, size = self._surface[pair]
                 if hardening and distance < 0.0:
                     stiffness *= 1.0 - hardening * distance
                 force = -(stiffness * distance + damping * velocity[row]) / pairs.count(pair)
                 reference[row] = force * regularisation[row]
-                reference[row + 1 : row + size] = -velocity[row + 1 : row + size] / self.model.opt.timestep
+                for k in range(row + 1, row + size):
+                    reference[k] = -velocity[k] / self._step
 
     @property
     def theta(self) -> list[float]:

@@ -34,6 +34,10 @@ class Encoders:
         self._is_perfect = not any(resolution) and not any(noise)
         self._last: list[float] | None = None
 
+    def reset(self) -> None:
+        """Forget the last reading: the next velocity is zero, whatever angle it comes from."""
+        self._last = None
+
     def read(self, angle: list[float], velocity: list[float], dt: float) -> tuple[list[float], list[float]]:
         """Angles, rad, and velocities, rad/s, read `dt` seconds after the last reading."""
         if self._is_perfect:
@@ -57,6 +61,11 @@ class Sensors:
         self._strain_noise = parameters.strain_noise
         self._is_strain_noisy = any(parameters.strain_noise)
         self._random = random
+
+    def reset(self) -> None:
+        """Forget the last readings."""
+        self._motors.reset()
+        self._joints.reset()
 
     def motors(self, theta: list[float], thetad: list[float], torque: list[float], dt: float) -> State:
         """Reading of the motor side, (n,) each: rad, rad/s, and the torque by the current, N m."""

@@ -119,7 +119,7 @@ def efficiency(losses: ArrayLike) -> float:
     losses : (stages,), `stage_loss` of each.
     """
     loss = np.asarray(losses, dtype=float)
-    if np.any(loss < 0.0) or np.any(loss >= 1.0):
+    if not np.all((loss >= 0.0) & (loss < 1.0)):
         raise ValueError(f"losses are {loss.tolist()!r}; each must be at least 0 and below 1")
     return float(np.prod(1.0 - loss))
 

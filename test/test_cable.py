@@ -1,0 +1,127 @@
+"""Springs, tensions, losses and creep of a cable against numbers worked out by hand in pounds and inches."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wam_theory import cable
+
+LB, INCH = 4.4482216152605, 0.0254
+IN_LB = LB * INCH
+EA, RADIUS = 9500 * LB, 0.375 * INCH  # the thesis's cable and pinion (6.4.5)
+PRINTED = 7e-4  # three printed digits, cut off rather than rounded
+EXACT = 1e-12  # the same arithmetic in another order
+
+
+def test_span_of_the_testbed_has_8_33_newton_metres_a_radian() -> None:
+    """(4.3.2) 14443 lb in/rad at the joint are 73.69 lb in/rad at the motor; three digits are known."""
+    compliance = cable.stage_compliance(EA, 36.26 * INCH, RADIUS, 1, 1)
+    assert 1 / compliance == pytest.approx(14443 / 14**2 * IN_LB, rel=1e-3)
+    assert 1 / compliance == pytest.approx(8.33, rel=1e-3)
+
+
+def test_stage_is_twice_as_stiff_for_twice_the_circuits_and_a_quarter_for_twice_the_ratio() -> None:
+    """One strand of EA/L = 1000 N/m on 0.1 m: 10 N m/rad; both 20."""
+    compliance = cable.stage_compliance([2000, 2000, 2000, 2000], 2.0, 0.1, [1, 2, 1, 1], [1, 1, 2, 1])
+    np.testing.assert_allclose(1 / compliance, [20.0, 40.0, 5.0, 20.0], rtol=EXACT)
+    assert cable.stage_compliance(2000, 0.0, 0.1, 1, 1) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("distance", "expected"),
+    [
+        (2.0, 98_000.0),  # all of the line runs fast: N^2 EA/L
+        (0.0, 7_000.0),  # all of it slow, N times the section: N EA/L
+        (1.0, 1 / (1 / 196_000 + 1 / 14_000)),  # 1 m of each, in series
+    ],
+)
+def test_reducer_at_the_joint_makes_the_line_n_times_stiffer_than_at_the_motor(
+    distance: float, expected: float
+) -> None:
+    """(4.1) for EA = 1000 N, L = 2 m, N = 14."""
+    assert cable.stiffness_with_reducer(1000, 2.0, 14, distance) == pytest.approx(expected, rel=EXACT)
+
+
+def test_torque_is_that_of_two_strands_that_only_pull() -> None:
+    """Strand by strand: 400 N/m each on a pulley of 50 mm, pretension 10 N, slack at 0.5 rad."""
+    stretch = np.array([-2.0, -0.6, -0.5, -0.1, 0.0, 0.3, 0.5, 0.7, 3.0])
+    strands = [[max(0.0, 10 + way * 400 * 0.05 * x) for x in stretch] for way in (1, -1)]
+    torque = 0.05 * (np.array(strands[0]) - strands[1])
+    np.testing.assert_allclose(cable.circuit_torque(stretch, 2.0, 10, 0.05), torque, rtol=EXACT, atol=1e-15)
+    assert cable.slack_stretch(2.0, 10, 0.05) == pytest.approx(0.5, rel=EXACT)
+    tight, loose = cable.tensions(torque, 10, 0.05)
+    np.testing.assert_allclose(tight, np.max(strands, axis=0), rtol=EXACT)
+    np.testing.assert_allclose(loose, np.min(strands, axis=0), rtol=EXACT, atol=1e-12)
+
+
+def test_no_strand_goes_slack_where_the_pretension_is_half_of_the_full_torque_tension() -> None:
+    """(6.5): 60 in lb on 0.375 in are 160 lb; 80 lb keep the loose strand just tight."""
+    tight, loose = cable.tensions(60 * IN_LB, 80 * LB, RADIUS)
+    assert tight / LB == pytest.approx(160, rel=EXACT)
+    assert loose / LB == pytest.approx(0, abs=1e-9)
+    assert cable.tensions(59 * IN_LB, 80 * LB, RADIUS)[1] > 0.0
+    assert cable.tensions(90 * IN_LB, 80 * LB, RADIUS)[0] / LB == pytest.approx(240, rel=EXACT)
+
+
+def test_efficiency_of_one_and_of_two_stages_is_the_printed_one() -> None:
+    """(6.15), section 6.4.5: 0.983 and 0.966 under 60 in lb, both stages with the same stress."""
+    ratio = 3.7417
+    first = cable.stage_loss(60 * IN_LB, RADIUS, EA, 1, 1)
+    second = cable.stage_loss(60 * IN_LB, RADIUS, EA, ratio, ratio)  # as many circuits as the torque grows
+    assert first == pytest.approx(160 / 9500, rel=EXACT)
+    assert second == pytest.approx(160 / 9500, rel=EXACT)
+    assert cable.efficiency(first) == pytest.approx(0.983, abs=PRINTED)
+    assert cable.efficiency([first, second]) == pytest.approx(0.966, abs=PRINTED)
+    assert cable.stage_loss(-60 * IN_LB, RADIUS, EA, 1, 1) == first
+    assert cable.efficiency([]) == 1.0
+
+
+def test_creep_yields_to_the_torque_whichever_way_the_pulley_goes() -> None:
+    """(6.19): a radian out and back under 60 in lb gives 2 x 160/9500 rad, with the sign of the torque."""
+    assert cable.creep(2.0, 60 * IN_LB, RADIUS, EA) == pytest.approx(2 * 160 / 9500, rel=EXACT)
+    assert cable.creep(2.0, -60 * IN_LB, RADIUS, EA) == pytest.approx(-2 * 160 / 9500, rel=EXACT)
+
+
+def test_eccentric_pulley_makes_an_amplitude_of_one_inch_pound() -> None:
+    """(6.23): 0.010 in under 50 lb; the 2 in lb of the text are from peak to peak."""
+    torque = cable.eccentric_ripple(0.010 * INCH, 50 * LB, np.linspace(0.0, 2 * np.pi, 5)) / IN_LB
+    np.testing.assert_allclose(torque, [0.0, 1.0, 0.0, -1.0, 0.0], atol=1e-12)
+
+
+GOOD: dict[Callable[..., Any], dict[str, float]] = {
+    cable.stage_compliance: {"ea": 1.0, "length": 1.0, "radius": 1.0, "circuits": 1.0, "ratio": 1.0},
+    cable.stiffness_with_reducer: {"ea": 1.0, "length": 1.0, "ratio": 1.0, "distance": 0.5},
+    cable.circuit_torque: {"stretch": 1.0, "stiffness": 1.0, "pretension": 1.0, "radius": 1.0},
+    cable.slack_stretch: {"stiffness": 1.0, "pretension": 1.0, "radius": 1.0},
+    cable.tensions: {"torque": 1.0, "pretension": 1.0, "radius": 1.0},
+    cable.stage_loss: {"torque": 1.0, "radius": 1.0, "ea": 1.0, "circuits": 1.0, "ratio": 1.0},
+    cable.creep: {"travel": 1.0, "torque": 1.0, "radius": 1.0, "ea": 1.0},
+    cable.eccentric_ripple: {"eccentricity": 1.0, "pretension": 1.0, "angle": 1.0},
+}
+SIGNED = {"torque", "stretch", "angle"}
+MAY_BE_ZERO = {"length", "pretension", "distance", "travel", "eccentricity"}
+CASES = [(function, name) for function, good in GOOD.items() for name in good if name not in SIGNED]
+
+
+@pytest.mark.parametrize(("function", "name"), CASES, ids=lambda case: getattr(case, "__name__", case))
+def test_bad_value_is_refused_by_name(function: Callable[..., Any], name: str) -> None:
+    function(**GOOD[function])
+    zero_allowed = name in MAY_BE_ZERO and (function, name) != (cable.stiffness_with_reducer, "length")
+    for bad in (-1.0, float("nan"), float("inf"), [1.0, -1.0], *([] if zero_allowed else [0.0])):
+        with pytest.raises(ValueError, match=rf"^{name} is .*must be {'at least' if zero_allowed else 'above'} zero"):
+            function(**(GOOD[function] | {name: bad}))
+    if zero_allowed:
+        function(**(GOOD[function] | {name: 0.0}))
+
+
+def test_reducer_beyond_the_end_of_the_line_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"^distance is 2\.5 m; it must not be above length, 2\.0 m"):
+        cable.stiffness_with_reducer(1000, 2.0, 14, 2.5)
+
+
+@pytest.mark.parametrize("bad", [[-0.1], [0.5, 1.0], [float("nan")]])
+def test_loss_that_is_no_share_is_refused(bad: list[float]) -> None:
+    with pytest.raises(ValueError, match=r"losses are .*; each must be at least 0 and below 1"):
+        cable.efficiency(bad)

@@ -1,0 +1,123 @@
+"""What the sensors make of true values: steps, differences and noise with the statistics that were asked for."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from arms import CONFIGURATION, WAM
+
+from wam_description.parameters import ParameterError
+from wam_driver.driver import DriverParameters
+from wam_driver.sensors import Sensors
+
+DT = 1e-3
+PERFECT = CONFIGURATION.node("driver", DriverParameters).sensors
+ZERO = [0.0] * 4
+DRAWS = 40_000
+
+
+def sensors(seed: int = 1, **parameters: tuple[float, ...]) -> Sensors:
+    return Sensors(WAM, dataclasses.replace(PERFECT, **parameters), np.random.default_rng(seed))
+
+
+def test_perfect_sensors_pass_values_through_unchanged() -> None:
+    perfect = sensors()
+    theta, thetad, torque = [0.1, -0.2, 3.7, 1e-9], [1.0, -2.0, 0.0, 1e3], [0.3, 0.0, -0.1, 2.0]
+    for _ in range(3):
+        assert perfect.motors(theta, thetad, torque, DT) == (theta, thetad, torque)
+        assert perfect.joints(theta, thetad, torque, DT) == (theta, thetad, torque)
+
+
+def test_encoder_reads_the_nearest_of_its_steps() -> None:
+    """Off by half a step at most; spread evenly, so that the mean square is step^2/12: 2 % of 40 000 readings."""
+    step = 2 * math.pi / 4096
+    read = sensors(encoder_resolution=(step, step, 2 * step, 0.0))
+    true = np.random.default_rng(3).uniform(-9.0, 9.0, (DRAWS // 4, 4))
+    found = np.array([read.motors(angles.tolist(), ZERO, ZERO, DT).position for angles in true])
+    np.testing.assert_allclose(found[:, :2] / step, np.round(found[:, :2] / step), atol=1e-9)
+    error = found - true
+    assert np.abs(error[:, :2]).max() <= step / 2 * (1 + 1e-9)
+    assert np.abs(error[:, 2]).max() > 0.9 * step
+    np.testing.assert_allclose((error[:, :2] ** 2).mean(), step**2 / 12, rtol=0.02)
+    np.testing.assert_array_equal(error[:, 3], 0.0)
+
+
+def test_velocity_of_a_real_encoder_is_the_difference_of_two_readings() -> None:
+    step = 1e-3
+    read = sensors(encoder_resolution=(step,) * 4)
+    assert read.motors([0.25] * 4, [7.0] * 4, ZERO, DT).velocity == ZERO  # there is no reading before it
+    angles = [0.2504, 0.2506, 0.2494, 0.3]
+    expected = [0.0, step / DT, -step / DT, 50 * step / DT]
+    np.testing.assert_allclose(read.motors(angles, [7.0] * 4, ZERO, DT).velocity, expected, atol=1e-9)
+    np.testing.assert_allclose(read.motors(angles, [7.0] * 4, ZERO, 2 * DT).velocity, 0.0, atol=1e-9)
+
+
+def test_velocity_of_a_turning_shaft_is_right_on_average() -> None:
+    """One step over the whole time is all that it can be off."""
+    read = sensors(encoder_resolution=(1e-3,) * 4)
+    found = [read.motors([0.3 * k * DT] * 4, [0.3] * 4, ZERO, DT).velocity[0] for k in range(1001)]
+    assert sorted(set(np.round(found, 6))) == [0.0, 1.0]
+    assert np.mean(found[1:]) == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize("side", ["motors", "joints"])
+def test_noise_of_an_angle_has_its_standard_deviation_and_no_offset_and_no_memory(side: str) -> None:
+    """2 % and 2 % of a standard deviation: four sigma of 40 000 draws."""
+    deviation = (1e-3, 2e-3, 0.0, 5e-4)
+    read = sensors(**{"encoder_noise" if side == "motors" else "joint_encoder_noise": deviation})
+    states = [getattr(read, side)([1.0, 2.0, 3.0, 4.0], ZERO, [0.5] * 4, DT) for _ in range(DRAWS)]
+    error = np.array([state.position for state in states]) - [1.0, 2.0, 3.0, 4.0]
+    np.testing.assert_allclose(error.std(axis=0), deviation, rtol=0.02)
+    assert np.all(np.abs(error.mean(axis=0)) <= 0.02 * np.array(deviation))
+    normal = np.delete(error, 2, axis=1) / np.delete(deviation, 2)
+    np.testing.assert_allclose(np.corrcoef(normal.T), np.eye(3), atol=0.025)
+    np.testing.assert_allclose((normal[1:] * normal[:-1]).mean(axis=0), 0.0, atol=0.025)
+    assert (np.abs(normal) < 1).mean() == pytest.approx(0.6827, abs=0.01)
+    velocity = np.array([state.velocity for state in states])
+    np.testing.assert_allclose(velocity[1:], np.diff(error, axis=0) / DT, atol=1e-9)
+    assert all(state.effort == [0.5] * 4 for state in states)
+
+
+def test_noise_of_the_strain_gauges_has_its_standard_deviation_and_leaves_the_angles_alone() -> None:
+    deviation = (0.02, 0.0, 0.05, 0.01)
+    read = sensors(strain_noise=deviation)
+    states = [read.joints([1.0] * 4, [2.0] * 4, [3.0, 4.0, 5.0, 6.0], DT) for _ in range(DRAWS)]
+    error = np.array([state.effort for state in states]) - [3.0, 4.0, 5.0, 6.0]
+    np.testing.assert_allclose(error.std(axis=0), deviation, rtol=0.02)
+    assert np.all(np.abs(error.mean(axis=0)) <= 0.02 * np.array(deviation))
+    assert all(state.position == [1.0] * 4 and state.velocity == [2.0] * 4 for state in states)
+
+
+NOISY = {
+    "encoder_resolution": (1e-4,) * 4,
+    "encoder_noise": (1e-3,) * 4,
+    "joint_encoder_noise": (1e-3,) * 4,
+    "strain_noise": (0.1,) * 4,
+}
+
+
+def test_noise_is_that_of_the_seed() -> None:
+    def said(seed: int) -> list[object]:
+        read = sensors(seed, **NOISY)
+        return [f([1.0] * 4, ZERO, ZERO, DT) for _ in range(50) for f in (read.motors, read.joints)]
+
+    assert said(7) == said(7)
+    assert said(7) != said(8)
+
+
+def test_after_a_reset_no_speed_is_made_of_the_way_back() -> None:
+    read = sensors(encoder_resolution=(1e-4,) * 4, joint_encoder_noise=(1e-9,) * 4)
+    for reset in (False, True):
+        read.motors([50.0] * 4, ZERO, ZERO, DT)
+        read.joints([2.0] * 4, ZERO, ZERO, DT)
+        if reset:
+            read.reset()
+        speeds = [f(ZERO, ZERO, ZERO, DT).velocity for f in (read.motors, read.joints)]
+        assert (speeds == [ZERO, ZERO]) is reset
+
+
+@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(PERFECT)])
+def test_wrong_number_of_values_is_refused_by_name(name: str) -> None:
+    with pytest.raises(ParameterError, match=rf"'sensors\.{name}' has 3 values; 4 names need 4"):
+        sensors(**{name: (0.0,) * 3})
