@@ -1,7 +1,8 @@
 """A substep of the plant against a bare mj_step of the same model in the same state."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import mujoco
@@ -17,6 +18,7 @@ from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+SUBSTEP = Configuration.load(packaged("wam")).shared.timing.substep
 FREE = (0.0, -0.6, 0.0, 0.5)  # rad
 PUSH = (np.array([0.0, 12.0, 0.0]), np.array([0.0, 0.0, 12.0 * 0.28]))  # N, N m
 
@@ -28,11 +30,20 @@ class Case:
     ----------
     q : pose at the start, rad.
     extra : torque of each motor on top of what carries the links, N m.
-    pushed : whether a disturbance pushes on the outer link.
+    pushed : whether a disturbance pushes on the last link.
+    name : of the configuration.
+    values : changes of it.
     """
 
-    def __init__(self, q: tuple[float, ...], extra: float, pushed: bool = False) -> None:
-        configuration = Configuration.load(packaged("wam")).with_values({"arm.joints.start": q})
+    def __init__(
+        self,
+        q: tuple[float, ...],
+        extra: float,
+        pushed: bool = False,
+        name: str = "wam",
+        values: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
+        configuration = Configuration.load(packaged(name)).with_values({"arm.joints.start": q, **values})
         arm, step = configuration.shared.arm, configuration.shared.timing.substep
         parameters = configuration.node("driver", DriverParameters)
         self.plant = Plant(arm, parameters.world, parameters.effects, step)
@@ -59,7 +70,6 @@ class Case:
         """Seconds a step, of the plant and of the bare model, from the same state."""
         mujoco.mj_setState(self.plant.model, self.plant.data, self._state, STATE)
         self.bare.dof_frictionloss[:] = self.plant.model.dof_frictionloss
-        self.bare.pair_solref[:] = self.plant.model.pair_solref
         mujoco.mj_setState(self.bare, self.data, self._state, STATE)
         return _seconds(self._steps, count), _seconds(self._bare_steps, count)
 
@@ -68,6 +78,15 @@ def _seconds(steps: Callable[[int], None], count: int) -> float:
     begin = time.perf_counter()
     steps(count)
     return (time.perf_counter() - begin) / count
+
+
+def every_effect(motors: int) -> dict[str, Any]:
+    """Everything that the plant can do at once, beside what is on anyway."""
+    return {
+        "driver:effects.tension_friction": (1e-5,) * motors,
+        "driver:effects.rubbing_friction": (0.1,) * motors,
+        "driver:effects.ripples.amplitude": (0.01,) * motors,
+    }
 
 
 def pose_in_contact() -> tuple[float, ...]:
@@ -89,7 +108,9 @@ def main() -> None:
     cases = {
         "arm free, moving": Case(FREE, extra=0.2),
         "arm free, pushed": Case(FREE, extra=0.2, pushed=True),
+        "arm, every effect on": Case(FREE, extra=0.2, values=every_effect(4)),
         "in contact": Case(pose_in_contact(), extra=0.0),
+        "testbed, moving": Case((0.1,), extra=0.2, name="testbed"),
     }
     seconds: dict[str, tuple[list[float], list[float]]] = {name: ([], []) for name in cases}
     for _ in range(given.rounds):
@@ -102,10 +123,20 @@ def main() -> None:
         micro = [Spread(*(1e6 * value for value in spread(part))) for part in (plant, bare)]
         best = min(plant) / min(bare)
         contacts = cases[name].plant.data.ncon
-        rows.append([name, str(contacts), *(f"{part.median:.1f}" for part in micro), f"{ratio:.2f}", f"{best:.2f}"])
+        times = f"{SUBSTEP / min(plant):.0f}"
+        middle = [f"{part.median:.1f}" for part in micro]
+        rows.append([name, str(contacts), *middle, f"{ratio:.2f}", f"{best:.2f}", times])
         measured[name] = {"ratio": ratio, "best": best, "plant_us": micro[0], "bare_us": micro[1]}
     print(machine())
-    head = ["substep", "contacts", "plant [us]", "mj_step [us]", "ratio (middle half)", "of the best"]
+    head = [
+        "substep",
+        "contacts",
+        "plant [us]",
+        "mj_step [us]",
+        "ratio (middle half)",
+        "of the best",
+        "times real time",
+    ]
     print(table(head, rows))
     save("plant", given, measured)
 
