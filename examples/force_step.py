@@ -98,6 +98,12 @@ class ForceStep(Node):
 def main() -> None:
     rclpy.init()
     node = ForceStep()
+    for _ in range(50):
+        rclpy.spin_once(node, timeout_sec=0.1)
+        if node.q:
+            break
+    else:
+        sys.exit("no /wam/joint_states within 5 s; start the stack first: wam up")
     while not node.is_done:
         rclpy.spin_once(node)
     rclpy.try_shutdown()

@@ -73,6 +73,7 @@ def ask(loop: ForceLoop, world: World, force: Any, dt: float = DT, **more: Any) 
         given["contact"],
         given["external"],
         given.get("command", command),
+        given.get("age", 0.0),
         given["posture"],
         given["torque"],
         dt,
@@ -128,7 +129,7 @@ def test_a_short_lever_does_not_make_a_joint_race() -> None:
         state = State(upright, [0.0] * 4, [0.0] * 4)
         sensed = State(upright, [0.0] * 4, BODY.gravity_torque(upright).tolist())
         press = ForceCommand("base", (0.0, 0.0, -20.0))
-        out = machine.step(state, sensed, NO_CONTACT, None, press, upright, None, 0.005)
+        out = machine.step(state, sensed, NO_CONTACT, None, press, 0.0, upright, None, 0.005)
         assert max(map(abs, out.velocity)) <= most * (1.0 + 1e-12)
     assert max(map(abs, out.velocity)) > 10.0 * OWN.joint_speed_limit
 
@@ -219,7 +220,7 @@ def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
     for _ in range(4000):
         external = -stiffness * np.subtract(world.q, POSE)
         sensors = State(world.q, STILL, (BODY.gravity_torque(world.q) - external).tolist())
-        out = loop.step(world.joints, sensors, NO_CONTACT, None, None, None, asked, DT)
+        out = loop.step(world.joints, sensors, NO_CONTACT, None, None, 0.0, None, asked, DT)
         assert out.effort == asked
         world.move(out.velocity)
     assert stiffness * np.subtract(world.q, POSE) == pytest.approx(asked, rel=1e-3)
@@ -231,6 +232,28 @@ def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -
     out = ask(loop, World(1e-9), None, torque=[100.0, -100.0, 1.0, 0.0])
     limit, gain = OWN.torque_error_limit, OWN.torque_gain
     assert out.velocity == pytest.approx([gain * limit, -gain * limit, gain, 0.0], abs=1e-9)
+
+
+def test_a_force_whose_commander_is_gone_is_let_go_where_the_arm_is() -> None:
+    loop, world = ForceLoop(ARM, OWN), World(400.0)
+    for _ in range(1500):
+        world.move(ask(loop, world, down(6.0), posture=POSE).velocity)
+    pressed = list(world.q)
+    assert world.force == pytest.approx(6.0, abs=1e-3)
+    for age, asked in ((0.9 * OWN.command_timeout, 6.0), (1.1 * OWN.command_timeout, 0.0)):
+        out = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0], age=age)
+        assert any(out.effort) == bool(asked)
+    assert out.velocity == pytest.approx([0.0] * 4, abs=1e-9)  # holds here, not at the posture of old
+    assert world.q == pressed
+    again = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0], age=0.0)
+    assert max(map(abs, again.velocity)) > 0.1
+
+
+def test_joint_torque_without_a_command_stands_still_wherever_the_posture_is() -> None:
+    loop = ForceLoop(ARM, OWN)
+    ask(loop, World(400.0), None, posture=[0.3, 0.3, 0.3, 0.3])
+    loop.tune(replace(OWN, mode="joint_torque"))
+    assert ask(loop, World(400.0), None, posture=[0.3, 0.3, 0.3, 0.3]).velocity == [0.0] * 4
 
 
 def rotation(cover: str, q: list[float] = POSE) -> np.ndarray:
@@ -297,7 +320,7 @@ def test_a_force_without_a_lever_asks_for_no_motion_along_it() -> None:
 def test_sensors_that_have_not_come_yet_count_as_nothing_felt() -> None:
     loop = ForceLoop(ARM, OWN)
     command = ForceCommand("base", (0.0, 0.0, -5.0))
-    out = loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, command, None, None, DT)
+    out = loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, command, 0.0, None, None, DT)
     assert out.measured == pytest.approx((0.0, 0.0, 0.0))
     assert all(math.isfinite(value) for value in (*out.velocity, *out.effort))
 

@@ -116,7 +116,7 @@ def enable(ros: Any, stack: Stack) -> None:
 def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
     number: signal.Signals, started: Any, tmp_path: Path, ros: Any
 ) -> None:
-    stack = up(started)
+    stack = up(started, "--mode", "lockstep")  # a busy machine cannot let the watchdog come first
     enable(ros, stack)
     stack.process.send_signal(number)
     wait(lambda: stack.process.poll() is not None, PATIENCE, f"the end of wam up; {stack.said()}")
@@ -124,6 +124,39 @@ def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
     assert stack.process.returncode == 0
     assert "Traceback" not in stack.said()
     assert statuses(tmp_path, "driver")[-2:] == ["enabled", "braked"]
+
+
+def test_a_shell_without_ros2_asks_the_stack(started: Any, domain_id: int) -> None:
+    def call(request: str) -> tuple[int, str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "wam_ros.cli", "call", request], capture_output=True, text=True, timeout=20.0
+        )
+        return done.returncode, done.stdout
+
+    code, said = call("enable")
+    assert code == 1
+    assert "no service /wam/driver/enable" in said
+    assert "wam up" in said
+    up(started, "--mode", "lockstep")
+    assert call("enable") == (0, "enabled: brakes released\n")
+    assert call("tare")[0] == 0
+    assert call("estop")[0] == 0
+    code, said = call("enable")
+    assert code == 1
+    assert "call reset_fault first" in said
+    assert call("reset_fault")[0] == 0
+    assert call("disable")[0] == 0
+
+
+def test_nodes_that_do_not_exist_are_refused_with_those_that_do(tmp_path: Path, domain_id: int) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(packaged("wam").read_text().replace("nodes: [driver,", "nodes: [drver,"))
+    done = subprocess.run(
+        [sys.executable, "-m", "wam_ros.cli", "up", "--config", str(path)], capture_output=True, text=True, timeout=20.0
+    )
+    assert done.returncode == 1
+    assert "parameter 'nodes' names 'drver'; nodes: driver, transform" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path, domain_id: int) -> None:

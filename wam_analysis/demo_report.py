@@ -91,7 +91,7 @@ def _link_verdict(summary: DemoSummary) -> str:
         "right link",
         [wrong(touch) for touch in summary.touches],
         lambda value: not value,
-        lambda _: f"{100.0 * least:.0f} %",
+        lambda wrong: "another link" if wrong else f"{100.0 * least:.0f} %",
     )
 
 

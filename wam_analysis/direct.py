@@ -108,7 +108,7 @@ class DirectRun:
         self._request(played)
         gravity = self._body.gravity_torque(joints.position).tolist()
         external = list(estimate.external_torques)
-        out = self._force_loop.step(joints, sensors, contact, external, played.force, played.posture, None, dt)
+        out = self._force_loop.step(joints, sensors, contact, external, played.force, 0.0, played.posture, None, dt)
         velocity = self._transform.motor_velocity(out.velocity)
         effort = self._transform.motor_effort(gravity, out.effort)
         self._newest = (stamp, velocity, effort)

@@ -49,6 +49,9 @@ class ForceLoopParameters:
         "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", low=0.0, live=True
     )
     spring_rest: tuple[float, ...] = parameter("joint angle at which that spring is not pressed", "rad", live=True)
+    command_timeout: float = parameter(
+        "age at which a force command no longer counts and the arm holds where it is", "s", low=0.001, live=True
+    )
     contact_cover: str = parameter("cover that is taken to touch while no contact is felt", live=True)
     contact_place: float = parameter("place on it", "m", live=True)
 
@@ -88,6 +91,7 @@ class ForceLoop:
         self._n = len(arm.joints.names)
         self._hold: list[float] | None = None
         self._filtered: float | None = None
+        self._is_forsaken = False
         self._bias = np.zeros(self._n)
         self._external = np.zeros(self._n)
         self.tune(parameters)
@@ -118,6 +122,7 @@ class ForceLoop:
         contact: Contact,
         external: Sequence[float] | None,
         command: ForceCommand | None,
+        command_age: float,
         posture: Sequence[float] | None,
         torque: Sequence[float] | None,
         dt: float,
@@ -131,6 +136,7 @@ class ForceLoop:
         contact : estimated contact, force of the world on the cover.
         external : estimated torques of the world on the joints (n,), N m.
         command : force asked for; None or zero leaves all axes to the posture.
+        command_age : time since the state that the command answers, s; an old command counts as none.
         posture : joint angles asked for (n,), rad; None holds those of the first period.
         torque : joint torques on the world asked for in the joint_torque mode (n,), N m.
         dt : outer period, s.
@@ -138,8 +144,14 @@ class ForceLoop:
         q = joints.position
         if self._hold is None:
             self._hold = list(q)
-        if posture is not None:
+        is_old = command is not None and any(command.force) and command_age > self.parameters.command_timeout
+        if is_old:
+            if not self._is_forsaken:
+                self._hold = list(q)  # whoever pressed is gone: stay here, and ask for no force
+            command = None
+        elif posture is not None:
             self._hold = list(posture)
+        self._is_forsaken = is_old
         self._external = self._external_torque(sensors, external) - self._bias
         if self.parameters.mode == "joint_torque":
             return self._joint_torque(q, torque)
@@ -228,8 +240,8 @@ class ForceLoop:
         return _list(force + posture - along * (float(along @ posture) / square))
 
     def _joint_torque(self, q: Sequence[float], torque: Sequence[float] | None) -> ForceOutput:
-        if torque is None:
-            return ForceOutput(self._posture_velocity(q), [0.0] * self._n, *_ZERO_FORCES)
+        if torque is None:  # nothing is asked for: stand still
+            return ForceOutput([0.0] * self._n, [0.0] * self._n, *_ZERO_FORCES)
         limit = self.parameters.torque_error_limit
         error = np.clip(np.array(torque) + self._external, -limit, limit)
         return ForceOutput(_list(self.parameters.torque_gain * error), list(torque), *_ZERO_FORCES)

@@ -9,7 +9,16 @@ from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
 from wam_description.arm import seconds
 from wam_description.signals import State
 from wam_ros.lockstep import Gate, Need
-from wam_ros.messages import BASE, Wrench, contact_of, read_contact, read_joint_state, read_wrench, wrench_stamped
+from wam_ros.messages import (
+    BASE,
+    Wrench,
+    contact_of,
+    read_contact,
+    read_joint_state,
+    read_wrench,
+    stamp_of,
+    wrench_stamped,
+)
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
 from wam_ros.run import run
@@ -49,7 +58,7 @@ class ForceLoopNode(Node):
             "external_joint_torques": lambda m: read_joint_state(m, joints, "effort").effort,
             "contact/wrench": lambda m: read_wrench(m, frames),
             "contact/point": lambda m: read_contact(m, frames),
-            "force_command": lambda m: read_wrench(m, frames),
+            "force_command": lambda m: (stamp_of(m), read_wrench(m, frames)),
             "joint_posture_command": lambda m: read_joint_state(m, joints, "position").position,
             "joint_torque_command": lambda m: read_joint_state(m, joints, "effort").effort,
         }
@@ -60,13 +69,14 @@ class ForceLoopNode(Node):
     def _work(self, stamp: int, inputs: dict[str, Any]) -> None:
         dt = self._outer_period if self._last is None else stamp - self._last
         self._last = stamp
-        command: Wrench | None = inputs["force_command"]
+        command_stamp, command = inputs["force_command"] or (stamp, None)
         out = self._loop.step(
             inputs["joint_states"],
             inputs.get("joint_sensors"),
             contact_of(inputs["contact/wrench"], inputs["contact/point"]),
             inputs["external_joint_torques"],
             ForceCommand(command.frame, command.force) if command else None,
+            seconds(stamp - command_stamp),
             inputs["joint_posture_command"],
             inputs["joint_torque_command"],
             seconds(dt),

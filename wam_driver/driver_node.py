@@ -286,6 +286,8 @@ class DriverNode(Node):
         obstacle = ""
         if self._ports.publisher_count("motor_current_command") > 1:
             obstacle = TWO_PUBLISHERS
+        elif self.count_publishers("motor_states") > 1:
+            obstacle = TWO_DRIVERS
         elif self._timing.mode == "realtime" and now - self._command_came > self._watchdog:
             obstacle = "no motor_current_command comes in; start velocity_loop and its peers, then enable"
         self._progress = now
@@ -315,6 +317,10 @@ class DriverNode(Node):
         self._announce()
 
 
+TWO_DRIVERS = (
+    "another driver sends motor_states in this namespace; stop it, or give one of the two another namespace "
+    "(-r __ns:=/other) or another ROS_DOMAIN_ID"
+)
 TWO_PUBLISHERS = (
     "two publishers send motor_current_command; stop all but one ('ros2 topic info -v' lists them), then reset_fault"
 )

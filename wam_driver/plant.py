@@ -8,7 +8,7 @@ while stuck, F_dynamic once moving until the velocity changes its sign (section 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from struct import Struct
 
@@ -21,7 +21,7 @@ from wam_description.cables import Circuit
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
 from wam_description.signals import Contact
-from wam_description.world import World
+from wam_description.world import Springs, World
 
 STUCK_ROTOR = 1e-5  # rad/s; below it a rotor counts as stuck: far under one step of any real motion
 STUCK_JOINT = 1e-6  # rad/s; 1e-3 would make the limit cycle of (5.8) vanish
@@ -94,7 +94,22 @@ class Plant:
             (*surface, size)
             for surface, size in zip(list(surfaces) * len(arm.covers.names), self.model.pair_dim.tolist(), strict=True)
         ]
+        self._springs = list(self._springs_on_covers(world.springs))
         self._rest()
+
+    def _springs_on_covers(self, springs: Springs) -> Iterator[tuple[int, int, str, float, float, bool]]:
+        """Tendon, body, cover, lever, rest length and kind of each spring whose link carries a cover."""
+        arm = self._arm
+        tendons = iter(range(2 * self._n, self.model.ntendon))  # behind the strands of the cables
+        for i, joint in enumerate(springs.joints):
+            if springs.stiffness[i] == 0.0:
+                continue
+            tendon = next(tendons)
+            link = arm.links.names[arm.joints.names.index(joint)]
+            if link in arm.covers.links:
+                cover = arm.covers.names[arm.covers.links.index(link)]
+                lever = springs.lever[i]
+                yield tendon, self.model.body(link).id, cover, lever, lever * springs.rest[i], springs.bilateral[i]
 
     def _rest(self) -> None:
         """Put the arm at its start pose with the cables stretched so that they carry the links."""
@@ -334,7 +349,7 @@ class Plant:
         return result
 
     def loads(self) -> list[Contact]:
-        """What the world does to each touched or pushed cover, in the order of the arm's covers."""
+        """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
         data = self.data
         parts: dict[str, list[tuple[np.ndarray, float]]] = {name: [] for name in self._site}
         for i in range(data.ncon):
@@ -351,6 +366,14 @@ class Plant:
             square = float(force[1] ** 2 + force[2] ** 2)  # a force along x goes through every place
             moment = float(force[1] * torque[2] - force[2] * torque[1])
             parts[cover].append((force, moment / square if square > 0.0 else np.nan))
+        for tendon, body, cover, lever, rest, bilateral in self._springs:
+            squeeze = rest - float(data.ten_length[tendon])
+            if squeeze > 0.0 or bilateral:
+                along, across = data.xmat[body].reshape(3, 3).T[:2]
+                rotation = data.site_xmat[self._site[cover]].reshape(3, 3)
+                force = rotation.T @ across * (squeeze * float(self.model.tendon_stiffness[tendon]))
+                at = data.xpos[body] + lever * along - data.site_xpos[self._site[cover]]
+                parts[cover].append((force, float(rotation[:, 0] @ at)))
         result = []
         for cover, shares in parts.items():
             weights = [float(np.linalg.norm(force)) for force, _ in shares]

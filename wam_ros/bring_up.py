@@ -19,6 +19,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from wam_description.configuration import Configuration
+from wam_description.parameters import ParameterError
 from wam_ros.run import NAMESPACE, PARENT, make_executor, prepare_logging_directory, spin
 
 MODULES: Final = {
@@ -36,6 +37,13 @@ LAST: Final = "recorder"  # to be stopped: it closes the bag
 PATIENCE: Final = 1.5  # s, for a node to end by itself
 
 
+def check_nodes(configuration: Configuration) -> None:
+    """Refuse a bring-up with nodes that do not exist."""
+    for name in configuration.shared.nodes:
+        if name not in MODULES:
+            raise ParameterError(f"parameter 'nodes' names '{name}'; nodes: {', '.join(MODULES)}")
+
+
 class Processes:
     """Nodes as processes of their own; leaving the context stops them all, brakes first, bag last.
 
@@ -46,6 +54,7 @@ class Processes:
     """
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
+        check_nodes(configuration)
         prepare_logging_directory()
         self._stack = ExitStack()
         folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="wam_stack_")))
@@ -118,6 +127,7 @@ class Composition:
     """
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, domain_id: int | None = None) -> None:
+        check_nodes(configuration)
         prepare_logging_directory()
         self.context = Context()
         rclpy.init(args=[], context=self.context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)

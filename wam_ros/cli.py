@@ -15,6 +15,12 @@ from wam_description.parameters import ParameterError
 # commands that need no ROS; named here and imported when called, because ROS glue knows no analysis
 ANALYSES = {"report": "wam_analysis.demo_report:report", "plant": "wam_analysis.plant_figure:figure"}
 BASE_CONFIGURATION = "wam"
+REQUESTS = {  # of the command `call`: node and service
+    "estop": ("driver", "estop"),
+    "reset_fault": ("driver", "reset_fault"),
+    "reset": ("driver", "reset"),
+    "tare": ("force_loop", "tare"),
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -65,6 +71,10 @@ def _parser() -> argparse.ArgumentParser:
 
     report = _command(commands, "report", _report, "say what a recording of the demonstration shows")
     report.add_argument("bag", help="directory of the bag")
+
+    call = _command(commands, "call", _call, "ask a running stack: enable, disable, estop, reset_fault, reset, tare")
+    call.add_argument("request", choices=(*REQUESTS, "enable", "disable"))
+    call.add_argument("--namespace", default="wam", help="namespace of the stack, default wam")
 
     plant = _command(commands, "plant", _plant, "draw the plant's effects beside the theory, print the differences")
     plant.add_argument("file", help="picture to write, for example plant.png")
@@ -117,7 +127,7 @@ def _demo(given: argparse.Namespace) -> int:
             ended = processes.wait(lambda ended: stop.is_set or bool(ended))
         failure = ", ".join(f"node {node} ended with code {code}" for node, code in ended.items() if code)
     if stop.is_set:
-        print("stopped; what was recorded until then is in", bag)
+        print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130
     if failure:
         print(f"the demonstration failed: {failure}", file=sys.stderr)
@@ -169,6 +179,16 @@ def _record(given: argparse.Namespace) -> int:
         file.write_text(configuration.text, encoding="utf-8")
         run(node_class("recorder"), ["wam", "--ros-args", "--params-file", str(file)])
     return 0
+
+
+def _call(given: argparse.Namespace) -> int:
+    from wam_ros.call import call
+
+    node, service = REQUESTS.get(given.request, ("driver", "enable"))
+    switch = {"enable": True, "disable": False}.get(given.request)
+    answer = call(f"/{given.namespace.strip('/')}/{node}/{service}", switch)
+    print(answer.message)
+    return 0 if answer.success else 1
 
 
 def _plant(given: argparse.Namespace) -> int:

@@ -1,6 +1,7 @@
 """A node's connections, made from the interface table: typed, counted, and ready when all are matched."""
 
 import importlib
+import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -20,6 +21,7 @@ from wam_ros.topics import BY_NAME, TOPICS, Topic
 
 READY, WAITING = "ready", "waiting for its peers"
 CONNECTED = KeyValue(key="peers", value="connected")  # in the status of a node that has more to say than 'ready'
+LOG_PERIOD, MOST_REASONS = 1.0, 20  # s, a reason is logged at most so often; reasons kept in mind
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -45,6 +47,7 @@ class Ports:
         self._status = DiagnosticStatus(name=self._name, level=WARN, message=WAITING)
         self._next_report = 0
         self._absent: set[str] = set()
+        self._logged: dict[tuple[str, str], float] = {}
         for topic in TOPICS:
             if self._name in topic.publisher:
                 self._publishers[topic.name] = node.create_publisher(message_type(topic), topic.name, qos(topic))
@@ -102,7 +105,12 @@ class Ports:
     def refuse(self, topic: str, reason: str) -> None:
         """Count and report a message that was not let in."""
         self.refusals[topic] += 1
-        self.node.get_logger().warning(f"{topic}: refused: {reason}", throttle_duration_sec=1.0)
+        now = time.monotonic()
+        if now - self._logged.get((topic, reason), -LOG_PERIOD) >= LOG_PERIOD:
+            if len(self._logged) > MOST_REASONS:  # a reason may carry a number that never comes again
+                self._logged.clear()
+            self._logged[topic, reason] = now
+            self.node.get_logger().warning(f"{topic}: refused: {reason}")
 
     def set_status(self, level: bytes, message: str, **details: str) -> None:
         """Publish the state of the node, latched; once the node is ready."""

@@ -1,0 +1,51 @@
+"""One question to a service of a running stack, for shells without the `ros2` command."""
+
+from typing import NamedTuple
+
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from std_srvs.srv import SetBool, Trigger
+
+from wam_ros.run import make_executor, prepare_logging_directory
+
+PATIENCE = 3.0  # s
+
+
+class Reply(NamedTuple):
+    """What the service said."""
+
+    success: bool
+    message: str
+
+
+def call(service: str, switch: bool | None) -> Reply:
+    """Ask a service and wait for its answer.
+
+    Parameters
+    ----------
+    service : full name, for example '/wam/driver/enable'.
+    switch : value of a SetBool; None for a Trigger.
+    """
+    prepare_logging_directory()
+    context = Context()
+    rclpy.init(args=[], context=context)
+    node = Node("wam_call", context=context)
+    executor = make_executor(context)
+    executor.add_node(node)
+    try:
+        kind = Trigger if switch is None else SetBool
+        client = node.create_client(kind, service)
+        if not client.wait_for_service(PATIENCE):
+            return Reply(False, f"no service {service} within {PATIENCE:g} s; start the stack with 'wam up'")
+        future = client.call_async(kind.Request() if switch is None else kind.Request(data=switch))
+        executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+        answer = future.result() if future.done() else None
+        if answer is None:
+            return Reply(False, f"no answer from {service} within {PATIENCE:g} s")
+        return Reply(bool(answer.success), str(answer.message))
+    finally:
+        executor.remove_node(node)
+        node.destroy_node()
+        executor.shutdown()
+        rclpy.try_shutdown(context=context)
