@@ -129,7 +129,11 @@ def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
 def test_a_shell_without_ros2_asks_the_stack(started: Any, domain_id: int) -> None:
     def call(request: str) -> tuple[int, str]:
         done = subprocess.run(
-            [sys.executable, "-m", "wam_ros.cli", "call", request], capture_output=True, text=True, timeout=20.0
+            [sys.executable, "-m", "wam_ros.cli", "call", request],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=20.0,
         )
         return done.returncode, done.stdout
 
@@ -152,7 +156,11 @@ def test_nodes_that_do_not_exist_are_refused_with_those_that_do(tmp_path: Path, 
     path = tmp_path / "mine.yaml"
     path.write_text(packaged("wam").read_text().replace("nodes: [driver,", "nodes: [drver,"))
     done = subprocess.run(
-        [sys.executable, "-m", "wam_ros.cli", "up", "--config", str(path)], capture_output=True, text=True, timeout=20.0
+        [sys.executable, "-m", "wam_ros.cli", "up", "--config", str(path)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=20.0,
     )
     assert done.returncode == 1
     assert "parameter 'nodes' names 'drver'; nodes: driver, transform" in done.stderr
