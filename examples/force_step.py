@@ -5,6 +5,7 @@ It needs nothing of this package: topics and one service are the whole contract 
 """
 
 import sys
+import time
 from collections.abc import Iterator
 
 import rclpy
@@ -98,12 +99,11 @@ class ForceStep(Node):
 def main() -> None:
     rclpy.init()
     node = ForceStep()
-    for _ in range(50):
+    end = time.monotonic() + 10.0
+    while not node.q:
         rclpy.spin_once(node, timeout_sec=0.1)
-        if node.q:
-            break
-    else:
-        sys.exit("no /wam/joint_states within 5 s; start the stack first: wam up")
+        if time.monotonic() > end:
+            sys.exit("no /wam/joint_states within 10 s; start the stack first: wam up")
     while not node.is_done:
         rclpy.spin_once(node)
     rclpy.try_shutdown()
