@@ -18,6 +18,8 @@ from wam_analysis.plant_study import STUDIES, cycle, resonances, stiction_cycle
         ("ripple", 1e-6),
         ("linear surface", 2e-3),  # k_c 0.2 %: the tip accelerates, which takes 0.1 % of the force
         ("hardening surface", 2e-3),
+        ("impact", 5e-3),  # (3.1) 0.5 %
+        ("actuator cycle", 1e-2),  # (5.20) 1 %, at every moment of 6 s
     ],
 )
 def test_effect_is_as_near_to_theory_as_promised(name: str, most: float) -> None:

@@ -27,7 +27,7 @@ def figure(file: Path) -> str:
     """
     curves = {name: study() for name, study in STUDIES.items()}
     with plt.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}):
-        picture, axes = plt.subplots(2, 4, figsize=(13.0, 6.2), layout="constrained")
+        picture, axes = plt.subplots(2, 5, figsize=(16.0, 6.2), layout="constrained")
         flat = axes.ravel()
         _curve(flat[0], curves["slack"], "slack of the loose strand", "stretch [rad]", "circuit torque [N m]")
         _curve(
@@ -37,7 +37,9 @@ def figure(file: Path) -> str:
         _curve(flat[3], curves["ripple"], "eccentric pulley (6.23)", "angle of the motor [rad]", "torque [N m]")
         _surfaces(flat[4], curves["linear surface"], curves["hardening surface"])
         _curve(flat[5], curves["stiction cycle"], "stiction limit cycle (5.8), (5.9)", "time [s]", "$F_c$ [N m]")
-        worst = _resonances(flat[6], flat[7])
+        _curve(flat[6], curves["actuator cycle"], "actuator limit cycle (5.20)", "time [s]", "motor at the joint [rad]")
+        _curve(flat[7], curves["impact"], "impact (3.1)", "stiffness [N/m]", "greatest force [N]")
+        worst = _resonances(flat[8], flat[9])
         handles, labels = flat[0].get_legend_handles_labels()
         picture.legend(handles, labels, loc="outside upper right", ncols=2, frameon=False)
         picture.savefig(file, dpi=150)

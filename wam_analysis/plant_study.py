@@ -253,28 +253,73 @@ def cycle(times: Numbers, values: Numbers) -> Cycle:
     return Cycle(float(np.ptp(half)), float(np.diff(rises).mean() * (times[1] - times[0])))
 
 
-def stiction_cycle(seconds: float = 8.0) -> Curve:
-    """F_c of integral force control with stiction, over time, s; the exact motion beside it.
+class Response(NamedTuple):
+    """Step response of integral force control, over time: force F_c and motor position, each with the exact one."""
+
+    force: Curve
+    motor: Curve
+
+
+def step_response(friction: tuple[float, float], damping: float, gain: float, seconds: float) -> Response:
+    """Response of the testbed to a step of 20 N m, the exact motion beside it.
 
     The motor is an ideal velocity source, the loop answers in every step.
+
+    Parameters
+    ----------
+    friction : static and dynamic, at the joint, N m.
+    damping : b at the joint, N m s/rad.
+    gain : G_I, rad/s/(N m).
+    seconds : how long.
     """
-    stiffness, friction, asked, gain = 1464.28, (6.0, 4.0), 20.0, 2.0e-2
+    stiffness, asked = 1464.28, 20.0
     arm = ideal_testbed(rotor=UNSTOPPABLE, friction=friction)
-    damping = 12.0
     arm = replace(arm, joints=replace(arm.joints, viscous_friction=(damping,)))
     plant = _plant(arm, World(NOTHING, Springs(("joint1",), (stiffness,), (1.0,), (0.0,), (True,))))
-    times, forces = [], []
-    for i in range(round(seconds / STEP)):
-        force = stiffness * plant.q[0]
-        times.append(i * STEP)
-        forces.append(force)
-        plant.data.qvel[0] = 14.0 * gain * (asked - force)
+    forces, motors = [], []
+    for _ in range(round(seconds / STEP)):
+        forces.append(stiffness * plant.q[0])
+        motors.append(plant.theta[0] / 14.0)
+        plant.data.qvel[0] = 14.0 * gain * (asked - forces[-1])
         plant.step([0.0])
     (circuit,) = arm.circuits
     inertia = arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
     node = FrictionNode(inertia, damping, 14.0**2 * circuit.stiffness, stiffness, friction[1], friction[0])
-    exact = simulate(node, ForceLoop(gain=gain), asked, seconds)
-    return Curve(np.array(times), np.array(forces), exact.at(np.array(times)).contact_force)
+    times = np.arange(len(forces)) * STEP
+    exact = simulate(node, ForceLoop(gain=gain), asked, seconds).at(times)
+    return Response(Curve(times, np.array(forces), exact.contact_force), Curve(times, np.array(motors), exact.x_m))
+
+
+def stiction_cycle() -> Curve:
+    """F_c of a force loop with stiction, (5.8) and (5.9), N m over s."""
+    return step_response((6.0, 4.0), damping=12.0, gain=2e-2, seconds=8.0).force
+
+
+def actuator_cycle() -> Curve:
+    """Motor position of a force loop with Coulomb friction, (5.20), rad over s; domain I, above gamma_b."""
+    return step_response((6.0, 6.0), damping=18.7, gain=4.3e-2, seconds=6.0).motor
+
+
+def impact() -> Curve:
+    """Greatest force of a link that runs into a spring at 0.5 rad/s, over its stiffness at the tip, N/m; (3.1).
+
+    F = v sqrt(J k); the cable is so long that the rotor is not felt.
+    """
+    stiffness = np.linspace(200.0, 2e4, 25)
+    arm = ideal_testbed()
+    arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
+    inertia = arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
+    found = []
+    for k in stiffness:
+        world = World(NOTHING, Springs(("joint1",), (float(k),), (LEVER,), (0.0,), (False,)))
+        plant = _plant(arm, world)
+        plant.data.qvel[:] = (-7.0, -0.5)
+        greatest = 0.0
+        for _ in range(round(np.pi * np.sqrt(inertia / k) / LEVER / STEP)):
+            plant.step([0.0])
+            greatest = max(greatest, -float(k) * LEVER * plant.q[0])
+        found.append(greatest)
+    return Curve(stiffness, np.array(found), 0.5 * np.sqrt(inertia * stiffness))
 
 
 STUDIES: dict[str, Callable[[], Curve]] = {
@@ -284,5 +329,7 @@ STUDIES: dict[str, Callable[[], Curve]] = {
     "ripple": ripple,
     "linear surface": lambda: surface(0.0),
     "hardening surface": lambda: surface(50.0),
+    "impact": impact,
+    "actuator cycle": actuator_cycle,
     "stiction cycle": stiction_cycle,
 }
