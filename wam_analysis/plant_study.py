@@ -285,7 +285,7 @@ def step_response(friction: tuple[float, float], damping: float, gain: float, se
     (circuit,) = arm.circuits
     inertia = arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
     node = FrictionNode(inertia, damping, 14.0**2 * circuit.stiffness, stiffness, friction[1], friction[0])
-    times = np.arange(len(forces)) * STEP
+    times = np.arange(len(forces), dtype=np.float64) * STEP
     exact = simulate(node, ForceLoop(gain=gain), asked, seconds).at(times)
     return Response(Curve(times, np.array(forces), exact.contact_force), Curve(times, np.array(motors), exact.x_m))
 
