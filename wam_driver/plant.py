@@ -26,6 +26,7 @@ from wam_description.world import Springs, World
 STUCK_ROTOR = 1e-5  # rad/s; below it a rotor counts as stuck: far under one step of any real motion
 STUCK_JOINT = 1e-6  # rad/s; 1e-3 would make the limit cycle of (5.8) vanish
 SHARPNESS = 32  # of the sharing between the ends of a tube: energy is kept to 0.2 %, equal depths within 2 % share
+ALL_OF_IT = (1.0,)
 BRAKE_TORQUE = 1e3  # N m at a rotor, far above any cable
 
 
@@ -274,7 +275,7 @@ class Plant:
         pairs = [self._pair[first, second] for first, second in contact.geom.tolist()]
         rows, distances = contact.efc_address.tolist(), contact.dist.tolist()
         reference, regularisation, velocity = data.efc_aref, data.efc_R, data.efc_vel.tolist()
-        shares = [1.0] * len(pairs) if len(set(pairs)) == len(pairs) else _shares(pairs, distances)
+        shares = ALL_OF_IT if len(pairs) == 1 else _shares(pairs, distances)
         for pair, row, distance, share in zip(pairs, rows, distances, shares):  # noqa: B905 - one of each for a contact
             if row >= 0:
                 stiffness, damping, hardening, size = self._surface[pair]
