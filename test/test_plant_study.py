@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wam_analysis.plant_figure import RATIOS, figure
-from wam_analysis.plant_study import STUDIES, cycle, resonances, stiction_cycle
+from wam_analysis.plant_study import LEVELS, STUDIES, cycle, resonances, stiction_cycle
 
 
 @pytest.mark.parametrize(
@@ -46,3 +46,17 @@ def test_figure_is_drawn_and_its_table_names_every_effect(tmp_path: Path) -> Non
     assert (tmp_path / "plant.png").stat().st_size > 50_000
     for name in (*STUDIES, "lower resonance", "upper resonance"):
         assert name in text
+
+
+@pytest.mark.parametrize(
+    ("name", "most"),
+    [
+        ("friction with tension, breakaway", 1e-3),  # the motor needs some steps to be seen moving
+        ("rubbing, breakaway", 2e-3),  # and the link some more
+        ("damping of the circuit, decay", 1e-2),  # explicit damping, h d N^2/J
+        ("amplifier, time to the continuous limit", 1e-3),  # a period of 1 ms
+        ("sensor noise, 20 000 readings", 2e-2),  # 1/sqrt(2 n) is 0.5 %
+    ],
+)
+def test_level_is_as_near_to_theory_as_promised(name: str, most: float) -> None:
+    assert LEVELS[name]().error < most

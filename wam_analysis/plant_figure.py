@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from wam_analysis.plant_study import STUDIES, Curve, cycle, resonances
+from wam_analysis.plant_study import LEVELS, STUDIES, Curve, cycle, resonances
 
 BLUE, ORANGE = "#0b6fb8", "#d55e00"
 RATIOS = (4.0, 14.0, 60.0)
@@ -98,6 +98,7 @@ def _table(curves: dict[str, Curve], worst: tuple[float, float]) -> str:
         ("lower resonance", worst[0]),
         ("upper resonance", worst[1]),
     ]
+    rows += [(name, level().error) for name, level in LEVELS.items()]
     lines = ["| effect | greatest difference from theory |", "| --- | --- |"]
     return "\n".join(lines + [f"| {name} | {_percent(error)} |" for name, error in rows]) + "\n"
 

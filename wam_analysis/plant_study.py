@@ -16,7 +16,10 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Ripples, no_effects
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
+from wam_driver.amplifier import Amplifier
+from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
+from wam_driver.sensors import Encoders
 from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, stage_loss
 from wam_theory.resonance import force_resonances
 from wam_theory.stick_slip import ForceLoop, FrictionNode, simulate
@@ -321,6 +324,79 @@ def impact() -> Curve:
         found.append(greatest)
     return Curve(stiffness, np.array(found), 0.5 * np.sqrt(inertia * stiffness))
 
+
+class Level(NamedTuple):
+    """One number of the plant and what it ought to be."""
+
+    plant: float
+    theory: float
+
+    @property
+    def error(self) -> float:
+        """Difference as a share of the theoretical value."""
+        return abs(self.plant / self.theory - 1.0)
+
+
+def _breakaway(plant: Plant, at_joint: bool, start: float) -> float:
+    """Torque, N m, at which a shaft at rest begins to turn, raised by a hundred-thousandth each step."""
+    torque = start
+    while abs(plant.qd[0] if at_joint else plant.thetad[0]) < 1e-5:
+        torque *= 1.00001
+        if at_joint:
+            plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+        plant.step([0.0 if at_joint else torque])
+    return torque
+
+
+def tension_friction(coefficient: float = 1e-4) -> Level:
+    """Breakaway torque of the motor by friction that goes with the tension of both strands, c (T1 + T2), (6.5)."""
+    arm = ideal_testbed(friction=(50.0, 50.0))  # the link stays where it is
+    plant = _plant(arm, tension_friction=(coefficient,))
+    return Level(_breakaway(plant, False, 0.06), coefficient * 2.0 * arm.circuits[0].pretension)
+
+
+def rubbing() -> Level:
+    """Breakaway torque of the joint with a rod of 0.7 N m pressed on it, motor free."""
+    plant = _plant(ideal_testbed(friction=(0.3, 0.3)))
+    plant.rub((0.7,))
+    return Level(_breakaway(plant, True, 0.9), 1.0)
+
+
+def circuit_damping() -> Level:
+    """Decay of the link against a motor that stands still, s^-1: N^2 d/(2 J)."""
+    damping = 0.02
+    arm = ideal_testbed(rotor=UNSTOPPABLE, damping=damping)
+    values = np.linalg.eigvals(_one_step_map(_plant(arm)))
+    swinging = values[np.abs(values.imag) > 1e-6][0]
+    inertia = arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
+    return Level(-float(np.log(np.abs(swinging))) / STEP, 14.0**2 * damping / (2.0 * inertia))
+
+
+def heating(share: float = 2.0) -> Level:
+    """Time until twice the continuous current is limited, s: T ln(r^2/(r^2 - 1))."""
+    configuration = Configuration.load(packaged("testbed"))
+    parameters = configuration.node("driver", DriverParameters).amplifier
+    amplifier = Amplifier(configuration.shared.arm.motors, parameters, np.random.default_rng(0))
+    asked, ticks = share * amplifier.continuous[0], 0
+    while amplifier.step([asked], 1e-3)[0] == asked:
+        ticks += 1
+    return Level(ticks * 1e-3, parameters.thermal_time * float(np.log(share**2 / (share**2 - 1.0))))
+
+
+def noise(sd: float = 1e-3) -> Level:
+    """Standard deviation of 20 000 readings of a motor encoder, rad."""
+    encoders = Encoders([0.0], [sd], np.random.default_rng(1))
+    readings = [encoders.read([0.0], [0.0], 1e-3)[0][0] for _ in range(20_000)]
+    return Level(float(np.std(readings)), sd)
+
+
+LEVELS: dict[str, Callable[[], Level]] = {
+    "friction with tension, breakaway": tension_friction,
+    "rubbing, breakaway": rubbing,
+    "damping of the circuit, decay": circuit_damping,
+    "amplifier, time to the continuous limit": heating,
+    "sensor noise, 20 000 readings": noise,
+}
 
 STUDIES: dict[str, Callable[[], Curve]] = {
     "slack": slack,
