@@ -406,16 +406,22 @@ TENSIONS = [
 ]
 
 
-@pytest.mark.parametrize(("pretension", "torque", "slack"), TENSIONS)
-def test_rotor_breaks_away_at_a_friction_in_proportion_to_both_tensions(
-    pretension: float, torque: float, slack: bool
-) -> None:
-    """Constant until a strand is slack, then growing; 0.1 %: the torque rises by 0.01 % a step."""
+def gripping_under_load(pretension: float, torque: float, slack: bool) -> Plant:
+    """At rest under a load that the motor carries with `torque`, brakes released just now."""
     machine = gripping(pretension, slack)
     machine.brake(True)
     load(machine, [-N * torque])
     drive(machine, 5.0, [torque])
     machine.brake(False)
+    return machine
+
+
+@pytest.mark.parametrize(("pretension", "torque", "slack"), TENSIONS)
+def test_rotor_breaks_away_at_a_friction_in_proportion_to_both_tensions(
+    pretension: float, torque: float, slack: bool
+) -> None:
+    """Constant until a strand is slack, then growing; 0.1 %: the torque rises by 0.01 % a step."""
+    machine = gripping_under_load(pretension, torque, slack)
     drive(machine, 0.1, [torque])
     both = sum_of_tensions(pretension, torque if slack else 0.0)
     expected = BASE + COEFFICIENT * both
@@ -433,11 +439,7 @@ def test_turning_rotor_loses_momentum_to_a_friction_in_proportion_to_both_tensio
     pretension: float, torque: float, slack: bool
 ) -> None:
     """Both inertias slow down together by F; the tension that counts is that of the decelerating link."""
-    machine = gripping(pretension, slack)
-    machine.brake(True)
-    load(machine, [-N * torque])
-    drive(machine, 5.0, [torque])
-    machine.brake(False)
+    machine = gripping_under_load(pretension, torque, slack)
     machine.data.qvel[:] = (20.0, 20.0 / N)
     drive(machine, 0.15, [torque])
     whole = ROTOR + LINK_INERTIA / N**2

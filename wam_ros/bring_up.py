@@ -7,8 +7,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -44,6 +44,15 @@ def check_nodes(configuration: Configuration) -> None:
             raise ParameterError(f"parameter 'nodes' names '{name}'; nodes: {', '.join(MODULES)}")
 
 
+@contextmanager
+def parameter_file(configuration: Configuration) -> Iterator[Path]:
+    """The values of a configuration as a file that ROS reads, as long as the context lasts."""
+    with tempfile.TemporaryDirectory(prefix="wam_stack_") as folder:
+        file = Path(folder) / "parameters.yaml"
+        file.write_text(configuration.text, encoding="utf-8")
+        yield file
+
+
 class Processes:
     """Nodes as processes of their own; leaving the context stops them all, brakes first, bag last.
 
@@ -57,9 +66,7 @@ class Processes:
         check_nodes(configuration)
         prepare_logging_directory()
         self._stack = ExitStack()
-        folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="wam_stack_")))
-        parameters = folder / "parameters.yaml"
-        parameters.write_text(configuration.text, encoding="utf-8")
+        parameters = self._stack.enter_context(parameter_file(configuration))
         self._processes = {
             name: _start(name, ["--params-file", str(parameters), "-r", f"__ns:=/{namespace.strip('/')}"])
             for name in configuration.shared.nodes
@@ -134,9 +141,7 @@ class Composition:
         self.executor = make_executor(self.context)
         self.nodes: dict[str, Node] = {}
         try:
-            with tempfile.TemporaryDirectory(prefix="wam_stack_") as folder:
-                parameters = Path(folder) / "parameters.yaml"
-                parameters.write_text(configuration.text, encoding="utf-8")
+            with parameter_file(configuration) as parameters:
                 for name in configuration.shared.nodes:
                     self._make(name, namespace, parameters)
         except BaseException:

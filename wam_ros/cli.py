@@ -3,7 +3,6 @@
 import argparse
 import importlib
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,11 +14,13 @@ from wam_description.parameters import ParameterError
 # commands that need no ROS; named here and imported when called, because ROS glue knows no analysis
 ANALYSES = {"report": "wam_analysis.demo_report:report", "plant": "wam_analysis.plant_figure:figure"}
 BASE_CONFIGURATION = "wam"
-REQUESTS = {  # of the command `call`: node and service
-    "estop": ("driver", "estop"),
-    "reset_fault": ("driver", "reset_fault"),
-    "reset": ("driver", "reset"),
-    "tare": ("force_loop", "tare"),
+REQUESTS = {  # of the command `call`: node, service, and the value where it is a switch
+    "enable": ("driver", "enable", True),
+    "disable": ("driver", "enable", False),
+    "estop": ("driver", "estop", None),
+    "reset_fault": ("driver", "reset_fault", None),
+    "reset": ("driver", "reset", None),
+    "tare": ("force_loop", "tare", None),
 }
 
 
@@ -72,8 +73,8 @@ def _parser() -> argparse.ArgumentParser:
     report = _command(commands, "report", _report, "say what a recording of the demonstration shows")
     report.add_argument("bag", help="directory of the bag")
 
-    call = _command(commands, "call", _call, "ask a running stack: enable, disable, estop, reset_fault, reset, tare")
-    call.add_argument("request", choices=(*REQUESTS, "enable", "disable"))
+    call = _command(commands, "call", _call, f"ask a running stack: {', '.join(REQUESTS)}")
+    call.add_argument("request", choices=tuple(REQUESTS))
     call.add_argument("--namespace", default="wam", help="namespace of the stack, default wam")
 
     plant = _command(commands, "plant", _plant, "draw the plant's effects beside the theory, print the differences")
@@ -167,16 +168,14 @@ def _node(given: argparse.Namespace) -> int:
 
 
 def _record(given: argparse.Namespace) -> int:
-    from wam_ros.bring_up import node_class
+    from wam_ros.bring_up import node_class, parameter_file
     from wam_ros.run import run
 
     values = {"recorder:name": given.name}
     if given.directory:
         values["recorder:directory"] = given.directory
     configuration = _configuration(given).with_values(values)
-    with tempfile.TemporaryDirectory(prefix="wam_stack_") as folder:
-        file = Path(folder) / "parameters.yaml"
-        file.write_text(configuration.text, encoding="utf-8")
+    with parameter_file(configuration) as file:
         run(node_class("recorder"), ["wam", "--ros-args", "--params-file", str(file)])
     return 0
 
@@ -184,8 +183,7 @@ def _record(given: argparse.Namespace) -> int:
 def _call(given: argparse.Namespace) -> int:
     from wam_ros.call import call
 
-    node, service = REQUESTS.get(given.request, ("driver", "enable"))
-    switch = {"enable": True, "disable": False}.get(given.request)
+    node, service, switch = REQUESTS[given.request]
     answer = call(f"/{given.namespace.strip('/')}/{node}/{service}", switch)
     print(answer.message)
     return 0 if answer.success else 1
