@@ -9,7 +9,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from wam_ros.run import make_executor, prepare_logging_directory
 
-PATIENCE = 3.0  # s
+PATIENCE = 10.0  # s
+ATTEMPTS = 20  # an answer can be lost while the service still discovers who asks; asking twice does no harm
 
 
 class Reply(NamedTuple):
@@ -38,12 +39,14 @@ def call(service: str, switch: bool | None) -> Reply:
         client = node.create_client(kind, service)
         if not client.wait_for_service(PATIENCE):
             return Reply(False, f"no service {service} within {PATIENCE:g} s; start the stack with 'wam up'")
-        future = client.call_async(kind.Request() if switch is None else kind.Request(data=switch))
-        executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
-        answer = future.result() if future.done() else None
-        if answer is None:
-            return Reply(False, f"no answer from {service} within {PATIENCE:g} s")
-        return Reply(bool(answer.success), str(answer.message))
+        request = kind.Request() if switch is None else kind.Request(data=switch)
+        for _ in range(ATTEMPTS):
+            future = client.call_async(request)
+            executor.spin_until_future_complete(future, timeout_sec=PATIENCE / ATTEMPTS)
+            if future.done():
+                answer = future.result()
+                return Reply(bool(answer.success), str(answer.message))
+        return Reply(False, f"no answer from {service} within {PATIENCE:g} s")
     finally:
         executor.remove_node(node)
         node.destroy_node()
