@@ -189,6 +189,8 @@ def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
         ({"force_gain": [0.02], "posture_gain": "much"}, "Wrong parameter type"),
         ({"force_gain": [0.02], "timing.mode": "lockstep"}, "timing.mode"),
         ({"force_gain": [0.02], "force_gian": 0.02}, "undeclared parameter"),
+        ({"force_gain": [0.5]}, "times the largest linearly stable one"),
+        ({"force_gain": [0.02], "guard.contact_stiffness": 0.5}, "guard.contact_stiffness"),
     ],
 )
 def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, Any], text: str, ros: Any) -> None:
@@ -236,6 +238,7 @@ def run_node(name: str, *arguments: str, timeout: float = 20.0) -> subprocess.Co
     [
         ("velocity_loop", "integral_gain:", "integral_gian:", "unknown parameter 'integral_gian'"),
         ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
+        ("force_loop", "force_gain: [1.5e-2]", "force_gain: [0.5]", "times the largest linearly stable one"),
         ("transform", "mode: realtime", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of realtime"),
     ],
 )

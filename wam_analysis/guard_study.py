@@ -25,6 +25,7 @@ from wam_theory.stick_slip import FrictionNode, Verdict, assess, simulate
 RESTS, CYCLES, DIVERGES = "rests", "cycles", "diverges"
 ENDS = (RESTS, CYCLES, DIVERGES)  # from good to bad
 EVENTS = 6000
+SHORTEST = 20  # events around F_des, below which a response is still on its way
 GROWTH = 1.1  # of the last quarter over the one before, that counts as growing
 
 
@@ -85,10 +86,14 @@ def _exact_end(node: FrictionNode, loop: ExactLoop, step: float, throw: float) -
     if found.verdict is Verdict.DIVERGED:
         return DIVERGES
     events = simulate(node, loop, step, max(found.time, 1e-9), (0.0, speed, 0.0), EVENTS).events
-    forces = np.array([event.contact_force for event in events])
-    quarter = len(forces) // 4
-    late, before = np.ptp(forces[-quarter:]), np.ptp(forces[-2 * quarter : -quarter])
-    if late > GROWTH * before:
+    errors = step - np.array([event.contact_force for event in events])
+    passes = np.flatnonzero(np.diff(np.sign(errors)))
+    around = errors[passes[0] :] if passes.size else errors[:0]  # what comes before is on its way
+    quarter = len(around) // 4
+    if quarter < SHORTEST:
+        return RESTS
+    late, before = np.ptp(around[-quarter:]), np.ptp(around[-2 * quarter : -quarter])
+    if late > GROWTH * before and late > loop.error_limit:
         return DIVERGES
     return _by_size(float(late), loop.error_limit, stiction)
 

@@ -9,6 +9,7 @@ from std_srvs.srv import Trigger
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
 from wam_control.guard_report import Report
 from wam_description.arm import seconds
+from wam_description.parameters import ParameterError
 from wam_description.signals import State
 from wam_ros.lockstep import Gate, Need
 from wam_ros.messages import (
@@ -35,7 +36,10 @@ class ForceLoopNode(Node):
     def __init__(self, **ros: Any) -> None:
         super().__init__("force_loop", **ros)
         shared, own = declare(self, PARAMETERS)
-        self._loop = ForceLoop(shared.arm, own, shared.timing)
+        try:
+            self._loop = ForceLoop(shared.arm, own, shared.timing)
+        except ParameterError as error:
+            raise ParameterError(f"node '{self.get_name()}': {error}") from None
         follow(self, own, self._loop.tune)
         self._ports = ports = Ports(self, shared)
         self._outer_period = shared.timing.outer_period_ns

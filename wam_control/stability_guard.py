@@ -10,6 +10,7 @@ saturation found stable.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from wam_theory.stick_slip import FrictionNode
 
 Array = NDArray[np.float64]
 SMALLEST_LEVER = 0.05  # relative singular value below which a direction of force is left out
+ESTIMATE = "contact_estimate"
 LARGEST = 10.0  # scale of the gains above which no margin is looked for
 SCALES: tuple[float, ...] = tuple(np.geomspace(0.01, LARGEST, 19).tolist())
 REACH = 1e-3  # m; a force whose lever on every joint is shorter cannot be applied
@@ -166,10 +168,10 @@ class StabilityGuard:
         """
         for touch in touches:
             contact = self._contact(touch)
-            for late in {0, self.parameters.late}:
+            for late, feedback in product(sorted({0, self.parameters.late}), _lags(task.feedback)):
                 axes = self._axes(task, touch, late)
                 for part in self._parts(task):
-                    yield self._loop.margin(touch.q, axes, part * contact, task.feedback, tried)
+                    yield self._loop.margin(touch.q, axes, part * contact, feedback, tried)
 
     def judge(self, task: Task, touches: Sequence[Touch]) -> Judgement:
         """The worst that a set comes to at some touches.
@@ -300,6 +302,11 @@ class StabilityGuard:
         jacobian = self._loop.body.point_jacobian(touch.q, touch.cover, (touch.place, 0.0, 0.0))
         result: Array = np.array(touch.direction) @ jacobian
         return result
+
+
+def _lags(feedback: Feedback) -> list[Feedback]:
+    """The feedback with its lag, and without: a lag can also steady a loop, and is not relied on."""
+    return [feedback._replace(lag=lag) for lag in sorted({0.0, feedback.lag if feedback.kind == ESTIMATE else 0.0})]
 
 
 def _list(values: Sequence[float]) -> str:
