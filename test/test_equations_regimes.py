@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wam_theory import linear_loop, regimes
-from wam_theory.stick_slip import ForceLoop, FrictionNode, Kind, simulate
+from wam_theory.stick_slip import ForceLoop, FrictionNode, Kind, half_cycle, simulate
 
 
 def slip_by_matrix(gamma: float, zeta: float, samples: int = 400) -> tuple[float, float] | None:
@@ -50,6 +50,14 @@ def test_psi_is_the_ratio_that_matrix_steps_find(zeta: float) -> None:
         stopped = slip_by_matrix(gamma, zeta)
         assert stopped is not None
         assert regimes.psi(gamma, zeta) == pytest.approx(-stopped[0], abs=1e-7)
+
+
+@pytest.mark.parametrize(("gamma", "zeta"), [(0.7, 0.25), (1.8, 0.25), (1.2, 1.1)])
+def test_half_cycle_ends_where_matrix_steps_of_5_14_do(gamma: float, zeta: float) -> None:
+    stopped = slip_by_matrix(gamma, zeta)
+    assert stopped is not None
+    slip = half_cycle(gamma, zeta)
+    assert (slip.error, slip.acceleration) == pytest.approx(stopped, abs=1e-7)
 
 
 def test_psi_is_the_ratio_of_errors_at_successive_standstills() -> None:

@@ -83,6 +83,12 @@ def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tup
 
     T0 +- tau/(2 r), and tau/r and zero once the loose strand is slack (section 6.5: no strand goes
     slack where T0 is half of the full-torque tension).
+
+    Parameters
+    ----------
+    torque : at the pinion, N m.
+    pretension : T0, N, zero or more.
+    radius : of the pinion, m, above zero.
     """
     (radius,) = above_zero(radius=radius)
     (pretension,) = zero_or_more(pretension=pretension)

@@ -77,7 +77,7 @@ def predicted_unstable_cycle(
 
     N(A) takes the place of damping that is missing: b + N(A) = gamma b at omega = sqrt(ks/J_l), so that
     A = 4 F_friction/(pi b (gamma - 1)).  Against `unstable_cycle`, for zeta = 0.25, the force is 0.7 %
-    too large at gamma = 1.1, 5 % at 1.5, 18 % at 2.0 and 44 % at gamma_III = 2.19, and the frequency 0.03 %,
+    too large at gamma = 1.1, 5 % at 1.5, 18 % at 2.0 and 46 % at gamma_III = 2.19, and the frequency 0.03 %,
     1 %, 5 % and 13 %; in domain III a cycle is predicted where none exists.
 
     Parameters

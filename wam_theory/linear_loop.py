@@ -24,7 +24,12 @@ class SampledMargin(NamedTuple):
 
 
 def series_stiffness(transmission_stiffness: ArrayLike, contact_stiffness: ArrayLike) -> Array:
-    """K = k_tr k_c/(k_tr + k_c), N m/rad, of transmission and contact, both above zero."""
+    """K = k_tr k_c/(k_tr + k_c), N m/rad, of transmission and contact one after the other.
+
+    Parameters
+    ----------
+    transmission_stiffness, contact_stiffness : N m/rad, above zero.
+    """
     ktr, kc = above_zero(transmission_stiffness=transmission_stiffness, contact_stiffness=contact_stiffness)
     return ktr * kc / (ktr + kc)
 

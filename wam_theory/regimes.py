@@ -59,7 +59,7 @@ def gamma_a(zeta: ArrayLike) -> Array:
 
 
 def gamma_b(zeta: ArrayLike) -> Array:
-    """Value of gamma where Psi = 0: above it a slip overshoots F_des, and x_m has the cycle (5.20); not in print.
+    """Value of gamma where Psi = 0: above it a slip overshoots F_des, and x_m cycles; not in print.
 
     From zeta = sqrt(3)/2 on that is gamma_a.  Below zeta = 0.1372 it lies above the Routh limit, so that
     a lightly damped node (zeta = 0.05: 2.51) has no cycle of x_m in domain I.
