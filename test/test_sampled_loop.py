@@ -12,7 +12,7 @@ from wam_control.sampled_loop import Axes, Feedback, SampledLoop, Servo
 from wam_control.scenario import Step
 from wam_description.arm import Arm, Timing
 from wam_description.configuration import Configuration, packaged
-from wam_theory.limit_cycles import sampled_margin
+from wam_theory.linear_loop import sampled_margin
 
 TESTBED = Configuration.load(packaged("testbed"))
 STIFFNESS = 1500.0  # N/m at the tip

@@ -9,14 +9,9 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import NamedTuple
 
-from wam_theory.limit_cycles import (
-    damping_ratio,
-    routh_gain,
-    sampled_margin,
-    stiction_cycle_force,
-    stiction_cycle_period,
-)
+from wam_theory.linear_loop import damping_ratio, routh_gain, sampled_margin
 from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess
+from wam_theory.stiction import stiction_cycle_force, stiction_cycle_period
 
 SOFTER = (1.0, 0.6, 0.35, 0.2, 0.1, 0.03)  # parts of the worst contact stiffness that are looked at as well
 STEPS = (0.3, 0.8, 1.0, 1.5, 3.0, 10.0, 50.0)  # of F_des, in saturations, that have to come to rest
