@@ -19,7 +19,7 @@ from wam_control.force_law import ForceLaw
 from wam_control.force_loop_parameters import ForceLoopParameters, force_law, task_of, torque_law
 from wam_control.guard_report import report
 from wam_control.guard_watch import Watch, place_is_sure, possible_touches
-from wam_control.stability_guard import Judgement, StabilityGuard, Touch
+from wam_control.stability_guard import REACH, SMALLEST_LEVER, Judgement, StabilityGuard, Touch
 from wam_description.arm import Arm, Timing
 from wam_description.parameters import lengths, require
 from wam_description.rigid_body import RigidBody
@@ -28,8 +28,6 @@ from wam_description.signals import Contact, State
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
 Array = NDArray[np.float64]
-REACH = 1e-3  # m; a force whose lever on every joint is shorter cannot be applied
-SMALLEST_LEVER = 0.05  # relative singular value below which a direction of force is left out
 
 
 class ForceCommand(NamedTuple):
@@ -42,7 +40,8 @@ class ForceCommand(NamedTuple):
 class ForceOutput(NamedTuple):
     """What one period of the force loop asks for, and what it saw.
 
-    The three forces are components along the commanded direction, as vectors in the command's frame.
+    Measured force and error are components along the commanded direction, as vectors in the command's
+    frame; limited is the error of each axis of that frame after its own saturation.
     """
 
     velocity: list[float]  # (n,) rad/s, empty for torque only
