@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from wam_theory.stick_slip import half_cycle
+from wam_theory.half_cycle import half_cycle
 
 Array = NDArray[np.float64]
 
