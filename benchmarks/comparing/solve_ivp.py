@@ -21,7 +21,7 @@ class Tolerances(NamedTuple):
 
 
 # Of RK23, RK45, DOP853 and LSODA at rtol 1e-3 to 1e-6 the fastest that keeps the boundary to 0.5 %
-BEST = Tolerances("DOP853", 1e-4, 1e-6)
+BEST = Tolerances("DOP853", 1e-5, 1e-7)
 
 
 class Node(NamedTuple):
