@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wam_theory.limit_cycles import gamma_3, point_b
 from wam_theory.many_slips import modes, slip
+from wam_theory.regimes import gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
 from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess, largest_stable_step
 

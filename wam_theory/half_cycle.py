@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from wam_theory.friction_node import require
-from wam_theory.slip_arc import Zone, cubic_roots, first_stop, slip_arc, state_after
+from wam_theory.slip_arc import Zone, arc_from, cubic_roots, first_stop, state_after
 
 _INF = math.inf
 
@@ -33,7 +33,7 @@ def half_cycle(gamma: float, zeta: float) -> HalfCycle:
     require("gamma", gamma, above=0.0)
     require("zeta", zeta, above=0.0)
     zone = Zone(cubic_roots(2.0 * zeta, 1.0, 2.0 * zeta * gamma), True, 0.0, 0.0, 1.0, 1.0)
-    arc = slip_arc(zone, 0.0, 1.0, 0.0, 0.0)
+    arc = arc_from(zone, 0.0, 1.0, 0.0, 0.0)
     duration = first_stop(arc, -1, True)
     if duration == _INF:
         return HalfCycle(0.0, 0.0, _INF)

@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from wam_theory.friction_node import ForceLoop, FrictionNode, require
-from wam_theory.slip_arc import Arc, Zone, crossing, cubic_roots, first_stop, quadratic_roots, slip_arc, state_after
+from wam_theory.slip_arc import Arc, Zone, arc_from, crossing, cubic_roots, first_stop, quadratic_roots, state_after
 
 _INF = math.inf
 
@@ -152,7 +152,7 @@ def phases_of(model: Model, start: tuple[float, float, float]) -> Iterator[Phase
             a = sign * (node.static_friction - dynamic) / j
             continue
         yield t, kind, sign, i, rate, x, v, m, a
-        arc = slip_arc(zone, rate, x, v, a)
+        arc = arc_from(zone, rate, x, v, a)
         cause, end = _slip_end(arc, sign, v == 0.0, breaks[i + (sign > 0)], hold.next - t if hold else _INF)
         if end == _INF:
             return

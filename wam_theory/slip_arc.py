@@ -92,7 +92,7 @@ class Zone(NamedTuple):
     ramp: float  # v of the node for x_m' = 1, once it follows
 
 
-def slip_arc(zone: Zone, rate: float, x: float, v: float, acceleration: float) -> Arc:
+def arc_from(zone: Zone, rate: float, x: float, v: float, acceleration: float) -> Arc:
     """Closed form of a slip from its initial state."""
     lam, alpha, square, width, apart = zone.roots
     if zone.linear:

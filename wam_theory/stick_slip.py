@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from wam_theory.friction_node import ForceLoop, FrictionNode, require
 from wam_theory.half_cycle import HalfCycle, half_cycle
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
-from wam_theory.slip_arc import slip_arc, state_after
+from wam_theory.slip_arc import arc_from, state_after
 from wam_theory.staircase import Staircase, inertialess_staircase
 from wam_theory.verdicts import Outcome, Verdict, assess, largest_stable_step
 
@@ -110,7 +110,7 @@ class Trajectory:
         zone, dt = self._model.zones[i], time - start
         m += rate * dt
         if sign:
-            x, v, a = state_after(slip_arc(zone, rate, x, v, a), dt)
+            x, v, a = state_after(arc_from(zone, rate, x, v, a), dt)
             if zone.linear:
                 m = self._model.motor(zone, sign, (x, v, a))
         return x, v, m, self._model.contact_force(x)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from wam_theory.friction_node import ForceLoop, FrictionNode, require
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
-from wam_theory.slip_arc import slip_arc
+from wam_theory.slip_arc import arc_from
 
 _INF = math.inf
 
@@ -58,7 +58,7 @@ def _runaway_size(model: Model) -> float:
 def _runs_away(model: Model, phase: Phase, size: float) -> bool:
     """Whether the phase, which begins with a reversal, is the beginning of the end."""
     _, _, _, i, rate, x, v, _, a = phase
-    arc = slip_arc(model.zones[i], rate, x, v, a)
+    arc = arc_from(model.zones[i], rate, x, v, a)
     pair = math.hypot(arc.b, arc.c / arc.width)
     return pair > size and abs(arc.real) < 0.1 * pair
 
