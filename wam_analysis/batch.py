@@ -7,6 +7,7 @@ whoever computes them: results do not depend on the executor in any bit.
 """
 
 import hashlib
+import importlib
 import inspect
 import multiprocessing
 import os
@@ -182,11 +183,11 @@ def dask(address: str) -> Iterator[Executor]:
         where Dask is not installed, or nobody answers.
     """
     try:
-        from distributed import Client
+        distributed: Any = importlib.import_module("distributed")
     except ImportError:
         raise ValueError("Dask is not installed; pip install 'wam_stack[dask]'") from None
     try:
-        client = Client(address, timeout=10, set_as_default=False)
+        client = distributed.Client(address, timeout=10, set_as_default=False)
     except OSError as error:
         raise ValueError(f"no Dask scheduler answers at {address}: {error}") from None
     with client:

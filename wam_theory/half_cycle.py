@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from wam_theory.friction_node import require
+from wam_theory.friction_model import require
 from wam_theory.slip_arc import Zone, arc_from, cubic_roots, first_stop, state_after
 
 _INF = math.inf

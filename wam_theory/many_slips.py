@@ -52,7 +52,13 @@ class Standstill(NamedTuple):
 
 
 def modes(gamma: Array, zeta: Array) -> Modes:
-    """Roots of s^3 + 2 zeta s^2 + s + 2 zeta gamma by Cardano, polished by Newton; gamma above 1."""
+    """Roots of s^3 + 2 zeta s^2 + s + 2 zeta gamma by Cardano, polished by Newton.
+
+    Parameters
+    ----------
+    gamma : (n,), above 1.
+    zeta : (n,), above zero.
+    """
     c2, c0 = 2.0 * zeta, 2.0 * zeta * gamma
     p = 1.0 - c2 * c2 / 3.0
     q = (2.0 * c2 * c2 / 27.0 - 1.0 / 3.0) * c2 + c0
@@ -65,7 +71,14 @@ def modes(gamma: Array, zeta: Array) -> Modes:
 
 
 def slip(nodes: Modes, error: Array, acceleration: Array) -> Standstill:
-    """The slip in direction + from a standstill with this xi and xi'' (zero or more) to the next standstill."""
+    """The slip in direction + from one standstill to the next.
+
+    Parameters
+    ----------
+    nodes : n nodes.
+    error : (n,), xi at its beginning.
+    acceleration : (n,), xi'' at its beginning, zero or more.
+    """
     lam, alpha, w = nodes.real, nodes.alpha, nodes.width
     real = (acceleration + nodes.square * error) / nodes.apart
     b = error - real

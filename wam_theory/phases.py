@@ -12,7 +12,7 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
-from wam_theory.friction_node import ForceLoop, FrictionNode, require
+from wam_theory.friction_model import ForceLoop, FrictionNode, require
 from wam_theory.slip_arc import Arc, Zone, arc_from, crossing, cubic_roots, first_stop, quadratic_roots, state_after
 
 _INF = math.inf
@@ -52,7 +52,13 @@ class Model(NamedTuple):
 
 
 def prepared(node: FrictionNode, loop: ForceLoop, force: float) -> Model:
-    """Zones of x, with the roots of each."""
+    """Node and loop for one desired force: zones of x, with the roots of each.
+
+    Parameters
+    ----------
+    node, loop : what is simulated.
+    force : F_des, N m.
+    """
     require("force", force, at_least=-1e300)
     force = float(force)
     j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
@@ -121,7 +127,13 @@ Phase = tuple[float, Kind, int, int, float, float, float, float, float]
 
 
 def phases_of(model: Model, start: tuple[float, float, float]) -> Iterator[Phase]:
-    """Phases one after the other, until one lasts for ever."""
+    """Phases one after the other, until one lasts for ever.
+
+    Parameters
+    ----------
+    model : of `prepared`.
+    start : x, v, x_m at time 0.
+    """
     node, breaks, j, dynamic = model.node, model.breaks, model.node.inertia, model.node.dynamic_friction
     x, v, m = map(float, start)
     t, kind = 0.0, Kind.START

@@ -1,6 +1,6 @@
 """A slip in closed form, and the exact time of what ends it.
 
-While the sign of the velocity stands the model of `friction_node` is linear: x(t) comes from the roots
+While the sign of the velocity stands the model of `friction_model` is linear: x(t) comes from the roots
 of the cubic (5.14), or of the quadratic where x_m moves at a constant rate.  No event can be missed:
 extremes of the velocity, divided by its real mode, are known, so its first zero is bracketed between
 two of them, and until then x is monotone, which brackets every switch at a position.
@@ -27,6 +27,10 @@ def cubic_roots(c2: float, c1: float, c0: float) -> Roots:
     """Roots of s^3 + c2 s^2 + c1 s + c0, c0 > 0; of three real ones the one that stands apart is `real`.
 
     At a triple root c0 is moved by 1e-12 of itself: the modal form needs distinct roots.
+
+    Parameters
+    ----------
+    c2, c1, c0 : coefficients.
     """
     shift = -c2 / 3.0
     p = c1 - c2 * c2 / 3.0
@@ -53,7 +57,12 @@ def cubic_roots(c2: float, c1: float, c0: float) -> Roots:
 
 
 def quadratic_roots(c1: float, c0: float) -> Roots:
-    """Roots of s (s^2 + c1 s + c0): a node between a motor at constant speed and its springs."""
+    """Roots of s (s^2 + c1 s + c0): a node between a motor at constant speed and its springs.
+
+    Parameters
+    ----------
+    c1, c0 : coefficients.
+    """
     alpha = -c1 / 2.0
     square = alpha * alpha - c0
     if abs(square) < 1e-14 * c0:
@@ -93,7 +102,14 @@ class Zone(NamedTuple):
 
 
 def arc_from(zone: Zone, rate: float, x: float, v: float, acceleration: float) -> Arc:
-    """Closed form of a slip from its initial state."""
+    """Closed form of a slip from its initial state.
+
+    Parameters
+    ----------
+    zone : where it begins.
+    rate : of x_m, unless the zone is linear.
+    x, v, acceleration : at its beginning.
+    """
     lam, alpha, square, width, apart = zone.roots
     if zone.linear:
         xi = x - zone.target
@@ -124,7 +140,7 @@ def _pair(alpha: float, square: float, width: float, t: float) -> tuple[float, f
 
 
 def state_after(arc: Arc, t: float) -> tuple[float, float, float]:
-    """x, v and acceleration after t."""
+    """x, v and acceleration of an arc after time t, s."""
     lam, alpha, square, width, centre, ramp, real, b, c, velocity_real, p, q = arc
     cos, sin = _pair(alpha, square, width, t)
     e = math.exp(lam * t)
@@ -140,6 +156,15 @@ def first_stop(arc: Arc, sign: int, from_rest: bool, horizon: float = _INF) -> f
 
     Beyond the horizon any time beyond it will do.
 
+    Parameters
+    ----------
+    arc : of the slip.
+    sign : of the motion.
+    from_rest : whether v is zero at first.
+    horizon : s.
+
+    Notes
+    -----
     g = sign v e^(-lam t) = sign a + e^(beta t) R cos(w t - phi) has its minima one turn apart, and
     the least or the first negative one is known: the zero lies between it and the maximum before.
     """
@@ -237,7 +262,15 @@ def _first_stop_overdamped(arc: Arc, sign: int, from_rest: bool, horizon: float)
 
 
 def crossing(arc: Arc, sign: int, position: float, end: float) -> float:
-    """Time at which x, monotone in direction sign until end, reaches the position; infinite if never."""
+    """Time at which x, monotone in direction sign until end, reaches the position; infinite if never.
+
+    Parameters
+    ----------
+    arc : of the slip.
+    sign : of the motion.
+    position : x that is waited for.
+    end : of the slip, s.
+    """
     if end == _INF:
         if not arc.ramp and sign * (arc.centre - position) <= 0.0:
             return _INF

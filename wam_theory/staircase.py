@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_theory.friction_node import FrictionNode, require
+from wam_theory.friction_model import FrictionNode, require
 
 
 class Staircase(NamedTuple):

@@ -2,7 +2,7 @@
 
     J x'' = k_tr (x_m - x) - F_c - b x' - friction,    F_c = k_c x,    x_m' = G_I F_error
 
-Parameters are in `friction_node`, closed forms in `slip_arc`, events in `phases`, judgement in
+Parameters are in `friction_model`, closed forms in `slip_arc`, events in `phases`, judgement in
 `verdicts`, many steps at once in `stability_map`; what simulates one response is imported from here.
 Units are free but consistent (N, m, s or N m, rad, s).
 """
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wam_theory.friction_node import ForceLoop, FrictionNode, require
+from wam_theory.friction_model import ForceLoop, FrictionNode, require
 from wam_theory.half_cycle import HalfCycle, half_cycle
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
 from wam_theory.slip_arc import arc_from, state_after

@@ -6,7 +6,7 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
-from wam_theory.friction_node import ForceLoop, FrictionNode, require
+from wam_theory.friction_model import ForceLoop, FrictionNode, require
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
 from wam_theory.slip_arc import arc_from
 

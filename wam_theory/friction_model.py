@@ -102,7 +102,13 @@ def _as_floats(instance: object, *names: str) -> None:
 
 
 def require(name: str, value: float, above: float | None = None, at_least: float | None = None) -> None:
-    """Refuse a value that is not finite or not in its range."""
+    """Refuse a value that is not finite or not in its range.
+
+    Parameters
+    ----------
+    name, value : of the argument.
+    above, at_least : the bound, one of the two.
+    """
     if above is not None and not above < value < _INF:
         raise ValueError(f"{name} is {value}; it must be finite and above {above:g}")
     if at_least is not None and not at_least <= value < _INF:
