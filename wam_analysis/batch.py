@@ -24,6 +24,8 @@ from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from typing import Any, TypeVar
 
+from wam_description.configuration import packaged
+
 Input = TypeVar("Input")
 Output = TypeVar("Output")
 Report = Callable[[int, int], None]
@@ -31,8 +33,8 @@ _ROOT = Path(__file__).resolve().parents[1]
 _LOOK = 0.2  # s, between two looks for Ctrl-C
 
 
-class PieceError(RuntimeError):
-    """A piece failed; what was finished before is kept."""
+class PieceError(ValueError):
+    """An input cannot be computed; what was finished before is kept."""
 
 
 def results(
@@ -108,7 +110,7 @@ def _key(function: Callable[..., Any], given: Any) -> str:
 def _sources() -> str:
     """Hash of every source file of the stack, and of what it computes with."""
     digest = hashlib.sha256(f"{version('numpy')} {version('mujoco')}".encode())
-    for path in sorted([*_ROOT.glob("wam_*/**/*.py"), *_ROOT.glob("config/*.yaml")]):
+    for path in sorted([*_ROOT.glob("wam_*/**/*.py"), *packaged("testbed").parent.glob("*.yaml")]):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
@@ -136,6 +138,19 @@ def _read(file: Path) -> tuple[Any] | None:
 
 
 @contextmanager
+def executor(workers: int | None, dask_address: str | None) -> Iterator[Executor]:
+    """That of `dask` where an address is given, else that of `processes`.
+
+    Parameters
+    ----------
+    workers : processes of this machine.
+    dask_address : of a scheduler.
+    """
+    with dask(dask_address) if dask_address else processes(workers) as found:
+        yield found
+
+
+@contextmanager
 def processes(workers: int | None = None) -> Iterator[Executor]:
     """Executor of processes of this machine; on Ctrl-C, or where this process dies, they end at once.
 
@@ -143,9 +158,15 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     ----------
     workers : how many; None for as many as there are cores.
     """
+    count = workers or os.cpu_count() or 1
     context = multiprocessing.get_context("spawn")
     end, ours = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_worker, initargs=(end,))
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_worker, initargs=(end,))
+    # a worker inherits the mask: Ctrl-C in a terminal, which goes to all of them, is ours alone
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    for _ in range(count):
+        pool.submit(os.getpid)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
     try:
         yield pool
     except BaseException:
@@ -158,8 +179,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
 
 
 def _worker(end: Connection) -> None:
-    """Leave Ctrl-C to the process that started us, and end with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """End when the process that started us says so, or dies."""
     parent = multiprocessing.parent_process()
 
     def watch() -> None:
@@ -170,12 +190,13 @@ def _worker(end: Connection) -> None:
 
 
 @contextmanager
-def dask(address: str) -> Iterator[Executor]:
+def dask(address: str, patience: float = 10.0) -> Iterator[Executor]:
     """Executor of a Dask cluster, whose workers have this package installed.
 
     Parameters
     ----------
     address : of the scheduler, for example tcp://10.0.0.1:8786.
+    patience : s, how long it may take to answer.
 
     Raises
     ------
@@ -187,7 +208,7 @@ def dask(address: str) -> Iterator[Executor]:
     except ImportError:
         raise ValueError("Dask is not installed; pip install 'wam_stack[dask]'") from None
     try:
-        client = distributed.Client(address, timeout=10, set_as_default=False)
+        client = distributed.Client(address, timeout=patience, set_as_default=False)
     except OSError as error:
         raise ValueError(f"no Dask scheduler answers at {address}: {error}") from None
     with client:
