@@ -16,13 +16,14 @@ Numbers = NDArray[np.float64]
 
 
 class PlantResponse(NamedTuple):
-    """What the plant does after a step of the desired force, arrays over time (n,), and the node that theory takes for it.
+    """What the plant does after a step of the desired force, arrays over time (n,), and the node that theory takes.
 
-    `time` s, `force` F_c N m, `velocity` of the link rad/s, `motor` x_m at the joint rad.
+    `time` s, `force` F_c N m, `position` rad and `velocity` rad/s of the link, `motor` x_m at the joint rad.
     """
 
     time: Numbers
     force: Numbers
+    position: Numbers
     velocity: Numbers
     motor: Numbers
     node: FrictionNode
@@ -87,12 +88,12 @@ def force_step(
     for _ in range(round(seconds / step)):
         q, motor = side * plant.q[0], side * plant.theta[0] / RATIO
         force = stiffness * (max(q, 0.0) if unilateral else q)
-        rows.append((force, side * plant.qd[0], motor))
+        rows.append((force, q, side * plant.qd[0], motor))
         rate = gain * (asked - force)
         if proportional:
             rate = (rate - motor) / step
         plant.data.qvel[0] = side * RATIO * rate
         plant.step([0.0])
-    forces, velocities, motors = np.array(rows).T
+    forces, positions, velocities, motors = np.array(rows).T
     time = np.arange(len(rows), dtype=np.float64) * step
-    return PlantResponse(time, forces, velocities, motors, loop_node(arm, stiffness, unilateral))
+    return PlantResponse(time, forces, positions, velocities, motors, loop_node(arm, stiffness, unilateral))
