@@ -111,7 +111,7 @@ def test_half_cycles_shrink_by_psi_and_the_motor_goes_on(found: dict[str, Any]) 
     np.testing.assert_allclose(levels, 20.0 * 0.675704607 ** np.arange(levels.size), rtol=1e-6)
     assert levels.size > 5
     # (5.20), which the slip itself, with the motor moving on, still exceeds a little
-    late = response.motor.y[response.motor.x > 0.8]
+    late = response.motor.y[response.motor.x > 1.0]
     assert np.ptp(late) == pytest.approx(2.0 * 18.5 / K_TR, rel=0.03)
     assert found["5.11"].gamma == 1.5
 

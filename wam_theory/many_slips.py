@@ -99,8 +99,9 @@ def slip(nodes: Modes, error: Array, acceleration: Array) -> Standstill:
 def _stops(beta: Array, width: Array, p: Array, q: Array) -> Array:
     """First time above zero at which h = -p e^(-beta t) + p cos(w t) + q sin(w t), v e^(-alpha t), is zero.
 
-    h e^(beta t) has its minima one turn apart; the first negative one is known, and the zero lies
-    between it and the maximum before.
+    h e^(beta t) has its minima one turn apart, each deeper than the one before.  The one before the
+    beginning is not above zero, since v rises from there to zero: the next one is negative, and the zero
+    lies between it and the maximum before.
     """
     size = np.hypot(p, q)
     lag = np.arctan(beta / width)
@@ -108,12 +109,6 @@ def _stops(beta: Array, width: Array, p: Array, q: Array) -> Array:
     since = np.mod(-phase - lag - math.pi, _TURN)  # phase since the last minimum
     since = np.where(since > 0.75 * _TURN, since - _TURN, since)  # from rest v can only rise: the minimum itself
     high, low = (_TURN - since) / width, (math.pi - since) / width
-    depth = size * width / np.hypot(beta, width)
-    rising = p < 0.0
-    deep = np.log(np.where(rising, -p, depth) / depth) / beta
-    turns = np.where(rising, np.maximum(0.0, np.ceil((deep - high) * width / _TURN)), 0.0)
-    high = high + turns * _TURN / width
-    low = np.where(turns > 0.0, high - math.pi / width, low)
     middle = (low + high) / 2.0
     cosine = np.clip(p * np.exp(-beta * middle) / size, -1.0, 1.0)
     t = high - (math.pi + lag - np.arccos(cosine)) / width
