@@ -85,6 +85,14 @@ def test_there_is_no_cycle_in_domain_one_and_prediction_and_exact_meet_at_its_en
     assert exact.frequency == pytest.approx(2.0, rel=1e-4)
 
 
+def test_exact_cycle_of_another_node_has_its_own_units() -> None:
+    """J = 0.5, b = 0.8, k_tr = 3, k_c = 5: near gamma = 1 F_c swings by 4 F k_c/(pi b (gamma - 1) omega)."""
+    gain = 1.001 * 0.8 / 0.5 * (1.0 / 3.0 + 1.0 / 5.0)
+    cycle = describing_function.unstable_cycle(gain, 0.5, 0.8, 3.0, 5.0, 0.3)
+    assert cycle.frequency == pytest.approx(4.0, rel=1e-3)
+    assert cycle.force == pytest.approx(4.0 * 0.3 * 5.0 / (math.pi * 0.8 * 0.001 * 4.0), rel=1e-3)
+
+
 def test_cycle_grows_with_the_friction_and_arguments_broadcast() -> None:
     gains, friction = np.array([[1.2], [1.8]]), np.array([1.0, 2.0, 4.0])
     for find in (describing_function.unstable_cycle, describing_function.predicted_unstable_cycle):

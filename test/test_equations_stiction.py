@@ -95,21 +95,21 @@ def test_coulomb_friction_has_no_stiction_cycle() -> None:
 
 
 def first_slip(gain: float, step: float) -> tuple[float, float]:
-    """Travel of motor and of F_c in the first slip of a lightly damped node, k_tr = 3, k_c = 1.5."""
-    events = simulate(FrictionNode(1.0, 0.2, 3.0, 1.5, 1.0, 1.3), ForceLoop(gain), step, 1e5, max_events=4).events
+    """Travel of motor and of F_c in the first slip of a lightly damped node, J = 2, k_tr = 3, k_c = 1.5."""
+    events = simulate(FrictionNode(2.0, 0.2, 3.0, 1.5, 1.0, 1.3), ForceLoop(gain), step, 1e5, max_events=4).events
     assert [e.kind for e in events[1:3]] == [Kind.SLIP, Kind.STICK]
     return events[2].x_m - events[1].x_m, events[2].contact_force - events[1].contact_force
 
 
 def test_number_of_5_13_is_the_travel_of_the_motor_over_that_of_the_node() -> None:
-    zeta = 0.1 / math.sqrt(4.5)
+    zeta = 0.1 / math.sqrt(9.0)
     size = float(stiction.stiction_cycle_force(3.0, 1.5, 1.3, 1.0, zeta))
     for gain in (1e-4, 1e-3):  # F_c rises by 2 % of the error in the slip
         motor, force = first_slip(gain, 6.0)
-        number = stiction.staircase_number(gain, 6.0, 1.0, 0.2, 3.0, 1.5, 0.3)
+        number = stiction.staircase_number(gain, 6.0, 2.0, 0.2, 3.0, 1.5, 0.3)
         assert number == pytest.approx(motor / (0.3 / 4.5), rel=0.02)
         assert force == pytest.approx(size, rel=float(number))
-    assert stiction.staircase_number(1e-3, 6.0, 1.0, 0.2, 3.0, 1.5, 0.0) == math.inf
+    assert stiction.staircase_number(1e-3, 6.0, 2.0, 0.2, 3.0, 1.5, 0.0) == math.inf
     assert stiction.staircase_number(1e-3, 6.0, 1.0, 5.0, 3.0, 1.5, 0.3) == math.inf
 
 

@@ -108,6 +108,8 @@ def test_push_that_moves_no_joint_is_the_least_over_joints_and_the_greatest_over
             force += 0.02
         held.append(force)
     assert arm.least_force == pytest.approx(max(held), abs=0.03)
+    dynamic_range = row(scorecard(arm), "steady force over hidden force")
+    assert dynamic_range.value == pytest.approx(arm.steady_force / max(held), rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -137,6 +139,9 @@ def test_bandwidth_is_the_lowest_eigenvalue_of_any_joint(arm: Measures) -> None:
         lowest.append(math.sqrt(np.linalg.eigvalsh(scale @ stiffness @ scale)[0]) / (2.0 * math.pi))
     found = row(scorecard(arm), "force bandwidth, joint 2 (4.4)")
     assert found.value == pytest.approx(min(lowest), rel=1e-6)
+    rotor_alone = math.sqrt(arm.transmission_stiffness[1] / arm.rotor_inertia[1]) / (2.0 * math.pi)
+    share = row(scorecard(arm), "of its asymptote")
+    assert share.value == pytest.approx(min(lowest) / rotor_alone, rel=1e-6)
 
 
 def test_a_bad_measure_and_another_arm_are_refused(arm: Measures) -> None:

@@ -114,7 +114,7 @@ def effective_mass(levers: Array, inertia: Array) -> float:
 
 
 def aspect_ratios(arm: Arm) -> tuple[float, ...]:
-    """Length over width as 7.2.1 counts: inner link over the hole for the joint-4 mechanism, outer tube, ends and all."""
+    """Length over width as 7.2.1 counts: inner link over the joint-4 mechanism, outer tube with its ends."""
     (hole,) = printed("hole through which the joint-4 mechanism fits")
     tube = np.linalg.norm(np.subtract(arm.covers.end[3:], arm.covers.start[3:])) + 2.0 * arm.covers.radius[1]
     inner_width = max(hole, 2.0 * arm.covers.radius[0])
