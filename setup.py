@@ -48,14 +48,18 @@ setup(
         "zstandard",
     ],
     extras_require={
+        # maps and batteries on many machines: `wam map --dask ADDRESS`
+        "dask": ["distributed"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "colcon-common-extensions",
+            "distributed",
             "mypy",
             "pytest<9",
             "rosbags",
             "ruff",
+            "scipy",
             "setuptools<80",
             "types-PyYAML",
         ],

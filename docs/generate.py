@@ -17,6 +17,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from wam_analysis.batch import processes
+from wam_analysis.figures.catalogue import FIGURES, file_of, numbers
+from wam_analysis.figures.catalogue import table as figures_table
 from wam_analysis.plant_figure import figure
 from wam_analysis.scorecard import report as scorecard
 from wam_control.force_loop import ForceLoop, ForceLoopParameters
@@ -222,6 +225,17 @@ def plant_study() -> str:
     return text
 
 
+@cache
+def figures() -> str:
+    """How far the plant is from the lines of the thesis's figures; draws them on the way."""
+    with processes() as executor:
+        found = numbers(list(FIGURES), executor, ROOT / ".cache" / "pieces")
+    if WRITES_PICTURES:
+        for name, values in found.items():
+            FIGURES[name].draw(values, file_of(name, ROOT / "docs" / "figures"))
+    return figures_table(found)
+
+
 def blocks() -> dict[str, Callable[[], str]]:
     """What can stand in a page, by name."""
     configuration = Configuration.load(CONFIGURATION)
@@ -234,6 +248,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "plant": plant_study,
         "refusals": refusals,
         "guard": lambda: f"```\n{(ROOT / 'docs' / 'guard.txt').read_text(encoding='utf-8')}```\n",
+        "figures": figures,
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
