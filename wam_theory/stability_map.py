@@ -135,20 +135,34 @@ def _boundaries(nodes: _Nodes, rtol: float) -> Array:
     return steps
 
 
+def _sticking_edge(nodes: _Nodes) -> Array:
+    """Greatest error, nearly, (n,), from which the node still sticks once more before the response diverges."""
+    unit = slip(nodes.modes, -np.ones(nodes.stiction.size), np.zeros(nodes.stiction.size))
+    low = np.full(nodes.stiction.size, _FIRST)
+    high = 2.0 * np.maximum(nodes.guess, (1.0 + nodes.stiction) / np.abs(unit.acceleration))
+    for _ in range(14):
+        middle = np.sqrt(low * high)
+        sticks = np.isfinite(_next_errors(nodes, middle))
+        low, high = np.where(sticks, middle, low), np.where(sticks, high, middle)
+    return low
+
+
 def _stable_steps(nodes: _Nodes) -> Array:
     """A step of each node that is followed by no greater error, (n,); 0 where there is none.
 
     With Coulomb friction the smallest tells: within stick the map is a factor.  With stiction small
-    errors grow up to those of the limit cycle, and the step must be above it: a few are tried, then the
-    errors are followed to where they seem to converge.
+    errors grow up to those of the limit cycle, and the step must be above it: a few below the greatest that
+    still sticks are tried, then the errors are followed to where they seem to converge.
     """
-    steps = np.zeros(nodes.stiction.size)
-    unit = slip(nodes.modes, -np.ones(steps.size), np.zeros(steps.size))
-    stick = (1.0 + nodes.stiction) / np.abs(unit.acceleration)  # about the greatest error whose slip ends in stick
-    for tried in (np.full(steps.size, _FIRST), *(share * stick for share in (0.9, 0.6, 0.3, 0.1))):
-        left = np.flatnonzero((steps == 0.0) & ((nodes.stiction > 1.0) | (tried == _FIRST)))
-        held = left[_next_errors(nodes.take(left), tried[left]) <= tried[left]]
-        steps[held] = tried[held]
+    first = np.full(nodes.stiction.size, _FIRST)
+    steps = np.where(_next_errors(nodes, first) <= first, first, 0.0)
+    left = np.flatnonzero((steps == 0.0) & (nodes.stiction > 1.0))
+    edge = _sticking_edge(nodes.take(left))
+    for share in (0.9999, 0.98, 0.93, 0.8, 0.6, 0.3, 0.1):
+        tried = share * edge
+        held = _next_errors(nodes.take(left), tried) <= tried
+        steps[left[held]] = tried[held]
+        left, edge = left[~held], edge[~held]
     index = np.flatnonzero((steps == 0.0) & (nodes.stiction > 1.0))
     nodes = nodes.take(index)
     errors, rises = np.full(index.size, _FIRST), np.full(index.size, math.nan)
