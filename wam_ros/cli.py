@@ -17,6 +17,7 @@ COMMANDS = {
     "report": "say what a recording of the demonstration shows",
     "call": "ask a running stack: enable, disable, estop, reset_fault, reset, tare",
     "plant": "draw the plant's effects beside the theory, print the differences",
+    "evaluate": "judge a part of the stack by a seeded battery: contact",
     "model": "write the arm's model",
 }
 
