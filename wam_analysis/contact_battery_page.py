@@ -24,9 +24,9 @@ def mark(row: Row, found: Figure) -> str:
     if math.isnan(found.value):
         return "no data"
     counts = row.must == (0.0, 0.0)  # a count that must be none: its interval never is
-    if counts and found.count < FREE_MUST and found.value == 0.0:
+    if counts and found.observed < FREE_MUST and found.value == 0.0:
         return FEW
-    if row.stretch != ANY and holds(found.value, row.stretch) and not (counts and found.count < FREE_STRETCH):
+    if row.stretch != ANY and holds(found.value, row.stretch) and not (counts and found.observed < FREE_STRETCH):
         return STRETCH
     if row.must == ANY:
         return "below the aim"
@@ -58,13 +58,13 @@ def table(judgement: Judgement, arm: Arm, rows: Sequence[Row]) -> str:
     lines = [head, ["---"] * len(head)]
     for row in rows:
         found = row.of(judgement.total)
-        if found.count == 0 and row.must == ANY == row.stretch:
+        if found.observed == 0 and row.must == ANY == row.stretch:
             continue
         single = [_number(row, row.of(judgement.scores[seed]).value) for seed in judgement.seeds]
         span = f"{_number(row, found.low)} to {_number(row, found.high)}"
         asks = [_bound(row, row.must), _bound(row, row.stretch)]
         lines.append(
-            [row.name, row.unit, *asks, *single, _number(row, found.value), span, str(found.count), mark(row, found)]
+            [row.name, row.unit, *asks, *single, _number(row, found.value), span, str(found.observed), mark(row, found)]
         )
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
@@ -74,7 +74,8 @@ def counted(scores: Sequence[SceneScore]) -> str:
     touches = [touch for scene in scores for touch in scene.touches]
     stopped = [f"{scene.name}: {scene.failure}" for scene in scores if scene.failure]
     text = (
-        f"{len(scores)} scenes; {len(touches)} contacts judged, {sum(scene.short for scene in scores)} too short, "
+        f"{len(scores)} scenes; {len(touches)} contacts judged, "
+        f"{sum(scene.unfit for scene in scores)} too short or too hard, "
         f"{sum(scene.missed for scene in scores)} meant that never touched; "
         f"{sum(scene.quiet.seconds for scene in scores if scene.quiet.group == 'free'):.0f} s of free motion."
     )
