@@ -4,8 +4,10 @@ import math
 from collections.abc import Sequence
 
 from wam_analysis.contact_battery import Judgement
+from wam_analysis.contact_battery_scenes import FRICTION, MASS, PAYLOAD, STIFFNESS
 from wam_analysis.contact_battery_score import ANY, FREE_MUST, FREE_STRETCH, Bound, Row, SceneScore, asked, stated
 from wam_analysis.contact_battery_statistics import Figure
+from wam_analysis.contact_battery_touches import EDGE, MOVING, SETTLED, SETTLED_AT_REST, SETTLED_IN_FOAM, SLIDING
 from wam_description.arm import Arm
 
 MET, STRETCH, MARGINAL, MISSED, FEW = "must", "**stretch**", "must, marginal", "**MISSED**", "not enough time"
@@ -103,3 +105,58 @@ def _bound(row: Row, bound: Bound) -> str:
     if bound[0] <= 0.0:
         return high
     return f"at least {low}" if bound[1] >= 1.0 else f"{low} to {high}"
+
+
+def page(judgement: Judgement, arm: Arm, command: str, compute: str, picture: str) -> str:
+    """The page of the documentation.
+
+    Parameters
+    ----------
+    command : what writes this page.
+    compute : a sentence on the times.
+    picture : the figure's path, seen from the page.
+    """
+    total = judgement.total
+    parts = [
+        PREFACE.format(command=command),
+        counted(total),
+        "",
+        f"![What the battery found]({picture})",
+        "",
+        "## What must be met",
+        "",
+        table(judgement, arm, asked(arm)),
+        "## What else was found",
+        "",
+        table(judgement, arm, stated(arm)),
+        compute,
+        "",
+        RULES,
+    ]
+    return "\n".join(parts)
+
+
+PREFACE = f"""# Contact estimation, judged
+
+Written by `{{command}}`; nothing here is written by hand. Each seed draws poses, moves, contacts and an arm. The arm differs from
+what its controllers know: friction of each motor and joint by up to {FRICTION:.0%}, mass of each link by {MASS:.0%}, stiffness of each
+cable by {STIFFNESS:.0%}, evenly distributed; in free motion the tool carries up to {1e3 * PAYLOAD:.0f} g that nobody knows of. The
+estimator feels with the motors alone.
+"""
+RULES = f"""## How it is judged
+
+* Truth is what the simulator's contacts say: link, force, centre of force along the link, moment. Torques on the joints come from it by
+  the simulator's own kinematics. What was meant and did not touch is not counted.
+* Contacts: `push`, a force at a point of the link's axis, of an exact size; `sphere` and `flat`, hands with a soft surface that follow
+  the moving link, half of them sliding over it, friction 0 to 0.5 and 0.8 for every fifth; `foam`, a post that stands still and that
+  the arm runs into.
+* An answer is read {SETTLED:.2f} s after the touch ({SETTLED_IN_FOAM:.2f} s in foam, which stops the arm, {SETTLED_AT_REST:.1f} s at rest), once for each
+  contact, because samples of one contact err alike. In motion: the fastest joint above {MOVING:g} rad/s, at the touch and when read;
+  some motors may rest. Every motor slides: the slowest above {SLIDING:g} rad/s.
+* A contact for which no place is given, which is not felt, or whose link is wrong, counts as infinitely wrong ('none' where the median is).
+* Latency counts from the last period without force. Torques are not judged within {EDGE:.1f} s of a touch that begins or ends.
+* A false alarm is one that begins without touch, from the release of the brakes on.
+* The 90 % set is the estimator's where it gives one, else the densest one of its hypotheses.
+* 95 %: Wilson for shares, order statistics for quantiles, scenes resampled for rms, Poisson for counts. 'marginal': met, but the
+  interval reaches over the limit.
+"""

@@ -33,7 +33,7 @@ class Touch(NamedTuple):
     friction : coefficient of the pusher's surface.
     cover, place, force : truth when the answer is judged; m and N.
     moving : whether the arm moved then; `began_moving`, whether it did when the touch began.
-    latency : s from the touch to the first alarm; inf where none came, NaN where one was there before.
+    latency : s from the last period without touch to the first alarm; inf where none came, NaN where one was there before.
     felt : whether something was felt when the answer is judged.
     link_probability : of the link that was named, NaN where nothing was felt.
     right_link : whether it is the true one.
@@ -164,7 +164,7 @@ def _latency(records: Sequence[Record], span: Span, before: Record) -> float:
         return math.nan
     for record in records[span.first : span.last + 1]:
         if record.in_contact:
-            return (record.stamp - records[span.first].stamp) * 1e-9
+            return (record.stamp - before.stamp) * 1e-9
     return math.inf
 
 

@@ -12,10 +12,12 @@ import yaml
 
 from wam_analysis.contact_battery import Extent, Judgement, judge, scenes
 from wam_analysis.contact_battery_bag import recorded, script
-from wam_analysis.contact_battery_page import missed, report
+from wam_analysis.contact_battery_figure import figure
+from wam_analysis.contact_battery_page import missed, page, report
 from wam_analysis.contact_battery_run import Played
 from wam_analysis.contact_battery_scenes import Scene, dither_values
 from wam_analysis.contact_battery_score import SceneScore, score
+from wam_analysis.contact_battery_time import sentence, times
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
 from wam_ros.commands import configuration_of, take_configuration
@@ -75,6 +77,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     take_configuration(parser)
 
 
+def _write(given: argparse.Namespace, configuration: Configuration, judgement: Judgement, scene: Scene) -> None:
+    """The page, and its picture in a folder of the page's name."""
+    arm, file = configuration.shared.arm, Path(given.write)
+    picture = file.with_suffix("") / "battery.png"
+    figure(judgement.total, arm, picture)
+    defaults = f"--contacts {given.contacts} --resting {given.resting} --free {given.free:g}"
+    seeds = " ".join(map(str, given.seed))
+    sensors = " --joint-sensors" * given.joint_sensors
+    command = f"wam evaluate contact --seed {seeds} {defaults}{sensors} --mode {given.mode} --write {file}"
+    compute = sentence(times(configuration, scene))
+    text = page(judgement, arm, command, compute, f"{picture.parent.name}/{picture.name}")
+    file.write_text(text, encoding="utf-8")
+
+
 def run(given: argparse.Namespace) -> int:
     """Judge; 1 where a must is missed."""
     configuration = configuration_of(given)
@@ -91,7 +107,7 @@ def run(given: argparse.Namespace) -> int:
     text = report(judgement, arm)
     print(text)
     if given.write:
-        given.write.write_text(text, encoding="utf-8")
+        _write(given, configuration, judgement, drawn[given.seed[0]][0])
     short = missed(judgement, arm)
     if short:
         print(f"missed: {'; '.join(short)}", file=sys.stderr)
