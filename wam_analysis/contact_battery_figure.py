@@ -58,17 +58,15 @@ def _errors(axes: Axes, found: Sequence[Touch]) -> None:
 
 def _spreads(axes: Axes, found: Sequence[Touch]) -> None:
     given = [touch for touch in found if touch.right_link and math.isfinite(touch.error) and touch.place_sd > 0.0]
-    sd, error = (
-        100.0 * np.array([f(touch) for touch in given]) for f in (lambda t: t.place_sd, lambda t: abs(t.error))
-    )
+    sd = 100.0 * np.array([touch.place_sd for touch in given])
+    error = 100.0 * np.abs([touch.error for touch in given])
     axes.loglog(sd, np.maximum(error, 0.02), "o", color=COLOURS[0], ms=2.5, alpha=0.35)
     ends = (0.3, 15.0)
     axes.loglog(ends, ends, color="black", lw=1, label="one stated sd")
     groups = np.array_split(np.argsort(sd), BINS) if len(sd) >= BINS else []
     middle = [float(np.median(sd[group])) for group in groups]
-    axes.loglog(
-        middle, [float(np.quantile(error[group], 0.683)) for group in groups], "s-", color=COLOURS[1], label="68 %"
-    )
+    inner = [float(np.quantile(error[group], 0.683)) for group in groups]
+    axes.loglog(middle, inner, "s-", color=COLOURS[1], label="68 % of the errors are below")
     axes.set(title="stated spread against error", xlabel="stated sd of the place [cm]", ylabel="error [cm]")
     axes.legend(frameon=False, fontsize=8)
 

@@ -138,25 +138,29 @@ def page(judgement: Judgement, arm: Arm, command: str, compute: str, picture: st
 
 PREFACE = f"""# Contact estimation, judged
 
-Written by `{{command}}`; nothing here is written by hand. Each seed draws poses, moves, contacts and an arm. The arm differs from
-what its controllers know: friction of each motor and joint by up to {FRICTION:.0%}, mass of each link by {MASS:.0%}, stiffness of each
-cable by {STIFFNESS:.0%}, evenly distributed; in free motion the tool carries up to {1e3 * PAYLOAD:.0f} g that nobody knows of. The
-estimator feels with the motors alone.
+Written by `{{command}}`; nothing here is written by hand.
+
+Each seed draws poses, moves, contacts and an arm. The arm differs from what its controllers know: friction of each
+motor and joint by up to {FRICTION:.0%}, mass of each link by {MASS:.0%}, stiffness of each cable by {STIFFNESS:.0%}, evenly
+distributed; in free motion the tool carries up to {1e3 * PAYLOAD:.0f} g that nobody knows of.
 """
 RULES = f"""## How it is judged
 
-* Truth is what the simulator's contacts say: link, force, centre of force along the link, moment. Torques on the joints come from it by
-  the simulator's own kinematics. What was meant and did not touch is not counted.
-* Contacts: `push`, a force at a point of the link's axis, of an exact size; `sphere` and `flat`, hands with a soft surface that follow
-  the moving link, half of them sliding over it, friction 0 to 0.5 and 0.8 for every fifth; `foam`, a post that stands still and that
-  the arm runs into.
-* An answer is read {SETTLED:.2f} s after the touch ({SETTLED_IN_FOAM:.2f} s in foam, which stops the arm, {SETTLED_AT_REST:.1f} s at rest), once for each
-  contact, because samples of one contact err alike. In motion: the fastest joint above {MOVING:g} rad/s, at the touch and when read;
-  some motors may rest. Every motor slides: the slowest above {SLIDING:g} rad/s.
-* A contact for which no place is given, which is not felt, or whose link is wrong, counts as infinitely wrong ('none' where the median is).
-* Latency counts from the last period without force. Torques are not judged within {EDGE:.1f} s of a touch that begins or ends.
+* Truth is what the simulator's contacts say: link, force, centre of force along the link, moment. Torques on the joints
+  come from it by the simulator's own kinematics. What was meant and did not touch is not counted.
+* Contacts: `push`, a force at a point of the link's axis, of an exact size; `sphere` and `flat`, hands with a soft
+  surface that follow the moving link, half of them sliding over it, friction 0 to 0.5, and 0.8 for every fifth; `foam`, a
+  post that stands still and that the arm runs into.
+* An answer is read {SETTLED:g} s after the touch ({SETTLED_IN_FOAM:g} s in foam, which stops the arm; {SETTLED_AT_REST:g} s at
+  rest), once for each contact, because samples of one contact err alike.
+* In motion: the fastest joint is above {MOVING:g} rad/s, at the touch and when the answer is read; some motors may rest.
+  Every motor slides: the slowest is above {SLIDING:g} rad/s.
+* A contact that is not felt, for which no place is given or whose link is wrong counts as infinitely wrong: 'none',
+  where that is the median.
+* Latency counts from the last period without force. Torques are not judged within {EDGE:g} s of a touch that begins or
+  ends.
 * A false alarm is one that begins without touch, from the release of the brakes on.
-* The 90 % set is the estimator's where it gives one, else the densest one of its hypotheses.
-* 95 %: Wilson for shares, order statistics for quantiles, scenes resampled for rms, Poisson for counts. 'marginal': met, but the
-  interval reaches over the limit.
+* The 90 % set is the estimator's own where it gives one, else the densest one of its hypotheses.
+* 95 %: Wilson for shares, order statistics for quantiles, scenes resampled for rms, Poisson for counts. Marginal: met,
+  but the interval reaches over the limit.
 """

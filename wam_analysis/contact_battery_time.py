@@ -38,9 +38,8 @@ def times(configuration: Configuration, scene: Scene) -> Times:
     shared = configured.shared
     run = DirectRun(configured, scene.steps)
     run.play()
-    estimator = ContactEstimator(
-        shared.arm, shared.timing, configured.node("contact_estimator", ContactEstimatorParameters)
-    )
+    own = configured.node("contact_estimator", ContactEstimatorParameters)
+    estimator = ContactEstimator(shared.arm, shared.timing, own)
     n, period = len(shared.arm.motors.names), seconds(shared.timing.period_ns)
     sensors = run.rows.get("joint_sensors", run.rows["motor_states"])
     observed, estimated = [], []

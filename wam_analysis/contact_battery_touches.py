@@ -33,7 +33,8 @@ class Touch(NamedTuple):
     friction : coefficient of the pusher's surface.
     cover, place, force : truth when the answer is judged; m and N.
     moving : whether the arm moved then; `began_moving`, whether it did when the touch began.
-    latency : s from the last period without touch to the first alarm; inf where none came, NaN where one was there before.
+    latency : s from the last period without touch to the first alarm; inf where none came, NaN where one
+        was there before.
     felt : whether something was felt when the answer is judged.
     link_probability : of the link that was named, NaN where nothing was felt.
     right_link : whether it is the true one.
