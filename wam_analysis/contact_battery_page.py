@@ -141,20 +141,20 @@ PREFACE = f"""# Contact estimation, judged
 Written by `{{command}}`; nothing here is written by hand.
 
 Each seed draws poses, moves, contacts and an arm. The arm differs from what its controllers know: friction of each
-motor and joint by up to {FRICTION:.0%}, mass of each link by {MASS:.0%}, stiffness of each cable by {STIFFNESS:.0%}, evenly
-distributed; in free motion the tool carries up to {1e3 * PAYLOAD:.0f} g that nobody knows of.
+motor and joint by up to {FRICTION:.0%}, mass of each link by {MASS:.0%}, stiffness of each cable by {STIFFNESS:.0%},
+evenly distributed; in free motion the tool carries up to {1e3 * PAYLOAD:.0f} g that nobody knows of.
 """
 RULES = f"""## How it is judged
 
 * Truth is what the simulator's contacts say: link, force, centre of force along the link, moment. Torques on the joints
   come from it by the simulator's own kinematics. What was meant and did not touch is not counted.
 * Contacts: `push`, a force at a point of the link's axis, of an exact size; `sphere` and `flat`, hands with a soft
-  surface that follow the moving link, half of them sliding over it, friction 0 to 0.5, and 0.8 for every fifth; `foam`, a
-  post that stands still and that the arm runs into.
-* An answer is read {SETTLED:g} s after the touch ({SETTLED_IN_FOAM:g} s in foam, which stops the arm; {SETTLED_AT_REST:g} s at
-  rest), once for each contact, because samples of one contact err alike.
-* In motion: the fastest joint is above {MOVING:g} rad/s, at the touch and when the answer is read; some motors may rest.
-  Every motor slides: the slowest is above {SLIDING:g} rad/s.
+  surface that follow the moving link, half of them sliding over it, friction 0 to 0.5, and 0.8 for every fifth; `foam`,
+  a post that stands still and that the arm runs into.
+* An answer is read {SETTLED:g} s after the touch, once for each contact, because samples of one contact err alike
+  ({SETTLED_IN_FOAM:g} s in foam, which stops the arm; {SETTLED_AT_REST:g} s at rest).
+* In motion: the fastest joint is above {MOVING:g} rad/s, at the touch and when the answer is read; some motors may
+  rest. Every motor slides: the slowest is above {SLIDING:g} rad/s.
 * A contact that is not felt, for which no place is given or whose link is wrong counts as infinitely wrong: 'none',
   where that is the median.
 * Latency counts from the last period without force. Torques are not judged within {EDGE:g} s of a touch that begins or
