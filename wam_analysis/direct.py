@@ -3,6 +3,7 @@
 What is recorded here is what travels over the topics in lockstep, under the same names.
 """
 
+from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from wam_control.transform import Transform
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
+from wam_description.parameters import build, values
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State
 from wam_driver.driver import Driver, DriverParameters
@@ -62,7 +64,11 @@ class DirectRun:
         self._has_sensors, self._feels_sensors = arm.joint_sensors, estimation.use_joint_sensors
         zero = [0.0] * len(arm.joints.names)
         self._used: tuple[int, list[float], list[float]] = (0, zero, zero)  # stamp, velocity, effort
-        self._newest = self._used
+        self._sent = deque([self._used])  # what is not old enough to be used
+        self._flat = {
+            "driver": values(node("driver", DriverParameters)),
+            "force_loop": values(node("force_loop", ForceLoopParameters)),
+        }
 
     def play(self) -> str:
         """Play the scenario to its end; returns why it failed, '' where it did not."""
@@ -81,14 +87,11 @@ class DirectRun:
         period = seconds(self._timing.period_ns)
         self._estimator.observe(motors, sensors if self._feels_sensors else None, period)
         done = False
-        delayed = self._timing.outer_delay == 1 and self._newest[0] > 0
-        if delayed:
-            self._used = self._newest
         if driver.is_outer:
             self._say_truth(stamp)
             done = self._outer(stamp, motors, sensors)
-            if self._timing.outer_delay == 0:
-                self._used = self._newest
+        while self._sent and self._sent[0][0] <= stamp - self._timing.outer_delay * self._timing.period_ns:
+            self._used = self._sent.popleft()
         caused, velocity, effort = self._used
         currents = self._velocity_loop.step(
             motors.velocity, motors.effort, velocity, seconds(stamp - (caused or stamp)), effort, period
@@ -111,7 +114,7 @@ class DirectRun:
         out = self._force_loop.step(joints, sensors, contact, external, played.force, 0.0, played.posture, None, dt)
         velocity = self._transform.motor_velocity(out.velocity)
         effort = self._transform.motor_effort(gravity, out.effort)
-        self._newest = (stamp, velocity, effort)
+        self._sent.append((stamp, velocity, effort))
         self._say_joints("joint_states", stamp, joints)
         self._say("gravity_effort", stamp, gravity)
         self._say("external_joint_torques", stamp, external)
@@ -131,6 +134,11 @@ class DirectRun:
             self.driver.enable("")
         elif played.request == "disable":
             self.driver.disable()
+        for node, name, value in played.settings:
+            self._flat[node][name] = value
+        if played.settings:
+            self.driver.rub(build(DriverParameters, self._flat["driver"]).effects.rubbing_friction)
+            self._force_loop.tune(build(ForceLoopParameters, self._flat["force_loop"]))
         if played.push_cover:
             plant.push(played.push_cover, np.array(played.push_force), np.array(played.push_torque))
         else:
