@@ -18,13 +18,20 @@ ARM = CONFIGURATION.shared.arm
 BODY = RigidBody(ARM)
 GAIN, LIMIT = 0.015, 20.0
 OWN = replace(
-    CONFIGURATION.node("force_loop", ForceLoopParameters), force_gain=GAIN, force_error_limit=LIMIT, force_filter=0.0
+    CONFIGURATION.node("force_loop", ForceLoopParameters),
+    force_gain=(GAIN,),
+    force_error_limit=(LIMIT,),
+    force_limit=1e9,
+    torque_limit=1e9,
+    force_filter=0.0,
+    blend_time=0.0,
 )
 COVER, PLACE = OWN.contact_cover, OWN.contact_place
 POSE = [0.3, -1.2, 0.2, 1.0]
 DOWN = (0.0, 0.0, -1.0)
 DT = 5e-3
 STILL = [0.0] * 4
+DRIVEN = [1.0] * 4  # N m: the motors give torque
 
 
 def lever(q: list[float], n: Any = DOWN, cover: str = COVER, place: float = PLACE) -> np.ndarray:
@@ -58,7 +65,7 @@ class World:
 
     @property
     def joints(self) -> State:
-        return State(list(self.q), STILL, STILL)
+        return State(list(self.q), STILL, DRIVEN)
 
     def move(self, velocity: list[float], dt: float = DT) -> None:
         self.q = [a + b * dt for a, b in zip(self.q, velocity, strict=True)]
@@ -115,7 +122,7 @@ def test_saturation_limits_the_commanded_speed_exactly(asked: float, limited: fl
     assert along @ out.velocity == pytest.approx(GAIN * limited, rel=1e-7)
     assert out.error == pytest.approx(down(asked), rel=1e-7)
     assert out.limited == pytest.approx(down(limited), rel=1e-7)
-    free = replace(OWN, force_error_limit=1e9, joint_speed_limit=1e9)
+    free = replace(OWN, force_error_limit=(1e9,), joint_speed_limit=1e9)
     unlimited = ask(ForceLoop(ARM, free), World(400.0), down(asked))
     assert along @ unlimited.velocity == pytest.approx(GAIN * asked, rel=1e-7)
 
@@ -230,7 +237,7 @@ def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -
     loop = ForceLoop(ARM, replace(OWN, mode="joint_torque"))
     assert ask(loop, World(1e-9), None).velocity == [0.0] * 4
     out = ask(loop, World(1e-9), None, torque=[100.0, -100.0, 1.0, 0.0])
-    limit, gain = OWN.torque_error_limit, OWN.torque_gain
+    (limit,), (gain,) = OWN.torque_error_limit, OWN.torque_gain
     assert out.velocity == pytest.approx([gain * limit, -gain * limit, gain, 0.0], abs=1e-9)
 
 
@@ -331,7 +338,7 @@ def test_sensors_that_have_not_come_yet_count_as_nothing_felt() -> None:
         ({"contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
         ({"mode": "soft"}, "'mode' is 'soft'; allowed: one of hybrid, joint_torque, open_loop"),
         ({"feedback": "eyes"}, "'feedback' is 'eyes'; allowed: one of joint_sensors, contact_estimate"),
-        ({"force_gain": -0.1}, "'force_gain' is -0.1 m/s/N; allowed: at least 0"),
+        ({"force_gain": [-0.1]}, "'force_gain' is -0.1 m/s/N; allowed: at least 0"),
         ({"force_filter": math.nan}, "'force_filter' is nan s"),
         ({"contact_place": "tip"}, "'contact_place' is 'tip' m; allowed: a number"),
     ],

@@ -182,13 +182,13 @@ def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
 @pytest.mark.parametrize(
     ("given", "text"),
     [
-        ({"force_gain": 0.02, "contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
-        ({"force_gain": 0.02, "mode": "soft"}, "parameter 'mode' is 'soft'; allowed: one of hybrid"),
-        ({"force_gain": 0.02, "posture_gain": math.nan}, "posture_gain"),
-        ({"force_gain": 0.02, "posture_gain": -1.0}, "posture_gain"),
-        ({"force_gain": 0.02, "posture_gain": "much"}, "Wrong parameter type"),
-        ({"force_gain": 0.02, "timing.mode": "lockstep"}, "timing.mode"),
-        ({"force_gain": 0.02, "force_gian": 0.02}, "undeclared parameter"),
+        ({"force_gain": [0.02], "contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
+        ({"force_gain": [0.02], "mode": "soft"}, "parameter 'mode' is 'soft'; allowed: one of hybrid"),
+        ({"force_gain": [0.02], "posture_gain": math.nan}, "posture_gain"),
+        ({"force_gain": [0.02], "posture_gain": -1.0}, "posture_gain"),
+        ({"force_gain": [0.02], "posture_gain": "much"}, "Wrong parameter type"),
+        ({"force_gain": [0.02], "timing.mode": "lockstep"}, "timing.mode"),
+        ({"force_gain": [0.02], "force_gian": 0.02}, "undeclared parameter"),
     ],
 )
 def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, Any], text: str, ros: Any) -> None:
@@ -198,9 +198,9 @@ def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, An
     assert not result.successful
     assert text in result.reason
     assert node._loop.parameters == before
-    assert node.get_parameter("force_gain").value == before.force_gain
-    assert change(ros, "force_loop", force_gain=0.02).successful
-    assert node._loop.parameters.force_gain == 0.02, "the good part alone is taken"
+    assert tuple(node.get_parameter("force_gain").value) == before.force_gain
+    assert change(ros, "force_loop", force_gain=[0.02]).successful
+    assert node._loop.parameters.force_gain == (0.02,), "the good part alone is taken"
 
 
 def test_gains_of_a_wrong_number_are_refused_over_ros(ros: Any) -> None:

@@ -82,6 +82,8 @@ class ForceLoopNode(Node):
             seconds(dt),
         )
         ports = self._ports
+        for topic, reason in self._loop.refusals.items():
+            ports.refuse(topic, reason)
         ports.publish_joints("joint_velocity_command", stamp, State([], out.velocity, []))
         ports.publish_joints("joint_effort_command", stamp, State([], [], out.effort))
         frame = command.frame if command else BASE
