@@ -3,7 +3,6 @@
 What is recorded here is what travels over the topics in lockstep, under the same names.
 """
 
-from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -64,7 +63,7 @@ class DirectRun:
         self._has_sensors, self._feels_sensors = arm.joint_sensors, estimation.use_joint_sensors
         zero = [0.0] * len(arm.joints.names)
         self._used: tuple[int, list[float], list[float]] = (0, zero, zero)  # stamp, velocity, effort
-        self._sent = deque([self._used])  # what is not old enough to be used
+        self._newest = self._used
         self._flat = {
             "driver": values(node("driver", DriverParameters)),
             "force_loop": values(node("force_loop", ForceLoopParameters)),
@@ -87,11 +86,14 @@ class DirectRun:
         period = seconds(self._timing.period_ns)
         self._estimator.observe(motors, sensors if self._feels_sensors else None, period)
         done = False
+        delayed = self._timing.outer_delay == 1 and self._newest[0] > 0
+        if delayed:
+            self._used = self._newest
         if driver.is_outer:
             self._say_truth(stamp)
             done = self._outer(stamp, motors, sensors)
-        while self._sent and self._sent[0][0] <= stamp - self._timing.outer_delay * self._timing.period_ns:
-            self._used = self._sent.popleft()
+            if self._timing.outer_delay == 0:
+                self._used = self._newest
         caused, velocity, effort = self._used
         currents = self._velocity_loop.step(
             motors.velocity, motors.effort, velocity, seconds(stamp - (caused or stamp)), effort, period
@@ -114,7 +116,7 @@ class DirectRun:
         out = self._force_loop.step(joints, sensors, contact, external, played.force, 0.0, played.posture, None, dt)
         velocity = self._transform.motor_velocity(out.velocity)
         effort = self._transform.motor_effort(gravity, out.effort)
-        self._sent.append((stamp, velocity, effort))
+        self._newest = (stamp, velocity, effort)
         self._say_joints("joint_states", stamp, joints)
         self._say("gravity_effort", stamp, gravity)
         self._say("external_joint_torques", stamp, external)

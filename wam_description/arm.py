@@ -165,7 +165,7 @@ class Timing:
     period: float = parameter("period of the inner loop and of motor_states", "s", low=1e-4, high=0.1)
     substeps: int = parameter("steps of the plant in one period", low=1, high=1000)
     outer_divisor: int = parameter("inner periods in one period of the joint side", low=1, high=1000)
-    outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", low=0, high=1000)
+    outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", low=0, high=1)
     display_divisor: int = parameter("outer periods between messages that are made for people", low=1, high=1000)
     niceness: int = parameter(
         "scheduling priority of driver and velocity_loop in realtime, where the system grants it", low=-20, high=0

@@ -16,7 +16,7 @@ from wam_description.parameters import ParameterError, require
 FOLDER = "experiments"
 SETS = "experiments/sets"
 KEYS = ("title", "section", "configuration", "evaluation", "include", "values", "runs")
-RUN_KEYS = ("name", "values", "steps")
+RUN_KEYS = ("name", "values", "steps", "stops")
 
 
 class Run(NamedTuple):
@@ -25,6 +25,7 @@ class Run(NamedTuple):
     name: str
     values: Mapping[str, Any]
     steps: Sequence[Mapping[str, Any]]
+    stops: bool  # whether the driver is expected to stop the arm
 
     @property
     def seconds(self) -> float:
@@ -111,7 +112,7 @@ def _run(where: str, body: Any, shared: Mapping[str, Any]) -> Run:
     name = str(body["name"])
     require(name == Path(name).name and name != "..", f"{where}: name is '{name}'; it must be one for a directory")
     require(isinstance(body["steps"], list) and bool(body["steps"]), f"{where}: 'steps' must be a list with at least one")
-    return Run(name, {**shared, **body.get("values", {})}, tuple(body["steps"]))
+    return Run(name, {**shared, **body.get("values", {})}, tuple(body["steps"]), bool(body.get("stops", False)))
 
 
 def _mapping(path: Path) -> dict[str, Any]:

@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from wam_analysis.bag import BagError
-from wam_analysis.experiments.definition import Experiment
+from wam_analysis.experiments.definition import Experiment, Run
 from wam_analysis.experiments.recording import Recording, recording
-from wam_analysis.experiments.rows import Result, plain
+from wam_analysis.experiments.rows import Result, Row, plain
 
 Evaluation = Callable[[Mapping[str, Recording]], Result]
 
@@ -27,7 +27,20 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
     missing = [run.name for run in experiment.runs if not (directory / run.name).is_dir()]
     if missing:
         raise BagError(f"{directory} has no bag of {', '.join(missing)}; run 'wam experiment {experiment.name}'")
-    return evaluation_of(experiment)({run.name: recording(directory / run.name) for run in experiment.runs})
+    recordings = {run.name: recording(directory / run.name) for run in experiment.runs}
+    result = evaluation_of(experiment)(recordings)
+    stops = [_stop(run, recordings[run.name]) for run in experiment.runs if run.stops or recordings[run.name].fault]
+    remarks = [
+        f"{name.replace('_', ' ')}: the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}"
+        for name, run in recordings.items()
+        if run.fault
+    ]
+    return Result([*result.rows, *stops], result.panels, (*result.remarks, *remarks))
+
+
+def _stop(run: Run, recorded: Recording) -> Row:
+    predicted, measured = ("stops the arm" if stops else "lets it run" for stops in (run.stops, bool(recorded.fault)))
+    return Row(f"{run.name.replace('_', ' ')}, driver", predicted, measured)
 
 
 def evaluation_of(experiment: Experiment) -> Evaluation:

@@ -1,10 +1,11 @@
 """The limit cycles of chapter 5: by stiction, (5.8) and (5.9), and of the actuator alone, (5.20) to (5.22)."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from wam_analysis.experiments.one_link import STUCK, Cycle, OneLink, Response, asked, last_cycle, one_link, response
+from wam_analysis.experiments.one_link import STUCK, Cycle, OneLink, Response, asked, fate, last_cycle, one_link, response
 from wam_analysis.experiments.recording import Recording
 from wam_analysis.experiments.rows import Curve, Numbers, Panel, Result, Row
 from wam_theory.limit_cycles import (
@@ -15,7 +16,7 @@ from wam_theory.limit_cycles import (
     stiction_cycle_number,
     stiction_cycle_period,
 )
-from wam_theory.stick_slip import ForceLoop, simulate
+from wam_theory.stick_slip import assess, simulate
 
 WITHIN = 0.02
 CLOSED_FORM = 1.0  # deviation allowed to (5.8) and (5.9), times the left side of (5.11), which they neglect
@@ -41,13 +42,40 @@ def stiction(runs: Mapping[str, Recording]) -> Result:
         Row("period, exact", exact.period, found.period, "s", WITHIN, "integrator"),
     ]
     curves = [Curve("measured", "without deadband", shown.time, shown.force), curve]
+    rows += _with_deadband(runs["with_deadband"], force)
+    rows.append(_with_smaller_deadband(runs["with_smaller_deadband"], force))
+    quiet = response(runs["with_deadband"], link)
+    curves.append(Curve("measured", "with deadband", quiet.time, quiet.force))
     remark = f"(5.8) and (5.9) hold where (5.11) is far below 1; here it is {number:.3f}"
     return Result(rows, [Panel("stiction limit cycle", "time [s]", "force [N]", curves)], (remark,))
 
 
+def _with_deadband(run: Recording, force: float) -> list[Row]:
+    """The deadband of half the cycle, and what is left of the cycle in the last half of the run."""
+    link = one_link(run)
+    shown = response(run, link, run.steps[-1])
+    late = shown.force[len(shown.force) // 2 :]
+    deadband = link.loop.deadband / link.lever
+    rest = abs(asked(run, shown.time[0]) - float(late[-1]))
+    return [
+        Row("deadband that removes it", 0.5 * force, deadband, "N", WITHIN, "(5.7), (5.8)"),
+        Row("what is left of the cycle with it", 0.0, float(np.ptp(late)), "N", WITHIN * force, "(5.7)", True),
+        Row("error that is left with it", 0.0, rest, "N", deadband, "(5.7)", True),
+    ]
+
+
+def _with_smaller_deadband(run: Recording, force: float) -> Row:
+    link = one_link(run)
+    shown = response(run, link, run.steps[-1])
+    share = 2.0 * link.loop.deadband / link.lever / force
+    loop = replace(link.loop, sample_period=0.0)
+    predicted = assess(link.node, loop, asked(run, shown.time[0]) * link.lever).verdict
+    return Row(f"with {share:.2f} of that deadband", str(predicted), fate(run, run.steps[-1], shown), equation="integrator")
+
+
 def _exact(run: Recording, link: OneLink, shown: Response) -> tuple[Cycle, Curve]:
     """Cycle and force of the exact motion of the continuous loop over the same time."""
-    loop = ForceLoop(link.loop.gain, link.loop.error_limit, link.loop.deadband)
+    loop = replace(link.loop, sample_period=0.0)
     force = asked(run, shown.time[0]) * link.lever
     motion = simulate(link.node, loop, force, float(np.ptp(shown.time))).at(shown.time - shown.time[0])
     curve = motion.contact_force / link.lever

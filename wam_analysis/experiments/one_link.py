@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.experiments.recording import Recording, Step
-from wam_control.force_loop import ForceLoopParameters
+from wam_control.force_loop_parameters import ForceLoopParameters, force_law
 from wam_description.arm import Arm, seconds
 from wam_description.world import World
 from wam_driver.driver import DriverParameters
@@ -16,6 +16,7 @@ from wam_theory.limit_cycles import SampledMargin, damping_ratio, gain_ratio, sa
 from wam_theory.stick_slip import ForceLoop, FrictionNode, Outcome, Verdict, assess
 
 Numbers = NDArray[np.float64]
+ACROSS = 1  # y of the link's frame, along which the testbed presses
 SETTLED = 0.02  # of the step: what is left of a response that counts as settled
 STUCK = 1e-5  # rad/s of the joint, below which it sticks: far below any motion, far above what a stuck one shows
 STEADY = 0.1  # change of the span between two windows below which a cycle counts as steady
@@ -81,7 +82,7 @@ def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) ->
     Raises
     ------
     ValueError
-        where the arm has more than one joint, or the delay is not a whole number of samples.
+        where the arm has more than one joint, or the loop has a G_P.
     """
     changed = dict(settings or {})
     flat = {
@@ -92,11 +93,11 @@ def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) ->
     arm, timing = recording.shared.arm, recording.shared.timing
     if len(arm.joints.names) != 1:
         raise ValueError(f"{arm.name} has {len(arm.joints.names)} joints; this evaluation is for one")
-    samples, rest = divmod(timing.outer_delay, timing.outer_divisor)
-    if rest:
-        raise ValueError(f"outer_delay is {timing.outer_delay} periods; give a multiple of {timing.outer_divisor}")
     driver = recording.node("driver", DriverParameters)
     control = recording.node("force_loop", ForceLoopParameters)
+    law = force_law(control)
+    if law.proportional_gain[ACROSS]:
+        raise ValueError(f"force_proportional_gain is {law.proportional_gain[ACROSS]:g}; this evaluation is without G_P")
     ratio, lever = 1.0 / arm.joint_from_motor[0], control.contact_place
     rubbing = driver.effects.rubbing_friction[0]
     node = FrictionNode(
@@ -108,10 +109,11 @@ def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) ->
         static_friction=arm.joints.static_friction[0] + rubbing,
     )
     loop = ForceLoop(
-        gain=control.force_gain / lever**2,
-        error_limit=control.force_error_limit * lever,
+        gain=law.gain[ACROSS] / lever**2,
+        error_limit=law.error_limit[ACROSS] * lever,
+        deadband=law.deadband[ACROSS] * lever,
         sample_period=seconds(timing.outer_period_ns),
-        delay_samples=samples,
+        delay_samples=control.delay_samples,
     )
     return OneLink(node, loop, lever, ratio)
 

@@ -41,7 +41,7 @@ def story(runs: Mapping[str, Recording]) -> Result:
         _panel(runs, ("large_step", "large_step_saturated"), "10 lb, rod on, 1.5 of the margin"),
         _panel(runs, ("late_with_rod_at_0.8", "late_with_rod_at_0.9"), "one sample late, rod on"),
     ]
-    return Result(rows, panels, tuple(stopped(runs)))
+    return Result(rows, panels)
 
 
 def margin(below: Recording, above: Recording, how: str) -> list[Row]:
@@ -93,15 +93,6 @@ def _is_pushed(run: Recording, step: Step) -> bool:
     push = run.forces("sim/disturbance")
     during = (push.time >= step.begin) & (push.time < step.end - ROUNDING)
     return bool(push.force[during].any())
-
-
-def stopped(runs: Mapping[str, Recording]) -> list[str]:
-    """Which runs the driver ended, and why."""
-    return [
-        f"{name.replace('_', ' ')}: the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}"
-        for name, run in runs.items()
-        if run.fault
-    ]
 
 
 def _panel(runs: Mapping[str, Recording], names: Sequence[str], title: str) -> Panel:
