@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_force_loop import ARM, DRIVEN, DT, GAIN, OWN, POSE, STILL, World, ask, down, lever
+from test_force_loop import ARM, DRIVEN, DT, GAIN, OWN, POSE, STILL, Loop, World, ask, down, lever
 
 from wam_control.force_law import ForceLaw
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceOutput
@@ -46,7 +46,7 @@ def test_each_axis_has_a_law_of_its_own() -> None:
             OWN, force_gain=machine.gain, force_error_limit=machine.error_limit, force_deadband=machine.deadband,
             joint_speed_limit=1e9,
         )  # fmt: skip
-        out = ask(ForceLoop(ARM, own), World(400.0), [9.0 * c for c in n])
+        out = ask(Loop(ARM, own), World(400.0), [9.0 * c for c in n])
         assert lever(POSE, n) @ out.velocity == pytest.approx(expected, rel=1e-6)
 
 
@@ -55,27 +55,27 @@ def test_each_joint_has_a_law_of_its_own() -> None:
         OWN, mode="joint_torque", torque_gain=(1.0, 2.0, 3.0, 4.0), torque_error_limit=(9.0,),
         torque_deadband=(0.0, 0.5, 0.0, 1.0),
     )  # fmt: skip
-    out = ask(ForceLoop(ARM, own), World(1e-9), None, torque=[1.0, 1.0, -1.0, 3.0])
+    out = ask(Loop(ARM, own), World(1e-9), None, torque=[1.0, 1.0, -1.0, 3.0])
     assert out.velocity == pytest.approx([1.0, 1.0, -3.0, 8.0], abs=1e-6)
 
 
 def test_proportional_action_moves_by_its_gain_times_the_change_of_force_and_not_of_the_set_point() -> None:
     own, gp = replace(OWN, force_gain=(0.0,), force_proportional_gain=(2e-4,)), 2e-4
-    loop = ForceLoop(ARM, own)
+    loop = Loop(ARM, own)
     along = lever(POSE)
     assert along @ ask(loop, World(400.0, force=1.0), down(4.0)).velocity == pytest.approx(0.0, abs=1e-12)
     more = ask(loop, World(400.0, force=3.0), down(4.0)).velocity
     assert along @ more * DT == pytest.approx(-gp * 2.0, rel=1e-5)
     stepped = ask(loop, World(400.0, force=3.0), down(9.0)).velocity
     assert along @ stepped == pytest.approx(0.0, abs=1e-9), "a new set point is no change of the force"
-    blunt = ForceLoop(ARM, replace(own, force_error_limit=(0.5,)))
+    blunt = Loop(ARM, replace(own, force_error_limit=(0.5,)))
     ask(blunt, World(400.0, force=1.0), down(4.0))
     assert along @ ask(blunt, World(400.0, force=3.0), down(4.0)).velocity == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("samples", [1, 3])
 def test_an_answer_that_is_held_back_comes_so_many_periods_later(samples: int) -> None:
-    loop = ForceLoop(ARM, replace(OWN, delay_samples=samples))
+    loop = Loop(ARM, replace(OWN, delay_samples=samples))
     along = lever(POSE)
     said = [float(along @ ask(loop, World(400.0, force=f), down(9.0)).velocity) for f in (1.0, 2.0, 3.0, 4.0, 5.0)]
     expected = [0.0] * samples + [GAIN * (9.0 - f) for f in (1.0, 2.0, 3.0, 4.0, 5.0)]
@@ -92,7 +92,7 @@ def test_an_answer_that_is_held_back_comes_so_many_periods_later(samples: int) -
     ],
 )
 def test_laws_that_do_not_fit_are_refused_whole(change: dict[str, Any], text: str) -> None:
-    loop = ForceLoop(ARM, OWN)
+    loop = Loop(ARM, OWN)
     with pytest.raises(ParameterError, match=text):
         loop.tune(replace(OWN, **change, posture_gain=1.0))
     assert loop.parameters == OWN
@@ -121,14 +121,14 @@ def largest_jump(loop: ForceLoop, changes: list[Any]) -> float:
     ],
 )
 def test_velocity_does_not_jump_when_a_command_begins_or_ends_or_mode_or_gain_changes(changes: list[Any]) -> None:
-    smooth = largest_jump(ForceLoop(ARM, replace(OWN, blend_time=0.05)), changes)
-    hard = largest_jump(ForceLoop(ARM, OWN), changes)
+    smooth = largest_jump(Loop(ARM, replace(OWN, blend_time=0.05)), changes)
+    hard = largest_jump(Loop(ARM, OWN), changes)
     assert smooth < 0.2 * hard
     assert hard > 0.05
 
 
 def test_blending_ends_at_what_the_law_asks_for() -> None:
-    loop = ForceLoop(ARM, replace(OWN, blend_time=0.05))
+    loop = Loop(ARM, replace(OWN, blend_time=0.05))
     for _ in range(200):
         out = ask(loop, World(400.0, force=2.0), down(12.0))
     assert lever(POSE) @ out.velocity == pytest.approx(GAIN * 10.0, rel=1e-6)
@@ -136,7 +136,7 @@ def test_blending_ends_at_what_the_law_asks_for() -> None:
 
 def felt_across(torque: list[float]) -> ForceOutput:
     """What is felt of 3 N after 9 N, at the moment when the motors give this torque."""
-    loop = ForceLoop(ARM, replace(OWN, force_filter=1.0, delay_samples=5))
+    loop = Loop(ARM, replace(OWN, force_filter=1.0, delay_samples=5))
     for _ in range(400):
         ask(loop, World(400.0, force=9.0), down(9.5))
     world = World(400.0, force=3.0)
@@ -153,7 +153,7 @@ def test_brakes_and_faults_make_the_loop_forget_filter_and_delayed_answers() -> 
 
 
 def test_the_posture_to_hold_is_that_of_the_enabling() -> None:
-    loop = ForceLoop(ARM, OWN)
+    loop = Loop(ARM, OWN)
     moved = [0.3, -1.0, 0.4, 0.9]
 
     def hold(q: list[float], effort: list[float]) -> list[float]:
@@ -166,8 +166,8 @@ def test_the_posture_to_hold_is_that_of_the_enabling() -> None:
 
 
 def test_a_force_above_the_limit_is_refused_and_the_last_good_one_stands() -> None:
-    loop = ForceLoop(ARM, replace(OWN, force_limit=30.0))
-    free = ForceLoop(ARM, OWN)
+    loop = Loop(ARM, replace(OWN, force_limit=30.0))
+    free = Loop(ARM, OWN)
     for machine, effort in ((loop, 10.0), (free, 31.0)):
         for newtons in (10.0, 31.0):
             out = ask(machine, World(400.0), down(newtons))
@@ -180,7 +180,7 @@ def test_a_force_above_the_limit_is_refused_and_the_last_good_one_stands() -> No
 
 
 def test_a_torque_above_the_limit_is_refused_and_the_last_good_one_stands() -> None:
-    loop = ForceLoop(ARM, replace(OWN, mode="joint_torque", torque_limit=4.0))
+    loop = Loop(ARM, replace(OWN, mode="joint_torque", torque_limit=4.0))
     for torque in ([1.0, 2.0, 0.0, 0.0], [1.0, -4.5, 0.0, 0.0]):
         out = ask(loop, World(1e-9), None, torque=torque)
     assert out.effort == [1.0, 2.0, 0.0, 0.0]

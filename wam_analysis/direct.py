@@ -57,7 +57,7 @@ class DirectRun:
         self._transform = Transform(arm)
         self._body = RigidBody(arm)
         self._velocity_loop = VelocityLoop(arm.motors, node("velocity_loop", VelocityLoopParameters))
-        self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters))
+        self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters), self._timing)
         estimation = node("contact_estimator", ContactEstimatorParameters)
         self._estimator = ContactEstimator(arm, self._timing, estimation)
         self._has_sensors, self._feels_sensors = arm.joint_sensors, estimation.use_joint_sensors

@@ -9,13 +9,18 @@ joint_torque.  Forces are those of the arm on the world.
 import math
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force_loop_parameters import ForceLoopParameters, force_law, torque_law
-from wam_description.arm import Arm
+from wam_control.force_law import ForceLaw
+from wam_control.force_loop_parameters import ForceLoopParameters, force_law, task_of, torque_law
+from wam_control.guard_report import report
+from wam_control.guard_watch import Watch, place_is_sure, possible_touches
+from wam_control.stability_guard import Judgement, StabilityGuard, Touch
+from wam_description.arm import Arm, Timing
 from wam_description.parameters import lengths, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact, State
@@ -54,19 +59,27 @@ class ForceLoop:
     ----------
     arm : the arm as the controller knows it.
     parameters : gains and limits.
+    timing : periods of the loops, for the guard.
 
     Attributes
     ----------
     parameters : those in force.
+    judgement : what the guard finds of them; None where it is off or nothing is fed back.
+    watch : what the guard does while the arm moves; None with the judgement.
+    report : what the guard says; a new object where that has changed.
     refused : how many commands were not taken.
     refusals : why a present command is not taken, by topic; the last good one stands.
     """
 
-    def __init__(self, arm: Arm, parameters: ForceLoopParameters) -> None:
-        self._arm = arm
+    def __init__(self, arm: Arm, parameters: ForceLoopParameters, timing: Timing) -> None:
+        self._arm, self._timing = arm, timing
         self._body = RigidBody(arm)
         self._n = len(arm.joints.names)
         self._still = [0.0] * self._n
+        self._joints: tuple[float, ...] = ()
+        self._guard: StabilityGuard | None = None
+        self.judgement: Judgement | None = None
+        self.watch: Watch | None = None
         self._bias = np.zeros(self._n)
         self._external = np.zeros(self._n)
         self._admitted: ForceCommand | None = None
@@ -78,7 +91,13 @@ class ForceLoop:
         self.tune(parameters)
 
     def tune(self, parameters: ForceLoopParameters) -> None:
-        """Take new parameters, or refuse the set."""
+        """Take new parameters, or refuse the set.
+
+        Raises
+        ------
+        ParameterError
+            where values do not fit each other or the arm, or the guard finds the set not stable.
+        """
         covers = self._arm.covers.names
         require(
             parameters.contact_cover in covers,
@@ -90,10 +109,36 @@ class ForceLoop:
         )
         springs = {"spring_stiffness": parameters.spring_stiffness, "spring_rest": parameters.spring_rest}
         lengths("force_loop", self._arm.joints.names, springs)
-        laws = force_law(parameters), torque_law(parameters, self._arm.joints.names)
-        self._force_law, self._torque_law = laws
+        self._force_law, self._torque_law = self._guarded(parameters)
         self.parameters = parameters
+        self._say()
         self._is_new = True  # blend into what the new set asks for
+
+    def _guarded(self, parameters: ForceLoopParameters) -> tuple[ForceLaw, ForceLaw]:
+        """The laws of a set, of the force and of the joints, once the guard has let it pass."""
+        laws = force_law(parameters), torque_law(parameters, self._arm.joints.names)
+        guard = StabilityGuard(self._arm, self._timing, parameters.guard)
+        if parameters.guard.mode == "off" or parameters.mode == "open_loop":
+            self._guard = self.judgement = self.watch = None
+            return laws
+        which = int(parameters.mode == "joint_torque")
+        task = task_of(parameters, laws[which])
+        postures = [parameters.guard.posture] + ([self._joints] if self._joints else [])
+        places = [guard.touches(q, parameters.contact_cover, parameters.contact_place) for q in postures]
+        found = guard.judge(task, [touch for touches in places for touch in touches])
+        mode = parameters.guard.mode
+        if found.reason and found.stable_error and mode == "limit":
+            limits = tuple(min(limit, found.stable_error) for limit in task.law.error_limit)
+            task = task._replace(law=replace(task.law, error_limit=limits))
+            found = found._replace(reason="")
+        require(not found.reason or mode == "warn", found.reason)
+        self._guard, self.judgement = guard, found
+        self.watch = Watch(guard, task, found, parameters.schedule == "place")
+        return (laws[0], task.law) if which else (task.law, laws[1])
+
+    def _say(self) -> None:
+        mode, is_joints = self.parameters.guard.mode, self.parameters.mode == "joint_torque"
+        self.report = report(self.judgement, self.watch, mode, is_joints)
 
     def tare(self) -> None:
         """Take the external torques that are felt now as zero."""
@@ -128,11 +173,12 @@ class ForceLoop:
         """
         if not self._hold or not any(joints.effort):
             self._start(joints.position)
+        self._joints = tuple(joints.position)
         command, torque = self._admit(command, torque)
         command = self._fresh(joints.position, command, command_age, posture)
         self._external = self._external_torque(sensors, external) - self._bias
         if self.parameters.mode == "joint_torque":
-            out = self._joint_torque(torque, dt)
+            out = self._joint_torque(contact, torque, dt)
         else:
             out = self._along(joints.position, contact, command, dt)
         return out._replace(velocity=self._blend(out.velocity, joints.velocity, dt))
@@ -209,6 +255,7 @@ class ForceLoop:
                 for i, share in enumerate(axis)
             ]
             speed = sum(share * held for share, held in zip(axis, self._held_back(speeds), strict=True))
+            speed *= self._factor(contact, direction, dt)
             velocity = self._hybrid_velocity(q, along, speed)
         self._before = [measured]
         return ForceOutput(
@@ -278,10 +325,14 @@ class ForceLoop:
         return rotation @ (np.array(command.force) / asked), rotation, asked
 
     def _contact_jacobian(self, q: Sequence[float], contact: Contact) -> Array:
-        cover, place = contact.cover, contact.place
-        if not cover or math.isnan(place):
-            cover, place = self.parameters.contact_cover, self.parameters.contact_place
+        cover, place = self._place(contact)
         return self._body.point_jacobian(q, cover, (place, 0.0, 0.0))
+
+    def _place(self, contact: Contact) -> tuple[str, float]:
+        """Where the force acts: where it is felt, else where the parameters say."""
+        if not contact.cover or math.isnan(contact.place):
+            return self.parameters.contact_cover, self.parameters.contact_place
+        return contact.cover, contact.place
 
     def _measured(self, q: Sequence[float], jacobian: Array, contact: Contact, direction: Array) -> float:
         """F_c: force of the arm on the world along the direction, N."""
@@ -315,7 +366,7 @@ class ForceLoop:
             force *= limit / fastest
         return _list(force + posture - along * (float(along @ posture) / square))
 
-    def _joint_torque(self, torque: Sequence[float] | None, dt: float) -> ForceOutput:
+    def _joint_torque(self, contact: Contact, torque: Sequence[float] | None, dt: float) -> ForceOutput:
         self._begin("joints" if torque is not None else "")
         if torque is None:  # nothing is asked for: stand still
             return ForceOutput([0.0] * self._n, [0.0] * self._n, *_ZERO_FORCES)
@@ -325,10 +376,37 @@ class ForceLoop:
             [self._torque_law.velocity(i, asked - measured[i], asked - before[i], dt) for i, asked in enumerate(torque)]
         )
         self._before = measured
-        return ForceOutput(velocity, list(torque), *_ZERO_FORCES)
+        factor = self._factor(contact, None, dt)
+        return ForceOutput([factor * v for v in velocity], list(torque), *_ZERO_FORCES)
+
+    def _factor(self, contact: Contact, direction: Array | None, dt: float) -> float:
+        """Factor of the gains by the guard; `direction` None for both across the cover."""
+        if self.watch is None or self._guard is None:
+            return 1.0
+        guard = self._guard
+
+        def where() -> list[Touch]:
+            cover, place = self._place(contact)
+            sure = place_is_sure(contact.place, math.nan, self.parameters.place_uncertainty_limit)
+            if self.parameters.schedule == "place" and not sure:
+                length = self._arm.covers.length[self._arm.covers.names.index(cover)]
+                return possible_touches(guard, self._joints, cover, length)
+            if direction is None:
+                return guard.touches(self._joints, cover, place)
+            return guard.touching(Touch(self._joints, cover, place, _triple(direction)))
+
+        if self.watch.step(where, dt):
+            self._is_new = True
+            self._say()
+        return 1.0 if self.parameters.guard.mode == "warn" else self.watch.factor
 
 
 _ZERO_FORCES = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 def _scaled(axis: Sequence[float], value: float) -> tuple[float, float, float]:

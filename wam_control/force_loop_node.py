@@ -2,10 +2,12 @@
 
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
+from wam_control.guard_report import Report
 from wam_description.arm import seconds
 from wam_description.signals import State
 from wam_ros.lockstep import Gate, Need
@@ -33,11 +35,12 @@ class ForceLoopNode(Node):
     def __init__(self, **ros: Any) -> None:
         super().__init__("force_loop", **ros)
         shared, own = declare(self, PARAMETERS)
-        self._loop = ForceLoop(shared.arm, own)
+        self._loop = ForceLoop(shared.arm, own, shared.timing)
         follow(self, own, self._loop.tune)
         self._ports = ports = Ports(self, shared)
         self._outer_period = shared.timing.outer_period_ns
         self._last: int | None = None
+        self._said: Report | None = None
         joints, frames = list(shared.arm.joints.names), (BASE, *shared.arm.covers.names)
         estimated = Need(True, streamed=ports.streamed("contact_estimator"))
         played = Need(True, streamed=ports.streamed("scenario"))
@@ -90,7 +93,17 @@ class ForceLoopNode(Node):
         ports.publish("force_measured", wrench_stamped(stamp, Wrench(frame, out.measured, NO_TORQUE)))
         ports.publish("force_error", wrench_stamped(stamp, Wrench(frame, out.error, NO_TORQUE)))
         ports.publish("force_error_limited", wrench_stamped(stamp, Wrench(frame, out.limited, NO_TORQUE)))
+        self._announce()
         ports.report(stamp)
+
+    def _announce(self) -> None:
+        """Publish what the guard says where it has changed, once the peers are there."""
+        report = self._loop.report
+        if report is self._said or not self._ports.ready:
+            return
+        self._said = report
+        level = DiagnosticStatus.WARN if report.is_warning else DiagnosticStatus.OK
+        self._ports.set_status(level, report.message, peers="connected", **report.facts)
 
     def _tare(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._loop.tare()

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 from wam_control.force_law import ForceLaw
+from wam_control.sampled_loop import Feedback
+from wam_control.stability_guard import GuardParameters, Task
 from wam_description.parameters import parameter
 
 AXES = ("x", "y", "z")  # of the force command's frame
@@ -12,6 +14,7 @@ AXES = ("x", "y", "z")  # of the force command's frame
 class ForceLoopParameters:
     """Gains and limits of the force loop."""
 
+    guard: GuardParameters
     mode: str = parameter(
         "hybrid: force along its direction, posture elsewhere; joint_torque: torque of each joint; "
         "open_loop: J^T F fed forward, no feedback",
@@ -74,6 +77,15 @@ class ForceLoopParameters:
     )
     contact_cover: str = parameter("cover that is taken to touch while no contact is felt", live=True)
     contact_place: float = parameter("place on it", "m", live=True)
+    schedule: str = parameter(
+        "off: the gains stay; place: the gains follow the estimated place so that the margin stays what it is at "
+        "contact_place, and fall back to the worst place of the cover where the estimate is not sure",
+        choices=("off", "place"),
+        live=True,
+    )
+    place_uncertainty_limit: float = parameter(
+        "standard deviation of an estimated place up to which it is sure", "m", low=0.0, live=True
+    )
 
 
 def force_law(parameters: ForceLoopParameters) -> ForceLaw:
@@ -97,4 +109,17 @@ def torque_law(parameters: ForceLoopParameters, joints: tuple[str, ...]) -> Forc
         parameters.torque_proportional_gain,
         parameters.torque_error_limit,
         parameters.torque_deadband,
+    )
+
+
+def task_of(parameters: ForceLoopParameters, law: ForceLaw) -> Task:
+    """What the guard has to know of a set."""
+    is_joints = parameters.mode == "joint_torque"
+    return Task(
+        law=law,
+        is_joints=is_joints,
+        feedback=Feedback(parameters.feedback, parameters.spring_stiffness, parameters.guard.feedback_lag),
+        hold_gain=parameters.posture_gain,
+        filter_time=0.0 if is_joints else parameters.force_filter,
+        delay_samples=parameters.delay_samples,
     )

@@ -18,6 +18,7 @@ COMMANDS = {
     "call": "ask a running stack: enable, disable, estop, reset_fault, reset, tare",
     "experiment": "run an experiment of the thesis, record it, print predicted against measured",
     "plant": "draw the plant's effects beside the theory, print the differences",
+    "guard": "hold the stability guard's verdicts against simulation of random sets",
     "model": "write the arm's model",
 }
 
