@@ -218,7 +218,9 @@ def _step(where: str, body: Any, arm: Arm) -> Step:
     until_force = _float(where, "until_force", body.get("until_force", 0.0))
     require(until_force >= 0.0, f"{where}: until_force is {until_force:g}; it must be 0 (no contact awaited) or above")
     force = _force(where, body["force"], arm) if "force" in body else NO_FORCE
-    require("chirp" not in body or any(force.force), f"{where}: chirp needs a force above 0 N, whose direction it takes")
+    require(
+        "chirp" not in body or any(force.force), f"{where}: chirp needs a force above 0 N, whose direction it takes"
+    )
     return Step(
         name=name,
         seconds=seconds,

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from rclpy.node import Node
 from rcl_interfaces.srv import SetParameters
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 

@@ -21,7 +21,6 @@ from wam_ros.remote_parameters import RemoteParameters, as_yaml
 from wam_ros.run import run
 from wam_ros.topics import BY_NAME, TOPICS, Topic
 
-
 EVERY = "*"
 
 

@@ -24,12 +24,17 @@ def efficiency(runs: Mapping[str, Recording]) -> Result:
         torque, given, taken = work(run, step, after)
         predicted = 1.0 - cable.efficiency(_losses(arm, torque))
         measured = 1.0 - taken / given
-        rows.append(Row(f"power lost, {torque:.2f} N m at the motor", 100 * predicted, 100 * measured, "%", WITHIN, "(6.15)"))
+        rows.append(
+            Row(f"power lost, {torque:.2f} N m at the motor", 100 * predicted, 100 * measured, "%", WITHIN, "(6.15)")
+        )
         torques.append(torque)
         losses.append(measured)
         predictions.append(predicted)
     x = np.array(torques)
-    curves = [Curve("measured", "measured", x, 100 * np.array(losses)), Curve("predicted", "(6.15)", x, 100 * np.array(predictions))]
+    curves = [
+        Curve("measured", "measured", x, 100 * np.array(losses)),
+        Curve("predicted", "(6.15)", x, 100 * np.array(predictions)),
+    ]
     return Result(rows, [Panel("power lost in the cables", "motor torque [N m]", "[%]", curves)])
 
 
@@ -78,7 +83,9 @@ def creeping(runs: Mapping[str, Recording]) -> Result:
             rows.append(Row(label, float(1e3 * predicted[at]), float(1e3 * given[at]), "mrad", WITHIN, "(6.19)"))
     curves = [Curve("measured", "measured", travel, 1e3 * given), Curve("predicted", "(6.19)", travel, 1e3 * predicted)]
     remark = "with the signed differential that is printed, (6.19) would give zero after each way back"
-    return Result(rows, [Panel("creep, out and back twice", "travel of the motor [rad]", "given way [mrad]", curves)], (remark,))
+    return Result(
+        rows, [Panel("creep, out and back twice", "travel of the motor [rad]", "given way [mrad]", curves)], (remark,)
+    )
 
 
 def crept(arm: Arm, travel: Numbers, load: float) -> Numbers:

@@ -78,7 +78,8 @@ def load(name: str) -> Experiment:
     runs = tuple(_run(f"{path}, run {i + 1}", body, shared) for i, body in enumerate(tree["runs"]))
     doubled = sorted({run.name for run in runs if sum(run.name == other.name for other in runs) > 1})
     require(not doubled, f"{path}: several runs are named {', '.join(doubled)}")
-    return Experiment(path.stem, *(str(tree[key]) for key in KEYS[:4]), runs)
+    title, section, configuration, evaluation = (str(tree[key]) for key in KEYS[:4])
+    return Experiment(path.stem, title, section, configuration, evaluation, runs)
 
 
 def configured(experiment: Experiment, run: Run, directory: Path) -> Configuration:
@@ -111,7 +112,9 @@ def _run(where: str, body: Any, shared: Mapping[str, Any]) -> Run:
     _keys(where, body, RUN_KEYS, ("name", "steps"))
     name = str(body["name"])
     require(name == Path(name).name and name != "..", f"{where}: name is '{name}'; it must be one for a directory")
-    require(isinstance(body["steps"], list) and bool(body["steps"]), f"{where}: 'steps' must be a list with at least one")
+    require(
+        isinstance(body["steps"], list) and bool(body["steps"]), f"{where}: 'steps' must be a list with at least one"
+    )
     return Run(name, {**shared, **body.get("values", {})}, tuple(body["steps"]), bool(body.get("stops", False)))
 
 

@@ -1,5 +1,6 @@
 """The picture of an experiment: predicted lines, measured traces."""
 
+import textwrap
 from pathlib import Path
 
 import matplotlib
@@ -14,6 +15,7 @@ from wam_analysis.experiments.rows import Panel, Result
 
 COLOURS = ("#d55e00", "#0b6fb8", "#009e73", "#cc79a7", "#7a5c00")
 MOST_POINTS = 2000
+FEW = 40  # points that are drawn one by one
 
 
 def draw(experiment: Experiment, result: Result, file: Path) -> None:
@@ -34,7 +36,8 @@ def draw(experiment: Experiment, result: Result, file: Path) -> None:
             _panel(place, panel)
         for place in axes.ravel()[count:]:
             place.set_axis_off()
-        picture.suptitle(f"{experiment.title} (section {experiment.section})", fontsize=10)
+        title = f"{experiment.title} (section {experiment.section})"
+        picture.suptitle("\n".join(textwrap.wrap(title, 45 * columns)), fontsize=10)
         picture.savefig(file, dpi=110)
         plt.close(picture)
 
@@ -48,8 +51,11 @@ def _panel(axes: Axes, panel: Panel) -> None:
             axes.plot(x, y, color="black", linewidth=0.9, linestyle="--", label=curve.label or None, zorder=3)
             continue
         colour += 1
-        style = {"marker": "o", "markersize": 3.5, "mfc": "none", "linestyle": "none"} if len(x) < 40 else {}
-        axes.plot(x, y, color=COLOURS[colour % len(COLOURS)], linewidth=1.1, label=curve.label or None, **style)
+        label = curve.label or None
+        if len(x) < FEW:
+            axes.plot(x, y, "o", color=COLOURS[colour % len(COLOURS)], markersize=3.5, mfc="none", label=label)
+        else:
+            axes.plot(x, y, color=COLOURS[colour % len(COLOURS)], linewidth=1.1, label=label)
     axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
     if "x" in panel.logarithmic:
         axes.set_xscale("log")

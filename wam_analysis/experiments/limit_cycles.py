@@ -5,7 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from wam_analysis.experiments.one_link import STUCK, Cycle, OneLink, Response, asked, fate, last_cycle, one_link, response
+from wam_analysis.experiments.one_link import (
+    STUCK,
+    Cycle,
+    OneLink,
+    Response,
+    asked,
+    fate,
+    last_cycle,
+    one_link,
+    response,
+)
 from wam_analysis.experiments.recording import Recording
 from wam_analysis.experiments.rows import Curve, Numbers, Panel, Result, Row
 from wam_theory.limit_cycles import (
@@ -70,7 +80,9 @@ def _with_smaller_deadband(run: Recording, force: float) -> Row:
     share = 2.0 * link.loop.deadband / link.lever / force
     loop = replace(link.loop, sample_period=0.0)
     predicted = assess(link.node, loop, asked(run, shown.time[0]) * link.lever).verdict
-    return Row(f"with {share:.2f} of that deadband", str(predicted), fate(run, run.steps[-1], shown), equation="integrator")
+    return Row(
+        f"with {share:.2f} of that deadband", str(predicted), fate(run, run.steps[-1], shown), equation="integrator"
+    )
 
 
 def _exact(run: Recording, link: OneLink, shown: Response) -> tuple[Cycle, Curve]:
@@ -152,8 +164,7 @@ def half_cycle_work(run: Recording, link: OneLink, shown: Response) -> tuple[flo
     truth = run.joints("sim/joint_states")
     pull = -np.interp(shown.time, truth.time, truth.effort[:, 0]) - shown.force * link.lever
     speed = np.gradient(shown.motor, shown.time)
-    sign = np.sign(speed)
-    turns = np.flatnonzero(sign[1:] * sign[:-1] < 0.0)
+    turns = np.flatnonzero(np.diff(speed > 0.0))
     begin, end = turns[-2] + 1, turns[-1] + 1
     sticks = np.abs(shown.speed[begin:end]) < STUCK
     given = np.where(sticks, np.clip(pull[begin:end] * speed[begin:end], 0.0, None), 0.0)

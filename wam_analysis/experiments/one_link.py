@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,7 +98,9 @@ def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) ->
     control = recording.node("force_loop", ForceLoopParameters)
     law = force_law(control)
     if law.proportional_gain[ACROSS]:
-        raise ValueError(f"force_proportional_gain is {law.proportional_gain[ACROSS]:g}; this evaluation is without G_P")
+        raise ValueError(
+            f"force_proportional_gain is {law.proportional_gain[ACROSS]:g}; this evaluation is without G_P"
+        )
     ratio, lever = 1.0 / arm.joint_from_motor[0], control.contact_place
     rubbing = driver.effects.rubbing_friction[0]
     node = FrictionNode(
@@ -214,7 +217,7 @@ def growth(time: Numbers, values: Numbers) -> Growth:
         raise ValueError(f"{len(crossings)} zero crossings are too few to see growth; record longer")
     shares = level[crossings] / (level[crossings] - level[crossings + 1])
     times = time[crossings] + shares * np.diff(time)[crossings]
-    parts = [level[a : b + 1] for a, b in zip(crossings[:-1], crossings[1:], strict=True)]
+    parts = [level[a : b + 1] for a, b in pairwise(crossings)]
     peaks = np.array([np.abs(part).max() for part in parts])
     at = 0.5 * (times[:-1] + times[1:])
     # of two neighbours, so that an error of the mean cancels

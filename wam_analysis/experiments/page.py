@@ -28,9 +28,11 @@ def write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> Non
     for experiment, result, picture in results:
         block = re.compile(rf"(<!-- experiment: {re.escape(experiment.name)} -->\n).*?(<!-- end -->)", re.DOTALL)
         if not block.search(content):
-            raise ValueError(f"{page} has no block '<!-- experiment: {experiment.name} -->'; add one, and '<!-- end -->'")
+            raise ValueError(
+                f"{page} has no block '<!-- experiment: {experiment.name} -->'; add one, and '<!-- end -->'"
+            )
         text = _text(experiment, result, f"{folder.name}/{experiment.name}.png")
-        content = block.sub(lambda found, text=text: f"{found[1]}{text}{found[2]}", content)
+        content = block.sub(rf"\g<1>{_literal(text)}\g<2>", content)
         shutil.copyfile(picture, folder / f"{experiment.name}.png")
     page.write_text(content, encoding="utf-8")
 
@@ -38,3 +40,8 @@ def write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> Non
 def _text(experiment: Experiment, result: Result, picture: str) -> str:
     remarks = "".join(f"\n- {remark}" for remark in result.remarks)
     return f"\n{markdown(result.rows)}{remarks}\n\n![{experiment.title}]({picture})\n\n".replace("\n\n\n", "\n\n")
+
+
+def _literal(text: str) -> str:
+    """A text for the right side of a substitution."""
+    return text.replace("\\", "\\\\")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,7 +39,10 @@ def responses(runs: Mapping[str, Recording]) -> Result:
         rows += _first(label, link, shown, force)
         farthest = float(np.abs(shown.force - predicted).max()) / force
         rows.append(Row(f"{label}, farthest from the exact response", 0.0, farthest, "of step", WITHIN, "", True))
-        curves = [Curve("measured", "measured", shown.time, shown.force), Curve("predicted", "exact", shown.time, predicted)]
+        curves = [
+            Curve("measured", "measured", shown.time, shown.force),
+            Curve("predicted", "exact", shown.time, predicted),
+        ]
         panels.append(Panel(f"{label}, gamma {link.gamma:.2f}: {domain(link)}", "time [s]", "force [N]", curves))
     return Result(rows, panels)
 
@@ -50,7 +54,13 @@ def domain(link: OneLink) -> str:
     low, high = float(gamma_a(link.zeta)), float(gamma_b(link.zeta))
     if link.gamma < low:
         return "slides straight"
-    return "stairs from one side" if link.gamma < high else "domain I, overshoots" if link.gamma < 1.0 else "domain II, III"
+    return (
+        "stairs from one side"
+        if link.gamma < high
+        else "domain I, overshoots"
+        if link.gamma < 1.0
+        else "domain II, III"
+    )
 
 
 def _first(label: str, link: OneLink, shown: Response, force: float) -> list[Row]:
@@ -95,7 +105,7 @@ def errors_at_rest(shown: Response, force: float) -> Numbers:
     edges = np.flatnonzero(np.diff(resting.astype(int)))
     bounds = [0, *(edges + 1).tolist(), len(resting)]
     found = []
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in pairwise(bounds):
         if resting[begin] and begin > 0 and shown.time[end - 1] - shown.time[begin] > LEAST:
             found.append(force - float(np.median(shown.force[begin:end])))
     return np.array(found)

@@ -10,8 +10,8 @@ from wam_analysis.experiments.one_link import (
     asked,
     fate,
     growth,
-    one_link,
     last_cycle,
+    one_link,
     predicted_outcome,
     response,
     set_until,
@@ -36,12 +36,18 @@ def story(runs: Mapping[str, Recording]) -> Result:
     for name in ("late_with_rod_at_0.8", "late_with_rod_at_0.9"):
         rows += fates(runs[name], name.replace("_", " "))
     panels = [
-        _panel(runs, ("below_the_margin", "above_the_margin"), "10 lb, then 0.95 and 1.05 of the margin"),
+        _panel(runs, ("below_the_margin", "above_the_margin"), "0.95 and 1.05 of the margin"),
         _panel(runs, ("rod",), "1.5 of the margin, rod on; taken away at the end"),
         _panel(runs, ("large_step", "large_step_saturated"), "10 lb, rod on, 1.5 of the margin"),
         _panel(runs, ("late_with_rod_at_0.8", "late_with_rod_at_0.9"), "one sample late, rod on"),
     ]
     return Result(rows, panels)
+
+
+def large_step(runs: Mapping[str, Recording]) -> Result:
+    """The run of a large step alone: what becomes of it."""
+    rows = [row for name, run in runs.items() for row in fates(run, name.replace("_", " "))]
+    return Result(rows, [_panel(runs, tuple(runs), "large step")])
 
 
 def margin(below: Recording, above: Recording, how: str) -> list[Row]:
@@ -59,7 +65,9 @@ def margin(below: Recording, above: Recording, how: str) -> list[Row]:
     for one, shaken in ((link, first), (other, second)):
         share = one.loop.gain / one.margin.gain
         expected = "decays" if share < 1.0 else "grows"
-        rows.append(Row(f"at {share:.2f} of it, {how}", expected, "grows" if shaken.rate > 0.0 else "decays", "", 0.0, law))
+        rows.append(
+            Row(f"at {share:.2f} of it, {how}", expected, "grows" if shaken.rate > 0.0 else "decays", "", 0.0, law)
+        )
     return rows
 
 
@@ -84,7 +92,9 @@ def fates(run: Recording, name: str) -> list[Row]:
         rows.append(Row(label, str(outcome.verdict), fate(run, step, shown), equation=law))
         if outcome.verdict is Verdict.LIMIT_CYCLE:
             found = last_cycle(shown.time, shown.force)
-            rows.append(Row(f"{label}, peak to peak", outcome.peak_to_peak / link.lever, found.peak_to_peak, "N", CYCLE))
+            rows.append(
+                Row(f"{label}, peak to peak", outcome.peak_to_peak / link.lever, found.peak_to_peak, "N", CYCLE)
+            )
             rows.append(Row(f"{label}, period", outcome.period, found.period, "s", CYCLE))
     return rows
 
@@ -102,10 +112,15 @@ def _panel(runs: Mapping[str, Recording], names: Sequence[str], title: str) -> P
         run = runs[name]
         step = run.steps[-1]
         link = one_link(run, set_until(run, step))
-        shown = response(run, link)
+        is_plain = len(run.steps) <= PLAIN
+        last = response(run, link, step)
+        shown = last if is_plain else response(run, link)
         curves.append(Curve("measured", name.replace("_", " "), shown.time, shown.force))
-        if len(run.steps) <= PLAIN:
-            last = response(run, link, step)
-            exact = simulate(link.node, link.loop, asked(run, step.begin) * link.lever, np.ptp(last.time), link.state(last))
-            curves.append(Curve("predicted", "", last.time, exact.at(last.time - last.time[0]).contact_force / link.lever))
-    return Panel(title, "time [s]", "force [N]", curves)
+        if is_plain:
+            exact = simulate(
+                link.node, link.loop, asked(run, step.begin) * link.lever, np.ptp(last.time), link.state(last)
+            )
+            curves.append(
+                Curve("predicted", "", last.time, exact.at(last.time - last.time[0]).contact_force / link.lever)
+            )
+    return Panel(title, "time [s]", "force by deflection [N]", curves)

@@ -40,9 +40,9 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     inside = (found.frequency > low) & (found.frequency < high)
     lowest = inside & (found.frequency < 2.0 * low)
     predicted = np.abs(response_of(run, found.frequency))
+    expected = {"lower resonance": float(theory.lower) * HZ, "upper resonance": float(theory.upper) * HZ}
     rows = [
-        Row("lower resonance", float(theory.lower) * HZ, zero_of(run, found, float(theory.lower) * HZ), "Hz", WITHIN, "(4.4)"),
-        Row("upper resonance", float(theory.upper) * HZ, zero_of(run, found, float(theory.upper) * HZ), "Hz", WITHIN, "(4.4)"),
+        *(Row(name, at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)") for name, at in expected.items()),
         Row(
             f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz",
             static,
@@ -62,7 +62,8 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
         Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy"),
         Panel("coherence", "frequency [Hz]", "", coherence, "x"),
     ]
-    return Result(rows, panels)
+    remark = f"the coherence falls where the response changes within the {SMOOTH} neighbouring frequencies averaged"
+    return Result(rows, panels, (remark,))
 
 
 def allocation(runs: Mapping[str, Recording]) -> Result:
@@ -71,7 +72,7 @@ def allocation(runs: Mapping[str, Recording]) -> Result:
     lower: dict[str, float] = {}
     for name, run in runs.items():
         found, theory = transfer(run), resonances(run)
-        lower[name] = zero_of(run, found, float(theory.lower) * HZ)
+        lower[name] = zero_of(found, float(theory.lower) * HZ, _lead(run))
         label = name.replace("_", " ")
         rows.append(Row(f"{label}, lower resonance", float(theory.lower) * HZ, lower[name], "Hz", WITHIN, "(4.4)"))
         low, high = swept(run)
@@ -115,12 +116,17 @@ def response_of(run: Recording, frequency: Numbers) -> Complex:
     return found
 
 
+def _lead(run: Recording) -> float:
+    (circuit,) = run.shared.arm.circuits
+    return circuit.damping / circuit.stiffness
+
+
 def _contact_stiffness(run: Recording) -> float:
     return joint_stiffness(run.node("driver", DriverParameters).world)
 
 
 def swept(run: Recording) -> tuple[float, float]:
-    """Lowest and highest frequency of the force that was asked for, Hz, from its crossings of what is asked after it."""
+    """Lowest and highest frequency of the chirp, Hz, from where its force crosses what is asked for after it."""
     command, sweep = run.forces("force_command"), run.step("sweep")
     during = (command.time >= sweep.begin) & (command.time < sweep.end)
     after = command.force[int(np.searchsorted(command.time, sweep.end + ROUNDING))]
@@ -141,7 +147,7 @@ def transfer(run: Recording) -> Transfer:
     part = slice(*np.searchsorted(motors.time, [begin - ROUNDING, end - ROUNDING]).tolist())
     period = float(motors.time[1] - motors.time[0])
     torque, angle = motors.effort[part, 0], sensors.position[part, 0]
-    frequency = np.fft.rfftfreq(len(torque), period)
+    frequency: Numbers = np.fft.rfftfreq(len(torque), period).astype(np.float64)
     held = np.sinc(frequency * period) * np.exp(1j * np.pi * frequency * period)
     u = np.fft.rfft(torque - torque[-1]) * held
     y = np.fft.rfft(angle - angle[-1])
@@ -160,13 +166,15 @@ def spectra(frequency: Numbers, u: Complex, y: Complex) -> Transfer:
     return Transfer(frequency, both / outputs, np.abs(both) ** 2 / (inputs * outputs))
 
 
-def zero_of(run: Recording, found: Transfer, near: float) -> float:
+def zero_of(found: Transfer, near: float, lead: float) -> float:
     """Frequency, Hz, at which the real part of the inverse response is zero: a resonance without its damping.
 
-    The zero that the damping of the cable puts into the response is taken out before.
+    Parameters
+    ----------
+    near : where it is expected, Hz.
+    lead : damping over stiffness of the cable, s, whose zero in the response is taken out before.
     """
-    (circuit,) = run.shared.arm.circuits
     chosen = np.abs(found.frequency / near - 1.0) < NEAR
-    zero = 1.0 + 2j * np.pi * found.frequency[chosen] * circuit.damping / circuit.stiffness
+    zero = 1.0 + 2j * np.pi * found.frequency[chosen] * lead
     slope, offset = np.polyfit(found.frequency[chosen] ** 2, (found.inverse[chosen] * zero).real, 1)
     return float(np.sqrt(-offset / slope))
