@@ -22,9 +22,7 @@ def joints(time: Any, position: Any, velocity: Any = None, effort: Any = None) -
         return np.broadcast_to(0.0 if values is None else values, len(time)).reshape(-1, 1).astype(float)
 
     stamps = np.round(np.asarray(time) * 1e9).astype(np.int64)
-    return JointColumns(
-        stamps, stamps, ("",) * len(time), ("one",), column(position), column(velocity), column(effort)
-    )
+    return JointColumns(stamps, stamps, ("",) * len(time), ("one",), column(position), column(velocity), column(effort))
 
 
 def forces(time: Any, force: Any, frame: str = "link", torque: Any = (0.0, 0.0, 0.0)) -> WrenchColumns:

@@ -52,7 +52,7 @@ def test_the_experiments_of_chapters_four_to_six_are_there() -> None:
 
 
 def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
-    with pytest.raises(ParameterError, match="no experiment is named 'creeep'; there are: .*creep"):
+    with pytest.raises(ParameterError, match=r"no experiment is named 'creeep'; there are: .*creep"):
         load("creeep")
 
 

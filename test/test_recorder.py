@@ -42,7 +42,14 @@ ROOT = Path(__file__).parents[1]
 
 def parameters(directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: Any) -> Any:
     shared = flatten(yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"])
-    changed = {"timing.mode": mode, "nodes": list(nodes), "directory": str(directory), "name": "bag", "topics": ["*"], **own}
+    changed = {
+        "timing.mode": mode,
+        "nodes": list(nodes),
+        "directory": str(directory),
+        "name": "bag",
+        "topics": ["*"],
+        **own,
+    }
     return {**shared, **changed}
 
 

@@ -1,10 +1,13 @@
 """Section 5.6: what friction, step size, saturation and delay do to the stable gain."""
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from wam_analysis.experiments.one_link import (
+    ACROSS,
     Growth,
     OneLink,
     asked,
@@ -18,6 +21,9 @@ from wam_analysis.experiments.one_link import (
 )
 from wam_analysis.experiments.recording import Recording, Step
 from wam_analysis.experiments.rows import Curve, Panel, Result, Row
+from wam_control.force_loop_parameters import ForceLoopParameters, force_law, task_of
+from wam_control.stability_guard import StabilityGuard
+from wam_control.velocity_loop import VelocityLoopParameters
 from wam_theory.stick_slip import Verdict, simulate
 
 TRANSIENT = 0.4  # s after a step until only the growing mode is left
@@ -48,6 +54,44 @@ def large_step(runs: Mapping[str, Recording]) -> Result:
     """The run of a large step alone: what becomes of it."""
     rows = [row for name, run in runs.items() for row in fates(run, name.replace("_", " "))]
     return Result(rows, [_panel(runs, tuple(runs), "large step")])
+
+
+def own_servo(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `testbed-own-servo`: the margin with the velocity loop of the testbed, which is no ideal source."""
+    below, above = runs["below_the_margin"], runs["above_the_margin"]
+    ideal = margin(below, above, "")[0]
+    with_servo = margin_with_servo(below)
+    rows = [
+        ideal._replace(quantity="marginal gain, beside that of an ideal velocity source", bound=math.nan),
+        ideal._replace(
+            quantity="marginal gain, with the velocity loop", predicted=with_servo, equation="wam_control.sampled_loop"
+        ),
+    ]
+    panel = Panel(
+        "either side of the margin",
+        "time [s]",
+        "force by deflection [N]",
+        [_last_step(name.replace("_", " "), run) for name, run in runs.items()],
+    )
+    return Result(rows, [panel])
+
+
+def _last_step(label: str, run: Recording) -> Curve:
+    shown = response(run, one_link(run), run.steps[-1])
+    return Curve("measured", label, shown.time, shown.force)
+
+
+def margin_with_servo(run: Recording) -> float:
+    """Marginal G_I at the tip, m/s/N, of the sampled loop with the velocity loop and the damping of the cable."""
+    parameters = run.node("force_loop", ForceLoopParameters)
+    servo = run.node("velocity_loop", VelocityLoopParameters)
+    guard = replace(
+        parameters.guard, servo_proportional=servo.proportional_gain, servo_integral=servo.integral_gain, late=0
+    )
+    found = StabilityGuard(run.shared.arm, run.shared.timing, guard)
+    touches = found.touches(guard.posture, parameters.contact_cover, parameters.contact_place)
+    law = force_law(parameters)
+    return law.gain[ACROSS] * found.judge(task_of(parameters, law), touches).scale
 
 
 def margin(below: Recording, above: Recording, how: str) -> list[Row]:
