@@ -137,6 +137,16 @@ def test_marginal_gain_lies_where_growth_changes_its_sign(tmp_path: Path) -> Non
     assert (high.predicted, high.measured) == ("grows", "grows")
 
 
+def test_margin_with_the_velocity_loop_tends_to_that_of_a_velocity_source_as_it_gets_stiffer(tmp_path: Path) -> None:
+    run = recorded(load("testbed-own-servo"), 0, {}, PRESS, tmp_path)
+    own = testbed.margin_with_servo(run)
+    stiff = {"proportional_gain": (0.03,), "integral_gain": (9.0,)}
+    stiffer = {**run.parameters, "velocity_loop": {**run.parameters["velocity_loop"], **stiff}}
+    closer = testbed.margin_with_servo(run._replace(parameters=stiffer))
+    ideal = one_link(run).margin.gain * LEVER**2
+    assert own > closer > ideal
+
+
 def test_fate_of_a_step_is_read_from_its_last_windows(tmp_path: Path) -> None:
     experiment = load("testbed-5.6")
     time = np.arange(0.0, 3.0, 5e-4)

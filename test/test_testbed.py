@@ -78,9 +78,7 @@ def test_the_teflon_rod_is_pressed_on_while_the_testbed_runs(tmp_path: Path, dom
         assert not answer.successful
 
 
-def test_what_a_scenario_sets_and_sweeps_is_the_same_over_topics_and_without_ros(
-    tmp_path: Path, domain_id: int
-) -> None:
+def test_settings_and_chirps_are_the_same_over_topics_and_without_ros(tmp_path: Path, domain_id: int) -> None:
     force = {"frame": "link", "newtons": [0.0, -20.0, 0.0]}
     set_up = {"driver": {"effects.rubbing_friction": [0.7]}, "force_loop": {"force_gain": [0.009]}}
     steps = [

@@ -37,7 +37,7 @@ def draw(experiment: Experiment, result: Result, file: Path) -> None:
         for place in axes.ravel()[count:]:
             place.set_axis_off()
         title = f"{experiment.title} (section {experiment.section})"
-        picture.suptitle("\n".join(textwrap.wrap(title, 45 * columns)), fontsize=10)
+        picture.suptitle("\n".join(textwrap.wrap(title, 60 * columns)), fontsize=9)
         picture.savefig(file, dpi=110)
         plt.close(picture)
 

@@ -57,7 +57,7 @@ def large_step(runs: Mapping[str, Recording]) -> Result:
 
 
 def own_servo(runs: Mapping[str, Recording]) -> Result:
-    """The experiment `testbed-own-servo`: the margin with the velocity loop of the testbed, which is no ideal source."""
+    """The experiment `testbed-own-servo`: the margin with the testbed's velocity loop, no ideal source."""
     below, above = runs["below_the_margin"], runs["above_the_margin"]
     ideal = margin(below, above, "")[0]
     with_servo = margin_with_servo(below)
