@@ -18,6 +18,8 @@ NODES = {
     "recorder": "wam_ros.recorder_node",
 }
 
+CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets")
+
 package = ElementTree.parse(Path(__file__).resolve().parent / "package.xml").getroot()
 name = package.findtext("name")
 
@@ -67,7 +69,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
         (f"share/{name}", ["package.xml"]),
-        (f"share/{name}/config", sorted(glob("config/*.yaml"))),
+        *((f"share/{name}/{folder}", sorted(glob(f"{folder}/*.yaml"))) for folder in CONFIGURATIONS),
         (f"share/{name}/launch", sorted(glob("launch/*.launch.py"))),
         (f"lib/{name}", launchers),
     ],

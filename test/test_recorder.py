@@ -40,9 +40,16 @@ CONFIG = Path(__file__).parents[1] / "config" / "wam.yaml"
 ROOT = Path(__file__).parents[1]
 
 
-def parameters(directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: str) -> Any:
+def parameters(directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: Any) -> Any:
     shared = flatten(yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"])
-    changed = {"timing.mode": mode, "nodes": list(nodes), "directory": str(directory), "name": "bag", **own}
+    changed = {
+        "timing.mode": mode,
+        "nodes": list(nodes),
+        "directory": str(directory),
+        "name": "bag",
+        "topics": ["*"],
+        **own,
+    }
     return {**shared, **changed}
 
 
@@ -128,6 +135,25 @@ def test_every_message_of_every_topic_is_in_the_bag(ros: Any, tmp_path: Path) ->
             assert abs(log_time - time.time_ns()) < 60e9
             assert log_time >= last
             last = log_time
+
+
+def test_only_the_topics_that_were_chosen_are_in_the_bag(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path, topics=["motor_states", "/clock"])
+    sender = ros.node("sender")
+    publishers = {name: publisher(sender, name) for name in ("motor_states", "motor_currents", "/clock")}
+    ros.wait(matched(*publishers.values()), what="it listens to the others too, so that every publisher begins")
+    for k in range(1, 11):
+        for name in ("motor_currents", "motor_states"):
+            publishers[name].publish(state(k * 1_000_000, 0.1 * k))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 10)
+    ros.remove(node)
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert {c.topic: c.msgcount for c in reader.connections} == {"/wam/motor_states": 10, "/clock": 0}
+
+
+def test_a_topic_that_does_not_exist_is_refused(ros: Any, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="parameter 'topics' names 'motor_state'; allowed: \\*, "):
+        recorder(ros, tmp_path, topics=["motor_state"])
 
 
 def test_counts_and_drops_are_in_the_bag(ros: Any, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from wam_control.transform import Transform
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
+from wam_description.parameters import build, values
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State
 from wam_driver.driver import Driver, DriverParameters
@@ -65,6 +66,10 @@ class DirectRun:
         zero = [0.0] * len(arm.joints.names)
         self._used: tuple[int, list[float], list[float]] = (0, zero, zero)  # stamp, velocity, effort
         self._newest = self._used
+        self._flat = {
+            "driver": values(node("driver", DriverParameters)),
+            "force_loop": values(node("force_loop", ForceLoopParameters)),
+        }
 
     def play(self) -> str:
         """Play the scenario to its end; returns why it failed, '' where it did not."""
@@ -133,6 +138,11 @@ class DirectRun:
             self.driver.enable("")
         elif played.request == "disable":
             self.driver.disable()
+        for node, name, value in played.settings:
+            self._flat[node][name] = value
+        if played.settings:
+            self.driver.rub(build(DriverParameters, self._flat["driver"]).effects.rubbing_friction)
+            self._force_loop.tune(build(ForceLoopParameters, self._flat["force_loop"]))
         if played.push_cover:
             plant.push(played.push_cover, np.array(played.push_force), np.array(played.push_torque))
         else:

@@ -16,6 +16,7 @@ COMMANDS = {
     "record": "record every topic of a running stack until Ctrl-C",
     "report": "say what a recording of the demonstration shows",
     "call": "ask a running stack: enable, disable, estop, reset_fault, reset, tare",
+    "experiment": "run an experiment of the thesis, record it, print predicted against measured",
     "plant": "draw the plant's effects beside the theory, print the differences",
     "guard": "hold the stability guard's verdicts against simulation of random sets",
     "evaluate": "judge a part of the stack by a seeded battery: contact",
