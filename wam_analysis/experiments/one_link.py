@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.experiments.recording import Recording, Step
-from wam_control.force_loop_parameters import ForceLoopParameters, force_law
+from wam_control.force_law import ForceLaw
+from wam_control.force_loop_parameters import AXES
 from wam_description.arm import Arm, seconds
-from wam_description.world import World
-from wam_driver.driver import DriverParameters
-from wam_theory.limit_cycles import SampledMargin, damping_ratio, gain_ratio, sampled_margin
+from wam_description.world import Springs
+from wam_theory.linear_loop import SampledMargin, damping_ratio, gain_ratio, sampled_margin
 from wam_theory.stick_slip import ForceLoop, FrictionNode, Outcome, Verdict, assess
 
 Numbers = NDArray[np.float64]
+LAW = ("gain", "proportional_gain", "error_limit", "deadband")  # fields of a force law, in its order
 ACROSS = 1  # y of the link's frame, along which the testbed presses
 SETTLED = 0.02  # of the step: what is left of a response that counts as settled
 STUCK = 1e-5  # rad/s of the joint, below which it sticks: far below any motion, far above what a stuck one shows
@@ -68,9 +69,10 @@ def link_inertia(arm: Arm) -> float:
     return float(arm.links.inertia[1] + arm.links.mass[0] * x * x + arm.joints.armature[0])
 
 
-def joint_stiffness(world: World) -> float:
+def joint_stiffness(recording: Recording) -> float:
     """k_c of the spring at the joint, N m/rad."""
-    return float(world.springs.stiffness[0] * world.springs.lever[0] ** 2)
+    springs = recording.part("driver", "world.springs", Springs)
+    return float(springs.stiffness[0] * springs.lever[0] ** 2)
 
 
 def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) -> OneLink:
@@ -94,20 +96,19 @@ def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) ->
     arm, timing = recording.shared.arm, recording.shared.timing
     if len(arm.joints.names) != 1:
         raise ValueError(f"{arm.name} has {len(arm.joints.names)} joints; this evaluation is for one")
-    driver = recording.node("driver", DriverParameters)
-    control = recording.node("force_loop", ForceLoopParameters)
-    law = force_law(control)
+    control = recording.parameters["force_loop"]
+    law = ForceLaw("force", AXES, *(tuple(control[f"force_{name}"]) for name in LAW))
     if law.proportional_gain[ACROSS]:
         raise ValueError(
             f"force_proportional_gain is {law.proportional_gain[ACROSS]:g}; this evaluation is without G_P"
         )
-    ratio, lever = 1.0 / arm.joint_from_motor[0], control.contact_place
-    rubbing = driver.effects.rubbing_friction[0]
+    ratio, lever = 1.0 / arm.joint_from_motor[0], float(control["contact_place"])
+    rubbing = float(recording.parameters["driver"]["effects.rubbing_friction"][0])
     node = FrictionNode(
         inertia=link_inertia(arm),
         damping=arm.joints.viscous_friction[0],
         transmission_stiffness=ratio**2 * arm.circuits[0].stiffness,
-        contact_stiffness=joint_stiffness(driver.world),
+        contact_stiffness=joint_stiffness(recording),
         dynamic_friction=arm.joints.dynamic_friction[0] + rubbing,
         static_friction=arm.joints.static_friction[0] + rubbing,
     )
@@ -116,7 +117,7 @@ def one_link(recording: Recording, settings: Mapping[str, Any] | None = None) ->
         error_limit=law.error_limit[ACROSS] * lever,
         deadband=law.deadband[ACROSS] * lever,
         sample_period=seconds(timing.outer_period_ns),
-        delay_samples=control.delay_samples,
+        delay_samples=int(control["delay_samples"]),
     )
     return OneLink(node, loop, lever, ratio)
 

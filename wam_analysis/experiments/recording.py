@@ -77,6 +77,12 @@ class Recording(NamedTuple):
         own = {field.name for field in fields(cls)}
         return build(cls, {key: value for key, value in self.parameters[name].items() if key in own})
 
+    def part(self, name: str, prefix: str, cls: type[T]) -> T:
+        """A part of a node's parameters, as ``part('driver', 'world.springs', Springs)``, whatever else it has."""
+        begin = f"{prefix}."
+        flat = self.parameters[name]
+        return build(cls, {key.removeprefix(begin): value for key, value in flat.items() if key.startswith(begin)})
+
     def joints(self, topic: str) -> Joints:
         """A JointState topic."""
         columns = self._columns(topic, JointColumns)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from wam_analysis.experiments.one_link import joint_stiffness, link_inertia
 from wam_analysis.experiments.recording import Recording
 from wam_analysis.experiments.rows import Curve, Numbers, Panel, Result, Row
-from wam_driver.driver import DriverParameters
 from wam_theory.cable import stiffness_with_reducer
 from wam_theory.resonance import Resonances, force_resonances
 
@@ -36,7 +35,7 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     theory = resonances(run)
     gain = 1.0 / np.abs(found.inverse)
     arm = run.shared.arm
-    static = 1.0 / (arm.joint_from_motor[0] * _contact_stiffness(run))
+    static = 1.0 / (arm.joint_from_motor[0] * joint_stiffness(run))
     inside = (found.frequency > low) & (found.frequency < high)
     lowest = inside & (found.frequency < 2.0 * low)
     predicted = np.abs(response_of(run, found.frequency))
@@ -101,7 +100,7 @@ def resonances(run: Recording) -> Resonances:
     """(4.4) from the recorded parameters, rad/s."""
     arm = run.shared.arm
     motor, ratio = arm.motors.inertia[0], 1.0 / arm.joint_from_motor[0]
-    return force_resonances(motor, link_inertia(arm), arm.circuits[0].stiffness, _contact_stiffness(run), ratio)
+    return force_resonances(motor, link_inertia(arm), arm.circuits[0].stiffness, joint_stiffness(run), ratio)
 
 
 def response_of(run: Recording, frequency: Numbers) -> Complex:
@@ -111,7 +110,7 @@ def response_of(run: Recording, frequency: Numbers) -> Complex:
     ratio, circuit = 1.0 / arm.joint_from_motor[0], arm.circuits[0]
     cable = circuit.stiffness + circuit.damping * s
     motor = arm.motors.inertia[0] * s**2 + arm.motors.viscous_friction[0] * s + cable
-    link = link_inertia(arm) * s**2 + arm.joints.viscous_friction[0] * s + ratio**2 * cable + _contact_stiffness(run)
+    link = link_inertia(arm) * s**2 + arm.joints.viscous_friction[0] * s + ratio**2 * cable + joint_stiffness(run)
     found: Complex = ratio * cable / (motor * link - (ratio * cable) ** 2)
     return found
 
@@ -119,10 +118,6 @@ def response_of(run: Recording, frequency: Numbers) -> Complex:
 def _lead(run: Recording) -> float:
     (circuit,) = run.shared.arm.circuits
     return circuit.damping / circuit.stiffness
-
-
-def _contact_stiffness(run: Recording) -> float:
-    return joint_stiffness(run.node("driver", DriverParameters).world)
 
 
 def swept(run: Recording) -> tuple[float, float]:
