@@ -381,6 +381,8 @@ def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path,
     assert (tmp_path / "mine" / "result.png").is_file()
     assert run_command("creep", "--evaluate", str(tmp_path / "mine")) == 0
     assert capfd.readouterr().out == said.out
+    assert run_command("creep", "--evaluate", str(tmp_path / "mine" / "out_and_back")) == 0
+    capfd.readouterr()
     # a bound that is missed: the same bag for an experiment in which the driver should have stopped the arm
     other = tmp_path / "creep.yaml"
     text = packaged("experiments/creep").read_text()

@@ -17,17 +17,20 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
 
     Parameters
     ----------
-    directory : holds a bag of the name of each run.
+    directory : holds a bag of the name of each run; or the bag of an experiment of one run.
 
     Raises
     ------
     BagError
         where a bag is missing or cannot be read.
     """
-    missing = [run.name for run in experiment.runs if not (directory / run.name).is_dir()]
+    bags = {run.name: directory / run.name for run in experiment.runs}
+    if len(bags) == 1 and (directory / "metadata.yaml").is_file():
+        bags = dict.fromkeys(bags, directory)
+    missing = [name for name, bag in bags.items() if not bag.is_dir()]
     if missing:
         raise BagError(f"{directory} has no bag of {', '.join(missing)}; run 'wam experiment {experiment.name}'")
-    recordings = {run.name: recording(directory / run.name) for run in experiment.runs}
+    recordings = {name: recording(bag) for name, bag in bags.items()}
     result = evaluation_of(experiment)(recordings)
     stops = [_stop(run, recordings[run.name]) for run in experiment.runs if run.stops or recordings[run.name].fault]
     remarks = [
