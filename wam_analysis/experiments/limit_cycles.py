@@ -18,15 +18,9 @@ from wam_analysis.experiments.one_link import (
 )
 from wam_analysis.experiments.recording import Recording
 from wam_analysis.experiments.rows import Curve, Numbers, Panel, Result, Row
-from wam_theory.limit_cycles import (
-    actuator_cycle,
-    actuator_cycle_power,
-    actuator_cycle_work,
-    stiction_cycle_force,
-    stiction_cycle_number,
-    stiction_cycle_period,
-)
+from wam_theory.regimes import actuator_cycle, actuator_cycle_power, actuator_cycle_work
 from wam_theory.stick_slip import assess, simulate
+from wam_theory.stiction import stiction_cycle_force, stiction_cycle_number, stiction_cycle_period
 
 WITHIN = 0.02
 CLOSED_FORM = 1.0  # deviation allowed to (5.8) and (5.9), times the left side of (5.11), which they neglect

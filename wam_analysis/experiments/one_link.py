@@ -13,7 +13,7 @@ from wam_control.force_loop_parameters import ForceLoopParameters, force_law
 from wam_description.arm import Arm, seconds
 from wam_description.world import World
 from wam_driver.driver import DriverParameters
-from wam_theory.limit_cycles import SampledMargin, damping_ratio, gain_ratio, sampled_margin
+from wam_theory.linear_loop import SampledMargin, damping_ratio, gain_ratio, sampled_margin
 from wam_theory.stick_slip import ForceLoop, FrictionNode, Outcome, Verdict, assess
 
 Numbers = NDArray[np.float64]

@@ -9,15 +9,10 @@ import numpy as np
 from wam_analysis.experiments.one_link import STUCK, OneLink, Response, asked, one_link, response
 from wam_analysis.experiments.recording import Recording
 from wam_analysis.experiments.rows import Curve, Numbers, Panel, Result, Row
-from wam_theory.limit_cycles import (
-    breakaway_delay,
-    gamma_a,
-    gamma_b,
-    integral_time_constant,
-    psi,
-    series_stiffness,
-)
+from wam_theory.linear_loop import integral_time_constant, series_stiffness
+from wam_theory.regimes import gamma_a, gamma_b, psi
 from wam_theory.stick_slip import Kind, simulate
+from wam_theory.stiction import breakaway_delay
 
 WITHIN = 0.02
 HOLD = 0.15  # what the hold of a sample moves of (5.18), which is for the continuous loop
