@@ -38,9 +38,9 @@ setup(
     packages=find_packages(include=["wam_*"]),
     python_requires=">=3.11",
     install_requires=[
+        "lz4",
         "matplotlib",
         "mcap",
-        "mcap-ros2-support",
         "mujoco",
         "numpy",
         "pin",
@@ -52,6 +52,7 @@ setup(
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "colcon-common-extensions",
+            "mcap-ros2-support",
             "mypy",
             "pytest<9",
             "rosbags",
