@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.bag_file import BagError, files, is_asked, opened, type_of
+from wam_analysis.bag_file import files, is_asked, opened, type_of
 from wam_analysis.cdr import Decoder
 from wam_analysis.columns import (
     BoolColumns,
@@ -24,11 +24,11 @@ from wam_analysis.columns import (
     JointColumns,
     Messages,
     PointColumns,
-    Times,
     WrenchColumns,
 )
 from wam_analysis.mcap_file import NEVER, Batch, McapFile, Offsets, log_times, messages
-from wam_analysis.mcap_records import Bytes, Damage
+from wam_analysis.mcap_records import BagError, Bytes, Damage
+from wam_analysis.message_groups import Times
 from wam_ros.message_text import Fields
 
 __all__ = [
@@ -96,7 +96,7 @@ def read(path: str | Path, topics: Collection[str] | None = None, begin_ns: int 
                     collector(channel.topic, *type_of(mcap, channel))
             attachments.update(mcap.attachments())
             metadata.update(mcap.metadata())
-    columns = {topic: found.columns(_decoder(Path(path), topic)) for topic, found in sorted(collectors.items())}
+    columns = {topic: found.columns(f"{path}, topic {topic}") for topic, found in sorted(collectors.items())}
     return Bag(Path(path), columns, types, attachments, metadata)
 
 
@@ -120,16 +120,6 @@ def raw(path: str | Path, topics: Collection[str] | None = None) -> dict[str, Ra
     for topic, parts in times.items():
         found[topic] = found[topic]._replace(log_time_ns=np.concatenate(parts))
     return found
-
-
-def _decoder(path: Path, topic: str) -> Callable[[Callable[[bytes], Any], bytes], Any]:
-    def decode(one: Callable[[bytes], Any], data: bytes) -> Any:
-        try:
-            return one(data)
-        except Damage as error:
-            raise BagError(f"{path} is damaged (topic {topic}: {error}); copy it again") from None
-
-    return decode
 
 
 def _parts(

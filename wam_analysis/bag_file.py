@@ -10,7 +10,7 @@ import yaml
 import zstandard
 
 from wam_analysis.mcap_file import McapFile, NotClosedError
-from wam_analysis.mcap_records import MAGIC, Channel, Damage
+from wam_analysis.mcap_records import MAGIC, BagError, Channel, Damage
 from wam_ros.message_text import Fields, definitions
 
 PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
@@ -18,10 +18,6 @@ _BROKEN = (
     ValueError, struct.error, zstandard.ZstdError, RuntimeError, IndexError, KeyError, OverflowError, MemoryError,
 )  # fmt: skip
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
-
-
-class BagError(ValueError):
-    """A bag that cannot be read; the message names the path and what to do."""
 
 
 def files(path: Path) -> list[Path]:

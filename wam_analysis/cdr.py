@@ -50,6 +50,7 @@ class Layout:
     ----------
     numbers : what is one number or an array, by path: 'header.stamp.sec', 'position', 'markers[0].scale.x'.
     texts : what is a string or strings, by path.
+    counts : length of each sequence of messages, by path.
     fixed : for each byte of the message whether it decides the layout: byte order, counts, strings.
     """
 
@@ -57,6 +58,7 @@ class Layout:
         self.order = byte_order(data)
         self.numbers: dict[str, Leaf] = {}
         self.texts: dict[str, tuple[str, ...]] = {}
+        self.counts: dict[str, int] = {}
         self.fixed = np.zeros(len(data), np.bool_)
         self.fixed[:2] = True
         self.data = data
@@ -85,6 +87,7 @@ class Layout:
         elif length is None:
             self._message(kind, path)
         else:
+            self.counts[path] = count
             for i in range(count):
                 self._message(kind, f"{path}[{i}]")
 
@@ -137,7 +140,7 @@ class Decoder:
     """
 
     def __init__(self, kind: str, definitions: Definitions) -> None:
-        self._kind, self._definitions = kind, definitions
+        self.kind, self.definitions = kind, definitions
         self._classes: dict[str, Any] = {}
         self._steps: dict[str, Step] = {}
 
@@ -146,7 +149,7 @@ class Decoder:
         order = byte_order(data)
         step = self._steps.get(order)
         if step is None:
-            step = self._steps[order] = self._struct(self._kind, order)
+            step = self._steps[order] = self._struct(self.kind, order)
         try:
             message, _ = step(data[ENCAPSULATION:], 0)
         except struct.error:
@@ -154,8 +157,8 @@ class Decoder:
         return message
 
     def _struct(self, kind: str, order: str) -> Step:
-        fields = self._definitions[kind]
-        make = self._make(kind)
+        fields = self.definitions[kind]
+        make = self.maker(kind)
         steps = [self._field(inner, length, order) for _, inner, length in fields]
 
         def decode(data: bytes, position: int) -> tuple[Any, int]:
@@ -167,10 +170,11 @@ class Decoder:
 
         return decode
 
-    def _make(self, kind: str) -> Callable[[Any], Any]:
+    def maker(self, kind: str) -> Callable[[Any], Any]:
+        """A function that makes an object of a type from the values of its fields."""
         make: Callable[[Any], Any] | None = self._classes.get(kind)
         if make is None:
-            names = [name + "_" * keyword.iskeyword(name) for name, _, _ in self._definitions[kind]]
+            names = [name + "_" * keyword.iskeyword(name) for name, _, _ in self.definitions[kind]]
             kinds: Any = namedtuple(kind.rpartition("/")[2], names)  # type: ignore[misc]
             make = self._classes[kind] = kinds._make
         return make
@@ -180,8 +184,8 @@ class Decoder:
             return _array(kind, length, order)
         if kind in PRIMITIVES:
             return _number(kind, order)
-        if length == 0 and "/" in kind and all(item[1:] == ("string", None) for item in self._definitions[kind]):
-            return _texts(self._make(kind), len(self._definitions[kind]), order)
+        if length == 0 and "/" in kind and all(item[1:] == ("string", None) for item in self.definitions[kind]):
+            return _texts(self.maker(kind), len(self.definitions[kind]), order)
         one = _string(order) if kind == "string" else self._struct(kind, order)
         return one if length is None else _sequence(one, length, order)
 

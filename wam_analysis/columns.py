@@ -4,24 +4,19 @@ Messages of a topic mostly have the same counts and strings.  Then every number 
 place in each, and a column is a look at many records at once.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from operator import attrgetter
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.cdr import ENCAPSULATION, Decoder, Definitions, Layout
-from wam_analysis.mcap_file import DATA, Offsets, at, log_times, messages, sizes
-from wam_analysis.mcap_records import Bytes, Damage
+from wam_analysis.cdr import Decoder, Definitions
+from wam_analysis.mcap_file import DATA, Offsets, log_times, messages, sizes
+from wam_analysis.mcap_records import Bytes
+from wam_analysis.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
 
-Times = NDArray[np.int64]
-Numbers = NDArray[np.float64]
 Texts = NDArray[np.object_]
-Index = NDArray[np.intp]
-
-_BEFORE = 8 - ENCAPSULATION  # bytes before the data that put its numbers on multiples of eight
-_MOST_LAYOUTS = 64  # that are kept in mind; a topic with more has them read message by message
 
 
 class JointColumns(NamedTuple):
@@ -88,69 +83,6 @@ class Messages(NamedTuple):
 Columns = JointColumns | WrenchColumns | PointColumns | BoolColumns | ClockColumns | Messages
 
 
-class Decoded(Sequence[Any]):
-    """Messages that are decoded when somebody looks at them.
-
-    Parameters
-    ----------
-    data : serialized messages.
-    decode : makes an object of one.
-    """
-
-    def __init__(self, data: list[bytes], decode: Callable[[bytes], Any]) -> None:
-        self._data, self._decode = data, decode
-        self._known: dict[int, Any] = {}
-
-    def __len__(self) -> int:
-        return len(self._data)
-
-    @overload
-    def __getitem__(self, index: int) -> Any: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Any]: ...
-    def __getitem__(self, index: int | slice) -> Any:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        number = range(len(self))[index]
-        if number not in self._known:
-            self._known[number] = self._decode(self._data[number])
-        return self._known[number]
-
-
-class _Group(NamedTuple):
-    """Messages of one layout: which of the topic they are, and their bytes, one row each."""
-
-    rows: Index
-    layout: Layout
-    words: NDArray[np.uint64]
-
-    def numbers(self, path: str) -> NDArray[Any]:
-        """Numbers of each message at a path, (m, n)."""
-        try:
-            leaf = self.layout.numbers[path]
-        except KeyError:
-            raise Damage(f"its type has no numbers '{path}'") from None
-        size = leaf.dtype.itemsize * (1 if leaf.length is None else leaf.length)
-        begin = 8 + leaf.offset
-        return self.words.view(np.uint8)[:, begin : begin + size].view(leaf.dtype)
-
-    def text(self, path: str) -> tuple[str, ...]:
-        """Strings at a path."""
-        try:
-            return self.layout.texts[path]
-        except KeyError:
-            raise Damage(f"its type has no strings '{path}'") from None
-
-    def time(self, path: str) -> Times:
-        """Time at a path, ns, (m,)."""
-        seconds = self.numbers(f"{path}.sec")[:, 0].astype(np.int64)
-        return np.asarray(seconds * 1_000_000_000 + self.numbers(f"{path}.nanosec")[:, 0])
-
-    def vector(self, path: str) -> Numbers:
-        """x, y and z at a path, (m, 3)."""
-        return np.hstack([self.numbers(f"{path}.{axis}") for axis in "xyz"])
-
-
 class Collector:
     """Takes the messages of one topic batch by batch and makes columns of them.
 
@@ -165,7 +97,7 @@ class Collector:
         self._kind, self._definitions = kind, definitions
         self._begin, self._end = begin, end
         self._times: list[Times] = []
-        self._known: list[_Known] = []
+        self._groups_of = Grouping(kind, definitions)
         self._groups: list[Any] = []
         self._data: list[bytes] = []
         self._kept = 0
@@ -184,98 +116,35 @@ class Collector:
         if (extract := _EXTRACTS.get(self._kind)) is None:
             self._data += messages(buffer, offsets)
         else:
-            for group in self._grouped(buffer, offsets + DATA, sizes(buffer, offsets)):
+            for group in self._groups_of(buffer, offsets + DATA, sizes(buffer, offsets)):
                 self._groups.append((group.rows + self._kept, *extract(group)))
         self._kept += len(offsets)
 
-    def columns(self, decode: Callable[[Callable[[bytes], Any], bytes], Any]) -> Columns:
-        """Everything that came, in the order of log times.
-
-        Parameters
-        ----------
-        decode : called with a function that decodes a message and with the message, when it is looked at.
-        """
+    def columns(self, label: str) -> Columns:
+        """Everything that came, in the order of log times; the label names bag and topic in errors to come."""
         times = np.concatenate(self._times) if self._times else np.empty(0, np.int64)
         order = None if (np.diff(times) >= 0).all() else np.argsort(times, kind="stable")
         if self._kind not in _ASSEMBLE:
-            one = Decoder(self._kind, self._definitions)
             data = self._data if order is None else [self._data[i] for i in order]
-            return Messages(times if order is None else times[order], Decoded(data, lambda item: decode(one, item)))
+            messages = Decoded(data, Decoder(self._kind, self._definitions), label)
+            return Messages(times if order is None else times[order], messages)
         columns: Any = _ASSEMBLE[self._kind](times, self._groups)
         if order is None:
             return columns
         return type(columns)(*(column[order] if isinstance(column, np.ndarray) else column for column in columns))
 
-    def _grouped(self, buffer: Bytes, starts: Offsets, sizes: Offsets) -> Iterator[_Group]:
-        for size in [int(sizes[0])] if len(sizes) and (sizes == sizes[0]).all() else np.unique(sizes).tolist():
-            rows = np.flatnonzero(sizes == size)
-            words = _rows(buffer, starts[rows], size)
-            tried = iter([known for known in self._known if known.size == size])
-            while len(rows):
-                known = next(tried, None)
-                if known is None:
-                    first = int(starts[rows[0]])
-                    known = _Known.of(Layout(self._kind, self._definitions, buffer[first : first + size].tobytes()))
-                    if len(self._known) < _MOST_LAYOUTS:
-                        self._known.append(known)
-                fits = known.fits(words)
-                if fits is None:
-                    yield _Group(rows, known.layout, words)
-                    break
-                if fits.any():
-                    yield _Group(rows[fits], known.layout, words[fits])
-                    rows, words = rows[~fits], words[~fits]
 
-
-class _Known(NamedTuple):
-    """A layout and how its messages are recognised: spans of words with the bits that must be equal."""
-
-    size: int
-    layout: Layout
-    spans: list[tuple[int, int, NDArray[np.uint64], NDArray[np.uint64]]]
-
-    @staticmethod
-    def of(layout: Layout) -> "_Known":
-        """What the messages of this layout have in common."""
-        size = len(layout.fixed)
-        width = 8 * _words(size)
-        mask, want = np.zeros(width, np.uint8), np.zeros(width, np.uint8)
-        mask[_BEFORE : _BEFORE + size][layout.fixed] = 255
-        want[_BEFORE : _BEFORE + size] = np.frombuffer(layout.data, np.uint8)
-        masks, wants = mask.view(np.uint64), (want & mask).view(np.uint64)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], masks != 0, [0]])))
-        spans = [(a, b, masks[a:b], wants[a:b]) for a, b in edges.reshape(-1, 2).tolist()]
-        return _Known(size, layout, spans)
-
-    def fits(self, words: NDArray[np.uint64]) -> NDArray[np.bool_] | None:
-        """Which rows are of this layout; None where all are."""
-        wrong = [((words[:, a:b] & mask) != want) for a, b, mask, want in self.spans]
-        if not any(each.any() for each in wrong):
-            return None
-        return ~np.logical_or.reduce([each.any(axis=1) for each in wrong])
-
-
-def _words(size: int) -> int:
-    return -(-(_BEFORE + size) // 8)
-
-
-def _rows(buffer: Bytes, starts: Offsets, size: int) -> NDArray[np.uint64]:
-    """Messages of one size, a row each, as words; numbers stand where words allow it."""
-    width = 8 * _words(size)
-    return at(buffer, starts - _BEFORE, f"V{width}").view(np.uint64).reshape(len(starts), -1)
-
-
-def _joints(group: _Group) -> tuple[Any, ...]:
+def _joints(group: Group) -> tuple[Any, ...]:
     fields = [group.numbers(name).astype(np.float64) for name in ("position", "velocity", "effort")]
     return group.time("header.stamp"), group.text("header.frame_id")[0], (group.text("name"), fields)
 
 
-def _wrench(group: _Group) -> tuple[Any, ...]:
+def _wrench(group: Group) -> tuple[Any, ...]:
     values = np.hstack([group.vector("wrench.force"), group.vector("wrench.torque")])
     return group.time("header.stamp"), group.text("header.frame_id")[0], values
 
 
-def _point(group: _Group) -> tuple[Any, ...]:
+def _point(group: Group) -> tuple[Any, ...]:
     return group.time("header.stamp"), group.text("header.frame_id")[0], group.vector("point")
 
 
@@ -346,7 +215,7 @@ def _clock_columns(times: Times, groups: list[Any]) -> ClockColumns:
     return ClockColumns(times, stamps)
 
 
-_EXTRACTS: dict[str, Callable[[_Group], tuple[Any, ...]]] = {
+_EXTRACTS: dict[str, Callable[[Group], tuple[Any, ...]]] = {
     "sensor_msgs/msg/JointState": _joints,
     "geometry_msgs/msg/WrenchStamped": _wrench,
     "geometry_msgs/msg/PointStamped": _point,

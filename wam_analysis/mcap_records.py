@@ -24,6 +24,10 @@ FOOTER_SIZE: Final = HEAD.size + 20
 LARGEST_CHUNK: Final = 2**30  # bytes; a larger one is taken for a damaged length
 
 
+class BagError(ValueError):
+    """A bag that cannot be read; the message names the path and what to do."""
+
+
 class Damage(ValueError):
     """Something in a file that cannot be; the message says what and where."""
 

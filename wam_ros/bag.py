@@ -17,7 +17,7 @@ from wam_ros.definitions import schema, type_hash
 from wam_ros.message_layout import ExactLength
 
 LIBRARY: Final = "wam_stack"
-CHUNK_SIZE: Final = 256 * 1024  # bytes; a tenth of this is a zstd chunk on disk
+CHUNK_SIZE: Final = 1024 * 1024  # bytes; half of this is half a second of the arm, a tenth is left on disk
 FLUSH_PERIOD: Final = 0.5  # s; a killed recorder loses at most this and one timer period
 INFINITE: Final = {"sec": 9223372036, "nsec": 854775807}
 POLICIES: Final = (
@@ -92,7 +92,7 @@ class BagWriter:
         self._file_name = f"{path.name}_0.mcap"
         _make(path)
         self._stream = (path / self._file_name).open("xb")
-        self._writer: Any = Writer(self._stream, chunk_size=CHUNK_SIZE)
+        self._writer: Any = Writer(self._stream, chunk_size=CHUNK_SIZE, enable_data_crcs=True)
         self._writer.start(profile="ros2", library=LIBRARY)
         self._stream.flush()
         self._schemas: dict[str, int] = {}
