@@ -33,6 +33,11 @@ def files(path: Path) -> list[Path]:
             raise BagError(
                 f"{path} lacks its file {name}; copy the whole directory, or read its .mcap files one by one"
             )
+    if forgotten := sorted({file.name for file in found} - set(named)) if named else []:
+        raise BagError(
+            f"{path} has the file {forgotten[0]}, which its metadata.yaml does not list; "
+            f"'wam bag repair {path}' writes it again, or give the file by itself"
+        )
     if named:
         return [path / name for name in named]
     if not found:

@@ -128,7 +128,9 @@ class Collector:
             data = self._data if order is None else [self._data[i] for i in order]
             messages = Decoded(data, Decoder(self._kind, self._definitions), label)
             return Messages(times if order is None else times[order], messages)
-        columns: Any = _ASSEMBLE[self._kind](times, self._groups)
+        rank = np.arange(len(times)) if order is None else np.argsort(order)
+        groups = sorted(self._groups, key=lambda group: int(rank[group[0]].min()))
+        columns: Any = _ASSEMBLE[self._kind](times, groups)
         if order is None:
             return columns
         return type(columns)(*(column[order] if isinstance(column, np.ndarray) else column for column in columns))
