@@ -26,7 +26,7 @@ from wam_analysis.columns import (
     PointColumns,
     WrenchColumns,
 )
-from wam_analysis.mcap_file import NEVER, Batch, McapFile, Offsets, log_times, messages
+from wam_analysis.mcap_file import NEVER, Batch, Found, McapFile, log_times, messages, together
 from wam_analysis.mcap_records import BagError, Bytes, Damage
 from wam_analysis.message_groups import Times
 from wam_ros.message_text import Fields
@@ -89,8 +89,8 @@ def read(path: str | Path, topics: Collection[str] | None = None, begin_ns: int 
         with opened(file) as mcap:
             if topics is None and begin_ns <= 0 and end_ns >= NEVER:
                 mcap.check_all()
-            for topic, kind, definitions, buffer, offsets in _parts(mcap, topics, begin_ns, end_ns):
-                collector(topic, kind, definitions).add(buffer, offsets)
+            for topic, kind, definitions, buffer, found in _parts(mcap, topics, begin_ns, end_ns):
+                collector(topic, kind, definitions).add(buffer, found)
             for channel in mcap.channels.values():
                 if is_asked(channel.topic, topics):
                     collector(channel.topic, *type_of(mcap, channel))
@@ -106,13 +106,13 @@ def raw(path: str | Path, topics: Collection[str] | None = None) -> dict[str, Ra
     times: dict[str, list[Times]] = {}
     for file in files(Path(path)):
         with opened(file) as mcap:
-            for topic, kind, definitions, buffer, offsets in _parts(mcap, topics, 0, NEVER):
+            for topic, kind, definitions, buffer, some in _parts(mcap, topics, 0, NEVER):
                 decode = Decoder(kind, definitions)
                 entry = found.setdefault(topic, Raw(kind, np.empty(0, np.int64), [], decode))
                 if entry.type != kind:
                     raise Damage(f"topic {topic} is of type {entry.type} and of {kind}")
-                times.setdefault(topic, []).append(log_times(buffer, offsets))
-                entry.data.extend(messages(buffer, offsets))
+                times.setdefault(topic, []).append(log_times(buffer, some.offsets))
+                entry.data.extend(messages(buffer, some))
             for channel in mcap.channels.values():
                 if is_asked(channel.topic, topics) and channel.topic not in found:
                     kind, definitions = type_of(mcap, channel)
@@ -124,7 +124,7 @@ def raw(path: str | Path, topics: Collection[str] | None = None) -> dict[str, Ra
 
 def _parts(
     mcap: McapFile, topics: Collection[str] | None, begin: int, end: int
-) -> Iterator[tuple[str, str, dict[str, Fields], Bytes, Offsets]]:
+) -> Iterator[tuple[str, str, dict[str, Fields], Bytes, Found]]:
     """Messages of each asked topic in each batch; that none is missing is checked at the end."""
     numbers = None
     if topics is not None and mcap.has_all_definitions():
@@ -135,13 +135,15 @@ def _parts(
         for topic, members in _by_topic(mcap, batch).items():
             if not is_asked(topic, topics):
                 continue
-            for number, offsets in members:
-                counts[number] = counts.get(number, 0) + len(offsets)
+            for number, found in members:
+                counts[number] = counts.get(number, 0) + len(found.offsets)
                 if number not in types:
                     types[number] = type_of(mcap, mcap.channels[number])
-            found = [offsets for _, offsets in members]
-            offsets = found[0] if len(found) == 1 else np.sort(np.concatenate(found))
-            yield topic, *types[members[0][0]], batch.buffer, offsets
+            all_found = together([found for _, found in members])
+            if len(members) > 1:
+                order = np.argsort(all_found.offsets)
+                all_found = Found(all_found.offsets[order], all_found.sizes[order])
+            yield topic, *types[members[0][0]], batch.buffer, all_found
     if mcap.counts is None or begin > 0 or end < NEVER:
         return
     for number, channel in mcap.channels.items():
@@ -150,10 +152,10 @@ def _parts(
             raise Damage(f"topic {channel.topic} has {counts.get(number, 0)} messages instead of {expected}")
 
 
-def _by_topic(mcap: McapFile, batch: Batch) -> dict[str, list[tuple[int, Offsets]]]:
-    found: dict[str, list[tuple[int, Offsets]]] = {}
-    for number, offsets in batch.found:
+def _by_topic(mcap: McapFile, batch: Batch) -> dict[str, list[tuple[int, Found]]]:
+    topics: dict[str, list[tuple[int, Found]]] = {}
+    for number, found in batch.found.items():
         if number not in mcap.channels:
             raise Damage(f"a message is on channel {number}, which is not defined")
-        found.setdefault(mcap.channels[number].topic, []).append((number, offsets))
-    return found
+        topics.setdefault(mcap.channels[number].topic, []).append((number, found))
+    return topics

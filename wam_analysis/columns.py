@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.cdr import Decoder, Definitions
-from wam_analysis.mcap_file import DATA, Offsets, log_times, messages, sizes
+from wam_analysis.mcap_file import DATA, Found, log_times, messages
 from wam_analysis.mcap_records import Bytes
 from wam_analysis.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
 
@@ -106,19 +106,19 @@ class Collector:
         """Whether messages of a type belong into these columns."""
         return kind == self._kind and definitions == self._definitions
 
-    def add(self, buffer: Bytes, offsets: Offsets) -> None:
-        """Take messages whose records begin at these places of the buffer."""
-        times = log_times(buffer, offsets)
+    def add(self, buffer: Bytes, found: Found) -> None:
+        """Take these messages of a buffer."""
+        times = log_times(buffer, found.offsets)
         wanted = (times >= self._begin) & (times < self._end)
         if not wanted.all():
-            offsets, times = offsets[wanted], times[wanted]
+            found, times = Found(found.offsets[wanted], found.sizes[wanted]), times[wanted]
         self._times.append(times)
         if (extract := _EXTRACTS.get(self._kind)) is None:
-            self._data += messages(buffer, offsets)
+            self._data += messages(buffer, found)
         else:
-            for group in self._groups_of(buffer, offsets + DATA, sizes(buffer, offsets)):
+            for group in self._groups_of(buffer, found.offsets + DATA, found.sizes):
                 self._groups.append((group.rows + self._kept, *extract(group)))
-        self._kept += len(offsets)
+        self._kept += len(times)
 
     def columns(self, label: str) -> Columns:
         """Everything that came, in the order of log times; the label names bag and topic in errors to come."""
@@ -174,7 +174,10 @@ def _joint_columns(times: Times, groups: list[Any]) -> JointColumns:
         if not any(group[3][1][field].shape[1] for group in groups):
             arrays.append(np.empty((len(times), 0)))
             continue
-        array = np.full((len(times), len(names)), np.nan)
+        is_filled = all(own == names and fields[field].shape[1] == len(names) for *_, (own, fields) in groups)
+        array = np.empty((len(times), len(names)))
+        if not is_filled:
+            array[:] = np.nan
         for rows, _, _, (own, fields) in groups:
             values = fields[field][:, : len(own)]
             found = own[: values.shape[1]]

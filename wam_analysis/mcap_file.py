@@ -6,7 +6,8 @@ record, and so is the whole file where there is no summary.
 
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
@@ -35,17 +36,17 @@ class Loose(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Messages of one channel in a batch: where their records begin, in the order of the file."""
+    """Messages in a batch, in the order of the file: where their records begin, and bytes of each message."""
 
-    channel: int
     offsets: Offsets
+    sizes: Offsets
 
 
 class Batch(NamedTuple):
     """Some records in memory, until the next batch is taken, and where in them the messages are."""
 
     buffer: Bytes
-    found: list[Found]
+    found: dict[int, Found]  # by number of the channel
 
 
 class NotClosedError(Damage):
@@ -294,7 +295,7 @@ class McapFile:
             self._memory = np.empty(max(size, BATCH) + TAIL, np.uint8)
         buffer = self._memory[: size + TAIL]
         buffer[size:] = 0
-        parts: dict[int, list[Offsets]] = {}
+        parts: dict[int, list[Found]] = {}
         position = 0
         for block in blocks:
             part = buffer[position : position + _size(block)]
@@ -305,31 +306,35 @@ class McapFile:
                 index = data[block.end - block.start :]
             else:
                 part[:] = np.frombuffer(self._read(block.start, block.end - block.start), np.uint8)
-            for channel, offsets in self._find(part, index).items():
-                parts.setdefault(channel, []).append(offsets + position)
+            for channel, found in self._find(part, index).items():
+                parts.setdefault(channel, []).append(Found(found.offsets + position, found.sizes))
             position += len(part)
-        return Batch(buffer, [Found(number, np.concatenate(found)) for number, found in parts.items()])
+        return Batch(buffer, {channel: together(found) for channel, found in parts.items()})
 
-    def _find(self, part: Bytes, index: bytes) -> dict[int, Offsets]:
+    def _find(self, part: Bytes, index: bytes) -> dict[int, Found]:
         """Places of the messages among the records of a chunk, by channel; definitions are taken."""
         if index and (found := self._find_by_index(part, index)) is not None:
             return found
         data = part.tobytes()
-        messages = []
+        messages, sizes = [], []
         for kind, start, end in _walk(data, 0, len(data)):
             if kind == records.MESSAGE:
                 if end - start < HEAD.size + _LEAST_MESSAGE:
                     raise Damage("a message record ends early")
                 messages.append(start)
+                sizes.append(end - start - DATA)
             elif kind in (records.SCHEMA, records.CHANNEL):
                 self.define(kind, data[start + HEAD.size : end])
             elif kind < records.FIRST_PRIVATE:
                 raise Damage(f"a record among messages has kind {kind}, which does not belong there")
-        offsets = np.array(messages, np.int64)
+        offsets, lengths = np.array(messages, np.int64), np.array(sizes, np.int64)
         channels = at(part, offsets + 9, "<u2")
-        return {int(number): offsets[channels == number] for number in np.unique(channels)}
+        return {
+            int(number): Found(offsets[channels == number], lengths[channels == number])
+            for number in np.unique(channels)
+        }
 
-    def _find_by_index(self, part: Bytes, index: bytes) -> dict[int, Offsets] | None:
+    def _find_by_index(self, part: Bytes, index: bytes) -> dict[int, Found] | None:
         """The same from the message indexes; None where these are not whole or not in order.
 
         They are whole where the messages they name are different ones and fill all bytes but those of
@@ -362,18 +367,23 @@ class McapFile:
         rising[ends[:-1] - 1] = True
         if not rising.all() or offsets.min() < begin or offsets.max() > size - HEAD.size - _LEAST_MESSAGE:
             return None
-        lengths = at(part, offsets + 1, "<u8")
-        owners = at(part, offsets + 9, "<u2")
-        expected = np.repeat(np.array(numbers, np.uint16), np.diff(ends, prepend=0))
+        heads, tails = at(part, offsets, "<u8"), at(part, offsets + 7, "<u4")
+        sizes = (heads >> 8).astype(np.int64) - _LEAST_MESSAGE  # of the length only the last byte is in the tail
+        expected = np.repeat(np.array(numbers, np.uint32), np.diff(ends, prepend=0)) << 16
         is_whole = (
-            (at(part, offsets, "u1") == records.MESSAGE).all()
-            and (owners == expected).all()
-            and (lengths >= _LEAST_MESSAGE).all()
-            and (lengths < size).all()
-            and (offsets + lengths.astype(np.int64) <= size - HEAD.size).all()
-            and int(lengths.sum()) + HEAD.size * len(offsets) == size - begin
+            (heads & 255 == records.MESSAGE).all()
+            and (tails & ~np.uint32(255) == expected).all()
+            and (sizes >= 0).all()
+            and (offsets + sizes <= size - DATA).all()
+            and int(sizes.sum()) + DATA * len(offsets) == size - begin
         )
-        return dict(zip(numbers, found, strict=True)) if is_whole else None
+        if not is_whole:
+            return None
+        starts = [0, *ends.tolist()]
+        return {
+            number: Found(offsets[start:end], sizes[start:end])
+            for number, (start, end) in zip(numbers, pairwise(starts), strict=True)
+        }
 
 
 def at(buffer: Bytes, offsets: Offsets, dtype: str) -> NDArray[Any]:
@@ -391,15 +401,17 @@ def log_times(buffer: Bytes, offsets: Offsets) -> NDArray[np.int64]:
     return times.astype(np.int64)
 
 
-def sizes(buffer: Bytes, offsets: Offsets) -> Offsets:
-    """Bytes of these messages, without their records' heads."""
-    return at(buffer, offsets + 1, "<u8").astype(np.int64) - _LEAST_MESSAGE
+def together(found: Sequence[Found]) -> Found:
+    """Several one after the other."""
+    if len(found) == 1:
+        return found[0]
+    return Found(np.concatenate([part.offsets for part in found]), np.concatenate([part.sizes for part in found]))
 
 
-def messages(buffer: Bytes, offsets: Offsets) -> list[bytes]:
+def messages(buffer: Bytes, found: Found) -> list[bytes]:
     """These messages, serialized."""
-    starts = offsets + DATA
-    ends = starts + sizes(buffer, offsets)
+    starts = found.offsets + DATA
+    ends = starts + found.sizes
     return [buffer[start:end].tobytes() for start, end in zip(starts.tolist(), ends.tolist(), strict=True)]
 
 
