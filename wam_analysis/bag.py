@@ -26,9 +26,9 @@ from wam_analysis.columns import (
     PointColumns,
     WrenchColumns,
 )
-from wam_analysis.mcap_file import NEVER, Batch, Found, McapFile, log_times, messages, together
-from wam_analysis.mcap_records import BagError, Bytes, Damage
 from wam_analysis.message_groups import Times
+from wam_ros.mcap_file import NEVER, Batch, Found, McapFile, log_times, messages, together
+from wam_ros.mcap_records import BagError, Bytes, Damage
 from wam_ros.message_text import Fields
 
 __all__ = [
@@ -144,10 +144,10 @@ def _parts(
                 order = np.argsort(all_found.offsets)
                 all_found = Found(all_found.offsets[order], all_found.sizes[order])
             yield topic, *types[members[0][0]], batch.buffer, all_found
-    if mcap.counts is None or begin > 0 or end < NEVER:
+    if mcap.statistics is None or begin > 0 or end < NEVER:
         return
     for number, channel in mcap.channels.items():
-        expected = mcap.counts.get(number, 0)
+        expected = mcap.statistics.counts.get(number, 0)
         if is_asked(channel.topic, topics) and counts.get(number, 0) != expected:
             raise Damage(f"topic {channel.topic} has {counts.get(number, 0)} messages instead of {expected}")
 

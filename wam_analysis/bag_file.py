@@ -1,22 +1,19 @@
 """Bags as they lie on disk: their files found and opened, and refused in words."""
 
 import re
-import struct
+from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import yaml
-import zstandard
 
-from wam_analysis.mcap_file import McapFile, NotClosedError
-from wam_analysis.mcap_records import MAGIC, BagError, Channel, Damage
+from wam_ros.mcap_file import McapFile, NotClosedError
+from wam_ros.mcap_records import BROKEN, MAGIC, BagError, Channel, Damage
 from wam_ros.message_text import Fields, definitions
 
 PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
-_BROKEN = (
-    ValueError, struct.error, zstandard.ZstdError, RuntimeError, IndexError, KeyError, OverflowError, MemoryError,
-)  # fmt: skip
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
 
 
@@ -77,7 +74,7 @@ def opened(path: Path) -> Iterator[McapFile]:
         raise
     except OSError as error:
         raise BagError(f"{path} cannot be read: {error.strerror or error}") from error
-    except _BROKEN as error:
+    except BROKEN as error:
         raise BagError(_explain(path, error)) from error
 
 
@@ -95,6 +92,56 @@ def _explain(path: Path, error: Exception) -> str:
         )
     reason = str(error) if isinstance(error, Damage) else f"{type(error).__name__}: {error}"
     return f"{path} is damaged ({reason}); copy it again, or let 'wam bag repair' save what can be read"
+
+
+class TopicContents(NamedTuple):
+    """A topic of a bag: its type and how many messages it has."""
+
+    type: str
+    messages: int
+
+
+class Contents(NamedTuple):
+    """What is in a bag, as its files say; no message is read where they do.
+
+    Attributes
+    ----------
+    files : the files.
+    first, last : log times, ns; 0 in an empty bag.
+    topics : by name.
+    attachments : bytes by name.
+    recording : what the recorder says about itself, see bags/README.md; empty for other recorders.
+    """
+
+    files: list[Path]
+    first: int
+    last: int
+    topics: dict[str, TopicContents]
+    attachments: dict[str, int]
+    recording: dict[str, str]
+
+
+def contents(path: str | Path) -> Contents:
+    """What is in a bag; errors are those of `wam_analysis.bag.read`."""
+    found = files(Path(path))
+    counts: Counter[str] = Counter()
+    types: dict[str, str] = {}
+    times: list[int] = []
+    attachments: dict[str, int] = {}
+    recording: dict[str, str] = {}
+    for file in found:
+        with opened(file) as mcap:
+            said = mcap.statistics or mcap.count()
+            if any(said.counts.values()):
+                times += [said.first, said.last]
+            for number, channel in mcap.channels.items():
+                counts[channel.topic] += said.counts.get(number, 0)
+                schema = mcap.schemas.get(channel.schema)
+                types.setdefault(channel.topic, schema.name if schema else "?")
+            attachments.update({name: len(data) for name, data in mcap.attachments().items()})
+            recording.update(mcap.metadata().get("recording", {}))
+    topics = {topic: TopicContents(types[topic], counts[topic]) for topic in sorted(types)}
+    return Contents(found, min(times, default=0), max(times, default=0), topics, attachments, recording)
 
 
 def is_asked(topic: str, topics: Collection[str] | None) -> bool:

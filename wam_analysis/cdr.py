@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.mcap_records import Damage
+from wam_ros.mcap_records import Damage
 from wam_ros.message_text import PRIMITIVES, Fields
 
 ENCAPSULATION: Final = 4

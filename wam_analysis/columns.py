@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.cdr import Decoder, Definitions
-from wam_analysis.mcap_file import DATA, Found, log_times, messages
-from wam_analysis.mcap_records import Bytes
 from wam_analysis.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
+from wam_ros.mcap_file import DATA, Found, log_times, messages
+from wam_ros.mcap_records import Bytes
 
 Texts = NDArray[np.object_]
 

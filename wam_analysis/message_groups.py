@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.cdr import ENCAPSULATION, Decoder, Definitions, Layout
-from wam_analysis.mcap_file import Offsets, at
-from wam_analysis.mcap_records import BagError, Bytes, Damage
+from wam_ros.mcap_file import Offsets, at
+from wam_ros.mcap_records import BagError, Bytes, Damage
 from wam_ros.message_text import PRIMITIVES
 
 Index = NDArray[np.intp]

@@ -6,6 +6,7 @@ record, and so is the whole file where there is no summary.
 
 import os
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -15,8 +16,8 @@ from typing import Any, Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis import mcap_records as records
-from wam_analysis.mcap_records import HEAD, Bytes, Channel, Chunk, Damage, Schema
+from wam_ros import mcap_records as records
+from wam_ros.mcap_records import HEAD, Bytes, Channel, Chunk, Damage, Schema, Statistics
 
 Offsets = NDArray[np.int64]
 BATCH: Final = 16 * 2**20  # bytes that are decoded together
@@ -63,7 +64,8 @@ class McapFile:
     Attributes
     ----------
     schemas, channels : by number; those within chunks are known only when these were read.
-    counts : messages of each channel as the file itself counts them, None where it does not.
+    statistics : what the file itself says about its messages, None where it says nothing.
+    definitions : content of the schema and channel records by kind and number.
 
     Raises
     ------
@@ -75,7 +77,8 @@ class McapFile:
         self.path = path
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
-        self.counts: dict[int, int] | None = None
+        self.statistics: Statistics | None = None
+        self.definitions: dict[tuple[int, int], bytes] = {}
         self.profile = ""
         self.is_closed = False
         self._stream = path.open("rb")
@@ -122,6 +125,58 @@ class McapFile:
         self._walk(position, self._data_end)
         self.is_closed = True
 
+    def count(self) -> Statistics:
+        """What the file would say about its messages, found by reading them all."""
+        counts: Counter[int] = Counter()
+        first, last = NEVER, 0
+        for batch in self.batches(None, 0, NEVER):
+            for channel, found in batch.found.items():
+                times = log_times(batch.buffer, found.offsets)
+                counts[channel] += len(times)
+                first, last = min(first, int(times.min())), max(last, int(times.max()))
+        return Statistics(first if counts else 0, last, dict(counts))
+
+    def salvage(self) -> Iterator[tuple[int, int, int]]:
+        """Kind, begin and end of the records of the data that can be told apart in a broken file.
+
+        They are walked through to the first that is none; behind it go on those that a summary names.
+        """
+        position = self._read_header()
+        known = {records.SCHEMA, records.CHANNEL, records.MESSAGE, records.CHUNK, records.MESSAGE_INDEX,
+                 records.ATTACHMENT, records.METADATA}  # fmt: skip
+        while position + HEAD.size <= self._size:
+            kind, length = HEAD.unpack(self._read(position, HEAD.size))
+            end = position + HEAD.size + length
+            if kind not in known or end > self._size:
+                break
+            yield kind, position, end
+            position = end
+        try:
+            parts = self._read_summary()
+        except ValueError:
+            return
+        for start, end, part in sorted(parts, key=lambda item: item[0]):
+            if start >= position and end <= self._size:
+                yield (records.CHUNK, start, part.end) if isinstance(part, Chunk) else (part, start, end)
+
+    def data_size(self) -> int:
+        """Bytes of the file without its end, as far as it has one."""
+        return self._data_end or self._size
+
+    def content(self, start: int, end: int) -> bytes:
+        """Content of the record between two places."""
+        return self._read(start + HEAD.size, end - start - HEAD.size)
+
+    def unpacked(self, start: int, end: int) -> Batch:
+        """The chunk between two places, checked."""
+        content = self.content(start, end)
+        chunk = records.chunk(start, end, content[:24])
+        if chunk.size > records.LARGEST_CHUNK:
+            raise Damage(f"the chunk at byte {start} is to hold {chunk.size} bytes")
+        buffer = np.empty(chunk.size + TAIL, np.uint8)
+        records.unpack(chunk, self._read(start, end - start), buffer[: chunk.size])
+        return Batch(buffer, self._find(buffer[: chunk.size], b""))
+
     def check_all(self) -> None:
         """Compare the checksum of all data with the one at their end, where there is one."""
         if not self._data_crc:
@@ -134,20 +189,16 @@ class McapFile:
 
     def attachments(self) -> dict[str, bytes]:
         """Content of the attachments by name."""
-        return dict(records.attachment(self._content(*extent)) for extent in self._attachments)
+        found = [records.attachment(self.content(*extent)) for extent in self._attachments]
+        return {item.name: item.data for item in found}
 
     def metadata(self) -> dict[str, dict[str, str]]:
         """Metadata records by name."""
-        return dict(records.metadata(self._content(*extent)) for extent in self._metadata)
-
-    def extent(self) -> tuple[int, int] | None:
-        """First and last log time according to the chunks, ns; None where there are none."""
-        chunks = [block for block in self._blocks if isinstance(block, Chunk)]
-        return (min(c.first for c in chunks), max(c.last for c in chunks)) if chunks else None
+        return dict(records.metadata(self.content(*extent)) for extent in self._metadata)
 
     def has_all_definitions(self) -> bool:
         """Whether every channel that the file counts is known without reading chunks."""
-        return self.counts is not None and self.counts.keys() <= self.channels.keys()
+        return self.statistics is not None and self.statistics.counts.keys() <= self.channels.keys()
 
     def batches(self, channels: frozenset[int] | None, begin: int, end: int) -> Iterator[Batch]:
         """Records in memory, some megabytes at a time.
@@ -183,6 +234,7 @@ class McapFile:
             number, channel = records.channel(content)
             if self.channels.setdefault(number, channel) != channel:
                 raise Damage(f"channel {number} is defined twice, differently")
+        self.definitions[kind, number] = content
 
     def _read(self, start: int, size: int) -> bytes:
         data = os.pread(self._stream.fileno(), size, start)
@@ -192,9 +244,6 @@ class McapFile:
                 raise Damage(f"it ends at byte {start + len(data)}, in the middle of something")
             data += more
         return data
-
-    def _content(self, start: int, end: int) -> bytes:
-        return self._read(start + HEAD.size, end - start - HEAD.size)
 
     def _read_header(self) -> int:
         kind, length = HEAD.unpack(self._read(len(records.MAGIC), HEAD.size))
@@ -244,7 +293,7 @@ class McapFile:
                 part = records.ATTACHMENT if kind == records.ATTACHMENT_INDEX else records.METADATA
                 parts.append((first, first + length, part))
             elif kind == records.STATISTICS:
-                self.counts = records.statistics(content)
+                self.statistics = records.statistics(content)
         return parts
 
     def _walk(self, start: int, end: int) -> None:
@@ -276,7 +325,7 @@ class McapFile:
 
     def _note(self, kind: int, start: int, end: int) -> None:
         if kind in (records.SCHEMA, records.CHANNEL):
-            self.define(kind, self._content(start, end))
+            self.define(kind, self.content(start, end))
         elif kind == records.CHUNK:
             head = self._read(start + HEAD.size, min(24, end - start - HEAD.size))
             chunk = records.chunk(start, end, head)

@@ -14,6 +14,7 @@ import zstandard
 from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
+Entries = NDArray[np.uint64]  # of a message index: log time, offset, log time, offset ...
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 HEAD: Final = struct.Struct("<BQ")  # kind and length of a record
@@ -22,6 +23,10 @@ HEAD: Final = struct.Struct("<BQ")  # kind and length of a record
 FIRST_PRIVATE: Final = 0x80  # kinds from here on are anybody's and skipped
 FOOTER_SIZE: Final = HEAD.size + 20
 LARGEST_CHUNK: Final = 2**30  # bytes; a larger one is taken for a damaged length
+BROKEN: Final = (
+    ValueError, struct.error, zstandard.ZstdError, RuntimeError, LookupError, OverflowError, MemoryError,
+)  # fmt: skip
+"""What reading of a broken file may raise, ours and of the libraries for decompression."""
 
 
 class BagError(ValueError):
@@ -46,6 +51,7 @@ class Channel(NamedTuple):
     topic: str
     encoding: str
     schema: int
+    metadata: dict[str, str]
 
 
 class Chunk(NamedTuple):
@@ -67,6 +73,23 @@ class Chunk(NamedTuple):
     last: int
     size: int
     channels: frozenset[int]
+
+
+class Statistics(NamedTuple):
+    """What a file says about its messages: first and last log time in ns, and how many a channel has."""
+
+    first: int
+    last: int
+    counts: dict[int, int]
+
+
+class Attachment(NamedTuple):
+    """A file in the file: name, media type, content, times of log and making in ns."""
+
+    name: str
+    media_type: str
+    data: bytes
+    times: tuple[int, int]
 
 
 class Content:
@@ -119,8 +142,7 @@ def channel(data: bytes) -> tuple[int, Channel]:
     content = Content(data, "a channel record")
     number, schema_number = content.numbers("HH")
     topic, encoding = content.text(), content.text()
-    content.pairs()
-    return number, Channel(topic, encoding, schema_number)
+    return number, Channel(topic, encoding, schema_number, content.pairs())
 
 
 def chunk_index(data: bytes) -> Chunk:
@@ -140,27 +162,26 @@ def chunk(start: int, end: int, head: bytes) -> Chunk:
     return Chunk(start, end, end, first, last, size, frozenset())
 
 
-def statistics(data: bytes) -> dict[int, int]:
-    """Messages of each channel according to a statistics record."""
+def statistics(data: bytes) -> Statistics:
+    """What a statistics record says."""
     content = Content(data, "the statistics record")
-    content.numbers("QHIIIIQQ")
+    *_, first, last = content.numbers("QHIIIIQQ")
     (size,) = content.numbers("I")
-    return dict(struct.iter_unpack("<HQ", content.raw(size)))
+    return Statistics(first, last, dict(struct.iter_unpack("<HQ", content.raw(size))))
 
 
-def attachment(data: bytes) -> tuple[str, bytes]:
-    """Name and content of an attachment record; its checksum is checked."""
+def attachment(data: bytes) -> Attachment:
+    """Content of an attachment record; its checksum is checked."""
     content = Content(data, "an attachment")
-    content.numbers("QQ")
-    name = content.text()
-    content.text()
+    log_time, create_time = content.numbers("QQ")
+    name, media_type = content.text(), content.text()
     (size,) = content.numbers("Q")
     inside = content.raw(size)
     checked = content.position
     (crc,) = content.numbers("I")
     if crc and crc != zlib.crc32(data[:checked]):
         raise Damage(f"attachment '{name}' does not match its checksum")
-    return name, inside
+    return Attachment(name, media_type, inside, (log_time, create_time))
 
 
 def metadata(data: bytes) -> tuple[str, dict[str, str]]:
