@@ -5,6 +5,7 @@ A page is written by hand, but for its blocks between `<!-- generated: NAME -->`
 """
 
 import argparse
+import ast
 import importlib
 import re
 import shutil
@@ -17,16 +18,19 @@ from pathlib import Path
 from typing import Any
 
 from wam_analysis.plant_figure import figure
+from wam_analysis.scorecard import report as scorecard
 from wam_description.arm import Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
 from wam_description.parameters import fields
 from wam_ros.bring_up import MODULES
 from wam_ros.topics import TOPICS
+from wam_theory.equations import EQUATIONS, Equation
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGURATION = ROOT / "config" / "wam.yaml"
 WRITES_PICTURES = __name__ == "__main__"
+CITED = re.compile(r"\((\d\.\d+)(?:\.[ab])?\)")
 BLOCK = re.compile(r"(<!-- generated: (?P<name>[^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -138,6 +142,66 @@ def constant_row(row: Constant) -> list[str]:
     ]
 
 
+# equations
+
+
+def functions(path: Path) -> Iterator[ast.FunctionDef]:
+    """The public functions of a module."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+            yield node
+
+
+def citing() -> dict[str, list[str]]:
+    """Equation number to the functions, module.name, that cite it in the first line of their docstring."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(ROOT.glob("wam_theory/*.py")):
+        for function in functions(path):
+            summary = (ast.get_docstring(function) or "").split("\n")[0]
+            for number_ in dict.fromkeys(CITED.findall(summary)):
+                found.setdefault(number_, []).append(f"{path.stem}.{function.name}")
+    return found
+
+
+def tests_by_function() -> dict[str, list[str]]:
+    """Name of a function to the tests, file.name, that use it; those of shapes and refusals do not count."""
+    found: dict[str, list[str]] = {}
+    paths = [*sorted(ROOT.glob("test/test_equations_*.py")), ROOT / "test" / "test_stick_slip.py"]
+    for path in paths:
+        named = {function.name: names_in(function) for function in functions(path)}
+        for test, names in named.items():
+            if test.startswith("test_") and not re.search("refus|broadcast", test):
+                through = set().union(*(named[name] for name in names & set(named)))
+                for name in sorted(names | through):
+                    found.setdefault(name, []).append(f"{path.stem}.{test}")
+    return found
+
+
+def names_in(function: ast.FunctionDef) -> set[str]:
+    """Every name and attribute that a function mentions."""
+    return {getattr(node, "id", getattr(node, "attr", "")) for node in ast.walk(function)}
+
+
+def equations() -> str:
+    """Every numbered equation: what it says, what is wrong in its print, its functions and their tests."""
+    citing_, using = citing(), tests_by_function()
+    head = ["", "section", "what", "in print", "function", "test"]
+    return table(head, [equation_row(row, citing_.get(row.number, []), using) for row in EQUATIONS])
+
+
+def equation_row(row: Equation, names: Sequence[str], using: Mapping[str, Sequence[str]]) -> list[str]:
+    """One equation; of its tests the first three."""
+    tests = dict.fromkeys(test for name in names for test in using.get(name.split(".")[1], []))
+    return [
+        f"({row.number})",
+        row.section,
+        row.says,
+        row.correction,
+        row.reason or ", ".join(f"`{name}`" for name in names),
+        ", ".join(f"`{test}`" for test in list(tests)[:3]),
+    ]
+
+
 # pages
 
 
@@ -167,6 +231,8 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
         "plant": plant_study,
+        "equations": equations,
+        "scorecard": lambda: scorecard(configuration),
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
 

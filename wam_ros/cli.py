@@ -18,6 +18,7 @@ COMMANDS = {
     "report": "say what a recording of the demonstration shows",
     "call": "ask a running stack: enable, disable, estop, reset_fault, reset, tare",
     "plant": "draw the plant's effects beside the theory, print the differences",
+    "scorecard": "print the arm beside the requisites of chapter 3",
     "model": "write the arm's model",
 }
 
