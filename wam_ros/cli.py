@@ -15,6 +15,7 @@ COMMANDS = {
     "node": "start one node by hand, with ROS arguments if need be",
     "record": "record every topic of a running stack until Ctrl-C",
     "bag": "say what is in a bag, or make a broken one whole",
+    "replay": "run a node's recorded inputs through it again, compare what comes out",
     "report": "say what a recording of the demonstration shows",
     "call": "ask a running stack: enable, disable, estop, reset_fault, reset, tare",
     "plant": "draw the plant's effects beside the theory, print the differences",
