@@ -40,7 +40,6 @@ setup(
     install_requires=[
         "lz4",
         "matplotlib",
-        "mcap",
         "mujoco",
         "numpy",
         "pin",
@@ -52,6 +51,7 @@ setup(
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "colcon-common-extensions",
+            "mcap",
             "mcap-ros2-support",
             "mypy",
             "pytest<9",

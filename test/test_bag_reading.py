@@ -31,6 +31,8 @@ from wam_analysis.bag import (
     raw,
     read,
 )
+from wam_analysis.message_groups import Grouping
+from wam_ros.message_text import definitions
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 
@@ -177,6 +179,40 @@ def test_padding_that_was_never_set_is_no_layout(tmp_path: Path) -> None:
     columns = bag.topics["/js"]
     assert isinstance(columns, JointColumns)
     assert columns.position[:, 0].tolist() == list(range(200))
+
+
+def test_messages_of_one_layout_are_one_group_whatever_their_padding_is() -> None:
+    chance = random.Random(2)
+    buffer, starts = bytearray(), []
+    for k in range(50):
+        data = bytearray(joints(k, "ab", ["a"], [k]).data)
+        data[19] = chance.randrange(256)
+        starts.append(len(buffer) + 8)
+        buffer += bytes(8) + data
+    grouping = Grouping(JOINTS, definitions(JOINTS, STORE.generate_msgdef(JOINTS, ros_version=2)[0].encode()))
+    sizes = np.full(50, len(data))
+    (group,) = grouping(np.frombuffer(bytes(buffer) + bytes(16), np.uint8), np.array(starts), sizes)
+    assert group.numbers("position")[:, 0].tolist() == list(range(50))
+
+
+def test_a_flipped_bit_in_the_summary_is_found(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag.mcap", random_samples([JOINTS], 30, seed=1))
+    data = bytearray(path.read_bytes())
+    data[data.rindex(b"/jointstate") + 1] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(BagError, match="its summary does not match its checksum"):
+        read(path)
+
+
+def test_messages_that_are_missing_are_missed(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag.mcap", random_samples([JOINTS], 30, seed=1), Way(crcs=False))
+    counts = struct.pack("<IHQ", 10, 1, 30)
+    assert path.read_bytes().count(counts) == 1
+    path.write_bytes(path.read_bytes().replace(counts, struct.pack("<IHQ", 10, 1, 31)))
+    with pytest.raises(BagError, match="topic /jointstate has 30 messages instead of 31"):
+        read(path)
+    with pytest.raises(BagError, match="30 messages instead of 31"):
+        read(path, ["jointstate"])
 
 
 def three_chunks(tmp_path: Path) -> tuple[Path, list[Sample]]:

@@ -110,7 +110,7 @@ def test_a_repair_that_is_killed_can_be_done_again(tmp_path: Path) -> None:
     samples = samples_of(4000)
     killed(tmp_path / "broken", samples)
     chance = random.Random(1)
-    for k in range(12):
+    for k in range(6):
         bag = tmp_path / f"bag{k}"
         shutil.copytree(tmp_path / "broken", bag)
         (bag / "broken_0.mcap").rename(bag / f"bag{k}_0.mcap")
@@ -124,6 +124,19 @@ def test_a_repair_that_is_killed_can_be_done_again(tmp_path: Path) -> None:
         repair(bag)
         assert serialized(bag) == written(samples)
         assert {path.name for path in bag.iterdir()} == {f"bag{k}_0.mcap", "metadata.yaml"}
+
+
+def test_a_repair_that_is_killed_before_its_last_step_has_changed_nothing(tmp_path: Path) -> None:
+    killed(tmp_path / "bag", samples_of(50))
+    before = (tmp_path / "bag" / "bag_0.mcap").read_bytes()
+    child = os.fork()
+    if child == 0:
+        Path.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)  # type: ignore[method-assign]
+        repair(tmp_path / "bag")
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+    assert (tmp_path / "bag" / "bag_0.mcap").read_bytes() == before
+    (result,) = repair(tmp_path / "bag")
+    assert result.messages == 50
 
 
 def test_a_repair_that_fails_leaves_the_bag_as_it_was(tmp_path: Path) -> None:
