@@ -124,6 +124,16 @@ def test_every_value_of_every_type_is_that_of_rosbags(tmp_path: Path, way: str) 
     assert bag.metadata == {"note": {"by": "a test"}}
 
 
+@pytest.mark.parametrize("way", WAYS)
+def test_a_part_of_a_bag_is_that_part_however_it_was_written(tmp_path: Path, way: str) -> None:
+    samples = random_samples(OURS, 60, seed=9)
+    bag = read(write(tmp_path / "bag.mcap", samples, WAYS[way]), ["jointstate", "string"], 30_000_000, 45_000_000)
+    expected = in_order([sample for sample in samples if 30_000_000 <= sample.time < 45_000_000])
+    assert bag.topics.keys() == {"/jointstate", "/string"}
+    for topic, columns in bag.topics.items():
+        assert_columns(columns, expected[topic])
+
+
 def test_every_value_is_that_of_mcap_ros2(tmp_path: Path) -> None:
     kinds = [kind for kind in [*OURS, *FOREIGN] if kind != "std_msgs/msg/Empty"]
     path = write(tmp_path / "bag.mcap", random_samples(kinds, 25, seed=7))

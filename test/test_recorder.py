@@ -19,6 +19,7 @@ from mcap.stream_reader import StreamReader
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
@@ -26,8 +27,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 
 from wam_analysis.bag import read
+from wam_analysis.bag_file import contents
+from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, flatten
 from wam_ros.bag import BagWriter
+from wam_ros.bring_up import Composition
 from wam_ros.messages import header
 from wam_ros.ports import message_type
 from wam_ros.qos import qos
@@ -394,3 +398,34 @@ def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: P
     bag = read(tmp_path / "bag")
     assert len(bag.topics["/wam/motor_states"].log_time_ns) == 300
     assert bag.metadata["recording"]["/wam/motor_states driver received"] == "300"
+
+
+def test_every_message_that_the_stack_publishes_is_in_the_bag(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "script.yaml"
+    script.write_text(yaml.safe_dump({"steps": [{"name": "speak", "seconds": 0.3}]}))
+    base = Configuration.load(CONFIG)
+    configuration = base.with_values(
+        {
+            "nodes": [*base.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.timeout": 60.0,
+            "scenario:script": str(script),
+            "recorder:directory": str(tmp_path),
+            "recorder:name": "bag",
+        }
+    )
+    published: Counter[str] = Counter()
+    publish = Publisher.publish
+
+    def counting(self: Any, message: Any) -> None:
+        published[self.topic_name] += 1
+        publish(self, message)
+
+    monkeypatch.setattr(Publisher, "publish", counting)
+    with Composition(configuration, domain_id=domain_id) as composition:
+        composition.spin(lambda: composition.nodes["scenario"].done)
+    recorded = {name: topic.messages for name, topic in contents(tmp_path / "bag").topics.items()}
+    assert published["/wam/motor_states"] == 301
+    assert {name: published[name] for name in recorded} == recorded

@@ -126,12 +126,14 @@ def _parts(
     mcap: McapFile, topics: Collection[str] | None, begin: int, end: int
 ) -> Iterator[tuple[str, str, dict[str, Fields], Bytes, Found]]:
     """Messages of each asked topic in each batch; that none is missing is checked at the end."""
-    numbers = None
-    if topics is not None and mcap.has_all_definitions():
-        numbers = frozenset(number for number, channel in mcap.channels.items() if is_asked(channel.topic, topics))
+    numbers, times = None, (0, NEVER)
+    if mcap.has_all_definitions():  # else any chunk may hold one that is needed
+        times = begin, end
+        if topics is not None:
+            numbers = frozenset(number for number, channel in mcap.channels.items() if is_asked(channel.topic, topics))
     types: dict[int, tuple[str, dict[str, Fields]]] = {}
     counts: dict[int, int] = {}
-    for batch in mcap.batches(numbers, begin, end):
+    for batch in mcap.batches(numbers, *times):
         for topic, members in _by_topic(mcap, batch).items():
             if not is_asked(topic, topics):
                 continue

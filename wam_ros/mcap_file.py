@@ -197,8 +197,10 @@ class McapFile:
         return dict(records.metadata(self.content(*extent)) for extent in self._metadata)
 
     def has_all_definitions(self) -> bool:
-        """Whether every channel that the file counts is known without reading chunks."""
-        return self.statistics is not None and self.statistics.counts.keys() <= self.channels.keys()
+        """Whether every channel that the file counts, and its schema, is known without reading chunks."""
+        if self.statistics is None or not self.statistics.counts.keys() <= self.channels.keys():
+            return False
+        return {channel.schema for channel in self.channels.values()} <= self.schemas.keys()
 
     def batches(self, channels: frozenset[int] | None, begin: int, end: int) -> Iterator[Batch]:
         """Records in memory, some megabytes at a time.
