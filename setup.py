@@ -18,6 +18,8 @@ NODES = {
     "recorder": "wam_ros.recorder_node",
 }
 
+CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets")
+
 package = ElementTree.parse(Path(__file__).resolve().parent / "package.xml").getroot()
 name = package.findtext("name")
 
@@ -47,16 +49,20 @@ setup(
         "zstandard",
     ],
     extras_require={
+        # maps and batteries on many machines: `wam map --dask ADDRESS`
+        "dask": ["distributed"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "colcon-common-extensions",
             "mcap",
             "mcap-ros2-support",
+            "distributed",
             "mypy",
             "pytest<9",
             "rosbags",
             "ruff",
+            "scipy",
             "setuptools<80",
             "types-PyYAML",
         ],
@@ -64,7 +70,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
         (f"share/{name}", ["package.xml"]),
-        (f"share/{name}/config", sorted(glob("config/*.yaml"))),
+        *((f"share/{name}/{folder}", sorted(glob(f"{folder}/*.yaml"))) for folder in CONFIGURATIONS),
         (f"share/{name}/launch", sorted(glob("launch/*.launch.py"))),
         (f"lib/{name}", launchers),
     ],

@@ -17,12 +17,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from wam_analysis.batch import processes
+from wam_analysis.figures.catalogue import FIGURES, file_of, numbers
+from wam_analysis.figures.catalogue import table as figures_table
 from wam_analysis.plant_figure import figure
 from wam_analysis.scorecard import report as scorecard
+from wam_control.force_loop import ForceLoop, ForceLoopParameters
 from wam_description.arm import Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
-from wam_description.parameters import fields
+from wam_description.parameters import ParameterError, fields
 from wam_ros.bring_up import MODULES
 from wam_ros.topics import TOPICS
 from wam_theory.equations import EQUATIONS, Equation
@@ -221,6 +225,17 @@ def plant_study() -> str:
     return text
 
 
+@cache
+def figures() -> str:
+    """How far the plant is from the lines of the thesis's figures; draws them on the way."""
+    with processes() as executor:
+        found = numbers(list(FIGURES), executor, ROOT / ".cache" / "pieces")
+    if WRITES_PICTURES:
+        for name, values in found.items():
+            FIGURES[name].draw(values, file_of(name, ROOT / "docs" / "figures"))
+    return figures_table(found)
+
+
 def blocks() -> dict[str, Callable[[], str]]:
     """What can stand in a page, by name."""
     configuration = Configuration.load(CONFIGURATION)
@@ -231,10 +246,43 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
         "plant": plant_study,
+        "refusals": refusals,
+        "guard": lambda: f"```\n{(ROOT / 'docs' / 'guard.txt').read_text(encoding='utf-8')}```\n",
+        "figures": figures,
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
+
+
+def refusals() -> str:
+    """What the force loop says to some sets that are not stable."""
+    lines = []
+    for name, change in (
+        ("wam", {"force_loop:force_gain": [0.5]}),
+        ("wam", {"force_loop:mode": "joint_torque", "force_loop:torque_gain": [0.05]}),
+        ("testbed", {"force_loop:force_gain": [0.05], "force_loop:guard.mode": "refuse"}),
+        ("testbed", {"force_loop:force_gain": [0.2], "force_loop:guard.mode": "refuse"}),
+    ):
+        configuration = Configuration.load(ROOT / "config" / f"{name}.yaml").with_values(change)
+        shared = configuration.shared
+        given = ", ".join(f"{key.removeprefix('force_loop:')} {value}" for key, value in change.items())
+        try:
+            ForceLoop(shared.arm, configuration.node("force_loop", ForceLoopParameters), shared.timing)
+        except ParameterError as error:
+            lines.append(f"{name}, {given}:\n  {error}")
+        else:
+            raise SystemExit(f"the guard accepts {given} on {name}; the page wants a refusal")
+    return "```\n" + "\n".join(lines) + "\n```\n"
+
+
+def measure_guard() -> None:
+    """Hold the guard against simulation and keep the two tables."""
+    command = [sys.executable, "-m", "wam_ros.cli", "guard"]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"the guard accepted what diverges, docs/guard.txt stays as it was:\n{done.stdout}")
+    (ROOT / "docs" / "guard.txt").write_text(done.stdout.rstrip() + "\n", encoding="utf-8")
 
 
 def filled(text: str) -> str:
@@ -265,10 +313,12 @@ def draw_demonstration() -> None:
 
 
 def main() -> None:
-    """Write the pages, then the picture."""
+    """Measure the guard, write the pages, then the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--pages", action="store_true", help="pages only, without playing the demonstration")
+    parser.add_argument("--pages", action="store_true", help="pages only, without demonstration and guard's trials")
     given = parser.parse_args()
+    if not given.pages:
+        measure_guard()
     for path, text in pages().items():
         path.write_text(text, encoding="utf-8")
         print(path.relative_to(ROOT))

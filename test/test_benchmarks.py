@@ -21,6 +21,11 @@ ROWS = {
     "recording.py": ["messages in the bag", "writing a message [us]"],
     "round_trip.py": ["one process, p50", "one process, p99", "two processes, p50", "two processes, p99"],
     "speed.py": ["direct run", "lockstep", "lockstep, recorded"],
+    "stability_map.py": [
+        "map, against solve_ivp",
+        "its points alone, against solve_ivp",
+        "map, against the scalar bisection",
+    ],
 }
 RATIO = re.compile(r"(\d+\.\d\d) \(\d+\.\d\d\.\.\d+\.\d\d\)")
 

@@ -135,7 +135,8 @@ def test_ament_index_finds_the_package(installed, monkeypatch):
     assert get_package_prefix("wam_stack") == str(installed)
     share = Path(get_package_share_directory("wam_stack"))
     assert (share / "package.xml").read_bytes() == (ROOT / "package.xml").read_bytes()
-    assert files_in(share / "config") == {path.name for path in ROOT.glob("config/*.yaml")}
+    for folder in ("config", "config/experiments", "config/experiments/sets"):
+        assert files_in(share / folder) == {path.name for path in ROOT.glob(f"{folder}/*.yaml")}
     assert files_in(share / "launch") == {path.name for path in ROOT.glob("launch/*.launch.py")}
 
 

@@ -134,6 +134,25 @@ def test_every_message_of_every_topic_is_in_the_bag(ros: Any, tmp_path: Path) ->
             last = log_time
 
 
+def test_only_the_topics_that_were_chosen_are_in_the_bag(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path, topics=["motor_states", "/clock"])
+    sender = ros.node("sender")
+    publishers = {name: publisher(sender, name) for name in ("motor_states", "motor_currents", "/clock")}
+    ros.wait(matched(*publishers.values()), what="it listens to the others too, so that every publisher begins")
+    for k in range(1, 11):
+        for name in ("motor_currents", "motor_states"):
+            publishers[name].publish(state(k * 1_000_000, 0.1 * k))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 10)
+    ros.remove(node)
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert {c.topic: c.msgcount for c in reader.connections} == {"/wam/motor_states": 10, "/clock": 0}
+
+
+def test_a_topic_that_does_not_exist_is_refused(ros: Any, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="parameter 'topics' names 'motor_state'; allowed: \\*, "):
+        recorder(ros, tmp_path, topics=["motor_state"])
+
+
 def test_counts_and_drops_are_in_the_bag(ros: Any, tmp_path: Path) -> None:
     node = recorder(ros, tmp_path)
     sender = publisher(ros.node("driver"), "motor_states")

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from wam_control.force_loop import ForceCommand
-from wam_control.scenario import NO_FORCE, Push, Scenario, ScenarioOutput, Step, load
+from wam_control.scenario import NO_FORCE, Chirp, Push, Scenario, ScenarioOutput, Setting, Step, load
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -259,3 +259,52 @@ def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) ->
     path.write_bytes(b"\xff\xfe\x00\x81")
     with pytest.raises(ParameterError, match=f"scenario {path} is not YAML"):
         load(path, ARM)
+
+
+# chirps and settings
+
+
+def test_a_chirp_swings_the_force_along_itself_from_the_first_frequency_to_the_last() -> None:
+    chirp = Chirp(2.0, 1.0, 8.0)
+    press = ForceCommand("base", (0.0, -3.0, -4.0))
+    dt = 1e-3
+    scenario = Scenario([Step("sweep", 6.0, force=press, chirp=chirp), Step("rest", 0.1, force=press)])
+    forces = np.array([scenario.step(START, NO_CONTACT, dt).force.force for _ in range(6002)])
+    swing = forces @ np.array([0.0, -0.6, -0.8]) - 5.0
+    assert np.abs(forces @ np.array([1.0, 0.8, -0.6])).max() < 1e-12, "nothing across the force"
+    assert swing[:6000].max() == pytest.approx(2.0, rel=1e-3)
+    assert swing[6000:] == pytest.approx(0.0, abs=1e-12)
+    rises = np.flatnonzero((swing[:-1] <= 0.0) & (swing[1:] > 0.0)) * dt
+    between = 0.5 * (rises[1:] + rises[:-1])
+    assert 1.0 / np.diff(rises) == pytest.approx(8.0 ** (between / 6.0), rel=0.02)
+    assert (between[0], between[-1]) == (pytest.approx(0.5, abs=0.4), pytest.approx(5.9, abs=0.1))
+    assert len(rises) == pytest.approx(6.0 * 7.0 / math.log(8.0), abs=1)  # turns of an exponential sweep
+
+
+def test_settings_are_made_once_when_their_step_begins() -> None:
+    settings = (Setting("driver", "effects.rubbing_friction", (0.5,)),)
+    scenario = Scenario([Step("wait", 0.01), Step("rub", 0.02, settings=settings)])
+    assert [out.settings for out in play(scenario, 6)] == [(), (), settings, (), (), ()]
+
+
+def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) -> None:
+    def read(**body: Any) -> Step:
+        file = tmp_path / "one.yaml"
+        file.write_text(yaml.safe_dump({"steps": [{"name": "a", "seconds": 1.0, **body}]}))
+        return load(file, ARM)[0]
+
+    force = {"frame": "base", "newtons": [0.0, 0.0, -5.0]}
+    step = read(set={"driver": {"effects": {"rubbing_friction": [0.5, 0, 0, 0]}}, "force_loop": {"posture_gain": 2.0}})
+    assert step.settings == (
+        Setting("driver", "effects.rubbing_friction", (0.5, 0, 0, 0)),
+        Setting("force_loop", "posture_gain", 2.0),
+    )
+    assert read(force=force, chirp={"newtons": 1, "from": 2, "to": 9}).chirp == Chirp(1.0, 2.0, 9.0)
+    with pytest.raises(ParameterError, match="unknown key 'velocity_loop'; allowed: driver, force_loop"):
+        read(set={"velocity_loop": {"proportional_gain": [1.0]}})
+    with pytest.raises(ParameterError, match="set, driver is 3; give names and values"):
+        read(set={"driver": 3})
+    with pytest.raises(ParameterError, match="it must begin above 0 and rise"):
+        read(force=force, chirp={"newtons": 1, "from": 9, "to": 2})
+    with pytest.raises(ParameterError, match="chirp needs a force above 0 N"):
+        read(chirp={"newtons": 1, "from": 2, "to": 9})

@@ -38,7 +38,7 @@ def configured_testbed(folder: Path, *extra: str, mode: str = "lockstep") -> Con
             "scenario:script": str(script),
             "recorder:directory": str(folder),
             "recorder:name": "bag",
-            "force_loop:force_gain": 0.01,
+            "force_loop:force_gain": [0.01],
         }
     )
 
@@ -76,3 +76,34 @@ def test_the_teflon_rod_is_pressed_on_while_the_testbed_runs(tmp_path: Path, dom
         assert "rubbing_friction' has 2 values" in answer.reason
         (answer,) = node.set_parameters([Parameter("effects.rubbing_friction", value=[-0.1])])
         assert not answer.successful
+
+
+def test_settings_and_chirps_are_the_same_over_topics_and_without_ros(tmp_path: Path, domain_id: int) -> None:
+    force = {"frame": "link", "newtons": [0.0, -20.0, 0.0]}
+    set_up = {"driver": {"effects.rubbing_friction": [0.7]}, "force_loop": {"force_gain": [0.009]}}
+    steps = [
+        {"name": "press", "seconds": 0.3, "request": "enable", "force": force, "set": set_up},
+        {"name": "sweep", "seconds": 0.4, "force": force, "chirp": {"newtons": 6.0, "from": 2.0, "to": 20.0}},
+        {"name": "no rod", "seconds": 0.3, "force": force, "set": {"driver": {"effects.rubbing_friction": [0.0]}}},
+    ]
+    configured = configured_testbed(tmp_path, "scenario", "recorder")
+    (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": steps}))
+    record_composed(configured, domain_id)
+    run = play_directly(configured, tmp_path / "script.yaml")
+    assert differences(run.rows, read(tmp_path / "bag")) == []
+    (friction,) = run.driver.plant.model.dof_frictionloss[1:]
+    assert friction <= 0.19, "the rod is off again"
+    for step in steps:
+        step.pop("set", None)
+    (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": steps}))
+    assert run.rows["joint_sensors"] != play_directly(configured, tmp_path / "script.yaml").rows["joint_sensors"]
+
+
+def test_a_setting_that_is_refused_ends_the_scenario_with_the_reason(tmp_path: Path, domain_id: int) -> None:
+    configured = configured_testbed(tmp_path, "scenario")
+    body = {"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.rubbing_friction": [-1.0]}}}
+    (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": [body]}))
+    with Composition(configured, domain_id=domain_id) as composition:
+        scenario = composition.nodes["scenario"]
+        composition.spin(lambda: scenario.done)  # type: ignore[attr-defined]
+        assert "step 'rub': driver refuses" in scenario.failure  # type: ignore[attr-defined]

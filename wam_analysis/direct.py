@@ -15,6 +15,7 @@ from wam_control.transform import Transform
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
+from wam_description.parameters import build, values
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State
 from wam_driver.driver import Driver, DriverParameters
@@ -43,6 +44,7 @@ class DirectRun:
     ----------
     rows : what was said on each topic, JointState as position, velocity and effort one after the other.
     driver : the driver, for a look at the plant.
+    estimate : what the contact estimator said last, all of it.
     scenario : the scenario, for its failure.
     """
 
@@ -56,13 +58,18 @@ class DirectRun:
         self._transform = Transform(arm)
         self._body = RigidBody(arm)
         self._velocity_loop = VelocityLoop(arm.motors, node("velocity_loop", VelocityLoopParameters))
-        self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters))
+        self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters), self._timing)
         estimation = node("contact_estimator", ContactEstimatorParameters)
         self._estimator = ContactEstimator(arm, self._timing, estimation)
+        self.estimate = self._estimator.estimate()
         self._has_sensors, self._feels_sensors = arm.joint_sensors, estimation.use_joint_sensors
         zero = [0.0] * len(arm.joints.names)
         self._used: tuple[int, list[float], list[float]] = (0, zero, zero)  # stamp, velocity, effort
         self._newest = self._used
+        self._flat = {
+            "driver": values(node("driver", DriverParameters)),
+            "force_loop": values(node("force_loop", ForceLoopParameters)),
+        }
 
     def play(self) -> str:
         """Play the scenario to its end; returns why it failed, '' where it did not."""
@@ -101,7 +108,7 @@ class DirectRun:
 
     def _outer(self, stamp: int, motors: State, sensors: State | None) -> bool:
         dt = seconds(self._timing.outer_period_ns)
-        estimate = self._estimator.estimate()
+        self.estimate = estimate = self._estimator.estimate()
         contact = Contact(estimate.link, estimate.place, estimate.force) if estimate.link else NO_CONTACT
         joints = self._transform.joint_state(motors)
         played = self.scenario.step(joints.position, contact, dt)
@@ -131,6 +138,11 @@ class DirectRun:
             self.driver.enable("")
         elif played.request == "disable":
             self.driver.disable()
+        for node, name, value in played.settings:
+            self._flat[node][name] = value
+        if played.settings:
+            self.driver.rub(build(DriverParameters, self._flat["driver"]).effects.rubbing_friction)
+            self._force_loop.tune(build(ForceLoopParameters, self._flat["force_loop"]))
         if played.push_cover:
             plant.push(played.push_cover, np.array(played.push_force), np.array(played.push_torque))
         else:
@@ -141,7 +153,7 @@ class DirectRun:
         frame = contact.cover or "base"
         self._say("motor_currents", stamp, self.driver.currents)
         self._say_joints("sim/joint_states", stamp, self.driver.true_joint_state)
-        self._say("sim/contact/wrench", stamp, [*contact.force, 0.0, 0.0, 0.0], frame)
+        self._say("sim/contact/wrench", stamp, [*contact.force, *contact.moment], frame)
         self._say("sim/contact/point", stamp, [contact.place, 0.0, 0.0], frame)
 
     def _say_played(self, stamp: int, played: ScenarioOutput, out: ForceOutput) -> None:

@@ -6,15 +6,24 @@ has to turn at a given speed, its rotor is given an inertia that nothing can slo
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_description.arm import Arm
+from wam_analysis.ideal_testbed import (
+    LEVER,
+    NOTHING,
+    STEP,
+    UNSTOPPABLE,
+    ideal_testbed,
+    link_inertia,
+    released_plant,
+)
+from wam_analysis.plant_loop import force_step
 from wam_description.configuration import Configuration, packaged
-from wam_description.effects import Ripples, no_effects
+from wam_description.effects import Ripples
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
@@ -22,14 +31,9 @@ from wam_driver.plant import Plant
 from wam_driver.sensors import Encoders
 from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, stage_loss
 from wam_theory.resonance import force_resonances
-from wam_theory.stick_slip import ForceLoop, FrictionNode, simulate
+from wam_theory.stick_slip import ForceLoop, simulate
 
 Numbers = NDArray[np.float64]
-STEP = 2.5e-4  # s
-UNSTOPPABLE = 1e9  # kg m^2
-NOTHING = Obstacles((), (), (), (), (), (), (), (), ())
-EMPTY = World(NOTHING, NO_SPRINGS)
-LEVER = 0.9144  # m, from the joint to the tip
 
 
 class Curve(NamedTuple):
@@ -53,47 +57,6 @@ class Resonance(NamedTuple):
     upper: Curve
 
 
-def ideal_testbed(
-    ratio: float = 14.0, rotor: float | None = None, damping: float = 0.0, friction: tuple[float, float] = (0.0, 0.0)
-) -> Arm:
-    """The testbed without gravity, with what is asked for alone.
-
-    Parameters
-    ----------
-    ratio : N.
-    rotor : inertia of the rotor, kg m^2; None for that of the motor.
-    damping : of the cable circuit, N m s/rad.
-    friction : static and dynamic, at the joint, N m.
-    """
-    arm = Configuration.load(packaged("testbed")).shared.arm
-    none = (0.0,)
-    motors = replace(
-        arm.motors,
-        inertia=(rotor or arm.motors.inertia[0],),
-        static_friction=none,
-        dynamic_friction=none,
-        viscous_friction=none,
-    )
-    joints = replace(
-        arm.joints,
-        static_friction=(friction[0],),
-        dynamic_friction=(friction[1],),
-        viscous_friction=none,
-        lower=(-1e3,),
-        upper=(1e3,),
-    )
-    cables = replace(arm.cables, damping=(damping,))
-    return replace(
-        arm, motors=motors, joints=joints, cables=cables, joint_from_motor=(1.0 / ratio,), gravity=(0.0, 0.0, 0.0)
-    )
-
-
-def _plant(arm: Arm, world: World = EMPTY, **effects: Any) -> Plant:
-    plant = Plant(arm, world, replace(no_effects(arm), **effects), STEP)
-    plant.brake(False)
-    return plant
-
-
 def _run(plant: Plant, seconds: float) -> None:
     for _ in range(round(seconds / STEP)):
         plant.step([0.0])
@@ -102,7 +65,7 @@ def _run(plant: Plant, seconds: float) -> None:
 def slack() -> Curve:
     """Torque of a circuit over its stretch, past where the loose strand goes slack."""
     arm = ideal_testbed()
-    plant = _plant(arm, slack=True)
+    plant = released_plant(arm, slack=True)
     (circuit,) = arm.circuits
     stretch = np.linspace(-2.5, 2.5, 101) * circuit.slack_stretch
     torques = []
@@ -150,7 +113,7 @@ def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float 
 def _loaded(torque: float) -> Plant:
     """The testbed at rest under a load at the joint, N m, with creep, its rotor unstoppable."""
     arm = ideal_testbed(rotor=UNSTOPPABLE, damping=0.02)
-    plant = _plant(arm, creep=True)
+    plant = released_plant(arm, creep=True)
     plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
     plant.data.qpos[0] = -torque / 14.0 / arm.circuits[0].stiffness
     _run(plant, 0.1)
@@ -185,7 +148,7 @@ def ripple(eccentricity: float = 2.54e-4) -> Curve:
     (circuit,) = arm.circuits
     amplitude = 2.0 * eccentricity * circuit.pretension
     ripples = Ripples(("motor1",), (1.0 / 3.0,), (amplitude,), (1,), (0.5,))
-    plant = _plant(arm, ripples=ripples)
+    plant = released_plant(arm, ripples=ripples)
     angles, torques = [], []
     plant.data.qvel[:] = (20.0, 20.0 / 14.0)
     for _ in range(round(2.0 / STEP)):
@@ -203,9 +166,9 @@ def resonances(ratio: float, stiffness: Numbers) -> Resonance:
     found = []
     for k in stiffness:
         world = World(NOTHING, Springs(("joint1",), (float(k),), (1.0,), (0.0,), (True,)))
-        angles = np.abs(np.angle(np.linalg.eigvals(_one_step_map(_plant(arm, world)))))
+        angles = np.abs(np.angle(np.linalg.eigvals(_one_step_map(released_plant(arm, world)))))
         found.append(np.sort(angles)[[0, 2]] / STEP)
-    inertia = float(arm.motors.inertia[0]), arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
+    inertia = float(arm.motors.inertia[0]), link_inertia(arm)
     theory = force_resonances(*inertia, circuit.stiffness, stiffness, ratio)
     lower, upper = np.array(found).T
     return Resonance(ratio, Curve(stiffness, lower, theory.lower), Curve(stiffness, upper, theory.upper))
@@ -230,7 +193,7 @@ def surface(hardening: float) -> Curve:
     below = 0.01  # m below the link, which then touches with its tip alone
     place = (0.0, 0.0, -0.0254 - below)
     floor = Obstacles(("floor",), ("plane",), place, (0.0,) * 3, (2.0, 2.0, 0.0), (4e3,), (0.0,), (hardening,), (0.0,))
-    plant = _plant(ideal_testbed(rotor=UNSTOPPABLE), World(floor, NO_SPRINGS))
+    plant = released_plant(ideal_testbed(rotor=UNSTOPPABLE), World(floor, NO_SPRINGS))
     forces = []
     for depth in depths:
         q = -np.arcsin((depth + below) / LEVER)
@@ -275,22 +238,9 @@ def step_response(friction: tuple[float, float], damping: float, gain: float, se
     gain : G_I, rad/s/(N m).
     seconds : how long.
     """
-    stiffness, asked = 1464.28, 20.0
-    arm = ideal_testbed(rotor=UNSTOPPABLE, friction=friction)
-    arm = replace(arm, joints=replace(arm.joints, viscous_friction=(damping,)))
-    plant = _plant(arm, World(NOTHING, Springs(("joint1",), (stiffness,), (1.0,), (0.0,), (True,))))
-    forces, motors = [], []
-    for _ in range(round(seconds / STEP)):
-        forces.append(stiffness * plant.q[0])
-        motors.append(plant.theta[0] / 14.0)
-        plant.data.qvel[0] = 14.0 * gain * (asked - forces[-1])
-        plant.step([0.0])
-    (circuit,) = arm.circuits
-    inertia = arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
-    node = FrictionNode(inertia, damping, 14.0**2 * circuit.stiffness, stiffness, friction[1], friction[0])
-    times = np.arange(len(forces), dtype=np.float64) * STEP
-    exact = simulate(node, ForceLoop(gain=gain), asked, seconds).at(times)
-    return Response(Curve(times, np.array(forces), exact.contact_force), Curve(times, np.array(motors), exact.x_m))
+    found = force_step(20.0, 1464.28, gain, damping, friction, seconds)
+    exact = simulate(found.node, ForceLoop(gain=gain), 20.0, seconds).at(found.time)
+    return Response(Curve(found.time, found.force, exact.contact_force), Curve(found.time, found.motor, exact.x_m))
 
 
 def stiction_cycle() -> Curve:
@@ -311,11 +261,11 @@ def impact() -> Curve:
     stiffness = np.linspace(200.0, 2e4, 25)
     arm = ideal_testbed()
     arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
-    inertia = arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
+    inertia = link_inertia(arm)
     found = []
     for k in stiffness:
         world = World(NOTHING, Springs(("joint1",), (float(k),), (LEVER,), (0.0,), (False,)))
-        plant = _plant(arm, world)
+        plant = released_plant(arm, world)
         plant.data.qvel[:] = (-7.0, -0.5)
         greatest = 0.0
         for _ in range(round(np.pi * np.sqrt(inertia / k) / LEVER / STEP)):
@@ -351,13 +301,13 @@ def _breakaway(plant: Plant, at_joint: bool, start: float) -> float:
 def tension_friction(coefficient: float = 1e-4) -> Level:
     """Breakaway torque of the motor by friction that goes with the tension of both strands, c (T1 + T2), (6.5)."""
     arm = ideal_testbed(friction=(50.0, 50.0))  # the link stays where it is
-    plant = _plant(arm, tension_friction=(coefficient,))
+    plant = released_plant(arm, tension_friction=(coefficient,))
     return Level(_breakaway(plant, False, 0.06), coefficient * 2.0 * arm.circuits[0].pretension)
 
 
 def rubbing() -> Level:
     """Breakaway torque of the joint with a rod of 0.7 N m pressed on it, motor free."""
-    plant = _plant(ideal_testbed(friction=(0.3, 0.3)))
+    plant = released_plant(ideal_testbed(friction=(0.3, 0.3)))
     plant.rub((0.7,))
     return Level(_breakaway(plant, True, 0.9), 1.0)
 
@@ -366,9 +316,9 @@ def circuit_damping() -> Level:
     """Decay of the link against a motor that stands still, s^-1: N^2 d/(2 J)."""
     damping = 0.02
     arm = ideal_testbed(rotor=UNSTOPPABLE, damping=damping)
-    values = np.linalg.eigvals(_one_step_map(_plant(arm)))
+    values = np.linalg.eigvals(_one_step_map(released_plant(arm)))
     swinging = values[np.abs(values.imag) > 1e-6][0]
-    inertia = arm.links.inertia[1] + arm.links.mass[0] * arm.links.centre[0] ** 2
+    inertia = link_inertia(arm)
     return Level(-float(np.log(np.abs(swinging))) / STEP, 14.0**2 * damping / (2.0 * inertia))
 
 

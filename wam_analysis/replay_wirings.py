@@ -98,7 +98,7 @@ def _gravity(shared: Shared, _: Nothing) -> list[Step]:
 
 
 def _force_loop(shared: Shared, own: ForceLoopParameters) -> list[Step]:
-    loop = ForceLoop(shared.arm, own)
+    loop = ForceLoop(shared.arm, own, shared.timing)
 
     def work(stamp: int, dt: float, inputs: Mapping[str, Any]) -> Said:
         external, posture, torque = (

@@ -1,7 +1,7 @@
 """A scenario: steps of a task as data, played into the stack at the outer rate."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,10 +10,11 @@ import yaml
 
 from wam_control.force_loop import ForceCommand
 from wam_description.arm import Arm
-from wam_description.parameters import ParameterError, parameter, require
+from wam_description.parameters import ParameterError, flatten, parameter, require
 from wam_description.signals import Contact
 
 REQUESTS = ("", "enable", "disable")
+TUNABLE = ("driver", "force_loop")  # they wait for the scenario in lockstep: a setting meets them at its own stamp
 NO_FORCE = ForceCommand("base", (0.0, 0.0, 0.0))
 ROUNDING = 1e-9  # s, of a sum of periods
 
@@ -35,6 +36,22 @@ class Push(NamedTuple):
     end: float  # s
 
 
+class Chirp(NamedTuple):
+    """A sine on top of a step's force, its frequency growing by the same factor in every second."""
+
+    newtons: float  # amplitude
+    start: float  # Hz
+    end: float  # Hz
+
+
+class Setting(NamedTuple):
+    """A live parameter of a node and its new value."""
+
+    node: str
+    name: str
+    value: float | int | bool | str | tuple[float | int | bool | str, ...]
+
+
 class Step(NamedTuple):
     """One step of a scenario."""
 
@@ -45,6 +62,8 @@ class Step(NamedTuple):
     force: ForceCommand = NO_FORCE
     push: Push | None = None
     request: str = ""  # asked of the driver when the step begins
+    chirp: Chirp | None = None  # along the force
+    settings: tuple[Setting, ...] = ()  # made when the step begins
 
 
 class ScenarioOutput(NamedTuple):
@@ -56,6 +75,7 @@ class ScenarioOutput(NamedTuple):
     push_force: tuple[float, float, float]
     push_torque: tuple[float, float, float]
     request: str
+    settings: tuple[Setting, ...]
     step: str
     done: bool
     failure: str
@@ -104,11 +124,12 @@ class Scenario:
         request = "disable" if self.failure else step.request
         return ScenarioOutput(
             posture=list(self._posture),
-            force=NO_FORCE if self.done else step.force,
+            force=NO_FORCE if self.done else self._force(step),
             push_cover=push.cover if push else "",
             push_force=force,
             push_torque=(0.0, -lever * force[2], lever * force[1]),
             request=request if begins else "",
+            settings=step.settings if begins and not self.done else (),
             step=step.name,
             done=self.done,
             failure=self.failure,
@@ -142,10 +163,24 @@ class Scenario:
         self._begin(self._index + 1, q)
         return True
 
+    def _force(self, step: Step) -> ForceCommand:
+        if step.chirp is None:
+            return step.force
+        share = swept_sine(step.chirp, self._elapsed, step.seconds) / math.hypot(*step.force.force)
+        x, y, z = (newtons * (1.0 + share) for newtons in step.force.force)
+        return ForceCommand(step.force.frame, (x, y, z))
+
     def _on_path(self, step: Step) -> list[float]:
         s = min(self._elapsed / step.seconds, 1.0)
         blend = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
         return [a + (b - a) * blend for a, b in zip(self._from, step.posture, strict=True)]
+
+
+def swept_sine(chirp: Chirp, elapsed: float, seconds: float) -> float:
+    """Force of a chirp, N, at a time since its begin, s, of `seconds` in all."""
+    growth = math.log(chirp.end / chirp.start)
+    turns = chirp.start * seconds / growth * math.expm1(growth * elapsed / seconds)
+    return chirp.newtons * math.sin(2.0 * math.pi * turns)
 
 
 def load(path: Path, arm: Arm) -> list[Step]:
@@ -172,7 +207,8 @@ def load(path: Path, arm: Arm) -> list[Step]:
 def _step(where: str, body: Any, arm: Arm) -> Step:
     if not isinstance(body, dict):
         raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
-    _known(where, body, ("name", "seconds", "posture", "until_force", "force", "push", "request"), ("name", "seconds"))
+    keys = ("name", "seconds", "posture", "until_force", "force", "chirp", "push", "request", "set")
+    _known(where, body, keys, ("name", "seconds"))
     name = body["name"]
     require(isinstance(name, str) and name != "", f"{where}: name is {name!r}; it must be a text (quote it)")
     request = body.get("request", "")
@@ -181,14 +217,20 @@ def _step(where: str, body: Any, arm: Arm) -> Step:
     require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
     until_force = _float(where, "until_force", body.get("until_force", 0.0))
     require(until_force >= 0.0, f"{where}: until_force is {until_force:g}; it must be 0 (no contact awaited) or above")
+    force = _force(where, body["force"], arm) if "force" in body else NO_FORCE
+    require(
+        "chirp" not in body or any(force.force), f"{where}: chirp needs a force above 0 N, whose direction it takes"
+    )
     return Step(
         name=name,
         seconds=seconds,
         posture=_posture(where, body["posture"], arm) if "posture" in body else (),
         until_force=until_force,
-        force=_force(where, body["force"], arm) if "force" in body else NO_FORCE,
+        force=force,
         push=_push(where, body["push"], arm) if "push" in body else None,
         request=request,
+        chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
+        settings=tuple(_settings(where, body["set"])) if "set" in body else (),
     )
 
 
@@ -206,6 +248,22 @@ def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
     require(body["frame"] in frames, f"{where}: frame is {body['frame']!r}; allowed: {', '.join(frames)}")
     x, y, z = _floats(where, "newtons", body["newtons"], 3)
     return ForceCommand(body["frame"], (x, y, z))
+
+
+def _chirp(where: str, body: Any) -> Chirp:
+    keys = ("newtons", "from", "to")
+    _known(where + ", chirp", body, keys, keys)
+    newtons, start, end = (_float(where + ", chirp", key, body[key]) for key in keys)
+    require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
+    return Chirp(newtons, start, end)
+
+
+def _settings(where: str, body: Any) -> Iterator[Setting]:
+    _known(where + ", set", body, TUNABLE, ())
+    for node, values in body.items():
+        require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
+        for name, value in flatten(values).items():
+            yield Setting(node, name, tuple(value) if isinstance(value, list) else value)
 
 
 def _push(where: str, body: Any, arm: Arm) -> Push:

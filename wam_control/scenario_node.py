@@ -3,10 +3,12 @@
 from pathlib import Path
 from typing import Any
 
+from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
-from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, load
+from wam_control.scenario import TUNABLE, Scenario, ScenarioOutput, ScenarioParameters, Setting, load
 from wam_description.arm import seconds
 from wam_description.configuration import packaged
 from wam_description.signals import State
@@ -49,6 +51,7 @@ class ScenarioNode(Node):
         self.failure = ""
         self._enable = self.create_client(SetBool, "driver/enable")
         self._pause = self.create_client(SetBool, "driver/pause")
+        self._set = {name: self.create_client(SetParameters, f"{name}/set_parameters") for name in TUNABLE}
         estimated = Need(True, streamed=ports.streamed("contact_estimator"))
         gate = Gate(shared.timing, "joint_states", {"contact/wrench": estimated, "contact/point": estimated})
         joints, frames = list(shared.arm.joints.names), (BASE, *shared.arm.covers.names)
@@ -76,6 +79,8 @@ class ScenarioNode(Node):
         """Ask what has to be asked first, then stream."""
         if out.request:
             self._ask(self._enable, out.request == "enable", stamp, out._replace(request=""))
+        elif out.settings:
+            self._tune(stamp, out)
         elif out.done and not self.done and not self._asking:
             self._ask(self._pause, True, stamp, out)
         else:
@@ -94,11 +99,34 @@ class ScenarioNode(Node):
                 self._stream(stamp, out)
                 self._end(stamp, out.failure)
                 return
-            self._act(stamp, out)
-            while self._pending and not self._asking:
-                self._act(*self._pending.pop(0))
+            self._go_on(stamp, out)
 
         client.call_async(SetBool.Request(data=data)).add_done_callback(answered)
+
+    def _tune(self, stamp: int, out: ScenarioOutput) -> None:
+        """Set the parameters of one node, then go on with those of the next."""
+        node = out.settings[0].node
+        mine = [setting for setting in out.settings if setting.node == node]
+        rest = tuple(setting for setting in out.settings if setting.node != node)
+        self._asking = True
+
+        def answered(future: Any) -> None:
+            self._asking = False
+            refused = [result.reason for result in future.result().results if not result.successful]
+            if refused:
+                self._end(stamp, f"step '{out.step}': {node} refuses: {'; '.join(refused)}")
+                return
+            self._ports.set_status(OK, out.step, stamp=str(stamp), **{f"{s.node}:{s.name}": _said(s) for s in mine})
+            self._go_on(stamp, out._replace(settings=rest))
+
+        parameters = [Parameter(setting.name, value=_plain(setting)).to_parameter_msg() for setting in mine]
+        self._set[node].call_async(SetParameters.Request(parameters=parameters)).add_done_callback(answered)
+
+    def _go_on(self, stamp: int, out: ScenarioOutput) -> None:
+        """Act on what an answer has been waited for, and on what has come since."""
+        self._act(stamp, out)
+        while self._pending and not self._asking:
+            self._act(*self._pending.pop(0))
 
     def _stream(self, stamp: int, out: ScenarioOutput) -> None:
         ports = self._ports
@@ -122,6 +150,14 @@ class ScenarioNode(Node):
             self._fail(stamp, failure)
         self._ports.set_status(ERROR if self.failure else OK, self.failure or "done", stamp=str(stamp))
         self.done = True
+
+
+def _plain(setting: Setting) -> Any:
+    return list(setting.value) if isinstance(setting.value, tuple) else setting.value
+
+
+def _said(setting: Setting) -> str:
+    return str(_plain(setting))
 
 
 def main() -> None:

@@ -108,7 +108,7 @@ class Recorder:
             self._channels[name] = _Channel(topic, name)
 
     def receive(self, name: str, data: bytes, received: int, sent: int, number: int) -> None:
-        """Record one message.
+        """Record one message; one of a topic that is not recorded is left out.
 
         Parameters
         ----------
@@ -117,7 +117,9 @@ class Recorder:
         received, sent : system clock, ns.
         number : the publisher's sequence number.
         """
-        channel = self._channels[name]
+        channel = self._channels.get(name)
+        if channel is None:
+            return
         publisher = channel.publisher_of(data)
         channel.numbering(publisher).add(number)
         if self._lockstep:

@@ -21,6 +21,8 @@ from wam_ros.remote_parameters import RemoteParameters, as_yaml
 from wam_ros.run import run
 from wam_ros.topics import BY_NAME, TOPICS, Topic
 
+EVERY = "*"
+
 
 @dataclass(frozen=True)
 class RecorderParameters:
@@ -28,10 +30,14 @@ class RecorderParameters:
 
     directory: str = parameter("directory in which the bag is made; made where it is missing")
     name: str = parameter("name of the bag, a new directory; empty for arm, date and time of the start")
+    topics: tuple[str, ...] = parameter("topics that are recorded, as in docs/topics.md; '*' for every one")
     split_size: int = parameter("size at which the bag goes on in another file; 0: never", "byte", 0)
     split_time: float = parameter("time after which the bag goes on in another file; 0: never", "s", 0.0)
 
     def __post_init__(self) -> None:
+        for topic in self.topics:
+            if topic != EVERY and topic not in BY_NAME:
+                raise ParameterError(f"parameter 'topics' names '{topic}'; allowed: {EVERY}, {', '.join(BY_NAME)}")
         if self.name != Path(self.name).name or self.name == "..":
             raise ParameterError(f"parameter 'name' is '{self.name}'; allowed: a name without directories")
 
@@ -53,8 +59,10 @@ class RecorderNode(Node):
         except RecordingError as error:
             raise ParameterError(f"node 'recorder': {error} (parameters 'directory' and 'name')") from None
         topics = {self.resolve_topic_name(topic.name): topic for topic in TOPICS}
-        offered = {full_name: qos(topic) for full_name, topic in topics.items()}
-        self.recorder = Recorder(self.bag, topics, shared.timing.mode, offered)
+        chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
+        offered = {full_name: qos(topic) for full_name, topic in chosen.items()}
+        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered)
+        # it listens to all, also to what it does not keep: every publisher waits for it before it begins
         self._inlets = {name: self._listen(name, topic) for name, topic in topics.items()}
         others = [node for node in shared.nodes if node != self.get_name()]
         self._expected = {

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wam_theory.arguments import Array, above_zero, zero_or_more
-from wam_theory.stick_slip import half_cycle
+from wam_theory.half_cycle import half_cycle
 
 
 def psi(gamma: ArrayLike, zeta: ArrayLike) -> Array:

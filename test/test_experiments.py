@@ -1,0 +1,419 @@
+"""Experiments: what each evaluation says of a signal with a known answer, and two of them run for real."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from recordings import forces, joints, recorded
+
+from wam_analysis.bag import BagError
+from wam_analysis.experiments import arm_forces, cables, limit_cycles, step_response, testbed, transmission
+from wam_analysis.experiments.definition import configured, load, names
+from wam_analysis.experiments.evaluation import evaluation_of
+from wam_analysis.experiments.one_link import growth, last_cycle, one_link
+from wam_analysis.experiments.page import write
+from wam_analysis.experiments.recording import Step
+from wam_analysis.experiments.rows import Result, Row, markdown, plain
+from wam_control import scenario
+from wam_description.configuration import packaged
+from wam_description.parameters import ParameterError
+from wam_description.units import si
+from wam_ros.cli import main
+
+LEVER = 0.9144  # m
+STIFFNESS = 1464.28  # k_c of the testbed at its joint, N m/rad
+PRESS = (Step("press", 0.0, 20.0, {}),)
+
+
+def pressed(time, force):  # the sensors of a testbed that presses with this force, N
+    return joints(time, -np.asarray(force) * LEVER / STIFFNESS)
+
+
+# definition
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_experiment_has_parameters_that_exist_and_steps_that_can_be_played(name: str, tmp_path: Path) -> None:
+    experiment = load(name)
+    assert callable(evaluation_of(experiment))
+    for run in experiment.runs:
+        configuration = configured(experiment, run, tmp_path)
+        arm = configuration.shared.arm  # refuses what does not fit together
+        steps = scenario.load(tmp_path / f"{run.name}.yaml", arm)
+        assert sum(step.seconds for step in steps) == pytest.approx(run.seconds)
+
+
+def test_the_experiments_of_chapters_four_to_six_are_there() -> None:
+    needed = "testbed-5.6 stiction-limit-cycle actuator-limit-cycle step-response frequency-response"
+    needed += " stiffness-allocation efficiency creep wam-press wam-slide"
+    assert set(needed.split()) <= set(names())
+
+
+def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
+    with pytest.raises(ParameterError, match=r"no experiment is named 'creeep'; there are: .*creep"):
+        load("creeep")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"rums": []}, "unknown key 'rums'"),
+        ({"runs": []}, "'runs' must be a list with at least one"),
+        ({"runs": [{"name": "../x", "steps": [{}]}]}, "it must be one for a directory"),
+        ({"runs": [{"name": "a", "steps": [{}]}] * 2}, "several runs are named a"),
+        ({"runs": [{"name": "a"}]}, "'steps' is missing"),
+    ],
+)
+def test_a_file_that_is_not_an_experiment_is_refused(change: dict, message: str, tmp_path: Path) -> None:
+    body = {"title": "t", "section": "1", "configuration": "testbed", "evaluation": "cables.creeping"}
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump({**body, "runs": [{"name": "a", "steps": [{}]}], **change}))
+    with pytest.raises(ParameterError, match=message):
+        load(str(file))
+
+
+# rows
+
+
+def test_a_row_agrees_within_its_bound_and_never_with_what_could_not_be_measured() -> None:
+    assert Row("x", 2.0, 2.03, bound=0.02).agrees
+    assert not Row("x", 2.0, 2.05, bound=0.02).agrees
+    assert Row("x", -2.0, -1.97, bound=0.02).deviation == pytest.approx(0.015)
+    assert not Row("x", 2.0, math.nan, bound=0.02).agrees
+    assert not Row("x", 0.0, 0.001, bound=0.02).agrees, "nothing is near zero in parts of it"
+    assert Row("x", 0.0, 0.001, bound=0.02, absolute=True).agrees
+    assert not Row("x", "settled", "diverged").agrees
+    assert Row("x", 1.0, 9.0, bound=math.nan).agrees
+    assert not Result([Row("x", 1.0, 1.0), Row("x", 1.0, 2.0, bound=0.1)], []).agrees
+
+
+def test_tables_say_what_was_missed() -> None:
+    rows = [Row("period", 2.0, 2.5, "s", 0.02, "(5.9)"), Row("a|b", "settled", "settled")]
+    assert "+25.00 %  2.00 %  (5.9)     MISSED" in plain(rows)
+    assert "| a\\|b | settled | settled |" in markdown(rows)
+
+
+# measuring
+
+
+def test_growth_of_a_growing_and_of_a_decaying_oscillation() -> None:
+    time = np.arange(0.0, 3.0, 1e-3)
+    for rate in (0.4, -0.7):
+        found = growth(time, 40.0 + np.exp(rate * time) * np.sin(78.0 * time))
+        assert found.rate == pytest.approx(rate, abs=0.01)
+        assert found.frequency == pytest.approx(78.0, rel=1e-3)
+    with pytest.raises(ValueError, match="0 zero crossings are too few"):
+        growth(time, np.ones_like(time))
+
+
+def test_last_cycle_of_a_cycle_that_converges() -> None:
+    time = np.arange(0.0, 12.0, 1e-3)
+    sawtooth = 2.0 * ((time / 1.5) % 1.0 - 0.5) * (1.0 + np.exp(-2.0 * time)) + 9.0
+    found = last_cycle(time, sawtooth)
+    assert found.peak_to_peak == pytest.approx(2.0, rel=0.01)
+    assert found.period == pytest.approx(1.5, rel=0.01)
+    assert math.isnan(last_cycle(time, time).period)
+
+
+# evaluations
+
+
+def test_marginal_gain_lies_where_growth_changes_its_sign(tmp_path: Path) -> None:
+    experiment = load("testbed-5.6")
+    time = np.arange(0.0, 2.5, 5e-4)
+    runs = {}
+    for number, name, gain, rate in ((0, "below", 0.010, -0.6), (1, "above", 0.014, 0.2)):
+        steps = (Step("more gain", 0.0, 2.5, {"force_loop:force_gain": [gain]}),)
+        force = 44.0 + 0.5 * np.exp(rate * time) * np.sin(75.0 * time)
+        topics = {"joint_sensors": pressed(time, force), "motor_states": joints(time, 0.0)}
+        runs[name] = recorded(experiment, number, topics, steps, tmp_path)
+    gain, frequency, low, high = testbed.margin(runs["below"], runs["above"], "now")
+    assert gain.measured == pytest.approx(0.013, rel=2e-3)  # three quarters of the way
+    assert gain.predicted == pytest.approx(1.73e-3 * LEVER**2 / si(1.0, "lb-in"), rel=2e-3)  # of errata and thesis
+    assert frequency.measured == pytest.approx(75.0, rel=2e-3)
+    assert (low.predicted, low.measured) == ("decays", "decays")
+    assert (high.predicted, high.measured) == ("grows", "grows")
+
+
+def test_margin_with_the_velocity_loop_tends_to_that_of_a_velocity_source_as_it_gets_stiffer(tmp_path: Path) -> None:
+    run = recorded(load("testbed-own-servo"), 0, {}, PRESS, tmp_path)
+    own = testbed.margin_with_servo(run)
+    stiff = {"proportional_gain": (0.03,), "integral_gain": (9.0,)}
+    stiffer = {**run.parameters, "velocity_loop": {**run.parameters["velocity_loop"], **stiff}}
+    closer = testbed.margin_with_servo(run._replace(parameters=stiffer))
+    ideal = one_link(run).margin.gain * LEVER**2
+    assert own > closer > ideal
+
+
+def test_fate_of_a_step_is_read_from_its_last_windows(tmp_path: Path) -> None:
+    experiment = load("testbed-5.6")
+    time = np.arange(0.0, 3.0, 5e-4)
+    step = Step("press", 0.0, 3.0, {})
+    swing = np.sin(78.0 * time)
+    shapes = {
+        "settled": 10.0 * (1.0 - np.exp(-5.0 * time)),
+        "limit cycle": 10.0 + 2.0 * swing,
+        "diverged": 10.0 + np.exp(1.5 * time) * swing,
+    }
+    for verdict, force in shapes.items():
+        topics = {"joint_sensors": pressed(time, force), "motor_states": joints(time, 0.0)}
+        run = recorded(experiment, 2, topics, (step,), tmp_path)
+        shown = testbed.response(run, one_link(run), step)
+        assert testbed.fate(run, step, shown) == verdict
+        assert testbed.fate(run._replace(fault="cable", fault_time=2.0), step, shown) == "diverged"
+
+
+def test_saturation_rod_and_delay_come_from_the_recorded_parameters(tmp_path: Path) -> None:
+    experiment = load("testbed-5.6")
+    number = [run.name for run in experiment.runs].index("large_step_saturated")
+    run = recorded(experiment, number, {}, PRESS, tmp_path)
+    link = one_link(run, {"driver:effects.rubbing_friction": [0.949]})
+    assert link.loop.error_limit == pytest.approx(22.24 * LEVER)
+    assert link.loop.gain == pytest.approx(0.01921 / LEVER**2)
+    assert link.node.static_friction == pytest.approx(0.949)
+    assert one_link(run).node.static_friction == 0.0
+    late = recorded(experiment, number + 1, {}, PRESS, tmp_path)
+    assert (link.loop.delay_samples, one_link(late).loop.delay_samples) == (0, 1)
+    with pytest.raises(ValueError, match="without G_P"):
+        one_link(run, {"force_loop:force_proportional_gain": [0.001]})
+
+
+def test_stiction_cycle_of_a_square_wave(tmp_path: Path) -> None:
+    experiment = load("stiction-limit-cycle")
+    time = np.arange(0.0, 9.0, 1e-3)
+    square = 10.9 + 1.2 * np.sign(np.sin(2.0 * np.pi * time / 1.9))
+    calm = np.where(time < 2.0, square, 10.0)
+    runs = {}
+    for number, force in enumerate((square, calm, square)):
+        topics = {
+            "joint_sensors": pressed(time, force),
+            "motor_states": joints(time, 0.0),
+            "force_command": forces(time, (0.0, -10.936, 0.0)),
+        }
+        run = recorded(experiment, number, topics, (Step("press", 0.0, 9.0, {}),), tmp_path)
+        runs[experiment.runs[number].name] = run
+    rows = {row.quantity: row for row in limit_cycles.stiction(runs).rows}
+    assert rows["F_c peak to peak"].measured == pytest.approx(2.4, rel=1e-4)
+    assert rows["period"].measured == pytest.approx(1.9, rel=1e-3)
+    assert rows["what is left of the cycle with it"].measured == pytest.approx(0.0, abs=1e-9)
+    assert rows["error that is left with it"].measured == pytest.approx(0.936, abs=1e-4)
+    # (5.8), (5.9) corrected, by hand: zeta 0.1604, Omega 1.6, dF 3 N m
+    assert rows["F_c peak to peak"].predicted == pytest.approx(1.6 * 3.0 * 1464.28 / 3096.9 / LEVER, rel=2e-3)
+    assert rows["period"].predicted == pytest.approx(1.943, rel=2e-3)
+
+
+def test_actuator_cycle_of_a_motor_that_swings_against_a_stuck_joint(tmp_path: Path) -> None:
+    experiment = load("actuator-limit-cycle")
+    time = np.arange(0.0, 8.0, 1e-3)
+    stiffness, swing = 14.0**2 * 8.33, 0.007
+    motor = 0.03 + swing * (np.abs((time / 2.0) % 2.0 - 1.0) - 0.5)  # at the joint, up and down in 4 s
+    pull = stiffness * (motor - 0.03) + 20.0  # of the cable, the force of the contact and friction
+    topics = {
+        "joint_sensors": pressed(time, np.full(len(time), 20.0 / LEVER)),
+        "motor_states": joints(time, -14.0 * motor),
+        "sim/joint_states": joints(time, 0.0, effort=-pull),
+        "force_command": forces(time, (0.0, -21.9, 0.0)),
+    }
+    run = recorded(experiment, 0, topics, (Step("press", 0.0, 8.0, {}),), tmp_path)
+    rows = {row.quantity: row for row in limit_cycles.actuator({"press": run}).rows}
+    assert rows["motor at the joint, peak to peak"].measured == pytest.approx(swing, rel=1e-3)
+    assert rows["motor at the joint, peak to peak"].predicted == pytest.approx(12.0 / stiffness, rel=1e-3)
+    work = 0.5 * stiffness * (0.5 * swing) ** 2
+    assert rows["work of a half cycle"].measured == pytest.approx(work, rel=5e-3)
+    (power,) = (row for name, row in rows.items() if name.startswith("power"))
+    assert power.measured == pytest.approx(work / 2.0, rel=5e-3)
+    assert "power of a half cycle of 2.00 s" in rows
+
+
+def test_step_response_of_an_exponential(tmp_path: Path) -> None:
+    experiment = load("step-response")
+    time = np.arange(0.0, 2.5, 1e-3)
+    force = 21.87 * (1.0 - np.exp(-time / 0.5))
+    topics = {
+        "joint_sensors": pressed(time, force),
+        "motor_states": joints(time, 0.0),
+        "force_command": forces(time, (0.0, -21.87, 0.0)),
+    }
+    run = recorded(experiment, 0, topics, (Step("press", 0.0, 2.5, {}),), tmp_path)
+    constant, farthest = step_response.responses({"no_friction": run}).rows
+    assert constant.measured == pytest.approx(0.5, rel=1e-4)
+    assert constant.predicted == pytest.approx(1.0 / (0.002 * 772.0), rel=2e-3)  # (5.2), G_I 0.002, K 772 N m/rad
+    # farthest between two exponentials of 0.5 and 0.648 s: 0.095 of the step
+    assert farthest.measured == pytest.approx(0.095, abs=0.01)
+    assert not farthest.agrees
+
+
+def test_errors_at_rest_are_those_of_the_standstills() -> None:
+    time = np.arange(0.0, 1.0, 1e-3)
+    speed = np.where((time % 0.25) < 0.1, 0.0, 0.3)
+    force = np.select([time < 0.25, time < 0.5, time < 0.75], [0.0, 8.0, 9.5], 9.9)
+    shown = step_response.Response(time, force, force, speed)
+    assert step_response.errors_at_rest(shown, 10.0) == pytest.approx([2.0, 0.5, 0.1])
+
+
+def test_resonance_is_where_the_damped_response_has_it_without_damping() -> None:
+    frequency = np.arange(0.1, 200.0, 0.1)
+    s = 2j * np.pi * frequency
+    natural, lead = 2.0 * np.pi * 9.0, 4e-3
+    response = (1.0 + lead * s) / (s**2 + 2.0 * 0.07 * natural * s + natural**2)
+    u = np.exp(1j * frequency**2 / 7.0) * (1.0 + 0.1 * np.cos(frequency))
+    found = transmission.spectra(frequency, u, u * response)
+    assert transmission.zero_of(found, 9.1, lead) == pytest.approx(9.0, rel=2e-3)
+    assert found.coherence[1500] == pytest.approx(1.0, abs=1e-3)
+    noise = np.random.default_rng(1).standard_normal(len(u)) + 0j
+    assert np.median(transmission.spectra(frequency, u, noise).coherence) < 0.5
+
+
+def test_a_torque_that_is_held_for_a_period_is_transformed_as_that(tmp_path: Path) -> None:
+    """A pure integrator of a held torque, in closed form: the angle is the sum of the torques before it."""
+    experiment = load("frequency-response")
+    time = np.arange(1, 8001) * 1e-3
+    torque = np.where(time < 7.0, np.sin(2.0 * np.pi * (1.0 + 5.0 * time) * time), 0.0)
+    torque[time < 7.0] -= torque[time < 7.0].mean()  # so that the angle ends where it began
+    angle = np.cumsum(torque) * 1e-3
+    topics = {"motor_states": joints(time, 0.0, effort=torque), "joint_sensors": joints(time, angle)}
+    steps = (Step("sweep", 0.0, 7.0, {}), Step("ring down", 7.0, 8.1, {}))
+    found = transmission.transfer(recorded(experiment, 0, topics, steps, tmp_path))
+    inside = (found.frequency > 20.0) & (found.frequency < 60.0)
+    expected = 2j * np.pi * found.frequency[inside]
+    assert np.abs(found.inverse[inside] / expected - 1.0).max() < 0.02
+
+
+def test_work_lost_in_a_lift_is_that_of_a_motor_that_turns_too_far(tmp_path: Path) -> None:
+    experiment = load("efficiency")
+    time = np.arange(0.0, 2.7, 1e-3)
+    turn = np.clip(time / 1.2, 0.0, 1.0)
+    topics = {
+        "motor_states": joints(time, 14.0 * turn),
+        "joint_sensors": joints(time, 0.98 * turn),
+        "sim/joint_states": joints(time, 0.0, effort=36.0),
+        "sim/disturbance": forces(time, (0.0, -40.0, 0.0), torque=(0.0, 0.0, -36.0)),
+    }
+    steps = (Step("lift 40 N", 0.0, 1.2, {}), Step("hold 40 N", 1.2, 2.7, {}))
+    (row,) = cables.efficiency({"lift": recorded(experiment, 0, topics, steps, tmp_path)}).rows
+    assert row.measured == pytest.approx(2.0, abs=1e-6)  # %
+    # (6.14) by hand: both stages lose tau/(r E A)
+    by_hand = 36.0 / 14.0 * (1.0 / (0.009525 * 42258.1053) + 3.74166 / (0.009525 * 158116.0))
+    assert row.predicted == pytest.approx(100.0 * by_hand, rel=0.01)
+
+
+def test_creep_is_what_the_link_lags_behind_its_motor(tmp_path: Path) -> None:
+    experiment = load("creep")
+    time = np.arange(0.0, 4.0, 1e-3)
+    theta = 5.6 * (1.0 - np.abs(np.clip(time - 1.0, 0.0, 2.0) - 1.0)) * (time > 1.0)
+    travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(theta)))])
+    topics = {
+        "motor_states": joints(time, theta),
+        "joint_sensors": joints(time, theta / 14.0 - 1e-3 * travel),
+        "sim/disturbance": forces(time, (0.0, -45.0, 0.0), torque=(0.0, 0.0, -40.5)),
+    }
+    steps = (Step("out", 0.5, 2.0, {}), Step("rest back", 2.0, 4.0, {}))
+    (row,) = cables.creeping({"out_and_back": recorded(experiment, 0, topics, steps, tmp_path)}).rows
+    assert row.measured == pytest.approx(11.2, rel=1e-3)  # mrad for 11.2 rad
+    assert row.predicted == pytest.approx(11.5, rel=0.01)
+
+
+def test_forces_of_the_arm_are_compared_along_the_one_asked_for(tmp_path: Path) -> None:
+    experiment = load("wam-press")
+    time = np.arange(0.0, 4.0, 5e-3)
+    topics = {
+        "force_command": forces(time, (0.0, -10.0, 0.0), "outer_link"),
+        "force_measured": forces(time, (0.0, -10.0, 0.0), "outer_link"),
+        "contact/wrench": forces(time, (3.0, 9.6, 0.0), "outer_link"),
+        "sim/contact/wrench": forces(time, (-5.0, 9.5, 0.0), "outer_link"),
+    }
+    run = recorded(experiment, 0, topics, (Step("press 10 N", 0.0, 4.0, {}),), tmp_path)
+    found = arm_forces.along(run)
+    assert found.asked == pytest.approx(10.0)
+    assert found.applied == pytest.approx(9.5)
+    assert found.estimated == pytest.approx(9.6)
+    elsewhere = {**topics, "contact/wrench": forces(time, (0.0, 9.6, 0.0), "inner_link")}
+    run = recorded(experiment, 0, elsewhere, run.steps, tmp_path)
+    assert arm_forces.along(run).estimated == pytest.approx(0.0), "a force on another link is not this one"
+
+
+# the page
+
+
+def test_page_gets_the_table_and_the_picture_of_each_experiment(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("# Title\n<!-- experiment: creep -->\nold\n<!-- end -->\nafter\n")
+    picture = tmp_path / "result.png"
+    picture.write_bytes(b"picture")
+    experiment = load("creep")
+    write(page, [(experiment, Result([Row("q", 1.0, 1.01, "N", 0.02)], [], ("a \\d remark",)), picture)])
+    text = page.read_text()
+    assert "| q | 1 | 1.01 | N | +1.00 % | 2.00 % |  | ok |" in text
+    assert "- a \\d remark" in text
+    assert "old" not in text
+    assert text.endswith("<!-- end -->\nafter\n")
+    assert (tmp_path / "page" / "creep.png").read_bytes() == b"picture"
+    with pytest.raises(ValueError, match="no block '<!-- experiment: efficiency -->'"):
+        write(page, [(load("efficiency"), Result([], []), picture)])
+
+
+def test_documentation_shows_every_experiment() -> None:
+    docs = Path(__file__).resolve().parents[1] / "docs"
+    text = (docs / "experiments.md").read_text()
+    for name in names():
+        block = text.partition(f"<!-- experiment: {name} -->")[2].partition("<!-- end -->")[0]
+        assert "| predicted | measured |" in block, name
+        assert "MISSED" not in block, name
+        assert (docs / "experiments" / f"{name}.png").is_file()
+
+
+# run for real
+
+
+def run_command(*words: str) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main(["experiment", *words])
+    return int(ended.value.code or 0)
+
+
+def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path, domain_id: int, capfd) -> None:
+    assert run_command("creep", "--directory", str(tmp_path), "--name", "mine") == 0
+    said = capfd.readouterr()
+    assert "every bound is kept" in said.out
+    assert "creep 1/1 out_and_back: done" in said.err
+    assert (tmp_path / "mine" / "result.png").is_file()
+    assert run_command("creep", "--evaluate", str(tmp_path / "mine")) == 0
+    assert capfd.readouterr().out == said.out
+    # a bound that is missed: the same bag for an experiment in which the driver should have stopped the arm
+    other = tmp_path / "creep.yaml"
+    text = packaged("experiments/creep").read_text()
+    other.write_text(text.replace("  - name: out_and_back\n", "  - name: out_and_back\n    stops: true\n"))
+    assert run_command(str(other), "--evaluate", str(tmp_path / "mine")) == 1
+    assert "stops the arm  lets it run" in capfd.readouterr().out
+
+
+def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, domain_id: int, capfd) -> None:
+    """The large step of section 5.6 alone, in a file of one's own."""
+    whole = yaml.safe_load(packaged("experiments/testbed-5.6").read_text())
+    whole["runs"] = [run for run in whole["runs"] if run["name"] == "large_step"]
+    file = tmp_path / "large.yaml"
+    file.write_text(yaml.safe_dump({**whole, "evaluation": "testbed.large_step"}))
+    assert run_command(str(file), "--directory", str(tmp_path), "--name", "bags") == 0
+    said = capfd.readouterr().out
+    assert "large step, press 10 lb       diverged       diverged" in said
+    assert "the driver stopped the arm at" in said
+
+
+def test_bags_that_are_missing_are_named(tmp_path: Path, capfd) -> None:
+    assert run_command("wam-slide", "--evaluate", str(tmp_path)) == 1
+    assert "has no bag of slide; run 'wam experiment wam-slide'" in capfd.readouterr().err
+    with pytest.raises(BagError):
+        recorded(load("creep"), 0, {}, (), tmp_path).step("out")
+
+
+def test_list_names_every_experiment(capfd) -> None:
+    assert run_command("--list") == 0
+    said = capfd.readouterr().out
+    assert all(name in said and load(name).title in said for name in names())
+
+
+def test_nothing_to_run_is_refused(capfd) -> None:
+    assert run_command() == 1
+    assert "name one experiment, or give --all" in capfd.readouterr().err

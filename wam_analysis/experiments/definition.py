@@ -1,0 +1,134 @@
+"""An experiment as data: which runs of the stack make it, and who evaluates them.
+
+`config/experiments/NAME.yaml` holds title, section, configuration, evaluation, `include` (sets of
+values in `config/experiments/sets/`), values, and runs with a name, values and the steps of a scenario.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError, require
+
+FOLDER = "experiments"
+SETS = "experiments/sets"
+KEYS = ("title", "section", "configuration", "evaluation", "include", "values", "runs")
+RUN_KEYS = ("name", "values", "steps", "stops")
+
+
+class Run(NamedTuple):
+    """One recording: values on top of the experiment's, and what is played."""
+
+    name: str
+    values: Mapping[str, Any]
+    steps: Sequence[Mapping[str, Any]]
+    stops: bool  # whether the driver is expected to stop the arm
+
+    @property
+    def seconds(self) -> float:
+        """Length of all steps, s."""
+        return sum(float(step["seconds"]) for step in self.steps)
+
+
+class Experiment(NamedTuple):
+    """What is run and how it is judged; `evaluation` is a module and a function of `wam_analysis.experiments`."""
+
+    name: str
+    title: str
+    section: str
+    configuration: str
+    evaluation: str
+    runs: tuple[Run, ...]
+
+
+def names() -> list[str]:
+    """The experiments that come with the package."""
+    folder = packaged("wam").parent / FOLDER
+    return sorted(path.stem for path in folder.glob("*.yaml"))
+
+
+def load(name: str) -> Experiment:
+    """Read an experiment.
+
+    Parameters
+    ----------
+    name : of one that comes with the package, or the path of a YAML file.
+
+    Raises
+    ------
+    ParameterError
+        where there is none of this name, or the file is not built like an experiment.
+    """
+    if name.endswith(".yaml"):
+        path = Path(name)
+        require(path.is_file(), f"experiment {path} is not a file")
+    else:
+        require(name in names(), f"no experiment is named '{name}'; there are: {', '.join(names())}")
+        path = packaged(f"{FOLDER}/{name}")
+    tree = _mapping(path)
+    _keys(str(path), tree, KEYS, ("title", "section", "configuration", "evaluation", "runs"))
+    shared: dict[str, Any] = {}
+    for included in tree.get("include", ()):
+        shared.update(_mapping(packaged(f"{SETS}/{included}")))
+    shared.update(tree.get("values", {}))
+    require(isinstance(tree["runs"], list) and bool(tree["runs"]), f"{path}: 'runs' must be a list with at least one")
+    runs = tuple(_run(f"{path}, run {i + 1}", body, shared) for i, body in enumerate(tree["runs"]))
+    doubled = sorted({run.name for run in runs if sum(run.name == other.name for other in runs) > 1})
+    require(not doubled, f"{path}: several runs are named {', '.join(doubled)}")
+    title, section, configuration, evaluation = (str(tree[key]) for key in KEYS[:4])
+    return Experiment(path.stem, title, section, configuration, evaluation, runs)
+
+
+def configured(experiment: Experiment, run: Run, directory: Path) -> Configuration:
+    """The configuration of a run, recorded into `directory`; its steps are written beside the bag.
+
+    Raises
+    ------
+    ParameterError
+        where a value has no parameter or is not allowed.
+    """
+    base = Configuration.load(packaged(experiment.configuration))
+    script = directory / f"{run.name}.yaml"
+    script.parent.mkdir(parents=True, exist_ok=True)
+    script.write_text(yaml.safe_dump({"steps": list(run.steps)}, sort_keys=False), encoding="utf-8")
+    nodes = run.values.get("nodes", base.shared.nodes)
+    return base.with_values(
+        {
+            **run.values,
+            "nodes": [*nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "scenario:script": str(script),
+            "recorder:directory": str(directory),
+            "recorder:name": run.name,
+        }
+    )
+
+
+def _run(where: str, body: Any, shared: Mapping[str, Any]) -> Run:
+    require(isinstance(body, dict), f"{where} is {body!r}; it must be a mapping with name and steps")
+    _keys(where, body, RUN_KEYS, ("name", "steps"))
+    name = str(body["name"])
+    require(name == Path(name).name and name != "..", f"{where}: name is '{name}'; it must be one for a directory")
+    require(
+        isinstance(body["steps"], list) and bool(body["steps"]), f"{where}: 'steps' must be a list with at least one"
+    )
+    return Run(name, {**shared, **body.get("values", {})}, tuple(body["steps"]), bool(body.get("stops", False)))
+
+
+def _mapping(path: Path) -> dict[str, Any]:
+    try:
+        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        raise ParameterError(f"{path} is not YAML: {error}") from error
+    require(isinstance(tree, dict), f"{path} is not a mapping of names to values")
+    return dict(tree)
+
+
+def _keys(where: str, body: Mapping[str, Any], allowed: Sequence[str], needed: Sequence[str]) -> None:
+    for key in body:
+        require(key in allowed, f"{where}: unknown key '{key}'; allowed: {', '.join(allowed)}")
+    for key in needed:
+        require(key in body, f"{where}: '{key}' is missing")

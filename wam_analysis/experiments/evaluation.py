@@ -1,0 +1,57 @@
+"""From the bags of an experiment to its result, and to text and picture."""
+
+import importlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from wam_analysis.bag import BagError
+from wam_analysis.experiments.definition import Experiment, Run
+from wam_analysis.experiments.recording import Recording, recording
+from wam_analysis.experiments.rows import Result, Row, plain
+
+Evaluation = Callable[[Mapping[str, Recording]], Result]
+
+
+def evaluate(experiment: Experiment, directory: Path) -> Result:
+    """Judge an experiment from its bags alone.
+
+    Parameters
+    ----------
+    directory : holds a bag of the name of each run.
+
+    Raises
+    ------
+    BagError
+        where a bag is missing or cannot be read.
+    """
+    missing = [run.name for run in experiment.runs if not (directory / run.name).is_dir()]
+    if missing:
+        raise BagError(f"{directory} has no bag of {', '.join(missing)}; run 'wam experiment {experiment.name}'")
+    recordings = {run.name: recording(directory / run.name) for run in experiment.runs}
+    result = evaluation_of(experiment)(recordings)
+    stops = [_stop(run, recordings[run.name]) for run in experiment.runs if run.stops or recordings[run.name].fault]
+    remarks = [
+        f"{name.replace('_', ' ')}: the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}"
+        for name, run in recordings.items()
+        if run.fault
+    ]
+    return Result([*result.rows, *stops], result.panels, (*result.remarks, *remarks))
+
+
+def _stop(run: Run, recorded: Recording) -> Row:
+    predicted, measured = ("stops the arm" if stops else "lets it run" for stops in (run.stops, bool(recorded.fault)))
+    return Row(f"{run.name.replace('_', ' ')}, driver", predicted, measured)
+
+
+def evaluation_of(experiment: Experiment) -> Evaluation:
+    """The function that judges an experiment."""
+    module, _, function = experiment.evaluation.partition(".")
+    found: Evaluation = getattr(importlib.import_module(f"wam_analysis.experiments.{module}"), function)
+    return found
+
+
+def text(experiment: Experiment, result: Result) -> str:
+    """What a terminal shows."""
+    verdict = "every bound is kept" if result.agrees else "NOT every bound is kept"
+    remarks = "".join(f"\n{remark}" for remark in result.remarks)
+    return f"{experiment.title} (section {experiment.section})\n\n{plain(result.rows)}\n{remarks}\n{verdict}"

@@ -1,0 +1,180 @@
+"""Chapter 4: the force response of a transmission by chirp, and where its compliance sits."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.experiments.one_link import joint_stiffness, link_inertia
+from wam_analysis.experiments.recording import Recording
+from wam_analysis.experiments.rows import Curve, Numbers, Panel, Result, Row
+from wam_driver.driver import DriverParameters
+from wam_theory.cable import stiffness_with_reducer
+from wam_theory.resonance import Resonances, force_resonances
+
+Complex = NDArray[np.complex128]
+WITHIN = 0.02
+SMOOTH = 5  # neighbouring frequencies over which spectra are averaged
+NEAR = 0.06  # of a frequency: how far around it a straight line is fitted
+ROUNDING = 1e-6  # s
+HZ = 1.0 / (2.0 * np.pi)
+
+
+class Transfer(NamedTuple):
+    """Joint angle over motor torque: frequency, Hz, inverse response, N m/rad, and coherence."""
+
+    frequency: Numbers
+    inverse: Complex
+    coherence: Numbers
+
+
+def frequency_response(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `frequency-response`."""
+    run = runs["chirp"]
+    found, low, high = transfer(run), *swept(run)
+    theory = resonances(run)
+    gain = 1.0 / np.abs(found.inverse)
+    arm = run.shared.arm
+    static = 1.0 / (arm.joint_from_motor[0] * _contact_stiffness(run))
+    inside = (found.frequency > low) & (found.frequency < high)
+    lowest = inside & (found.frequency < 2.0 * low)
+    predicted = np.abs(response_of(run, found.frequency))
+    expected = {"lower resonance": float(theory.lower) * HZ, "upper resonance": float(theory.upper) * HZ}
+    rows = [
+        *(Row(name, at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)") for name, at in expected.items()),
+        Row(
+            f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz",
+            static,
+            float(np.median(gain[lowest] * (static / predicted[lowest]))),
+            "rad/(N m)",
+            WITHIN,
+            "(4.3)",
+        ),
+        Row("least coherence", 1.0, float(found.coherence[inside].min()), "", 0.05, "", True),
+    ]
+    curves = [
+        Curve("measured", "measured", found.frequency[inside], gain[inside]),
+        Curve("predicted", "(4.3) with damping", found.frequency[inside], predicted[inside]),
+    ]
+    coherence = [Curve("measured", "", found.frequency[inside], found.coherence[inside])]
+    panels = [
+        Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy"),
+        Panel("coherence", "frequency [Hz]", "", coherence, "x"),
+    ]
+    remark = f"the coherence falls where the response changes within the {SMOOTH} neighbouring frequencies averaged"
+    return Result(rows, panels, (remark,))
+
+
+def allocation(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `stiffness-allocation`."""
+    rows, curves = [], []
+    lower: dict[str, float] = {}
+    for name, run in runs.items():
+        found, theory = transfer(run), resonances(run)
+        lower[name] = zero_of(found, float(theory.lower) * HZ, _lead(run))
+        label = name.replace("_", " ")
+        rows.append(Row(f"{label}, lower resonance", float(theory.lower) * HZ, lower[name], "Hz", WITHIN, "(4.4)"))
+        low, high = swept(run)
+        inside = (found.frequency > low) & (found.frequency < high)
+        curves.append(Curve("measured", label, found.frequency[inside], 1.0 / np.abs(found.inverse[inside])))
+        predicted = np.abs(response_of(run, found.frequency[inside]))
+        curves.append(Curve("predicted", "", found.frequency[inside], predicted))
+    for ratio in (14, 30):
+        at_joint, at_motor = (runs[f"reducer_at_{place}_N_{ratio}"] for place in ("joint", "motor"))
+        softer = softening(at_joint)
+        stiffness = at_joint.shared.arm.circuits[0].stiffness / at_motor.shared.arm.circuits[0].stiffness
+        rows.append(Row(f"stiffness at joint over at motor, N {ratio}", softer, stiffness, "", 1e-3, "(4.1)"))
+    panel = Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy")
+    return Result(rows, [panel])
+
+
+def softening(run: Recording) -> float:
+    """How many times stiffer the line is with the reducer at the joint than at the motor, (4.1)."""
+    cables, ratio = run.shared.arm.cables, 1.0 / run.shared.arm.joint_from_motor[0]
+    ea, length = cables.stage_ea[0], cables.stage_length[0]
+    ends = [float(stiffness_with_reducer(ea, length, ratio, distance)) for distance in (length, 0.0)]
+    return ends[0] / ends[1]
+
+
+def resonances(run: Recording) -> Resonances:
+    """(4.4) from the recorded parameters, rad/s."""
+    arm = run.shared.arm
+    motor, ratio = arm.motors.inertia[0], 1.0 / arm.joint_from_motor[0]
+    return force_resonances(motor, link_inertia(arm), arm.circuits[0].stiffness, _contact_stiffness(run), ratio)
+
+
+def response_of(run: Recording, frequency: Numbers) -> Complex:
+    """Joint angle over motor torque of motor, cable, link and spring, with their damping; frequency in Hz."""
+    arm = run.shared.arm
+    s = 2j * np.pi * frequency
+    ratio, circuit = 1.0 / arm.joint_from_motor[0], arm.circuits[0]
+    cable = circuit.stiffness + circuit.damping * s
+    motor = arm.motors.inertia[0] * s**2 + arm.motors.viscous_friction[0] * s + cable
+    link = link_inertia(arm) * s**2 + arm.joints.viscous_friction[0] * s + ratio**2 * cable + _contact_stiffness(run)
+    found: Complex = ratio * cable / (motor * link - (ratio * cable) ** 2)
+    return found
+
+
+def _lead(run: Recording) -> float:
+    (circuit,) = run.shared.arm.circuits
+    return circuit.damping / circuit.stiffness
+
+
+def _contact_stiffness(run: Recording) -> float:
+    return joint_stiffness(run.node("driver", DriverParameters).world)
+
+
+def swept(run: Recording) -> tuple[float, float]:
+    """Lowest and highest frequency of the chirp, Hz, from where its force crosses what is asked for after it."""
+    command, sweep = run.forces("force_command"), run.step("sweep")
+    during = (command.time >= sweep.begin) & (command.time < sweep.end)
+    after = command.force[int(np.searchsorted(command.time, sweep.end + ROUNDING))]
+    force = np.linalg.norm(command.force[during], axis=1) - np.linalg.norm(after)
+    crossings = command.time[during][np.flatnonzero(force[:-1] * force[1:] < 0.0)]
+    lengths = np.diff(crossings)
+    return 0.5 / float(lengths[:2].mean()), 0.5 / float(lengths[-10:].mean())
+
+
+def transfer(run: Recording) -> Transfer:
+    """Inverse response from the sweep and the rest after it, which begin and end alike.
+
+    A motor's torque is held for the period before the state that reports it: its spectrum is that of the samples
+    times the hold's, sin(w T/2)/(w T/2) and half a period ahead.
+    """
+    motors, sensors = run.joints("motor_states"), run.joints("joint_sensors")
+    begin, end = run.step("sweep").begin, run.step("ring down").end
+    part = slice(*np.searchsorted(motors.time, [begin - ROUNDING, end - ROUNDING]).tolist())
+    period = float(motors.time[1] - motors.time[0])
+    torque, angle = motors.effort[part, 0], sensors.position[part, 0]
+    frequency: Numbers = np.fft.rfftfreq(len(torque), period).astype(np.float64)
+    held = np.sinc(frequency * period) * np.exp(1j * np.pi * frequency * period)
+    u = np.fft.rfft(torque - torque[-1]) * held
+    y = np.fft.rfft(angle - angle[-1])
+    return spectra(frequency[1:], u[1:], y[1:])
+
+
+def spectra(frequency: Numbers, u: Complex, y: Complex) -> Transfer:
+    """Inverse response and coherence of an input and an output spectrum, averaged over neighbouring frequencies."""
+    window = np.ones(SMOOTH) / SMOOTH
+
+    def mean(values: Complex) -> Complex:
+        found: Complex = np.convolve(values, window, mode="same")
+        return found
+
+    both, inputs, outputs = mean(u * y.conj()), mean(np.abs(u) ** 2 + 0j).real, mean(np.abs(y) ** 2 + 0j).real
+    return Transfer(frequency, both / outputs, np.abs(both) ** 2 / (inputs * outputs))
+
+
+def zero_of(found: Transfer, near: float, lead: float) -> float:
+    """Frequency, Hz, at which the real part of the inverse response is zero: a resonance without its damping.
+
+    Parameters
+    ----------
+    near : where it is expected, Hz.
+    lead : damping over stiffness of the cable, s, whose zero in the response is taken out before.
+    """
+    chosen = np.abs(found.frequency / near - 1.0) < NEAR
+    zero = 1.0 + 2j * np.pi * found.frequency[chosen] * lead
+    slope, offset = np.polyfit(found.frequency[chosen] ** 2, (found.inverse[chosen] * zero).real, 1)
+    return float(np.sqrt(-offset / slope))

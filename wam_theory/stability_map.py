@@ -1,0 +1,182 @@
+"""Stability map of figure 5.8: the largest stable step of many force loops at once, by exact events.
+
+What a stuck node does next depends on its error alone, so that a response is a chain of maps from the
+error at one breakaway to that at the next, with one slip between them or, where friction cannot hold
+the node, several reversals.  The boundary is the unstable fixed point of that map, or the error from
+which the node never sticks again.  The exact slips are those of `many_slips`; `largest_stable_step` finds
+the same for one node by following its response to the end.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wam_theory.many_slips import Array, Modes, modes, slip
+
+_FIRST = 1e-3  # step from which a stiction cycle is looked for, of the friction
+_ROUNDS = 200  # slips within which a cycle is found or the response diverges, with stiction
+
+
+def largest_stable_steps(
+    gamma: ArrayLike, zeta: ArrayLike, stiffness_ratio: ArrayLike = 1.0, stiction: ArrayLike = 1.0, rtol: float = 1e-4
+) -> Array:
+    """F_error/F_dynamic of the largest step from unstressed rest that does not diverge (figure 5.8).
+
+    One over it is the ordinate of the figure, where k_tr = k_c.  Up to the Routh limit it is infinite:
+    friction is bounded, and a bounded input cannot make a stable loop diverge.  With stiction the steps
+    below it end in a limit cycle (section 5.5.4).  Bisection of the response of all nodes at once, which
+    supposes that every smaller step is stable too.
+
+    Parameters
+    ----------
+    gamma : J_l G_I K/b of (5.15), above zero.
+    zeta : (5.12), above zero.
+    stiffness_ratio : k_tr/k_c, above zero; the result goes with k_c/(k_tr + k_c).
+    stiction : F_static/F_dynamic, at least 1, which is Coulomb friction.
+    rtol : relative, of the result.
+
+    Returns
+    -------
+    Array
+        of the shape they broadcast to; 0 where every step diverges (domain III).
+
+    Raises
+    ------
+    ValueError
+        where an argument is out of its range.
+    """
+    given = {"gamma": gamma, "zeta": zeta, "stiffness_ratio": stiffness_ratio, "stiction": stiction, "rtol": rtol}
+    for name, value in given.items():
+        array = np.asarray(value, dtype=float)
+        if not np.all(np.isfinite(array) & (array > 0.0)):
+            raise ValueError(f"{name} is {value!r}; it must be finite and above zero")
+    if not np.all(np.asarray(stiction) >= 1.0):
+        raise ValueError(f"stiction is {stiction!r}, F_static over F_dynamic; it must be at least 1")
+    g, z, ratio, s = np.broadcast_arrays(
+        *(np.asarray(a, dtype=float) for a in (gamma, zeta, stiffness_ratio, stiction))
+    )
+    steps = np.full(g.size, math.inf)
+    beyond = np.flatnonzero(g.ravel() > 1.0)
+    steps[beyond] = _boundaries(_Nodes.of(g.ravel()[beyond], z.ravel()[beyond], s.ravel()[beyond]), rtol)
+    return steps.reshape(g.shape) / (1.0 + ratio)
+
+
+class _Nodes(NamedTuple):
+    """Nodes beyond the Routh limit, arrays (n,); forces in the units of `many_slips`."""
+
+    modes: Modes
+    stiction: Array
+    runaway: Array  # size of the growing mode above which it outgrows whatever friction can take
+    guess: Array  # largest stable step by the describing function (5.16)
+
+    @classmethod
+    def of(cls, gamma: Array, zeta: Array, stiction: Array) -> "_Nodes":
+        """Nodes with their thresholds; that of `runaway` is the one of `verdicts`."""
+        m = modes(gamma, zeta)
+        kick = 2.0 / m.apart
+        kick_pair = kick * np.hypot(1.0, (m.alpha - m.real) / m.width)
+        real = -10.0 * kick / np.expm1(2.8 * m.real / m.width)
+        runaway = np.maximum(kick_pair / np.expm1(2.8 * m.alpha / m.width), real)
+        share = m.square / m.apart  # of a step that goes into the real mode
+        pair = np.hypot(1.0 - share, (m.real * share + m.alpha * (1.0 - share)) / m.width)
+        sine = 2.0 / (math.pi * zeta * (gamma - 1.0))
+        return cls(m, stiction, np.maximum(runaway, 3.0 * stiction / m.square), sine / pair)
+
+    def take(self, which: NDArray[np.generic]) -> "_Nodes":
+        """Those nodes alone."""
+        return _Nodes(self.modes.of(which), self.stiction[which], self.runaway[which], self.guess[which])
+
+
+def _next_errors(nodes: _Nodes, errors: Array) -> Array:
+    """Error at the next stick after a breakaway with this one, (n,); infinite where the response diverges.
+
+    It diverges once the growing mode outgrows friction, or has grown by more at each of two slips; where
+    it has shrunk by more at each of two, the error is given as 0.  For near a cycle of reversals the
+    changes of its size are a mu^n + b nu^n with mu > 1 > |nu|, nu from the real mode: two of one sign, the
+    later one greater, have the sign of a.
+    """
+    found = np.full(errors.size, math.inf)
+    index = np.arange(errors.size)
+    xi, acceleration = -errors, nodes.stiction - 1.0
+    before = rise_before = np.full(errors.size, math.nan)
+    while index.size:
+        end = slip(nodes.modes, xi, acceleration)
+        rise = end.pair - before
+        lost = (end.pair > nodes.runaway) & (np.abs(end.real) < 0.1 * end.pair)
+        lost |= (rise_before > 0.0) & (rise >= rise_before)
+        sticks = ~lost & (end.acceleration + 1.0 >= -nodes.stiction)
+        falls = ~lost & ~sticks & (rise_before < 0.0) & (rise <= rise_before)
+        found[index[sticks]] = np.abs(end.error[sticks])
+        found[index[falls]] = 0.0
+        on = np.flatnonzero(~(lost | sticks | falls))
+        index, nodes, before, rise_before = index[on], nodes.take(on), end.pair[on], rise[on]
+        xi, acceleration = -end.error[on], -end.acceleration[on] - 2.0
+    return found
+
+
+def _boundaries(nodes: _Nodes, rtol: float) -> Array:
+    """Largest stable step of each node, (n,)."""
+    steps = _stable_steps(nodes)
+    some = np.flatnonzero(steps > 0.0)
+    nodes, low = nodes.take(some), steps[some]
+    high = np.maximum(1.2 * low, nodes.guess)
+    rising = np.arange(some.size)
+    while rising.size:
+        rising = rising[_next_errors(nodes.take(rising), high[rising]) <= high[rising]]
+        low[rising] = high[rising]
+        high[rising] *= 1.5
+    while (apart := np.flatnonzero(high > low * (1.0 + rtol))).size:
+        middle = np.sqrt(low[apart] * high[apart])
+        stable = _next_errors(nodes.take(apart), middle) <= middle
+        low[apart[stable]], high[apart[~stable]] = middle[stable], middle[~stable]
+    steps[some] = np.sqrt(low * high)
+    return steps
+
+
+def _sticking_edge(nodes: _Nodes) -> Array:
+    """Greatest error, nearly, (n,), from which the node still sticks once more before the response diverges."""
+    unit = slip(nodes.modes, -np.ones(nodes.stiction.size), np.zeros(nodes.stiction.size))
+    low = np.full(nodes.stiction.size, _FIRST)
+    high = 2.0 * np.maximum(nodes.guess, (1.0 + nodes.stiction) / np.abs(unit.acceleration))
+    for _ in range(14):
+        middle = np.sqrt(low * high)
+        sticks = np.isfinite(_next_errors(nodes, middle))
+        low, high = np.where(sticks, middle, low), np.where(sticks, high, middle)
+    return low
+
+
+def _stable_steps(nodes: _Nodes) -> Array:
+    """A step of each node that is followed by no greater error, (n,); 0 where there is none.
+
+    With Coulomb friction the smallest tells: within stick the map is a factor.  With stiction small
+    errors grow up to those of the limit cycle, and the step must be above it: a few below the greatest that
+    still sticks are tried, then the errors are followed to where they seem to converge.
+    """
+    first = np.full(nodes.stiction.size, _FIRST)
+    steps = np.where(_next_errors(nodes, first) <= first, first, 0.0)
+    left = np.flatnonzero((steps == 0.0) & (nodes.stiction > 1.0))
+    edge = _sticking_edge(nodes.take(left))
+    for share in (0.9999, 0.98, 0.93, 0.8, 0.6, 0.3, 0.1):
+        tried = share * edge
+        held = _next_errors(nodes.take(left), tried) <= tried
+        steps[left[held]] = tried[held]
+        left, edge = left[~held], edge[~held]
+    index = np.flatnonzero((steps == 0.0) & (nodes.stiction > 1.0))
+    nodes = nodes.take(index)
+    errors, rises = np.full(index.size, _FIRST), np.full(index.size, math.nan)
+    for _ in range(_ROUNDS):
+        after = _next_errors(nodes, errors)
+        rise = after - errors
+        with np.errstate(invalid="ignore", divide="ignore"):
+            limit = 1.001 * (after + rise * rise / (rises - rise))
+        limit = np.where(rise <= 0.0, errors, np.where(rise < rises, limit, math.nan))
+        hope = np.flatnonzero(np.isfinite(limit))
+        settles = hope[_next_errors(nodes.take(hope), limit[hope]) <= limit[hope]]
+        steps[index[settles]] = limit[settles]
+        on = np.flatnonzero((steps[index] == 0.0) & np.isfinite(after))
+        if not on.size:
+            break
+        index, nodes, errors, rises = index[on], nodes.take(on), after[on], rise[on]
+    return steps
