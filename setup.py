@@ -40,9 +40,8 @@ setup(
     packages=find_packages(include=["wam_*"]),
     python_requires=">=3.11",
     install_requires=[
+        "lz4",
         "matplotlib",
-        "mcap",
-        "mcap-ros2-support",
         "mujoco",
         "numpy",
         "pin",
@@ -56,6 +55,8 @@ setup(
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "colcon-common-extensions",
+            "mcap",
+            "mcap-ros2-support",
             "distributed",
             "mypy",
             "pytest<9",

@@ -11,7 +11,14 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = sorted(path.name for path in ROOT.glob("benchmarks/*.py"))
 ROWS = {
+    "bag_reading.py": [
+        "everything against rosbags",
+        "columns against rosbags",
+        "everything against mcap-ros2-support",
+        "columns against mcap-ros2-support",
+    ],
     "plant.py": ["arm free, moving", "arm free, pushed", "arm, every effect on", "in contact", "testbed, moving"],
+    "recording.py": ["messages in the bag", "writing a message [us]"],
     "round_trip.py": ["one process, p50", "one process, p99", "two processes, p50", "two processes, p99"],
     "speed.py": ["direct run", "lockstep", "lockstep, recorded"],
     "stability_map.py": [

@@ -1,7 +1,6 @@
 """The recorder against real publishers; its bags read by readers that are not ours."""
 
 import contextlib
-import errno
 import os
 import signal
 import subprocess
@@ -20,6 +19,7 @@ from mcap.stream_reader import StreamReader
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
@@ -27,8 +27,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 
 from wam_analysis.bag import read
+from wam_analysis.bag_file import contents
+from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, flatten
 from wam_ros.bag import BagWriter
+from wam_ros.bring_up import Composition
 from wam_ros.messages import header
 from wam_ros.ports import message_type
 from wam_ros.qos import qos
@@ -41,15 +44,9 @@ ROOT = Path(__file__).parents[1]
 
 
 def parameters(directory: Path, mode: str = "realtime", nodes: tuple[str, ...] = ("recorder",), **own: Any) -> Any:
-    shared = flatten(yaml.safe_load(CONFIG.read_text())["/**"]["ros__parameters"])
-    changed = {
-        "timing.mode": mode,
-        "nodes": list(nodes),
-        "directory": str(directory),
-        "name": "bag",
-        "topics": ["*"],
-        **own,
-    }
+    sections = yaml.safe_load(CONFIG.read_text())
+    shared = flatten(sections["/**"]["ros__parameters"]) | sections["/**/recorder"]["ros__parameters"]
+    changed = {"timing.mode": mode, "nodes": list(nodes), "directory": str(directory), "name": "bag", **own}
     return {**shared, **changed}
 
 
@@ -366,17 +363,88 @@ def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
         }
 
 
-def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path, monkeypatch: Any) -> None:
+def fill_disk(bag: BagWriter) -> None:
+    """Let every further write end as on a full disk."""
+    with Path("/dev/full").open("wb") as full:
+        os.dup2(full.fileno(), bag._stream.fileno())
+
+
+def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> None:
     row = BY_NAME["contact/in_contact"]
-    with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)})
+    bag = BagWriter(tmp_path / "bag")
+    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)})
+    machine.receive(row.name, b"\0\1\0\0\1", 1, 1, 1)
+    assert not machine.failure
+    fill_disk(bag)
+    bag._writer._chunk_size = 1
+    for number in (2, 3):
+        machine.receive(row.name, b"\0\1\0\0\1", 1, 1, number)
+    machine.finish()
+    assert "No space left" in machine.failure
+    assert "free some space" in machine.failure
+    assert machine.lost_at_disk == 2
+    assert bag.closed
 
-        def full(*_: Any) -> None:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-        machine.receive(row.name, b"\0\1\0\0\1", 1, 1, 1)
-        monkeypatch.setattr(bag, "write", full)
-        for number in (2, 3):
-            machine.receive(row.name, b"\0\1\0\0\1", 1, 1, number)
-        assert "No space left" in machine.failure
-        assert machine.lost_at_disk == 2
+def test_a_node_whose_disk_is_full_says_so_in_its_status(ros: Any, tmp_path: Path) -> None:
+    states: list[Any] = []
+    row = BY_NAME["status"]
+    ros.node("listener").create_subscription(message_type(row), "status", states.append, qos(row))
+    node = recorder(ros, tmp_path)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(lambda: sender.get_subscription_count() == 1 and node.count_subscribers("/wam/status") == 2)
+    fill_disk(node.bag)
+    sender.publish(state(1, 0.0))
+    ros.wait(lambda: any(said.level == said.ERROR and "No space left" in said.message for said in states))
+    assert "No space left" in node.failure
+
+
+def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path, mode="lockstep", split_time=0.1)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(sender))
+    for k in range(1, 301):
+        sender.publish(state(k * 1_000_000, 0.5))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 300)
+    ros.remove(node)
+    names = [f"bag_{i}.mcap" for i in range(3)]
+    assert sorted(path.name for path in (tmp_path / "bag").glob("*.mcap")) == names
+    information = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert information["relative_file_paths"] == names
+    assert [file["message_count"] for file in information["files"]] == [100, 100, 100]
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert [time for _, time, _ in reader.messages()] == [k * 1_000_000 for k in range(1, 301)]
+    bag = read(tmp_path / "bag")
+    assert len(bag.topics["/wam/motor_states"].log_time_ns) == 300
+    assert bag.metadata["recording"]["/wam/motor_states driver received"] == "300"
+
+
+def test_every_message_that_the_stack_publishes_is_in_the_bag(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "script.yaml"
+    script.write_text(yaml.safe_dump({"steps": [{"name": "speak", "seconds": 0.3}]}))
+    base = Configuration.load(CONFIG)
+    configuration = base.with_values(
+        {
+            "nodes": [*base.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.timeout": 60.0,
+            "scenario:script": str(script),
+            "recorder:directory": str(tmp_path),
+            "recorder:name": "bag",
+        }
+    )
+    published: Counter[str] = Counter()
+    publish = Publisher.publish
+
+    def counting(self: Any, message: Any) -> None:
+        published[self.topic_name] += 1
+        publish(self, message)
+
+    monkeypatch.setattr(Publisher, "publish", counting)
+    with Composition(configuration, domain_id=domain_id) as composition:
+        composition.spin(lambda: composition.nodes["scenario"].done)
+    recorded = {name: topic.messages for name, topic in contents(tmp_path / "bag").topics.items()}
+    assert published["/wam/motor_states"] == 301
+    assert {name: published[name] for name in recorded} == recorded

@@ -1,80 +1,40 @@
 """Bags as named numpy columns, without ROS.
 
-Reads what `wam_ros.bag` and rosbag2 write: MCAP of profile ros2, a directory or a single file.
+Reads what `wam_ros.bag` and rosbag2 write, whole or in parts: MCAP of profile ros2 with messages in
+CDR, a directory of one or several files or a single file, in chunks or not, with indexes or without.
+
+What is guaranteed: a value that differs from what was written comes out only where the file bears no
+checksum over it.  The checksums of chunks, attachments and the summary are checked in what is read,
+that over all data when all is read.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wam_analysis.bag_file import BagError, Decoders, Opened, channels, files, schemas
+from wam_analysis.bag_file import files, is_asked, opened, type_of
+from wam_analysis.cdr import Decoder
+from wam_analysis.columns import (
+    BoolColumns,
+    ClockColumns,
+    Collector,
+    Columns,
+    JointColumns,
+    Messages,
+    PointColumns,
+    WrenchColumns,
+)
+from wam_analysis.message_groups import Times
+from wam_ros.mcap_file import NEVER, Batch, Found, McapFile, log_times, messages, together
+from wam_ros.mcap_records import BagError, Bytes, Damage
+from wam_ros.message_text import Fields
 
 __all__ = [
-    "Bag", "BagError", "BoolColumns", "Columns", "JointColumns", "Messages", "PointColumns", "WrenchColumns",
-    "read",
+    "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns", "Raw",
+    "WrenchColumns", "raw", "read",
 ]  # fmt: skip
-
-_JOINTS = "sensor_msgs/msg/JointState"
-_WRENCH = "geometry_msgs/msg/WrenchStamped"
-_POINT = "geometry_msgs/msg/PointStamped"
-
-Times = NDArray[np.int64]
-Numbers = NDArray[np.float64]
-
-
-class JointColumns(NamedTuple):
-    """sensor_msgs/JointState, k messages of n joints, matched by name.
-
-    `names` are in the order of their first appearance; what a message leaves empty is NaN.  A field
-    that every message leaves empty has shape (k, 0).
-    """
-
-    log_time_ns: Times
-    stamp_ns: Times
-    frames: tuple[str, ...]
-    names: tuple[str, ...]
-    position: Numbers
-    velocity: Numbers
-    effort: Numbers
-
-
-class WrenchColumns(NamedTuple):
-    """geometry_msgs/WrenchStamped, k messages: force (k, 3) N, torque (k, 3) N m."""
-
-    log_time_ns: Times
-    stamp_ns: Times
-    frames: tuple[str, ...]
-    force: Numbers
-    torque: Numbers
-
-
-class PointColumns(NamedTuple):
-    """geometry_msgs/PointStamped, k messages: point (k, 3) m."""
-
-    log_time_ns: Times
-    stamp_ns: Times
-    frames: tuple[str, ...]
-    point: Numbers
-
-
-class BoolColumns(NamedTuple):
-    """std_msgs/Bool, k messages."""
-
-    log_time_ns: Times
-    data: NDArray[np.bool_]
-
-
-class Messages(NamedTuple):
-    """Messages of any other type, decoded; fields are attributes."""
-
-    log_time_ns: Times
-    messages: tuple[Any, ...]
-
-
-Columns = JointColumns | WrenchColumns | PointColumns | BoolColumns | Messages
 
 
 class Bag(NamedTuple):
@@ -87,82 +47,117 @@ class Bag(NamedTuple):
     metadata: dict[str, dict[str, str]]
 
 
-def read(path: str | Path, topics: Collection[str] | None = None) -> Bag:
-    """Read a bag, the whole of it or some topics.
+class Raw(NamedTuple):
+    """Messages of a topic as they were serialized, in the order in which they stand in the files."""
+
+    type: str
+    log_time_ns: Times
+    data: list[bytes]
+    decode: Callable[[bytes], Any]
+
+
+def read(path: str | Path, topics: Collection[str] | None = None, begin_ns: int = 0, end_ns: int = NEVER) -> Bag:
+    """Read a bag, the whole of it or some topics or some time.
+
+    Chunks of the file that hold nothing of what is asked for are not read.
 
     Parameters
     ----------
     path : bag directory or .mcap file.
     topics : names of the topics to read, one without a leading '/' in every namespace; None reads all.
+    begin_ns, end_ns : log times to read, begin_ns <= t < end_ns.
 
     Raises
     ------
     BagError
-        where it is missing, empty, cut off or not a ROS 2 bag.
+        where it is missing, empty, cut off, damaged or not a ROS 2 bag.
     """
-    times: dict[str, list[int]] = {}
-    messages: dict[str, list[Any]] = {}
     types: dict[str, str] = {}
+    collectors: dict[str, Collector] = {}
     attachments: dict[str, bytes] = {}
     metadata: dict[str, dict[str, str]] = {}
-    decoders = Decoders()
+
+    def collector(topic: str, kind: str, definitions: dict[str, Fields]) -> Collector:
+        if topic not in collectors:
+            types[topic] = kind
+            collectors[topic] = Collector(kind, definitions, begin_ns, end_ns)
+        elif not collectors[topic].takes(kind, definitions):
+            raise Damage(f"topic {topic} is of type {types[topic]} and of another one")
+        return collectors[topic]
+
     for file in files(Path(path)):
-        with Opened(file) as reader:
-            for channel in channels(reader, file):
-                if not _is_asked(channel.topic, topics):
-                    continue
-                times.setdefault(channel.topic, [])
-                messages.setdefault(channel.topic, [])
-                types[channel.topic] = schemas(reader)[channel.schema_id].name
-            for schema, channel, message in reader.iter_messages(topics=None if topics is None else list(types)):
-                times[channel.topic].append(message.log_time)
-                messages[channel.topic].append(decoders(schema, channel, message.data))
-            attachments.update({item.name: item.data for item in reader.iter_attachments()})
-            metadata.update({item.name: item.metadata for item in reader.iter_metadata()})
-    columns = {name: _columns(types[name], times[name], messages[name]) for name in messages}
+        with opened(file) as mcap:
+            if topics is None and begin_ns <= 0 and end_ns >= NEVER:
+                mcap.check_all()
+            for topic, kind, definitions, buffer, found in _parts(mcap, topics, begin_ns, end_ns):
+                collector(topic, kind, definitions).add(buffer, found)
+            for channel in mcap.channels.values():
+                if is_asked(channel.topic, topics):
+                    collector(channel.topic, *type_of(mcap, channel))
+            attachments.update(mcap.attachments())
+            metadata.update(mcap.metadata())
+    columns = {topic: found.columns(f"{path}, topic {topic}") for topic, found in sorted(collectors.items())}
     return Bag(Path(path), columns, types, attachments, metadata)
 
 
-def _is_asked(name: str, topics: Collection[str] | None) -> bool:
-    if topics is None or name in topics:
-        return True
-    return any(name.endswith(f"/{topic}") for topic in topics if not topic.startswith("/"))
+def raw(path: str | Path, topics: Collection[str] | None = None) -> dict[str, Raw]:
+    """Serialized messages of a bag by topic; parameters and errors as those of `read`."""
+    found: dict[str, Raw] = {}
+    times: dict[str, list[Times]] = {}
+    for file in files(Path(path)):
+        with opened(file) as mcap:
+            for topic, kind, definitions, buffer, some in _parts(mcap, topics, 0, NEVER):
+                decode = Decoder(kind, definitions)
+                entry = found.setdefault(topic, Raw(kind, np.empty(0, np.int64), [], decode))
+                if entry.type != kind:
+                    raise Damage(f"topic {topic} is of type {entry.type} and of {kind}")
+                times.setdefault(topic, []).append(log_times(buffer, some.offsets))
+                entry.data.extend(messages(buffer, some))
+            for channel in mcap.channels.values():
+                if is_asked(channel.topic, topics) and channel.topic not in found:
+                    kind, definitions = type_of(mcap, channel)
+                    found[channel.topic] = Raw(kind, np.empty(0, np.int64), [], Decoder(kind, definitions))
+    for topic, parts in times.items():
+        found[topic] = found[topic]._replace(log_time_ns=np.concatenate(parts))
+    return found
 
 
-def _columns(kind: str, times: list[int], messages: list[Any]) -> Columns:
-    log_times = np.array(times, dtype=np.int64)
-    if kind == "std_msgs/msg/Bool":
-        return BoolColumns(log_times, np.array([message.data for message in messages], dtype=np.bool_))
-    if kind not in (_JOINTS, _WRENCH, _POINT):
-        return Messages(log_times, tuple(messages))
-    stamps = np.array([_nanoseconds(message.header.stamp) for message in messages], dtype=np.int64)
-    frames = tuple(message.header.frame_id for message in messages)
-    if kind == _WRENCH:
-        force = _vectors([message.wrench.force for message in messages])
-        torque = _vectors([message.wrench.torque for message in messages])
-        return WrenchColumns(log_times, stamps, frames, force, torque)
-    if kind == _POINT:
-        return PointColumns(log_times, stamps, frames, _vectors([m.point for m in messages]))
-    names = tuple(dict.fromkeys(name for message in messages for name in message.name))
-    position, velocity, effort = (_by_name(names, messages, field) for field in ("position", "velocity", "effort"))
-    return JointColumns(log_times, stamps, frames, names, position, velocity, effort)
+def _parts(
+    mcap: McapFile, topics: Collection[str] | None, begin: int, end: int
+) -> Iterator[tuple[str, str, dict[str, Fields], Bytes, Found]]:
+    """Messages of each asked topic in each batch; that none is missing is checked at the end."""
+    numbers, times = None, (0, NEVER)
+    if mcap.has_all_definitions():  # else any chunk may hold one that is needed
+        times = begin, end
+        if topics is not None:
+            numbers = frozenset(number for number, channel in mcap.channels.items() if is_asked(channel.topic, topics))
+    types: dict[int, tuple[str, dict[str, Fields]]] = {}
+    counts: dict[int, int] = {}
+    for batch in mcap.batches(numbers, *times):
+        for topic, members in _by_topic(mcap, batch).items():
+            if not is_asked(topic, topics):
+                continue
+            for number, found in members:
+                counts[number] = counts.get(number, 0) + len(found.offsets)
+                if number not in types:
+                    types[number] = type_of(mcap, mcap.channels[number])
+            all_found = together([found for _, found in members])
+            if len(members) > 1:
+                order = np.argsort(all_found.offsets)
+                all_found = Found(all_found.offsets[order], all_found.sizes[order])
+            yield topic, *types[members[0][0]], batch.buffer, all_found
+    if mcap.statistics is None or begin > 0 or end < NEVER:
+        return
+    for number, channel in mcap.channels.items():
+        expected = mcap.statistics.counts.get(number, 0)
+        if is_asked(channel.topic, topics) and counts.get(number, 0) != expected:
+            raise Damage(f"topic {channel.topic} has {counts.get(number, 0)} messages instead of {expected}")
 
 
-def _nanoseconds(time: Any) -> int:
-    return int(time.sec * 1_000_000_000 + time.nanosec)
-
-
-def _vectors(vectors: list[Any]) -> Numbers:
-    return np.array([(v.x, v.y, v.z) for v in vectors], dtype=np.float64).reshape(-1, 3)
-
-
-def _by_name(names: tuple[str, ...], messages: list[Any], field: str) -> Numbers:
-    arrays = [getattr(message, field) for message in messages]
-    if not any(len(values) for values in arrays):
-        return np.empty((len(messages), 0))
-    column = {name: i for i, name in enumerate(names)}
-    result = np.full((len(messages), len(names)), np.nan)
-    for row, message, numbers in zip(result, messages, arrays, strict=True):
-        for name, number in zip(message.name, numbers, strict=False):
-            row[column[name]] = number
-    return result
+def _by_topic(mcap: McapFile, batch: Batch) -> dict[str, list[tuple[int, Found]]]:
+    topics: dict[str, list[tuple[int, Found]]] = {}
+    for number, found in batch.found.items():
+        if number not in mcap.channels:
+            raise Damage(f"a message is on channel {number}, which is not defined")
+        topics.setdefault(mcap.channels[number].topic, []).append((number, found))
+    return topics

@@ -1,89 +1,20 @@
-"""MCAP files of ROS 2 as they lie on disk: found, opened, decoded, and refused in words."""
+"""Bags as they lie on disk: their files found and opened, and refused in words."""
 
-import struct
-from collections.abc import Callable
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
-import zstandard
-from mcap.exceptions import EndOfFile, McapError
-from mcap.reader import McapReader, make_reader
-from mcap.records import Channel, Schema
-from mcap_ros2.decoder import DecoderFactory
+import yaml
 
-_BROKEN = (
-    McapError, struct.error, zstandard.ZstdError, ValueError, IndexError, KeyError, EOFError, MemoryError,
-)  # fmt: skip
+from wam_ros.mcap_file import McapFile, NotClosedError
+from wam_ros.mcap_records import BROKEN, MAGIC, BagError, Channel, Damage
+from wam_ros.message_text import Fields, definitions
 
-
-class BagError(ValueError):
-    """A bag that cannot be read; the message names the path and what to do."""
-
-
-class Decoders:
-    """Decodes messages, one decoder a schema text."""
-
-    def __init__(self) -> None:
-        self._factory = DecoderFactory()
-        self._known: dict[tuple[str, bytes], Callable[[bytes], Any]] = {}
-
-    def __call__(self, schema: Schema | None, channel: Channel, data: bytes) -> Any:
-        """The message as an object whose fields are attributes."""
-        if schema is None:
-            raise ValueError(f"topic {channel.topic} has no schema")
-        key = (schema.name, schema.data)
-        decode = self._known.get(key)
-        if decode is None:
-            decode = self._factory.decoder_for(channel.message_encoding, schema)
-            if decode is None:
-                raise BagError(f"topic {channel.topic} has its schema in '{schema.encoding}'; only ros2msg is read")
-            self._known[key] = decode
-        return decode(data)
-
-
-class Opened:
-    """An open MCAP file; what goes wrong inside the with block becomes a BagError."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._stream = path.open("rb")
-
-    def __enter__(self) -> McapReader:
-        try:
-            reader = make_reader(self._stream)
-            profile = reader.get_header().profile
-            if profile != "ros2":
-                raise BagError(f"{self._path} has MCAP profile '{profile}'; only bags of ROS 2 ('ros2') are read")
-            return reader
-        except BaseException as error:
-            self._stream.close()
-            self._explain(error)
-            raise
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        self._stream.close()
-        if error is not None:
-            self._explain(error)
-
-    def _explain(self, error: BaseException) -> None:
-        if isinstance(error, BagError) or not isinstance(error, _BROKEN):
-            return
-        with self._path.open("rb") as stream:
-            is_mcap = stream.read(5) == b"\x89MCAP"
-            size = stream.seek(0, 2)
-            stream.seek(max(0, size - 8))
-            is_closed = is_mcap and stream.read(5) == b"\x89MCAP"
-        if size == 0:
-            raise BagError(f"{self._path} is empty, nothing was recorded; record again") from error
-        if not is_mcap:
-            raise BagError(f"{self._path} is not MCAP; give a bag recorded with storage 'mcap'") from error
-        if not is_closed:
-            raise BagError(
-                f"{self._path} was not closed, the recorder was killed or the copy is not whole; "
-                "'mcap recover' of the MCAP tools makes it readable up to the break"
-            ) from error
-        reason = f"{type(error).__name__}: {error}"
-        raise BagError(f"{self._path} is damaged ({reason}); record or copy it again") from error
+PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
+_FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
 
 
 def files(path: Path) -> list[Path]:
@@ -92,27 +23,156 @@ def files(path: Path) -> list[Path]:
         return [path]
     if not path.exists():
         raise BagError(f"{path} does not exist; give a bag directory or an .mcap file")
-    files = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
-    if not files:
+    found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
+    named = _named_files(path)
+    for name in named:
+        if not (path / name).is_file():
+            raise BagError(
+                f"{path} lacks its file {name}; copy the whole directory, or read its .mcap files one by one"
+            )
+    if forgotten := sorted({file.name for file in found} - set(named)) if named else []:
+        raise BagError(
+            f"{path} has the file {forgotten[0]}, which its metadata.yaml does not list; "
+            f"'wam bag repair {path}' writes it again, or give the file by itself"
+        )
+    if named:
+        return [path / name for name in named]
+    if not found:
         raise BagError(f"{path} has no .mcap file; give a bag directory recorded with storage 'mcap'")
-    return files
+    return found
 
 
-def schemas(reader: McapReader) -> dict[int, Schema]:
-    """The schemas of a closed file by their number."""
-    summary = reader.get_summary()
-    return dict(summary.schemas) if summary else {}
+def _named_files(path: Path) -> list[str]:
+    """Files that metadata.yaml lists, none where it is missing."""
+    file = path / "metadata.yaml"
+    if not file.is_file():
+        return []
+    try:
+        text = file.read_text(encoding="utf-8")
+        part = _FILE_NAMES.search(text)  # of a long page the only lines that are needed
+        names = yaml.safe_load(part[0] if part else text)["relative_file_paths"]
+        checked = [str(name) for name in names]
+    except (yaml.YAMLError, ValueError, KeyError, TypeError, RecursionError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise BagError(f"{file} is damaged ({reason}); 'wam bag repair {path}' writes it again") from None
+    for name in checked:
+        if not name.endswith(".mcap"):
+            raise BagError(f"{path} is recorded as {name}; only storage 'mcap' without compressed files is read")
+    return checked
 
 
-def channels(reader: McapReader, path: Path) -> list[Channel]:
-    """The topics of a closed file; refused where one is not in CDR or has no schema."""
-    summary = reader.get_summary()
-    if summary is None:
-        raise EndOfFile
-    for channel in summary.channels.values():
-        if channel.message_encoding != "cdr":
-            encoding = channel.message_encoding
-            raise BagError(f"{path} has topic {channel.topic} in encoding '{encoding}'; only 'cdr' is read")
-        if channel.schema_id not in summary.schemas:
-            raise BagError(f"{path} has topic {channel.topic} without a schema; record it again with one")
-    return list(summary.channels.values())
+@contextmanager
+def opened(path: Path) -> Iterator[McapFile]:
+    """An open file of a bag; what goes wrong with it in the context becomes a BagError."""
+    try:
+        with McapFile(path) as file:
+            file.open()
+            if file.profile not in PROFILES:
+                raise BagError(f"{path} has MCAP profile '{file.profile}'; only bags of ROS 2 ('ros2') are read")
+            yield file
+    except BagError:
+        raise
+    except OSError as error:
+        raise BagError(f"{path} cannot be read: {error.strerror or error}") from error
+    except BROKEN as error:
+        raise BagError(_explain(path, error)) from error
+
+
+def _explain(path: Path, error: Exception) -> str:
+    with path.open("rb") as stream:
+        start = stream.read(len(MAGIC))
+    if not start:
+        return f"{path} is empty, nothing was recorded; record again"
+    if start != MAGIC:
+        return f"{path} is not MCAP; give a bag recorded with storage 'mcap'"
+    if isinstance(error, NotClosedError):
+        return (
+            f"{path} was not closed, the recorder was killed or the copy is not whole; "
+            "'wam bag repair' makes it readable up to the break"
+        )
+    reason = str(error) if isinstance(error, Damage) else f"{type(error).__name__}: {error}"
+    return f"{path} is damaged ({reason}); copy it again, or let 'wam bag repair' save what can be read"
+
+
+class TopicContents(NamedTuple):
+    """A topic of a bag: its type and how many messages it has."""
+
+    type: str
+    messages: int
+
+
+class Contents(NamedTuple):
+    """What is in a bag, as its files say; no message is read where they do.
+
+    Attributes
+    ----------
+    files : the files.
+    first, last : log times, ns; 0 in an empty bag.
+    topics : by name.
+    attachments : bytes by name.
+    recording : what the recorder says about itself, see bags/README.md; empty for other recorders.
+    """
+
+    files: list[Path]
+    first: int
+    last: int
+    topics: dict[str, TopicContents]
+    attachments: dict[str, int]
+    recording: dict[str, str]
+
+
+def contents(path: str | Path) -> Contents:
+    """What is in a bag; errors are those of `wam_analysis.bag.read`."""
+    found = files(Path(path))
+    counts: Counter[str] = Counter()
+    types: dict[str, str] = {}
+    times: list[int] = []
+    attachments: dict[str, int] = {}
+    recording: dict[str, str] = {}
+    for file in found:
+        with opened(file) as mcap:
+            said = mcap.statistics or mcap.count()
+            if any(said.counts.values()):
+                times += [said.first, said.last]
+            for number, channel in mcap.channels.items():
+                counts[channel.topic] += said.counts.get(number, 0)
+                schema = mcap.schemas.get(channel.schema)
+                types.setdefault(channel.topic, schema.name if schema else "?")
+            attachments.update({name: len(data) for name, data in mcap.attachments().items()})
+            recording.update(mcap.metadata().get("recording", {}))
+    topics = {topic: TopicContents(types[topic], counts[topic]) for topic in sorted(types)}
+    return Contents(found, min(times, default=0), max(times, default=0), topics, attachments, recording)
+
+
+def is_asked(topic: str, topics: Collection[str] | None) -> bool:
+    """Whether a topic is among those asked for; one without a leading '/' is meant in every namespace."""
+    if topics is None or topic in topics:
+        return True
+    return any(topic.endswith(f"/{name}") for name in topics if not name.startswith("/"))
+
+
+def type_of(file: McapFile, channel: Channel) -> tuple[str, dict[str, Fields]]:
+    """Type of the messages of a channel and the fields of it and of what it is made of.
+
+    Raises
+    ------
+    BagError
+        where it is not CDR with a ros2msg schema.
+    """
+    instead = "name the topics to be read, without this one"
+    if channel.encoding != "cdr":
+        raise BagError(
+            f"{file.path} has topic {channel.topic} in encoding '{channel.encoding}'; only 'cdr' is read; {instead}"
+        )
+    schema = file.schemas.get(channel.schema)
+    if schema is None:
+        raise BagError(f"{file.path} has topic {channel.topic} without a schema; {instead}")
+    if schema.encoding != "ros2msg":
+        raise BagError(
+            f"{file.path} has the schema of topic {channel.topic} in '{schema.encoding}'; "
+            f"only 'ros2msg' is read; {instead}"
+        )
+    try:
+        return schema.name, definitions(schema.name, schema.data)
+    except ValueError as error:
+        raise BagError(f"{file.path} has topic {channel.topic} with a schema that says nothing: {error}") from None

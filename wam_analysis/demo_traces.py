@@ -2,6 +2,7 @@
 
 import itertools
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,7 +118,7 @@ def length(bag: Bag, namespace: str, name: str) -> int:
     return 0 if columns is None else len(columns.log_time_ns)
 
 
-def messages_of(bag: Bag, topic: str) -> tuple[Any, ...]:
+def messages_of(bag: Bag, topic: str) -> Sequence[Any]:
     """Decoded messages of a topic, none where it was not recorded."""
     columns = bag.topics.get(topic)
     return columns.messages if isinstance(columns, Messages) else ()
@@ -166,7 +167,7 @@ def traces_of(bag: Bag, namespace: str) -> Traces:
             at, is_there = _held(points.stamp_ns, base)
             same = is_there & known & (points.stamp_ns[at] == forces.stamp_ns[row])
             place[same] = points.point[at[same], 0]
-        return Signal(np.array(forces.frames)[row], force, place)
+        return Signal(np.array(forces.frames, np.str_)[row], force, place)
 
     base = np.empty(0, np.int64)
     for name in ("sim/contact/wrench", "force_command", "contact/wrench"):

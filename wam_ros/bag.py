@@ -3,22 +3,28 @@
 No node and no clock of its own: who records decides what is written and at what time.
 """
 
+import contextlib
+import fcntl
 import os
+import shutil
 import time
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, BinaryIO, Final, NamedTuple, Self
 
 import yaml
-from mcap.writer import Writer
 
 from wam_ros.definitions import schema, type_hash
+from wam_ros.mcap_writer import McapWriter
 from wam_ros.message_layout import ExactLength
 
 LIBRARY: Final = "wam_stack"
-CHUNK_SIZE: Final = 256 * 1024  # bytes; a tenth of this is a zstd chunk on disk
+CHUNK_SIZE: Final = 1024 * 1024  # bytes; half of this is half a second of the arm, a tenth is left on disk
 FLUSH_PERIOD: Final = 0.5  # s; a killed recorder loses at most this and one timer period
+RESERVE: Final = ".reserved"  # file that keeps space for the end of the bag
+RESERVED: Final = 8 * 2**20  # bytes of it; an hour of the arm needs two for its indexes
 INFINITE: Final = {"sec": 9223372036, "nsec": 854775807}
 POLICIES: Final = (
     "history", "depth", "reliability", "durability", "deadline", "lifespan", "liveliness",
@@ -73,12 +79,45 @@ def exact_cdr(name: str, data: bytes) -> bytes:
     return data[: ExactLength(name)(data)]
 
 
+class Split(NamedTuple):
+    """When a bag goes on in another file; 0 means never.
+
+    Attributes
+    ----------
+    size : bytes of a file.
+    seconds : of log time in a file.
+    """
+
+    size: int
+    seconds: float
+
+
+WHOLE: Final = Split(0, 0.0)  # one file
+
+
+class FileSummary(NamedTuple):
+    """What metadata.yaml says about one file: name, first and last log time in ns, messages."""
+
+    name: str
+    first: int
+    last: int
+    messages: int
+
+
 class BagWriter:
-    """Writes a new bag directory ``<path>/`` with ``<name>_0.mcap`` and, on closing, ``metadata.yaml``.
+    """Writes a new bag directory ``<path>/`` with ``<name>_0.mcap`` and so on and, on closing, ``metadata.yaml``.
+
+    Space for the end of the bag is reserved while it is open: a disk that is full is found out before
+    anything is recorded, and a disk that fills up leaves a bag that is closed and can be read.
 
     Parameters
     ----------
     path : directory of the bag; refused where it exists.  Missing parents are made.
+    split : when it goes on in another file.
+
+    Attributes
+    ----------
+    closed : True where nothing can be written any more.
 
     Raises
     ------
@@ -86,22 +125,29 @@ class BagWriter:
         where the bag cannot be made, before anything is recorded.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, split: Split = WHOLE) -> None:
         self.path = path
         self.closed = False
-        self._file_name = f"{path.name}_0.mcap"
-        _make(path)
-        self._stream = (path / self._file_name).open("xb")
-        self._writer: Any = Writer(self._stream, chunk_size=CHUNK_SIZE)
-        self._writer.start(profile="ros2", library=LIBRARY)
-        self._stream.flush()
-        self._schemas: dict[str, int] = {}
+        self._split = split
+        self._files: list[FileSummary] = []
+        self._topics: list[dict[str, Any]] = []
         self._channels: dict[str, int] = {}
         self._lengths: list[ExactLength] = []
-        self._topics: list[dict[str, Any]] = []
-        self._counts: list[int] = []
-        self._first, self._last = 2**63 - 1, 0
+        self._counts: Counter[int] = Counter()  # of the files that are finished
+        self._schemas: dict[str, int] = {}
+        self._definitions: list[tuple[str, str, Mapping[str, str]]] = []
         self._next_flush = 0.0
+        self._file_begin: int | None = None
+        _make(path)
+        try:
+            self._reserve = _reserve(path / RESERVE)
+            self._open()
+        except OSError as error:
+            shutil.rmtree(path, ignore_errors=True)
+            raise RecordingError(
+                f"bag {path} cannot be made: {error.strerror}; "
+                f"free {RESERVED >> 20} MiB or more, or give another directory"
+            ) from None
 
     def __enter__(self) -> Self:
         return self
@@ -122,12 +168,8 @@ class BagWriter:
         """
         offered = [policies(qos)]
         digest = type_hash(kind)
-        if kind not in self._schemas:
-            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", schema(kind))
-        channel = {"offered_qos_profiles": _yaml(offered).strip(), "topic_type_hash": digest}
-        self._channels[name] = self._writer.register_channel(name, "cdr", self._schemas[kind], channel)
+        self._define(name, kind, {"offered_qos_profiles": _yaml(offered).strip(), "topic_type_hash": digest})
         self._lengths.append(ExactLength(kind))
-        self._counts.append(0)
         self._topics.append(
             {
                 "name": name,
@@ -147,71 +189,224 @@ class BagWriter:
         data : CDR as it came; cut to its exact length.
         log_time, publish_time : ns.
         sequence : number that the publisher gave the message.
+
+        Raises
+        ------
+        RecordingError
+            where the disk does not take it; the bag is closed then and can be read.
         """
         channel = self._channels[topic]
         length = self._lengths[channel - 1](data)
         if length < len(data):
             data = data[:length]
-        self._writer.add_message(channel, log_time, data, publish_time, sequence & 0xFFFFFFFF)
-        self._counts[channel - 1] += 1
-        self._first = min(self._first, log_time)
-        self._last = max(self._last, log_time)
-        self.flush_when_due()
+        if self._file_begin is None:
+            self._file_begin = log_time
+        try:
+            if self._is_full(log_time):
+                self._next_file(log_time)
+            self._writer.add(channel, log_time, publish_time, sequence, data)
+            if time.monotonic() >= self._next_flush:
+                self._flush()
+        except OSError as error:
+            self._give_up(error)
 
     def flush_when_due(self) -> None:
         """Finish the chunk every half second of wall time; call it also while no message comes."""
-        now = time.monotonic()
-        if now >= self._next_flush:
-            self._next_flush = now + FLUSH_PERIOD
-            self._writer.flush()
+        if time.monotonic() >= self._next_flush and not self.closed:
+            try:
+                self._flush()
+            except OSError as error:
+                self._give_up(error)
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Add a file to the bag.  It bears no time, so that equal runs give equal bags."""
-        self._writer.flush()
-        self._writer.add_attachment(0, 0, name, media_type, data)
+        try:
+            self._writer.flush()
+            self._writer.attach(name, media_type, data)
+        except OSError as error:
+            self._give_up(error)
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Add a metadata record."""
-        self._writer.flush()
-        self._writer.add_metadata(name, dict(values))
+        try:
+            self._writer.flush()
+            self._writer.metadata(name, values)
+        except OSError as error:
+            self._give_up(error)
+
+    @property
+    def written(self) -> int:
+        """Messages on disk."""
+        return sum(self._counts.values()) + sum(self._writer.counts.values())
 
     def close(self) -> None:
-        """Finish the bag and write ``metadata.yaml``; nothing happens the second time."""
+        """Finish the bag and write ``metadata.yaml``; nothing happens the second time.
+
+        Raises
+        ------
+        RecordingError
+            where the disk does not take the last messages; the bag is closed and can be read.
+        """
         if self.closed:
             return
-        self.closed = True
-        information = self._information()
         try:
-            self.metadata("rosbag2", {"serialized_metadata": _yaml(information).strip()})
-            self._writer.finish()
+            self._writer.flush()
+        except OSError as error:
+            self._give_up(error)
+        self._finish_bag()
+
+    def _open(self) -> None:
+        path = self.path / self._file_name()
+        stream = path.open("xb", buffering=0)
+        try:
+            self._writer = McapWriter(stream, LIBRARY, CHUNK_SIZE)
+        except OSError:
+            stream.close()
+            path.unlink()
+            raise
+        self._stream = stream
+        self._schemas = {}
+        for definition in self._definitions:
+            self._define_in_file(*definition)
+
+    def _file_name(self) -> str:
+        return f"{self.path.name}_{len(self._files)}.mcap"
+
+    def _define(self, name: str, kind: str, metadata: Mapping[str, str]) -> None:
+        self._definitions.append((name, kind, metadata))
+        self._define_in_file(name, kind, metadata)
+
+    def _define_in_file(self, name: str, kind: str, metadata: Mapping[str, str]) -> None:
+        if kind not in self._schemas:
+            self._schemas[kind] = self._writer.schema(kind, "ros2msg", schema(kind))
+        self._channels[name] = self._writer.channel(name, "cdr", self._schemas[kind], metadata)
+
+    def _flush(self) -> None:
+        self._next_flush = time.monotonic() + FLUSH_PERIOD
+        self._writer.flush()
+
+    def _is_full(self, log_time: int) -> bool:
+        size, seconds = self._split
+        if size and self._writer.position >= size:
+            return True
+        begin = log_time if self._file_begin is None else self._file_begin
+        return bool(seconds) and log_time - begin >= round(seconds * 1e9)
+
+    def _next_file(self, log_time: int) -> None:
+        self._writer.flush()
+        self._finish_file()
+        self._file_begin = log_time
+        self._open()
+
+    def _finish_file(self) -> None:
+        writer = self._writer
+        file = FileSummary(self._file_name(), writer.first, writer.last, sum(writer.counts.values()))
+        counts = self._counts + Counter(writer.counts)
+        information = self._information([*self._files, file], counts)
+        writer.metadata("rosbag2", {"serialized_metadata": _yaml(information).strip()})
+        writer.finish()
+        self._stream.close()
+        self._files.append(file)
+        self._counts = counts
+        writer.counts = {}
+
+    def _give_up(self, error: OSError) -> None:
+        """Close the bag with what is on disk, in the space that was reserved for it."""
+        reason = error.strerror or str(error)
+        try:
+            self._finish_bag()
+        except OSError as second:
+            raise RecordingError(
+                f"{reason}, and there was no space to close it ({second.strerror}); 'wam bag repair {self.path}' will"
+            ) from None
+        raise RecordingError(f"{reason}; it was closed with what came before") from None
+
+    def _finish_bag(self) -> None:
+        self.closed = True
+        self._reserve.close()
+        release(self.path)
+        try:
+            if not self._stream.closed:
+                self._finish_file()
         finally:
             self._stream.close()
-        temporary = self.path / "metadata.yaml.tmp"
-        temporary.write_text(_yaml({"rosbag2_bagfile_information": information}), encoding="utf-8")
-        temporary.replace(self.path / "metadata.yaml")
+        write_metadata(self.path, self._information(self._files, self._counts))
 
-    def _information(self) -> dict[str, Any]:
-        count = sum(self._counts)
-        extent = {
-            "duration": {"nanoseconds": self._last - self._first if count else 0},
-            "starting_time": {"nanoseconds_since_epoch": self._first if count else 0},
-            "message_count": count,
-        }
-        return {
-            "version": 9,
-            "storage_identifier": "mcap",
-            **extent,
-            "topics_with_message_count": [
-                {"topic_metadata": topic, "message_count": number}
-                for topic, number in zip(self._topics, self._counts, strict=True)
-            ],
-            "compression_format": "",
-            "compression_mode": "",
-            "relative_file_paths": [self._file_name],
-            "files": [{"path": self._file_name, **extent}],
-            "custom_data": None,
-            "ros_distro": os.environ.get("ROS_DISTRO", "jazzy"),
-        }
+    def _information(self, files: Sequence[FileSummary], counts: Counter[int]) -> dict[str, Any]:
+        return bag_information(files, self._topics, [counts[channel] for channel in self._channels.values()])
+
+
+def bag_information(
+    files: Sequence[FileSummary], topics: Sequence[Mapping[str, Any]], counts: Sequence[int]
+) -> dict[str, Any]:
+    """What metadata.yaml says (version 9 of rosbag2).
+
+    Parameters
+    ----------
+    files : files of the bag in their order.
+    topics : name, type, serialization_format, offered_qos_profiles and type_description_hash of each.
+    counts : messages of each topic.
+    """
+    filled = [file for file in files if file.messages]
+    first = min((file.first for file in filled), default=0)
+    last = max((file.last for file in filled), default=0)
+    return {
+        "version": 9,
+        "storage_identifier": "mcap",
+        **_extent(first, last, sum(file.messages for file in files)),
+        "topics_with_message_count": [
+            {"topic_metadata": topic, "message_count": count} for topic, count in zip(topics, counts, strict=True)
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.name for file in files],
+        "files": [{"path": file.name, **_extent(file.first, file.last, file.messages)} for file in files],
+        "custom_data": None,
+        "ros_distro": os.environ.get("ROS_DISTRO", "jazzy"),
+    }
+
+
+def _extent(first: int, last: int, count: int) -> dict[str, Any]:
+    return {
+        "duration": {"nanoseconds": last - first if count else 0},
+        "starting_time": {"nanoseconds_since_epoch": first if count else 0},
+        "message_count": count,
+    }
+
+
+def write_metadata(path: Path, information: Mapping[str, Any]) -> None:
+    """Write metadata.yaml of a bag directory, at once or not at all."""
+    temporary = path / "metadata.yaml.tmp"
+    temporary.write_text(_yaml({"rosbag2_bagfile_information": information}), encoding="utf-8")
+    temporary.replace(path / "metadata.yaml")
+
+
+def _reserve(path: Path) -> BinaryIO:
+    """Take the space, and a lock that says that the bag is being recorded."""
+    stream = path.open("xb")
+    try:
+        os.posix_fallocate(stream.fileno(), 0, RESERVED)
+        fcntl.flock(stream, fcntl.LOCK_EX)
+    except OSError:
+        stream.close()
+        raise
+    return stream
+
+
+def release(path: Path) -> None:
+    """Give the space for the end of a bag back.
+
+    Raises
+    ------
+    RecordingError
+        where somebody records this bag at this moment.
+    """
+    with contextlib.suppress(FileNotFoundError), (path / RESERVE).open("rb") as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise RecordingError(f"bag {path} is being recorded; stop the recorder first") from None
+        (path / RESERVE).unlink()
 
 
 def _make(path: Path) -> None:

@@ -14,6 +14,8 @@ COMMANDS = {
     "up": "start the nodes and leave them running until Ctrl-C",
     "node": "start one node by hand, with ROS arguments if need be",
     "record": "record every topic of a running stack until Ctrl-C",
+    "bag": "say what is in a bag, or make a broken one whole",
+    "replay": "run a node's recorded inputs through it again, compare what comes out",
     "report": "say what a recording of the demonstration shows",
     "call": "ask a running stack: enable, disable, estop, reset_fault, reset, tare",
     "experiment": "run an experiment of the thesis, record it, print predicted against measured",

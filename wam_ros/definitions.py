@@ -6,32 +6,15 @@ PyPI), beside the Python package of the messages.
 
 import importlib.util
 import json
-import re
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-SEPARATOR = "=" * 80
-PRIMITIVES = {
-    "bool": 1, "byte": 1, "char": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4,
-    "int64": 8, "uint64": 8, "float32": 4, "float64": 8,
-}  # fmt: skip
-_FIELD = re.compile(r"^([A-Za-z][\w/]*)(?:<=\d+)?(?:\[(<=)?(\d*)\])?\s+([A-Za-z]\w*)\s*(=?)")
+from wam_ros.message_text import SEPARATOR, Fields, fields
 
 
 class DefinitionError(LookupError):
     """A message type whose definition cannot be found or read."""
-
-
-class Field(NamedTuple):
-    """One field of a message: `type` is a primitive or ``package/msg/Type``.
-
-    `length` is None for a single value, 0 for a sequence, else the length of a fixed array.
-    """
-
-    name: str
-    type: str
-    length: int | None
 
 
 class Definition(NamedTuple):
@@ -39,23 +22,14 @@ class Definition(NamedTuple):
 
     name: str
     text: str
-    fields: tuple[Field, ...]
+    fields: Fields
 
 
 @cache
 def definition(name: str) -> Definition:
     """The definition of ``package/msg/Type``."""
     text = _file(name, ".msg").read_text(encoding="utf-8")
-    package = name.partition("/")[0]
-    fields = []
-    for line in text.splitlines():
-        match = _FIELD.match(line.split("#")[0].strip())
-        if match is None or match[5]:
-            continue
-        kind = _full_name(match[1], package)
-        length = None if match[3] is None else 0 if match[2] or not match[3] else int(match[3])
-        fields.append(Field(match[4], kind, length))
-    return Definition(name, text, tuple(fields))
+    return Definition(name, text, fields(text, name.partition("/")[0]))
 
 
 @cache
@@ -79,16 +53,6 @@ def type_hash(name: str) -> str:
         if entry["type_name"] == name:
             return str(entry["hash_string"])
     raise DefinitionError(f"{path} has no hash of {name}; reinstall its package")
-
-
-def _full_name(kind: str, package: str) -> str:
-    if kind in PRIMITIVES or kind in ("string", "wstring"):
-        return kind
-    if kind == "Header":
-        return "std_msgs/msg/Header"
-    if "/" not in kind:
-        return f"{package}/msg/{kind}"
-    return "{}/msg/{}".format(*kind.split("/"))
 
 
 def _file(name: str, suffix: str) -> Path:

@@ -4,7 +4,8 @@ import struct
 from collections.abc import Callable
 from typing import Final
 
-from wam_ros.definitions import PRIMITIVES, definition
+from wam_ros.definitions import definition
+from wam_ros.message_text import PRIMITIVES
 
 HEADER: Final = 4  # encapsulation: byte order and options
 _STAMPS = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")

@@ -88,7 +88,7 @@ class Recorder:
 
     Parameters
     ----------
-    bag : open bag; the caller closes it.
+    bag : open bag; `finish` closes it.
     topics : rows of the interface table, by the full name under which each is recorded.
     mode : 'realtime': log time is the reception and publish time the sending, both of the system
         clock.  'lockstep': both are the stamp in the message, or for a message without one the
@@ -98,7 +98,7 @@ class Recorder:
 
     def __init__(self, bag: BagWriter, topics: Mapping[str, Topic], mode: str, qos: Mapping[str, object]) -> None:
         self.failure = ""
-        self.lost_at_disk = 0
+        self._received = 0
         self._bag = bag
         self._lockstep = mode == "lockstep"
         self._stamps: dict[str, int] = {}
@@ -129,21 +129,26 @@ class Recorder:
             else:
                 self._stamps[publisher] = stamp
             received = sent = stamp
+        self._received += 1
         if self.failure:
-            self.lost_at_disk += 1
             return
         try:
             self._bag.write(name, data, received, sent, number)
-        except OSError as error:
+        except RecordingError as error:
             self._fail(error)
 
     def flush(self) -> None:
         """Bring what came onto the disk; call it every few tenths of a second."""
-        if not self.failure:
-            try:
-                self._bag.flush_when_due()
-            except OSError as error:
-                self._fail(error)
+        self._try(self._bag.flush_when_due)
+
+    def attach(self, name: str, media_type: str, data: bytes) -> bool:
+        """Put a file into the bag; False where the disk does not take it."""
+        return self._try(lambda: self._bag.attach(name, media_type, data))
+
+    @property
+    def lost_at_disk(self) -> int:
+        """Messages that came and are not in the bag, because it could not be written."""
+        return self._received - self._bag.written if self.failure else 0
 
     def counts(self) -> list[Count]:
         """What came and what was lost, per topic and publisher."""
@@ -158,28 +163,27 @@ class Recorder:
         return sum(count.dropped for count in self.counts())
 
     def finish(self) -> None:
-        """Write counts and drops into the bag, before it is closed.
-
-        Raises
-        ------
-        RecordingError
-            where the bag could not be written to the end.
-        """
-        if self.failure:
-            raise RecordingError(self.failure)
+        """Write counts and drops into the bag and close it; `failure` says where that was not possible."""
         values = {"mode": "lockstep" if self._lockstep else "realtime"}
         for count in self.counts():
             key = f"{count.topic} {count.publisher}"
             values[f"{key} received"] = str(count.received)
             values[f"{key} dropped"] = str(count.dropped)
             values[f"{key} missed"] = str(count.missed)
-        self._bag.metadata("recording", values)
+        self._try(lambda: self._bag.metadata("recording", values))
+        self._try(self._bag.close)
 
-    def _fail(self, error: OSError) -> None:
-        self.lost_at_disk += 1
+    def _try(self, write: Callable[[], None]) -> bool:
+        if not self.failure:
+            try:
+                write()
+            except RecordingError as error:
+                self._fail(error)
+        return not self.failure
+
+    def _fail(self, error: RecordingError) -> None:
         self.failure = (
-            f"bag {self._bag.path} cannot be written any more: {error.strerror or error}; "
-            "what came before is in it, free some space and start a new recording"
+            f"bag {self._bag.path} cannot be written any more: {error}; free some space and start a new recording"
         )
 
 

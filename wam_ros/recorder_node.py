@@ -12,7 +12,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from wam_description.parameters import ParameterError, parameter, values
-from wam_ros.bag import BagWriter, RecordingError
+from wam_ros.bag import BagWriter, RecordingError, Split
 from wam_ros.parameters import declare
 from wam_ros.ports import READY, message_type
 from wam_ros.qos import DEPTH, qos
@@ -31,6 +31,8 @@ class RecorderParameters:
     directory: str = parameter("directory in which the bag is made; made where it is missing")
     name: str = parameter("name of the bag, a new directory; empty for arm, date and time of the start")
     topics: tuple[str, ...] = parameter("topics that are recorded, as in docs/topics.md; '*' for every one")
+    split_size: int = parameter("size at which the bag goes on in another file; 0: never", "byte", 0)
+    split_time: float = parameter("time after which the bag goes on in another file; 0: never", "s", 0.0)
 
     def __post_init__(self) -> None:
         for topic in self.topics:
@@ -53,7 +55,7 @@ class RecorderNode(Node):
         self._arm = shared.arm.name
         name = own.name or f"{shared.arm.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
         try:
-            self.bag = BagWriter(Path(own.directory) / name)
+            self.bag = BagWriter(Path(own.directory) / name, Split(own.split_size, own.split_time))
         except RecordingError as error:
             raise ParameterError(f"node 'recorder': {error} (parameters 'directory' and 'name')") from None
         topics = {self.resolve_topic_name(topic.name): topic for topic in TOPICS}
@@ -71,6 +73,7 @@ class RecorderNode(Node):
         diagnostics = BY_NAME["/diagnostics"]
         self._diagnostics = self.create_publisher(DiagnosticArray, diagnostics.name, qos(diagnostics))
         self.ready = False
+        self._attached = ""
         self._dropped = 0
         self._failed = False
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -81,10 +84,14 @@ class RecorderNode(Node):
 
     def destroy_node(self) -> None:
         """Take what has arrived, write parameters and counts, close the bag."""
-        if not self.bag.closed:
-            self._drain()
-            self._close()
+        self._drain()
+        self._close()
         super().destroy_node()
+
+    @property
+    def failure(self) -> str:
+        """Why the bag is not complete, '' where it is or will be."""
+        return self.recorder.failure
 
     def _listen(self, name: str, topic: Topic) -> Any:
         profile = qos(topic)
@@ -97,7 +104,10 @@ class RecorderNode(Node):
         self.recorder.flush()
         self._warn()
         self.parameters_of_nodes.ask()
-        if not self.ready and not self.parameters_of_nodes.missing and not self._unmatched():
+        if self.ready or self.parameters_of_nodes.missing or self._unmatched():
+            return
+        self._attach_parameters()  # now, so that a killed recorder has left them
+        if not self.recorder.failure:  # a scenario starts when all are ready
             self.ready = True
             self._status.publish(self._state(READY))
 
@@ -131,6 +141,9 @@ class RecorderNode(Node):
             "dropped": str(sum(count.dropped for count in counts)),
             "lost_at_disk": str(self.recorder.lost_at_disk),
         }
+        for count in counts:
+            if count.dropped:
+                facts[f"dropped {count.topic} from {count.publisher}"] = str(count.dropped)
         return DiagnosticStatus(
             level=DiagnosticStatus.ERROR if self.recorder.failure else DiagnosticStatus.OK,
             name=self.get_name(),
@@ -148,18 +161,24 @@ class RecorderNode(Node):
                         break
                     subscription.callback(*taken)
 
-    def _close(self) -> None:
+    def _attach_parameters(self) -> None:
+        """Attach what is known of the parameters, where that is more than was attached before."""
         found = self.parameters_of_nodes.found
         parameters = {self.resolve_service_name(node): given for node, given in found.items()}
         parameters[self.get_fully_qualified_name()] = self._own_parameters
-        try:
-            self.bag.attach("parameters.yaml", "application/yaml", as_yaml(parameters).encode())
-            self.recorder.finish()
-            self.bag.close()
-        except OSError as error:
-            self.get_logger().error(f"bag {self.bag.path} is not complete: {error}")
+        text = as_yaml(parameters)
+        if text != self._attached and self.recorder.attach("parameters.yaml", "application/yaml", text.encode()):
+            self._attached = text
+
+    def _close(self) -> None:
+        self._attach_parameters()
+        self.recorder.finish()
+        counts = summary(self.recorder.counts())
+        if self.recorder.failure:
+            lost = f"; {self.recorder.lost_at_disk} messages were lost at the disk"
+            self.get_logger().error(f"{self.recorder.failure}{lost}; {counts}")
         else:
-            self.get_logger().info(f"{self.bag.path}: {summary(self.recorder.counts())}")
+            self.get_logger().info(f"{self.bag.path}: {counts}")
 
 
 class _Receiver:

@@ -91,7 +91,7 @@ class Recording(NamedTuple):
     def forces(self, topic: str) -> Forces:
         """A WrenchStamped topic."""
         columns = self._columns(topic, WrenchColumns)
-        return Forces(columns.stamp_ns / 1e9, columns.force, columns.torque, columns.frames)
+        return Forces(columns.stamp_ns / 1e9, columns.force, columns.torque, tuple(columns.frames))
 
     def step(self, name: str) -> Step:
         """The first step of this name that was played."""
@@ -124,7 +124,7 @@ def recording(path: Path) -> Recording:
     said = bag.topics.get(f"{namespace}/status")
     if not isinstance(said, Messages):
         raise BagError(f"{path} has no topic 'status'; record it")
-    steps, outcome = _steps(said.messages)
+    steps, outcome = _steps(tuple(said.messages))
     fault, fault_time = "", float("nan")
     for message in said.messages:
         facts = {item.key: item.value for item in message.values}

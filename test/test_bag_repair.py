@@ -1,0 +1,262 @@
+"""Bags that were not closed, or are damaged, made whole; disks that fill up."""
+
+import math
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+from bag_samples import OURS, WAYS, Sample, Way, random_samples, write
+from mcap.reader import make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+from rosbags.highlevel import AnyReader
+
+from wam_analysis.bag import BagError, raw, read
+from wam_analysis.bag_file import contents
+from wam_ros.bag import INFINITE, RESERVE, WHOLE, BagWriter, RecordingError, Split
+from wam_ros.bag_repair import repair
+from wam_ros.commands.bag import described, told
+
+ROOT = Path(__file__).parents[1]
+JOINTS = "sensor_msgs/msg/JointState"
+QOS = {
+    "history": "keep_last", "depth": 7, "reliability": "reliable", "durability": "volatile", "deadline": INFINITE,
+    "lifespan": INFINITE, "liveliness": "automatic", "liveliness_lease_duration": INFINITE,
+    "avoid_ros_namespace_conventions": False,
+}  # fmt: skip
+
+
+def record(path: Path, samples: list[Sample], split: Split = WHOLE) -> BagWriter:
+    """A bag of ours that is still open, a chunk for each ten messages."""
+    bag = BagWriter(path, split)
+    for topic, kind in dict.fromkeys((sample.topic, sample.type) for sample in samples):
+        bag.add_topic(topic, kind, QOS)
+    bag._next_flush = math.inf
+    for k, sample in enumerate(samples, 1):
+        bag.write(sample.topic, sample.data, sample.time, sample.time, k)
+        if k % 10 == 0:
+            bag._next_flush = 0.0
+            bag.flush_when_due()
+            bag._next_flush = math.inf
+    return bag
+
+
+def killed(path: Path, samples: list[Sample], split: Split = WHOLE) -> None:
+    """A bag as a killed recorder leaves it: what is in memory is lost, nothing is closed."""
+    child = os.fork()
+    if child == 0:
+        record(path, samples, split)
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+
+
+def serialized(path: Path) -> list[bytes]:
+    return sorted(data for series in raw(path).values() for data in series.data)
+
+
+def written(samples: list[Sample]) -> list[bytes]:
+    return sorted(sample.data for sample in samples)
+
+
+def assert_others_read_it(path: Path, count: int) -> None:
+    with AnyReader([path]) as reader:
+        assert sum(1 for _ in reader.messages()) == count
+    found = 0
+    for file in path.glob("*.mcap"):
+        with file.open("rb") as stream:
+            found += sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages())
+    assert found == count
+
+
+def samples_of(number: int) -> list[Sample]:
+    """Joint states and wrenches, stamped one after the other."""
+    samples = random_samples([JOINTS, "geometry_msgs/msg/WrenchStamped"], number // 2, seed=number)
+    return [sample._replace(time=10 * k) for k, sample in enumerate(samples)]
+
+
+@pytest.mark.parametrize("split", [WHOLE, Split(4000, 0.0)])
+def test_a_killed_recording_is_whole_again_up_to_the_last_chunk(tmp_path: Path, split: Split) -> None:
+    samples = samples_of(106)
+    killed(tmp_path / "bag", samples, split)
+    with pytest.raises(BagError, match=r"was not closed.*wam bag repair"):
+        read(tmp_path / "bag")
+    lines = [told(result) for result in repair(tmp_path / "bag")]
+    assert "was repaired" in lines[-1]
+    assert serialized(tmp_path / "bag") == written(samples[:100])
+    assert_others_read_it(tmp_path / "bag", 100)
+    assert sorted(path.suffix for path in (tmp_path / "bag").iterdir()) == [".mcap"] * len(lines) + [".yaml"]
+    information = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert information["message_count"] == 100
+    assert information["topics_with_message_count"][0]["topic_metadata"]["offered_qos_profiles"] == [QOS]
+    assert (len(lines) > 1) == (split.size > 0)
+
+
+def test_repairing_twice_changes_nothing(tmp_path: Path) -> None:
+    killed(tmp_path / "bag", samples_of(50))
+    repair(tmp_path / "bag")
+    before = {path: path.read_bytes() for path in (tmp_path / "bag").iterdir()}
+    assert all(result.was_whole for result in repair(tmp_path / "bag"))
+    assert {path: path.read_bytes() for path in (tmp_path / "bag").iterdir()} == before
+
+
+def test_a_repair_that_is_killed_can_be_done_again(tmp_path: Path) -> None:
+    samples = samples_of(4000)
+    killed(tmp_path / "broken", samples)
+    chance = random.Random(1)
+    for k in range(6):
+        bag = tmp_path / f"bag{k}"
+        shutil.copytree(tmp_path / "broken", bag)
+        (bag / "broken_0.mcap").rename(bag / f"bag{k}_0.mcap")
+        child = os.fork()
+        if child == 0:
+            repair(bag)
+            os._exit(0)
+        time.sleep(chance.uniform(0.0, 0.1))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        repair(bag)
+        assert serialized(bag) == written(samples)
+        assert {path.name for path in bag.iterdir()} == {f"bag{k}_0.mcap", "metadata.yaml"}
+
+
+def test_a_repair_that_is_killed_before_its_last_step_has_changed_nothing(tmp_path: Path) -> None:
+    killed(tmp_path / "bag", samples_of(50))
+    before = (tmp_path / "bag" / "bag_0.mcap").read_bytes()
+    child = os.fork()
+    if child == 0:
+        Path.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)  # type: ignore[method-assign]
+        repair(tmp_path / "bag")
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+    assert (tmp_path / "bag" / "bag_0.mcap").read_bytes() == before
+    (result,) = repair(tmp_path / "bag")
+    assert result.messages == 50
+
+
+def test_a_repair_that_fails_leaves_the_bag_as_it_was(tmp_path: Path) -> None:
+    file = write(tmp_path / "bag.mcap", samples_of(20))
+    hopeless = b"\x89MCAP0\r\n" + b"\xff" * 20 + file.read_bytes()[28:]
+    file.write_bytes(hopeless)
+    with pytest.raises(BagError, match=r"cannot be repaired.*nothing was changed"):
+        repair(file)
+    assert file.read_bytes() == hopeless
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_what_stands_before_a_cut_is_saved_however_it_was_written(tmp_path: Path, way: str) -> None:
+    samples = random_samples(OURS, 20, seed=8)
+    file = write(tmp_path / "bag.mcap", samples, WAYS[way]._replace(chunk_size=2000))
+    whole = file.read_bytes()
+    for cut in range(len(whole) // 3, len(whole), len(whole) // 7):
+        file.write_bytes(whole[:cut])
+        (result,) = repair(file)
+        found = serialized(file)
+        assert result.messages == len(found)
+        order = [sample.data for sample in samples]
+        assert found == sorted(order[: len(found)])
+        assert len(found) > 5 or WAYS[way].chunk_size > 10000
+
+
+def test_around_a_damaged_chunk_everything_is_saved(tmp_path: Path) -> None:
+    samples = samples_of(400)
+    file = write(tmp_path / "bag.mcap", samples, Way(chunk_size=2000))
+    data = bytearray(file.read_bytes())
+    with file.open("rb") as stream:
+        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
+    data[data.index(chunks[5].data) + 30] ^= 255
+    file.write_bytes(data)
+    (result,) = repair(file)
+    lost = set(written(samples)) - set(serialized(file))
+    first, last = chunks[5].message_start_time, chunks[5].message_end_time
+    assert lost == {sample.data for sample in samples if first <= sample.time <= last}
+    assert result.lost > 0
+    assert read(file).attachments == {"note.txt": b"written by a test"}
+
+
+def test_a_bag_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
+    bag = record(tmp_path / "bag", samples_of(20))
+    with pytest.raises(RecordingError, match="is being recorded; stop the recorder"):
+        repair(tmp_path / "bag")
+    bag.close()
+    assert len(serialized(tmp_path / "bag")) == 20
+    assert not (tmp_path / "bag" / RESERVE).exists()
+
+
+def test_info_says_what_is_in_a_bag(tmp_path: Path) -> None:
+    samples = samples_of(100)
+    bag = record(tmp_path / "bag", samples, Split(4000, 0.0))
+    bag.metadata("recording", {"mode": "lockstep", "/jointstate driver dropped": "3", "/clock driver dropped": "0"})
+    bag.close()
+    lines = described(contents(tmp_path / "bag"))
+    assert any(line.startswith(f"{tmp_path}/bag/bag_1.mcap") for line in lines)
+    assert "100 messages" in "\n".join(lines)
+    assert "recorded in lockstep mode, lost: 3 of /jointstate from driver" in lines
+    joints = next(line for line in lines if line.startswith("/jointstate "))
+    assert joints.split()[1] == "50"
+    assert joints.endswith(JOINTS)
+
+
+@pytest.mark.parametrize("way", ["zstd", "unchunked", "no summary"])
+def test_info_counts_what_the_file_does_not_count(tmp_path: Path, way: str) -> None:
+    samples = samples_of(60)
+    found = contents(write(tmp_path / "bag.mcap", samples, WAYS[way]))
+    assert {topic: counted.messages for topic, counted in found.topics.items()} == {
+        "/jointstate": 30,
+        "/wrenchstamped": 30,
+    }
+    assert (found.first, found.last) == (0, 590)
+
+
+FILL = """
+import os, sys
+from pathlib import Path
+from test_bag_repair import QOS
+from wam_ros.bag import BagWriter, RecordingError, Split
+path = Path(sys.argv[1])
+bag = BagWriter(path / "bag", Split(int(sys.argv[2]), 0.0))
+bag.add_topic("/t", "std_msgs/msg/String", QOS)
+try:
+    for k in range(100_000):
+        text = os.urandom(500).hex().encode()
+        bag.write("/t", b"\\0\\1\\0\\0" + (1001).to_bytes(4, "little") + text + b"\\0", k, k, k)
+except RecordingError as error:
+    print(error)
+assert bag.closed
+from wam_analysis.bag import read
+from test_bag_repair import assert_others_read_it
+count = len(read(path / "bag").topics["/t"].log_time_ns)
+assert_others_read_it(path / "bag", count)
+assert count == bag.written > 1000, (count, bag.written)
+BagWriter(path / "second")
+try:
+    BagWriter(path / "third")
+except RecordingError as error:
+    print(error)
+assert not (path / "third").exists()
+"""
+
+
+@pytest.mark.parametrize("split_size", [0, 1_000_000])
+def test_a_disk_that_fills_up_leaves_a_bag_that_is_closed(tmp_path: Path, split_size: int) -> None:
+    inside = f'mount -t tmpfs -o size=12m none {tmp_path} && exec "$@"'
+    own_mounts = ["unshare", "--map-root-user", "--mount", "sh", "-c", inside, "sh"]
+    if subprocess.run([*own_mounts, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this system lets nobody mount a small disk")
+    done = subprocess.run(
+        [*own_mounts, sys.executable, "-c", FILL, str(tmp_path), str(split_size)],
+        env={**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT / 'test'}"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.splitlines()
+    assert first == "No space left on device; it was closed with what came before"
+    assert "third cannot be made: No space left on device; free 8 MiB or more" in second

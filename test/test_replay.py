@@ -1,0 +1,172 @@
+"""Recorded inputs through the same machines: bit for bit, and the first difference where there is one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from wam_analysis.bag import BagError, raw, read
+from wam_analysis.replay import replay
+from wam_analysis.replay_wirings import WIRINGS
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
+from wam_ros import cli
+from wam_ros.bag import INFINITE, BagWriter
+
+STEPS = {
+    "steps": [
+        {"name": "release", "seconds": 0.05, "request": "enable"},
+        {
+            "name": "move and be pushed",
+            "seconds": 0.35,
+            "posture": [0.1, -0.3, 0.05, 0.2],
+            "push": {"cover": "outer_link", "place": 0.28, "newtons": [0.0, 12.0, 0.0], "begin": 0.05, "end": 0.3},
+        },
+        {"name": "press", "seconds": 0.1, "force": {"frame": "outer_link", "newtons": [0.0, -5.0, 0.0]}},
+    ]
+}
+QOS = {
+    "history": "keep_last", "depth": 7, "reliability": "reliable", "durability": "volatile", "deadline": INFINITE,
+    "lifespan": INFINITE, "liveliness": "automatic", "liveliness_lease_duration": INFINITE,
+    "avoid_ros_namespace_conventions": False,
+}  # fmt: skip
+
+
+RECORDED: list[Path] = []
+
+
+@pytest.fixture
+def bag(tmp_path_factory: pytest.TempPathFactory, domain_id: int) -> Path:
+    """Half a second of the arm, recorded in lockstep; once, because nobody changes it."""
+    if not RECORDED:
+        RECORDED.append(recorded(tmp_path_factory.mktemp("replay"), domain_id))
+    return RECORDED[0]
+
+
+def recorded(folder: Path, domain_id: int) -> Path:
+    from wam_ros.bring_up import Composition
+
+    script = folder / "script.yaml"
+    script.write_text(yaml.safe_dump(STEPS))
+    base = Configuration.load(packaged("wam"))
+    configuration = base.with_values(
+        {
+            "nodes": [*base.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.timeout": 60.0,
+            "scenario:script": str(script),
+            "recorder:directory": str(folder),
+            "recorder:name": "bag",
+        }
+    )
+    with Composition(configuration, domain_id=domain_id) as composition:
+        scenario = composition.nodes["scenario"]
+        composition.spin(lambda: scenario.done)
+        assert scenario.failure == ""
+    return folder / "bag"
+
+
+def changed(bag: Path, to: Path, topic: str, number: int, change: bytes) -> Path:
+    """The same bag with the last bytes of one message replaced, and without what only the recorder says."""
+    contents = read(bag)
+    with BagWriter(to) as writer:
+        series = raw(bag)
+        for name, messages in series.items():
+            writer.add_topic(name, messages.type, QOS)
+        writer.attach("parameters.yaml", "application/yaml", contents.attachments["parameters.yaml"])
+        writer.metadata("recording", contents.metadata["recording"])
+        for name, messages in series.items():
+            for k, (time, data) in enumerate(zip(messages.log_time_ns.tolist(), messages.data, strict=True)):
+                new = data[: -len(change)] + change if (name, k) == (topic, number) else data
+                writer.write(name, new, time, time, k)
+    return to
+
+
+@pytest.mark.parametrize("node", WIRINGS)
+def test_a_lockstep_recording_replays_bit_for_bit(bag: Path, node: str) -> None:
+    done = replay(bag, node)
+    assert done.mode == "lockstep"
+    assert [topic for topic in done.topics if not topic.is_same] == []
+    counts = {topic.compared for topic in done.topics}
+    assert counts <= {501, 101}
+    assert counts
+    assert done.is_same
+
+
+def test_the_pushed_arm_says_something(bag: Path) -> None:
+    wrench = read(bag, ["contact/wrench"]).topics["/wam/contact/wrench"]
+    assert np.abs(wrench.force).max() > 1.0, "a replay of zeros would show nothing"
+
+
+@pytest.mark.parametrize(
+    ("node", "value", "topic"),
+    [
+        ("velocity_loop", {"velocity_loop:integral_gain": [2.5, 2.0, 2.0, 1.0]}, "motor_current_command"),
+        ("force_loop", {"force_loop:posture_gain": 4.5}, "joint_velocity_command"),
+        ("contact_estimator", {"contact_estimator:observer.time_constant": 0.03}, "external_joint_torques"),
+        ("gravity", {"arm.gravity": [0.0, 0.0, -9.81]}, "gravity_effort"),
+    ],
+)
+def test_another_parameter_makes_a_difference_that_is_named(bag: Path, node: str, value: dict, topic: str) -> None:  # type: ignore[type-arg]
+    configuration = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", **value})
+    nodes = [*configuration.shared.nodes, "scenario"]
+    done = replay(bag, node, configuration.with_values({"nodes": nodes}))
+    found = {result.topic: result for result in done.topics}[topic]
+    assert not done.is_same
+    assert found.different > 0
+    assert found.first is not None
+    assert found.largest > 0.0
+    assert replay(
+        bag, node, Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", "nodes": nodes})
+    ).is_same
+
+
+def test_the_last_bit_of_one_number_is_found(bag: Path, tmp_path: Path) -> None:
+    efforts = read(bag).topics["/wam/gravity_effort"]
+    wrong = np.nextafter(efforts.effort[40, 3], 1e9)
+    other = changed(bag, tmp_path / "other", "/wam/gravity_effort", 40, wrong.tobytes())
+    (topic,) = replay(other, "gravity").topics
+    assert (topic.compared, topic.different) == (101, 1)
+    assert topic.first == (int(efforts.stamp_ns[40]), "joint4", float(wrong), float(efforts.effort[40, 3]))
+    assert 0.0 < topic.largest < 1e-12
+
+
+def test_a_missing_input_is_named(bag: Path, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "part") as writer:
+        for name, messages in raw(bag, ["gravity_effort"]).items():
+            writer.add_topic(name, messages.type, QOS)
+            writer.write(name, messages.data[0], 1, 1, 1)
+        writer.attach("parameters.yaml", "application/yaml", read(bag).attachments["parameters.yaml"])
+    with pytest.raises(BagError, match="part lacks the topic joint_states, without which gravity does nothing"):
+        replay(tmp_path / "part", "gravity")
+    with pytest.raises(BagError, match="no topic of the node velocity_loop"):
+        replay(tmp_path / "part", "velocity_loop")
+
+
+def test_parameters_that_are_not_in_the_bag_are_asked_for(bag: Path, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bare") as writer:
+        for name, messages in raw(bag, ["joint_states", "gravity_effort"]).items():
+            writer.add_topic(name, messages.type, QOS)
+            for k, (time, data) in enumerate(zip(messages.log_time_ns.tolist(), messages.data, strict=True)):
+                writer.write(name, data, time, time, k)
+    with pytest.raises(BagError, match="no parameters in it; give a configuration with --config"):
+        replay(tmp_path / "bare", "gravity")
+    assert replay(tmp_path / "bare", "gravity", Configuration.load(packaged("wam"))).is_same
+    with pytest.raises(BagError, match=r"recorded are joint1, joint2, joint3, joint4; the configuration has joint1$"):
+        replay(tmp_path / "bare", "gravity", Configuration.load(packaged("testbed")))
+
+
+def test_the_driver_cannot_be_replayed(bag: Path) -> None:
+    with pytest.raises(ParameterError, match="no node 'driver' can be replayed; nodes: velocity_loop, transform"):
+        replay(bag, "driver")
+
+
+def test_the_command_prints_each_topic_and_says_by_its_code(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["replay", str(bag), "transform"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.splitlines()[0] == "joint_states: 101 messages, the same bit for bit"
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["replay", str(bag), "gravity", "--config", "wam"])
+    assert ended.value.code == 0
