@@ -19,8 +19,7 @@ from launch import LaunchContext, LaunchDescription
 def start_nodes(context: LaunchContext) -> list[Node]:
     """One process a node, all with the parameters of the configuration."""
     config, namespace, mode, record = (
-        LaunchConfiguration(argument).perform(context)
-        for argument in ("config", "namespace", "mode", "record")
+        LaunchConfiguration(argument).perform(context) for argument in ("config", "namespace", "mode", "record")
     )
     installed = Path(get_package_share_directory("wam_stack"), "config", f"{config}.yaml")
     parameters = installed if installed.is_file() else Path(config).resolve()
@@ -45,9 +44,7 @@ def generate_launch_description() -> LaunchDescription:
     """Describe the arguments and the nodes to `ros2 launch`."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "config", default_value="wam", description="configuration name or YAML file"
-            ),
+            DeclareLaunchArgument("config", default_value="wam", description="configuration name or YAML file"),
             DeclareLaunchArgument("namespace", default_value="wam", description="namespace of the arm"),
             DeclareLaunchArgument("mode", default_value="realtime", choices=["realtime", "lockstep"]),
             DeclareLaunchArgument("record", default_value="false", choices=["true", "false"]),

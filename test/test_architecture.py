@@ -40,9 +40,7 @@ def modules_under(root: Path) -> dict[str, ast.Module]:
     for package in ARROWS:
         for path in sorted(root.glob(f"{package}/**/*.py")):
             parts = path.relative_to(root).with_suffix("").parts
-            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = ast.parse(
-                path.read_text(), path
-            )
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = ast.parse(path.read_text(), path)
     return found
 
 

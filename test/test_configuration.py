@@ -115,13 +115,9 @@ def test_missing_file_is_refused_by_name(tmp_path: Path) -> None:
 def test_misspelt_parameter_is_refused_with_file_section_and_name(file: Path) -> None:
     file.write_text(file.read_text().replace("gain:", "gian:").replace("period:", "perod:"))
     configuration = Configuration.load(file)
-    with pytest.raises(
-        ParameterError, match=r"mine\.yaml, section '/\*\*/loop': missing .*'gain'.*unknown .*'gian'"
-    ):
+    with pytest.raises(ParameterError, match=r"mine\.yaml, section '/\*\*/loop': missing .*'gain'.*unknown .*'gian'"):
         configuration.node("loop", Loop)
-    with pytest.raises(
-        ParameterError, match=r"mine\.yaml, section '/\*\*': missing parameter 'timing.period'"
-    ):
+    with pytest.raises(ParameterError, match=r"mine\.yaml, section '/\*\*': missing parameter 'timing.period'"):
         _ = configuration.shared
     with pytest.raises(ParameterError, match="no section"):
         configuration.node("pool", Loop)

@@ -17,9 +17,7 @@ def arm_numbers(configuration: str = "wam") -> dict[str, tuple[float, ...]]:
     """Every number below `arm` in a configuration, arrays as tuples."""
     flat = values(Configuration.load(packaged(configuration)).shared.arm, "arm.")
     arrays = {name: value if isinstance(value, tuple) else (value,) for name, value in flat.items()}
-    return {
-        name: array for name, array in arrays.items() if not any(isinstance(x, str | bool) for x in array)
-    }
+    return {name: array for name, array in arrays.items() if not any(isinstance(x, str | bool) for x in array)}
 
 
 def elements(row: Constant, length: int) -> list[tuple[int, float]]:
@@ -108,9 +106,7 @@ def test_joint_friction_is_the_printed_part_of_peak_torque() -> None:
     peak = numbers["arm.motors.peak_torque"]
     at_motor, at_joint = numbers["arm.motors.static_friction"], numbers["arm.joints.static_friction"]
     for i, percent in enumerate((1.4, 1.0, 1.0, 1.0)):
-        assert at_motor[i] * ratios[i] + at_joint[i] == pytest.approx(
-            percent / 100 * ratios[i] * peak[i], rel=1e-3
-        )
+        assert at_motor[i] * ratios[i] + at_joint[i] == pytest.approx(percent / 100 * ratios[i] * peak[i], rel=1e-3)
 
 
 def test_assumed_pretension_leaves_no_strand_slack_at_peak_torque() -> None:

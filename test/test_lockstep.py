@@ -160,7 +160,7 @@ def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_p
     assert outputs[0] == outputs[1]
 
 
-TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0)
+TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0)
 
 
 def test_gate_waits_for_the_command_that_belongs_to_the_state() -> None:

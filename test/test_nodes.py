@@ -284,9 +284,7 @@ def test_enable_with_a_latched_fault_is_refused_until_it_is_reset(hand: Hand) ->
     assert hand.driver.currents == [0.0] * 4
     refused = hand.ask("enable", True)
     assert not refused.success
-    assert refused.message == (
-        "refused: fault 'emergency stop' is latched; call reset_fault first, then enable"
-    )
+    assert refused.message == ("refused: fault 'emergency stop' is latched; call reset_fault first, then enable")
     hand.wait_periods(10)
     assert hand.driver.currents == [0.0] * 4
     assert "call enable to move" in hand.ask("reset_fault").message

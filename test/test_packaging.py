@@ -200,9 +200,7 @@ def onlooker() -> Iterator[Node]:
 
 def start_and_stop(command: list[str | Path], name: str, onlooker, cwd: Path, env: dict[str, str]) -> None:
     """Start a node, wait until the ROS graph has it, interrupt it, and expect a clean end."""
-    process = subprocess.Popen(
-        command, cwd=cwd, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
+    process = subprocess.Popen(command, cwd=cwd, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         deadline = time.monotonic() + 60.0
         while not onlooker.wait_for_node(f"/wam/{name}", timeout=0.5):
@@ -255,9 +253,7 @@ def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(pr
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
     share = prefix / "share" / "wam_stack"
 
-    *declared, start = runpy.run_path(str(share / "launch" / "wam.launch.py"))[
-        "generate_launch_description"
-    ]()
+    *declared, start = runpy.run_path(str(share / "launch" / "wam.launch.py"))["generate_launch_description"]()
     assert set(declared) == set(given)
     nodes = start.function(given)
     config = yaml.safe_load((share / "config" / "wam.yaml").read_text())
@@ -285,9 +281,7 @@ def test_package_xml_is_valid_for_ros():
     assert named <= depends
 
 
-def reached(
-    name: str, extras: frozenset[str], seen: set[tuple[str, frozenset[str]]]
-) -> Iterator[Requirement]:
+def reached(name: str, extras: frozenset[str], seen: set[tuple[str, frozenset[str]]]) -> Iterator[Requirement]:
     """Every requirement that a package with its extras leads to."""
     if (name, extras) in seen:
         return

@@ -229,9 +229,7 @@ def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any
     said: list[str] = []
     states: list[Any] = []
     listener = ros.node("listener")
-    listener.create_subscription(
-        DiagnosticStatus, "status", lambda m: said.append(m.message), qos(BY_NAME["status"])
-    )
+    listener.create_subscription(DiagnosticStatus, "status", lambda m: said.append(m.message), qos(BY_NAME["status"]))
     listener.create_subscription(JointState, "motor_states", states.append, qos(BY_NAME["motor_states"]))
     stack = started("-m", "wam_ros.cli", "node", "driver")
     ros.wait(lambda: said and len(states) > 100, 20.0, "states of a driver that is alone")

@@ -56,17 +56,13 @@ def slope(function: object, q: Array) -> Array:
     """Central difference of a vector function, (m, n)."""
     assert callable(function)
     step = 1e-5
-    return np.stack(
-        [(function(q + step * e) - function(q - step * e)) / (2 * step) for e in np.eye(4)], axis=1
-    )
+    return np.stack([(function(q + step * e) - function(q - step * e)) / (2 * step) for e in np.eye(4)], axis=1)
 
 
 def test_poses_of_the_appendix_put_the_tip_where_it_says(body: RigidBody) -> None:
     inch = 0.0254
     assert body.tool_pose([0, 0, 0, 0]).position == pytest.approx([16 * inch, 0, 22 * inch])
-    assert body.tool_pose([0, -np.pi / 2, 0, np.pi / 2]).position == pytest.approx(
-        [38 * inch, 0, 0], abs=1e-12
-    )
+    assert body.tool_pose([0, -np.pi / 2, 0, np.pi / 2]).position == pytest.approx([38 * inch, 0, 0], abs=1e-12)
     assert body.tool_pose([0, 0, 0, -np.pi / 2]).position == pytest.approx([0, 0, 6 * inch], abs=1e-12)
 
 
@@ -78,13 +74,9 @@ def test_tool_and_covers_are_where_the_table_puts_them(body: RigidBody) -> None:
         assert np.allclose(body.cover_pose(q, "outer_link").rotation, fourth[:3, :3], atol=1e-9)
         inner = body.cover_pose(q, "inner_link")
         assert np.allclose(inner.position, 0.0, atol=1e-9)
-        assert np.allclose(
-            inner.rotation, np.column_stack([third[:3, 2], third[:3, 1], -third[:3, 0]]), atol=1e-9
-        )
+        assert np.allclose(inner.rotation, np.column_stack([third[:3, 2], third[:3, 1], -third[:3, 0]]), atol=1e-9)
         assert np.allclose(body.point(q, "inner_link", [L3, 0.0, 0.0]), fourth[:3, 3], atol=1e-9)
-        assert np.allclose(
-            body.point(q, "outer_link", [0.1, 0.02, 0.03]), (fourth @ [0.1, 0.02, 0.03, 1])[:3]
-        )
+        assert np.allclose(body.point(q, "outer_link", [0.1, 0.02, 0.03]), (fourth @ [0.1, 0.02, 0.03, 1])[:3])
 
 
 def test_hand_jacobian_is_corrected_a7(body: RigidBody) -> None:

@@ -85,9 +85,7 @@ def test_tip_and_covers_stand_at_the_same_place_in_every_pose(
             assert np.allclose(mujoco_data.body(name).xmat.reshape(3, 3), pose.rotation, rtol=0, atol=1e-9)
 
 
-def test_gravity_torque_of_other_readers_is_ours(
-    arm: Arm, by_pinocchio: pin.Model, by_mujoco: mujoco.MjModel
-) -> None:
+def test_gravity_torque_of_other_readers_is_ours(arm: Arm, by_pinocchio: pin.Model, by_mujoco: mujoco.MjModel) -> None:
     body = RigidBody(arm)
     data, mujoco_data = by_pinocchio.createData(), mujoco.MjData(by_mujoco)
     by_mujoco.opt.gravity[:] = arm.gravity

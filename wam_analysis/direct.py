@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_control.dither import Dither
 from wam_control.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.scenario import Scenario, ScenarioOutput, Step
 from wam_control.transform import Transform
@@ -55,7 +56,9 @@ class DirectRun:
         self.scenario = Scenario(steps)
         self._transform = Transform(arm)
         self._body = RigidBody(arm)
-        self._velocity_loop = VelocityLoop(arm.motors, node("velocity_loop", VelocityLoopParameters))
+        servo = node("velocity_loop", VelocityLoopParameters)
+        self._velocity_loop = VelocityLoop(arm.motors, servo)
+        self._dither = Dither(arm, self._timing, servo.dither)
         self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters))
         estimation = node("contact_estimator", ContactEstimatorParameters)
         self._estimator = ContactEstimator(arm, self._timing, estimation)
@@ -90,8 +93,9 @@ class DirectRun:
             if self._timing.outer_delay == 0:
                 self._used = self._newest
         caused, velocity, effort = self._used
+        feedforward = self._dither.added(stamp, effort)
         currents = self._velocity_loop.step(
-            motors.velocity, motors.effort, velocity, seconds(stamp - (caused or stamp)), effort, period
+            motors.velocity, motors.effort, velocity, seconds(stamp - (caused or stamp)), feedforward, period
         )
         self._say("motor_current_command", stamp, currents)
         if not done:

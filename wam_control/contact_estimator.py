@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from wam_control.contact_inference import (
     ContactInference,
     Hypothesis,
@@ -95,7 +97,7 @@ class ContactEstimator:
             f"it must be at least two periods, {2.0 * timing.period:g} s",
         )
         self._parameters = parameters
-        self._observer = MomentumObserver(arm, parameters.observer, parameters.use_joint_sensors)
+        self._observer = MomentumObserver(arm, parameters.observer, parameters.use_joint_sensors, timing.dither_cycle)
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
         self._in_contact = False
@@ -130,17 +132,18 @@ class ContactEstimator:
     def estimate(self) -> ContactEstimate:
         """Say what touches, from everything observed."""
         observer, parameters = self._observer, self._parameters
-        covariance = observer.covariance()
-        torques = tuple(observer.external_torques)
+        felt, covariance = observer.torques()
+        torques = tuple(felt)
         sd = tuple(math.sqrt(variance) for variance in covariance.diagonal().tolist())
         if not observer.is_ready:
             self._in_contact = False
             return _nothing(torques, sd, 0.0, "not enough has been observed")
-        statistic = detection_statistic(torques, covariance)
+        precision = np.linalg.inv(covariance)
+        statistic = detection_statistic(torques, precision)
         self._in_contact = statistic > (parameters.release if self._in_contact else parameters.detect)
         if not self._in_contact:
             return _nothing(torques, sd, statistic, "nothing touches")
-        hypotheses = self._inference.infer(observer.q, torques, covariance)
+        hypotheses = self._inference.infer(observer.q, torques, precision)
         best = hypotheses[0]
         return ContactEstimate(
             external_torques=torques,
