@@ -66,7 +66,8 @@ class ContactFit:
     start, end : (links,), m, where each link begins and ends along x.
     radius : (links,), m, of the tubes.
     force_scale : N, sd of each component of the force before anything is felt.
-    friction : sd of the force that friction adds along each direction of the surface, per force.
+    miss : sd of the distance by which the line of the force misses the axis of the tube, per radius.
+    friction : sd of the force of friction along the link, per force.
     places : how many places of each link are tried, at least 3.
     """
 
@@ -77,11 +78,13 @@ class ContactFit:
         radius: Sequence[float],
         *,
         force_scale: float,
+        miss: float,
         friction: float,
         places: int,
     ) -> None:
         self._ends = list(zip(start, end, strict=True))
         self._radius = list(radius)
+        self._miss = [miss * r for r in radius]
         self._precision, self._friction = force_scale**-2, friction
         self._widths = [(b - a) / places for a, b in self._ends]
         steps = (np.arange(places) + 0.5) / places  # the middle of each
@@ -97,8 +100,10 @@ class ContactFit:
         gram : (links, 7, 7), Z^T S^-1 Z for each link.
         """
         links = [
-            _Link(full, self._precision).leaning(full, 0.5 * (start + end), radius, self._friction)
-            for full, (start, end), radius in zip(gram.tolist(), self._ends, self._radius, strict=True)
+            _Link(full, self._precision).leaning(full, 0.5 * (start + end), miss, self._friction, radius)
+            for full, (start, end), miss, radius in zip(
+                gram.tolist(), self._ends, self._miss, self._radius, strict=True
+            )
         ]
         log_density = self._log_density(links)
         top = max(map(max, log_density))
@@ -230,7 +235,7 @@ class _Link:
         f1, f2 = (n22 * told1 - n12 * told2) / determinant, (n11 * told2 - n12 * told1) / determinant
         return (f1, f2), f1 * told1 + f2 * told2, (n22 / determinant, -n12 / determinant, n11 / determinant)
 
-    def leaning(self, gram: list[list[float]], middle: float, radius: float, friction: float) -> "_Link":
+    def leaning(self, gram: list[list[float]], middle: float, miss: float, friction: float, radius: float) -> "_Link":
         """The same with the lean of the force, as large as at the middle of the link, in the covariance.
 
         Twist: the line of the force misses the axis by some part of the radius.  Axial: a force along
@@ -240,9 +245,8 @@ class _Link:
         """
         (f1, f2), _, _ = self.force(middle)
         size = math.hypot(f1, f2) + LEAST_FORCE
-        sd = friction * size
-        arm = sd * radius
-        turn1, turn2 = arm * f1 / size, arm * f2 / size
+        sd, arm, turn = friction * size, miss * size, friction * radius
+        turn1, turn2 = turn * f1, turn * f2
         twist, axial = gram[5], gram[6]
         u = [arm * value for value in twist]
         v = [sd * a + turn1 * b1 + turn2 * b2 for b1, b2, a in zip(gram[3], gram[4], axial, strict=True)]

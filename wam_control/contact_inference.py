@@ -40,9 +40,8 @@ class InferenceParameters:
     """What is taken for likely before anything is felt."""
 
     force_scale: float = parameter("sd of each component of a contact's force before it is felt", "N", low=0.1)
-    friction: float = parameter(
-        "sd of the force of friction along each direction of a cover's surface, per force", low=0.0, high=2.0
-    )
+    miss: float = parameter("sd by which the line of a force misses the tube's axis, per radius", low=0.0, high=2.0)
+    friction: float = parameter("sd of the force of friction along a cover, per force", low=0.0, high=2.0)
     places: int = parameter("places along a link that are tried", low=9, high=200)
     sure: float = parameter("probability above which a link counts as told", low=0.5, high=1.0)
     largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", low=0.0)
@@ -120,6 +119,7 @@ class ContactInference:
             [cover.end[0] for cover in covers],
             arm.covers.radius,
             force_scale=parameters.force_scale,
+            miss=parameters.miss,
             friction=parameters.friction,
             places=parameters.places,
         )

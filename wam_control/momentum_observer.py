@@ -189,12 +189,13 @@ class MomentumObserver:
         self._resting = [keep * a + take * b for a, b in zip(self._resting, resting, strict=True)]
         if self._load is not None:
             self._load.observe(q, qd, span, keep)
-        self.is_ready = self.is_ready or before is not None
         self.q, self._residual, self._model_torque = q, residual, model
         self._momentum, self._known, self._bias, self._gap = momentum, known, bias, 0.0
         if self._cycle:
             self._ring[self._filled % self._cycle] = residual + self._sliding + self._resting
             self._filled += 1
+        # half a cycle of a dither would pass for a push; in the first one the arm still settles
+        self.is_ready = self.is_ready or (before is not None and self._filled >= 2 * self._cycle)
         return True
 
     def torques(self) -> tuple[list[float], NDArray[np.float64]]:
