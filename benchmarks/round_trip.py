@@ -11,13 +11,11 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
-import rclpy
 from comparing import Spread, arguments, machine, ratios, save, spread, table
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
 from wam_description.configuration import Configuration, packaged
@@ -25,7 +23,7 @@ from wam_description.signals import State
 from wam_ros.bring_up import Composition, Processes
 from wam_ros.messages import joint_state, stamp_of
 from wam_ros.qos import qos
-from wam_ros.run import make_executor, prepare_logging_directory, spin
+from wam_ros.run import Connection, spin
 from wam_ros.topics import BY_NAME
 
 PERIOD = 0.001  # s
@@ -75,42 +73,32 @@ class Relay(Node):
         self._publisher.publish(JointState(header=message.header, name=message.name, effort=message.effort))
 
 
-def _context() -> Context:
-    context = Context()
-    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
-    return context
-
-
 def relay_alone() -> None:
     """The relay as a process of its own, until its standard input is closed."""
-    context = _context()
-    executor = make_executor(context)
-    executor.add_node(Relay(context))
+    connection = Connection()
+    connection.add(Relay(connection.context))
     reader = threading.Thread(target=sys.stdin.buffer.read)
     reader.start()
-    spin(executor, lambda: not reader.is_alive())
-    executor.shutdown()
-    rclpy.try_shutdown(context=context)
+    spin(connection.executor, lambda: not reader.is_alive())
+    connection.close()
 
 
 def measure_relay(way: str, seconds: float) -> Any:
     """p50 and p99 of the bare relay, s."""
-    context = _context()
-    executor = make_executor(context)
     with ExitStack() as stack:
-        stack.callback(rclpy.try_shutdown, context=context)
-        stack.callback(executor.shutdown)
+        connection = Connection()
+        stack.callback(connection.close)
         if way == "one process":
-            executor.add_node(Relay(context))
+            connection.add(Relay(connection.context))
         else:
             child = subprocess.Popen([sys.executable, __file__, "--relay"], stdin=subprocess.PIPE)
             stack.callback(child.wait)
             stack.callback(child.stdin.close)  # type: ignore[union-attr]
-        sender = Sender(context)
-        executor.add_node(sender)
+        sender = Sender(connection.context)
+        connection.add(sender)
         need = 0.5 * seconds / PERIOD
         end = time.perf_counter() + SETTLE + seconds
-        spin(executor, lambda: time.perf_counter() > end and len(sender.latencies) > need)
+        spin(connection.executor, lambda: time.perf_counter() > end and len(sender.latencies) > need)
         latencies = sorted(sender.latencies)
     return latencies[len(latencies) // 2], latencies[int(0.99 * len(latencies))]
 
@@ -138,10 +126,9 @@ def measure_stack(way: str, seconds: float) -> Any:
             context, executor = composition.context, composition.executor
         else:
             stack.enter_context(Processes(configuration))
-            context = _context()
-            executor = make_executor(context)
-            stack.callback(rclpy.try_shutdown, context=context)
-            stack.callback(executor.shutdown)
+            connection = Connection()
+            stack.callback(connection.close)
+            context, executor = connection.context, connection.executor
         listener = Node("listener", context=context)
         stack.callback(listener.destroy_node)
         stack.callback(executor.remove_node, listener)
@@ -174,7 +161,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    prepare_logging_directory()
     if sys.argv[1:] == ["--relay"]:
         relay_alone()
     else:

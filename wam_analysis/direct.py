@@ -44,6 +44,7 @@ class DirectRun:
     ----------
     rows : what was said on each topic, JointState as position, velocity and effort one after the other.
     driver : the driver, for a look at the plant.
+    estimate : what the contact estimator said last, all of it.
     scenario : the scenario, for its failure.
     """
 
@@ -62,6 +63,7 @@ class DirectRun:
         self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters))
         estimation = node("contact_estimator", ContactEstimatorParameters)
         self._estimator = ContactEstimator(arm, self._timing, estimation)
+        self.estimate = self._estimator.estimate()
         self._has_sensors, self._feels_sensors = arm.joint_sensors, estimation.use_joint_sensors
         zero = [0.0] * len(arm.joints.names)
         self._used: tuple[int, list[float], list[float]] = (0, zero, zero)  # stamp, velocity, effort
@@ -105,7 +107,7 @@ class DirectRun:
 
     def _outer(self, stamp: int, motors: State, sensors: State | None) -> bool:
         dt = seconds(self._timing.outer_period_ns)
-        estimate = self._estimator.estimate()
+        self.estimate = estimate = self._estimator.estimate()
         contact = Contact(estimate.link, estimate.place, estimate.force) if estimate.link else NO_CONTACT
         joints = self._transform.joint_state(motors)
         played = self.scenario.step(joints.position, contact, dt)
@@ -145,7 +147,7 @@ class DirectRun:
         frame = contact.cover or "base"
         self._say("motor_currents", stamp, self.driver.currents)
         self._say_joints("sim/joint_states", stamp, self.driver.true_joint_state)
-        self._say("sim/contact/wrench", stamp, [*contact.force, 0.0, 0.0, 0.0], frame)
+        self._say("sim/contact/wrench", stamp, [*contact.force, *contact.moment], frame)
         self._say("sim/contact/point", stamp, [contact.place, 0.0, 0.0], frame)
 
     def _say_played(self, stamp: int, played: ScenarioOutput, out: ForceOutput) -> None:

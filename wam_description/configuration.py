@@ -90,6 +90,10 @@ class Configuration(NamedTuple):
             flat[parameter] = list(value) if isinstance(value, tuple) else value
         return Configuration(self.path, _text(sections), _frozen(sections))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Read-only mappings cannot be pickled; other processes get plain ones and make them read-only again."""
+        return _thawed, (self.path, self.text, {name: dict(flat) for name, flat in self.sections.items()})
+
     def _section(self, node: str) -> str:
         if node == SHARED or node not in self.sections:
             known = ", ".join(name for name in self.sections if name != SHARED)
@@ -158,6 +162,10 @@ def _sections(path: Path, text: str) -> Mapping[str, Mapping[str, Any]]:
             )
         sections[name] = flatten(body[PARAMETERS])
     return _frozen(sections)
+
+
+def _thawed(path: Path, text: str, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
+    return Configuration(path, text, _frozen(sections))
 
 
 def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str, Any]]:

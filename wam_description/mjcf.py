@@ -14,11 +14,12 @@ import numpy as np
 from wam_description.arm import Arm
 from wam_description.effects import Effects, Ripples
 from wam_description.parameters import lengths, require
-from wam_description.world import SHAPES, Obstacles, Springs, World
+from wam_description.world import SHAPES, Obstacles, Pushers, Springs, World
 
 NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, where slack is switched off
 FAR = 1e6  # rad or m, farther than any tendon gets
 NEVER_YIELDS = 1e9  # a yield torque, which only makes room for the creep in MuJoCo's state
+FAR_AWAY = 50.0  # m, where pushers wait for their time
 ROTOR_MASS = 1e-3  # kg; a rotor turns about its centre, so that its mass moves nothing
 
 
@@ -29,7 +30,8 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     ----------
     arm : the arm.
     step : simulation step, s.
-    world : obstacles, each paired with every cover and with nothing else, and springs at joints.
+    world : obstacles, each paired with every cover and with nothing else, springs at joints, pushers, each
+        paired with its cover.
     effects : slack, torque ripple of motors and pulleys.
 
     Returns
@@ -52,7 +54,10 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     _add_links(bodies, arm)
     for i, name in enumerate(world.obstacles.names):
         _add_obstacle(bodies, world.obstacles, i, name)
-    _add_pairs(root, arm, world.obstacles)
+    _add_pushers(bodies, world.pushers)
+    contact = _add(root, "contact")
+    _add_pairs(contact, arm, world.obstacles)
+    _add_pusher_pairs(contact, world.pushers)
     tendons = _add(root, "tendon")
     _add_cables(tendons, arm, effects.slack)
     _add_springs(tendons, world.springs)
@@ -65,6 +70,11 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
     motors, joints = arm.motors.names, arm.joints.names
     for name in world.obstacles.names:
         require(name not in arm.covers.names, f"obstacle '{name}' is named like a cover of the arm; rename it")
+    for name, cover in zip(world.pushers.names, world.pushers.covers, strict=True):
+        taken = (*arm.covers.names, *world.obstacles.names)
+        require(name not in taken, f"pusher '{name}' is named like a cover or an obstacle; rename it")
+        known = ", ".join(arm.covers.names)
+        require(cover in arm.covers.names, f"pusher '{name}' presses on '{cover}'; covers: {known}")
     for name in world.springs.joints:
         require(name in joints, f"world.springs.joints names '{name}'; joints: {', '.join(joints)}")
     for name in effects.ripples.shafts:
@@ -209,23 +219,44 @@ def _add_obstacle(world: ElementTree.Element, obstacles: Obstacles, i: int, name
     )
 
 
-def _add_pairs(root: ElementTree.Element, arm: Arm, obstacles: Obstacles) -> None:
-    contact = _add(root, "contact")
+def _add_pushers(world: ElementTree.Element, pushers: Pushers) -> None:
+    """Bodies that the plant leads, far away at first."""
+    for i, name in enumerate(pushers.names):
+        if pushers.force[i] == 0.0:
+            continue
+        body = _add(world, "body", name=name, mocap="true", pos=_numbers((FAR_AWAY, FAR_AWAY, float(i))))
+        size = pushers.sizes[3 * i : 3 * i + (1 if pushers.shapes[i] == "sphere" else 3)]
+        _add(body, "geom", name=name, type=pushers.shapes[i], size=_numbers(size), rgba="0.85 0.6 0.5 1")
+
+
+def _add_pairs(contact: ElementTree.Element, arm: Arm, obstacles: Obstacles) -> None:
     for cover in arm.covers.names:
-        for i, obstacle in enumerate(obstacles.names):
-            friction = obstacles.friction[i]
-            _add(
-                contact,
-                "pair",
-                name=f"{cover}/{obstacle}",
-                geom1=cover,
-                geom2=obstacle,
-                condim="3" if friction > 0.0 else "1",
-                friction=_numbers((friction, friction, 0.0, 0.0, 0.0)),
-                # so small an impedance lets the plant set the force itself, see plant.py
-                solimp="0.001 0.001 0.001 0.5 2",
-                solref=_numbers((-obstacles.stiffness[i], -obstacles.damping[i])),
-            )
+        for i, name in enumerate(obstacles.names):
+            _add_pair(contact, cover, name, obstacles.friction[i], obstacles.stiffness[i], obstacles.damping[i])
+
+
+def _add_pusher_pairs(contact: ElementTree.Element, pushers: Pushers) -> None:
+    for i, name in enumerate(pushers.names):
+        if pushers.force[i] > 0.0:
+            cover = pushers.covers[i]
+            _add_pair(contact, cover, name, pushers.friction[i], pushers.stiffness[i], pushers.damping[i])
+
+
+def _add_pair(
+    contact: ElementTree.Element, cover: str, other: str, friction: float, stiffness: float, damping: float
+) -> None:
+    _add(
+        contact,
+        "pair",
+        name=f"{cover}/{other}",
+        geom1=cover,
+        geom2=other,
+        condim="3" if friction > 0.0 else "1",
+        friction=_numbers((friction, friction, 0.0, 0.0, 0.0)),
+        # so small an impedance lets the plant set the force itself, see plant.py
+        solimp="0.001 0.001 0.001 0.5 2",
+        solref=_numbers((-stiffness, -damping)),
+    )
 
 
 def _add_cables(tendons: ElementTree.Element, arm: Arm, slack: bool) -> None:

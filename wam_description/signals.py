@@ -23,3 +23,15 @@ class Contact(NamedTuple):
 
 
 NO_CONTACT = Contact("", float("nan"), (0.0, 0.0, 0.0))
+
+
+class Load(NamedTuple):
+    """What the world truly does to one cover, as the simulator knows it."""
+
+    cover: str  # '' where nothing touches
+    place: float  # m along the cover, NaN where there is none
+    force: tuple[float, float, float]  # N, in the cover's frame
+    moment: tuple[float, float, float]  # N m, about the origin of the cover's frame, in that frame
+
+
+NO_LOAD = Load("", float("nan"), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

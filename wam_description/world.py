@@ -63,9 +63,66 @@ class Springs:
 NO_SPRINGS = Springs((), (), (), (), ())
 
 
+PUSHER_SHAPES = ("sphere", "box")
+
+
+@dataclass(frozen=True)
+class Pushers:
+    """Hands that follow a moving link and press on it: rigid bodies with a soft surface, led by the simulator.
+
+    Each comes from `clearance` away, presses with its force from `begin` to `end` (s since power-up),
+    goes along with the link, over which it slides, and leaves.  The force is that of the surface,
+    k_c times depth: what truly acts is what the simulator's contacts say.
+    """
+
+    names: tuple[str, ...] = parameter("names of the pushers")
+    shapes: tuple[str, ...] = parameter("shape of each; a box presses with its flat side", choices=PUSHER_SHAPES)
+    sizes: tuple[float, ...] = parameter(
+        "three numbers each: sphere radius, 0, 0; box half lengths along the link, across it and along the force",
+        "m",
+        low=0.0,
+    )
+    covers: tuple[str, ...] = parameter("cover that each presses on")
+    places: tuple[float, ...] = parameter("where along the cover each begins to press", "m", low=0.0)
+    angles: tuple[float, ...] = parameter("direction of the force round the cover, from its y to its z axis", "rad")
+    force: tuple[float, ...] = parameter("force across the link, zero for no pusher", "N", low=0.0)
+    begin: tuple[float, ...] = parameter("when each touches", "s", low=0.0)
+    end: tuple[float, ...] = parameter("when each leaves", "s", low=0.0)
+    rise: tuple[float, ...] = parameter("time in which the force grows and falls", "s", low=1e-3)
+    clearance: tuple[float, ...] = parameter("distance from the link where each waits", "m", low=1e-3)
+    slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s")
+    turn: tuple[float, ...] = parameter("speed at which each turns round the link", "rad/s")
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
+    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the cover", low=0.0)
+
+    def __post_init__(self) -> None:
+        single = {key: value for key, value in vars(self).items() if key not in ("names", "sizes")}
+        lengths("pushers", self.names, single)
+        lengths("pushers", self.names, {"sizes": self.sizes}, width=3)
+        require(
+            "" not in self.names and len(set(self.names)) == len(self.names),
+            f"parameter 'pushers.names' is {', '.join(self.names)}; give each pusher a name of its own",
+        )
+        for i, name in enumerate(self.names):
+            needed = self.sizes[3 * i : 3 * i + (1 if self.shapes[i] == "sphere" else 3)]
+            require(
+                min(needed) > 0.0, f"{name}: pushers.sizes of a {self.shapes[i]} are {needed}; each must be above 0"
+            )
+            require(
+                self.begin[i] + 2.0 * self.rise[i] <= self.end[i],
+                f"{name}: pushers.end is {self.end[i]:g} s; it must be at least twice the rise after "
+                f"begin, {self.begin[i] + 2.0 * self.rise[i]:g} s",
+            )
+
+
+NO_PUSHERS = Pushers((), (), (), (), (), (), (), (), (), (), (), (), (), (), (), ())
+
+
 @dataclass(frozen=True)
 class World:
     """Everything around the arm."""
 
     obstacles: Obstacles
     springs: Springs
+    pushers: Pushers = NO_PUSHERS

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_description.arm import Shared
+from wam_description.departure import Departure, built
 from wam_description.effects import Effects
 from wam_description.parameters import lengths, parameter
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import NO_CONTACT, Contact, State
+from wam_description.signals import NO_LOAD, Load, State
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier, AmplifierParameters
@@ -28,6 +29,7 @@ class DriverParameters:
     """The simulated hardware and its limits."""
 
     world: World
+    departure: Departure
     effects: Effects
     amplifier: AmplifierParameters
     sensors: SensorParameters
@@ -65,7 +67,7 @@ class Driver:
         arm, timing = shared.arm, shared.timing
         self.safety = Safety()
         random = np.random.Generator(np.random.PCG64(parameters.seed))
-        self.plant = Plant(arm, parameters.world, parameters.effects, timing.substep)
+        self.plant = Plant(built(arm, parameters.departure), parameters.world, parameters.effects, timing.substep)
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random)
         self._sensors = Sensors(arm, parameters.sensors, random)
         self.recent: deque[Sample] = deque(maxlen=parameters.post_mortem_samples)
@@ -226,6 +228,6 @@ class Driver:
         return State(self.plant.q, self.plant.qd, self.plant.cable_torque)
 
     @property
-    def true_contact(self) -> Contact:
+    def true_contact(self) -> Load:
         """The simulator's greatest load on a cover."""
-        return max(self.plant.loads(), key=lambda load: sum(f * f for f in load.force), default=NO_CONTACT)
+        return max(self.plant.loads(), key=lambda load: sum(f * f for f in load.force), default=NO_LOAD)

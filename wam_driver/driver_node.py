@@ -36,7 +36,6 @@ from wam_ros.ports import ERROR, OK, WARN, Ports
 from wam_ros.run import raise_priority, run
 
 PARAMETERS = DriverParameters
-NO_TORQUE = (0.0, 0.0, 0.0)
 
 
 class DriverNode(Node):
@@ -231,7 +230,7 @@ class DriverNode(Node):
             contact = driver.true_contact
             frame = contact.cover or BASE
             ports.publish_joints("sim/joint_states", stamp, driver.true_joint_state)
-            ports.publish("sim/contact/wrench", wrench_stamped(stamp, Wrench(frame, contact.force, NO_TORQUE)))
+            ports.publish("sim/contact/wrench", wrench_stamped(stamp, Wrench(frame, contact.force, contact.moment)))
             ports.publish("sim/contact/point", point_stamped(stamp, frame, (contact.place, 0.0, 0.0)))
         if self._timing.mode == "realtime" and ports.report_due(stamp):
             ports.facts = self._timing_facts()

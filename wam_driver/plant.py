@@ -20,8 +20,9 @@ from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
-from wam_description.signals import Contact
+from wam_description.signals import Load
 from wam_description.world import Springs, World
+from wam_driver.pusher import Pusher, pushers
 
 STUCK_ROTOR = 1e-5  # rad/s; below it a rotor counts as stuck: far under one step of any real motion
 STUCK_JOINT = 1e-6  # rad/s; 1e-3 would make the limit cycle of (5.8) vanish
@@ -36,7 +37,7 @@ class Plant:
     Parameters
     ----------
     arm : the arm; the plant is built from these parameters alone.
-    world : surfaces and springs to touch.
+    world : surfaces and springs to touch, pushers that touch.
     effects : which effects of the transmission are on.
     step : length of a step, s.
     """
@@ -91,10 +92,16 @@ class Plant:
         # MuJoCo may name the two geoms of a contact in either order
         self._pair = {geoms: i for i, pair in enumerate(pairs) for geoms in (pair, pair[::-1])}
         obstacles = world.obstacles
+        self._pushers = pushers(self.model, self.data, arm, world.pushers, step)
+        self._led = {self.model.geom(pusher.name).id: pusher for pusher in self._pushers}
         surfaces = zip(obstacles.stiffness, obstacles.damping, obstacles.hardening, strict=True)
         self._surface = [
             (*surface, size)
-            for surface, size in zip(list(surfaces) * len(arm.covers.names), self.model.pair_dim.tolist(), strict=True)
+            for surface, size in zip(
+                [*list(surfaces) * len(arm.covers.names), *(pusher.surface for pusher in self._pushers)],
+                self.model.pair_dim.tolist(),
+                strict=True,
+            )
         ]
         self._springs = list(self._springs_on_covers(world.springs))
         self._rest()
@@ -180,6 +187,8 @@ class Plant:
         model, data = self.model, self.data
         self._write_torque(0, *torque)
         self._set_friction()
+        for pusher in self._pushers:
+            pusher.lead(data.time)
         mj_step1(model, data)
         if self._pushes:
             self._apply_pushes()
@@ -276,6 +285,8 @@ class Plant:
         rows, distances = contact.efc_address.tolist(), contact.dist.tolist()
         reference, regularisation, velocity = data.efc_aref, data.efc_R, data.efc_vel.tolist()
         shares = ALL_OF_IT if len(pairs) == 1 else _shares(pairs, distances)
+        if self._led:
+            self._follow_pushers(velocity, rows, pairs)
         for pair, row, distance, share in zip(pairs, rows, distances, shares):  # noqa: B905 - one of each for a contact
             if row >= 0:
                 stiffness, damping, hardening, size = self._surface[pair]
@@ -285,6 +296,18 @@ class Plant:
                 reference[row] = force * regularisation[row]
                 for k in range(row + 1, row + size):
                     reference[k] = -velocity[k] / self._step
+
+    def _follow_pushers(self, velocity: list[float], rows: Sequence[int], pairs: Sequence[int]) -> None:
+        """Make the contacts' velocities those against the pushers, which MuJoCo takes for standing still."""
+        contact = self._contact
+        for i, (row, pair) in enumerate(zip(rows, pairs, strict=True)):
+            first, second = contact.geom[i].tolist()
+            pusher = self._led.get(second) or self._led.get(first)
+            if row >= 0 and pusher is not None:
+                sign = 1.0 if second in self._led else -1.0
+                along = (contact.frame[i].reshape(3, 3) @ pusher.velocity).tolist()
+                for k in range(self._surface[pair][3]):
+                    velocity[row + k] += sign * along[k]
 
     @property
     def theta(self) -> list[float]:
@@ -351,10 +374,10 @@ class Plant:
         result: list[float] = torque.tolist()
         return result
 
-    def loads(self) -> list[Contact]:
+    def loads(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
         data = self.data
-        parts: dict[str, list[tuple[np.ndarray, float]]] = {name: [] for name in self._site}
+        parts: dict[str, list[tuple[np.ndarray, np.ndarray, float]]] = {name: [] for name in self._site}
         for i in range(data.ncon):
             first, second = data.contact.geom[i].tolist()
             cover, sign = self._cover_of_geom.get(second), 1.0
@@ -362,28 +385,29 @@ class Plant:
                 cover, sign = self._cover_of_geom[first], -1.0
             mujoco.mj_contactForce(self.model, data, i, self._wrench)
             rotation = data.site_xmat[self._site[cover]].reshape(3, 3)
-            force = sign * (data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3])
-            place = rotation[:, 0] @ (data.contact.pos[i] - data.site_xpos[self._site[cover]])
-            parts[cover].append((rotation.T @ force, float(place)))
+            force = rotation.T @ (sign * (data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3]))
+            at = rotation.T @ (data.contact.pos[i] - data.site_xpos[self._site[cover]])
+            parts[cover].append((force, np.cross(at, force), float(at[0])))
         for cover, (force, torque) in self._pushes.items():
             square = float(force[1] ** 2 + force[2] ** 2)  # a force along x goes through every place
             moment = float(force[1] * torque[2] - force[2] * torque[1])
-            parts[cover].append((force, moment / square if square > 0.0 else np.nan))
+            parts[cover].append((force, torque, moment / square if square > 0.0 else np.nan))
         for tendon, body, cover, lever, rest, bilateral in self._springs:
             squeeze = rest - float(data.ten_length[tendon])
             if squeeze > 0.0 or bilateral:
                 along, across = data.xmat[body].reshape(3, 3).T[:2]
                 rotation = data.site_xmat[self._site[cover]].reshape(3, 3)
                 force = rotation.T @ across * (squeeze * float(self.model.tendon_stiffness[tendon]))
-                at = data.xpos[body] + lever * along - data.site_xpos[self._site[cover]]
-                parts[cover].append((force, float(rotation[:, 0] @ at)))
+                at = rotation.T @ (data.xpos[body] + lever * along - data.site_xpos[self._site[cover]])
+                parts[cover].append((force, np.cross(at, force), float(at[0])))
         result = []
         for cover, shares in parts.items():
-            weights = [float(np.linalg.norm(force)) for force, _ in shares]
+            weights = [float(np.linalg.norm(force)) for force, *_ in shares]
             if sum(weights) > 0.0:
-                place = sum(w * x for w, (_, x) in zip(weights, shares, strict=True)) / sum(weights)
-                force = np.sum([force for force, _ in shares], axis=0)
-                result.append(Contact(cover, place, tuple(force.tolist())))
+                place = sum(w * x for w, (*_, x) in zip(weights, shares, strict=True)) / sum(weights)
+                force = np.sum([force for force, *_ in shares], axis=0)
+                moment = np.sum([moment for _, moment, _ in shares], axis=0)
+                result.append(Load(cover, place, tuple(force.tolist()), tuple(moment.tolist())))
         return result
 
 

@@ -13,14 +13,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
-import rclpy
-from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
-from wam_ros.run import NAMESPACE, PARENT, make_executor, prepare_logging_directory, spin
+from wam_ros.run import NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
 MODULES: Final = {
     "driver": "wam_driver.driver_node",
@@ -131,14 +128,13 @@ class Composition:
     Attributes
     ----------
     nodes : the nodes by name.
+    context, executor : of this connection, for nodes beside these.
     """
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, domain_id: int | None = None) -> None:
         check_nodes(configuration)
-        prepare_logging_directory()
-        self.context = Context()
-        rclpy.init(args=[], context=self.context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
-        self.executor = make_executor(self.context)
+        self._connection = Connection(domain_id=domain_id)
+        self.context, self.executor = self._connection.context, self._connection.executor
         self.nodes: dict[str, Node] = {}
         try:
             with parameter_file(configuration) as parameters:
@@ -156,7 +152,7 @@ class Composition:
             use_global_arguments=False,
         )
         self.nodes[name] = node
-        self.executor.add_node(node)
+        self._connection.add(node)
 
     def __enter__(self) -> "Composition":
         return self
@@ -170,12 +166,9 @@ class Composition:
 
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last."""
-        for name in sorted(self.nodes, key=lambda name: (name == LAST) - (name == FIRST)):
-            node = self.nodes.pop(name)
-            self.executor.remove_node(node)
-            node.destroy_node()
-        self.executor.shutdown()
-        rclpy.try_shutdown(context=self.context)
+        names = {node: name for name, node in self.nodes.items()}
+        self._connection.close(lambda node: (names[node] == LAST) - (names[node] == FIRST))
+        self.nodes.clear()
 
 
 def node_class(name: str) -> Any:

@@ -2,12 +2,10 @@
 
 from typing import NamedTuple
 
-import rclpy
-from rclpy.context import Context
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from wam_ros.run import make_executor, prepare_logging_directory
+from wam_ros.run import Connection
 
 PATIENCE = 10.0  # s
 ATTEMPTS = 20  # an answer can be lost while the service still discovers who asks; asking twice does no harm
@@ -28,13 +26,10 @@ def call(service: str, switch: bool | None) -> Reply:
     service : full name, for example '/wam/driver/enable'.
     switch : value of a SetBool; None for a Trigger.
     """
-    prepare_logging_directory()
-    context = Context()
-    rclpy.init(args=[], context=context)
-    node = Node("wam_call", context=context)
-    executor = make_executor(context)
-    executor.add_node(node)
+    connection = Connection()
     try:
+        node = Node("wam_call", context=connection.context)
+        connection.add(node)
         kind = Trigger if switch is None else SetBool
         client = node.create_client(kind, service)
         if not client.wait_for_service(PATIENCE):
@@ -42,13 +37,10 @@ def call(service: str, switch: bool | None) -> Reply:
         request = kind.Request() if switch is None else kind.Request(data=switch)
         for _ in range(ATTEMPTS):
             future = client.call_async(request)
-            executor.spin_until_future_complete(future, timeout_sec=PATIENCE / ATTEMPTS)
+            connection.executor.spin_until_future_complete(future, timeout_sec=PATIENCE / ATTEMPTS)
             if future.done():
                 answer = future.result()
                 return Reply(bool(answer.success), str(answer.message))
         return Reply(False, f"no answer from {service} within {PATIENCE:g} s")
     finally:
-        executor.remove_node(node)
-        node.destroy_node()
-        executor.shutdown()
-        rclpy.try_shutdown(context=context)
+        connection.close()

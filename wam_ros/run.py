@@ -99,6 +99,46 @@ def prepare_logging_directory() -> None:
     os.environ["ROS_LOG_DIR"] = str(Path(tempfile.gettempdir()) / f"wam_stack_log_{os.getuid()}")
 
 
+class Connection:
+    """A context and an executor for the nodes of this process; leaving it destroys them.
+
+    Parameters
+    ----------
+    arguments : command line for ROS.
+    domain_id : ROS domain, the one of the environment where None.
+
+    Attributes
+    ----------
+    context, executor : to make nodes with, and to spin.
+    """
+
+    def __init__(self, arguments: Sequence[str] = (), domain_id: int | None = None) -> None:
+        prepare_logging_directory()
+        self.context = Context()
+        rclpy.init(
+            args=list(arguments),
+            context=self.context,
+            domain_id=domain_id,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        self.executor = make_executor(self.context)
+        self._nodes: list[Node] = []
+
+    def add(self, node: Node) -> None:
+        """Take a node into the executor."""
+        self.executor.add_node(node)
+        self._nodes.append(node)
+
+    def close(self, order: Callable[[Node], int] = lambda node: 0) -> None:
+        """Destroy the nodes, lowest order first, and leave the network."""
+        for node in sorted(self._nodes, key=order):
+            self.executor.remove_node(node)
+            node.destroy_node()
+        self._nodes.clear()
+        self.executor.shutdown()
+        rclpy.try_shutdown(context=self.context)
+
+
 def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
     """Run one node as this process, until SIGINT, SIGTERM or until its attribute `done` is true.
 
@@ -112,29 +152,21 @@ def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
     SystemExit
         with code 1 where the ROS arguments or the parameters are refused or the node has a `failure`.
     """
-    prepare_logging_directory()
     die_with_parent()
     stop = Stop()
-    context = Context()
     given = list(sys.argv if arguments is None else arguments)
     try:
-        rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
+        connection = Connection(given)
     except RuntimeError as error:
         reason = str(error).split(", at /")[0]
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
-    executor = make_executor(context)
-    node = None
     try:
-        node = make(context=context, namespace=NAMESPACE)
-        executor.add_node(node)
-        spin(executor, lambda: stop.is_set or getattr(node, "done", False))
+        node = make(context=connection.context, namespace=NAMESPACE)
+        connection.add(node)
+        spin(connection.executor, lambda: stop.is_set or getattr(node, "done", False))
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     finally:
-        if node is not None:
-            executor.remove_node(node)
-            node.destroy_node()
-        executor.shutdown()
-        rclpy.try_shutdown(context=context)
+        connection.close()
     if failure := getattr(node, "failure", ""):
         raise SystemExit(f"error: {failure}")

@@ -1,0 +1,104 @@
+"""The table of the battery as text."""
+
+import math
+from collections.abc import Sequence
+
+from wam_analysis.contact_battery import Judgement
+from wam_analysis.contact_battery_score import ANY, FREE_MUST, FREE_STRETCH, Bound, Row, SceneScore, asked, stated
+from wam_analysis.contact_battery_statistics import Figure
+from wam_description.arm import Arm
+
+MET, STRETCH, MARGINAL, MISSED, FEW = "must", "**stretch**", "must, marginal", "**MISSED**", "not enough time"
+
+
+def holds(value: float, bound: Bound) -> bool:
+    """Whether a value is allowed, but for rounding."""
+    low, high = bound
+    return low - 1e-12 <= value <= high + 1e-12
+
+
+def mark(row: Row, found: Figure) -> str:
+    """How a row stands against what is asked, '' where nothing is."""
+    if row.must == ANY and row.stretch == ANY:
+        return ""
+    if math.isnan(found.value):
+        return "no data"
+    counts = row.must == (0.0, 0.0)  # a count that must be none: its interval never is
+    if counts and found.count < FREE_MUST and found.value == 0.0:
+        return FEW
+    if row.stretch != ANY and holds(found.value, row.stretch) and not (counts and found.count < FREE_STRETCH):
+        return STRETCH
+    if row.must == ANY:
+        return "below the aim"
+    if not holds(found.value, row.must):
+        return MISSED
+    clear = counts or (holds(found.low, row.must) and holds(found.high, row.must))
+    return MET if clear else MARGINAL
+
+
+def missed(judgement: Judgement, arm: Arm) -> list[str]:
+    """Rows whose must is missed by all seeds together."""
+    total = judgement.total
+    return [row.name for row in asked(arm) if mark(row, row.of(total)) == MISSED]
+
+
+def table(judgement: Judgement, arm: Arm, rows: Sequence[Row]) -> str:
+    """Rows, a column a seed, all together with 95 % interval and count, and the mark."""
+    head = [
+        "quantity",
+        "unit",
+        "must",
+        "stretch",
+        *(f"seed {seed}" for seed in judgement.seeds),
+        "all",
+        "95 %",
+        "n",
+        "",
+    ]
+    lines = [head, ["---"] * len(head)]
+    for row in rows:
+        found = row.of(judgement.total)
+        if found.count == 0 and row.must == ANY == row.stretch:
+            continue
+        single = [_number(row, row.of(judgement.scores[seed]).value) for seed in judgement.seeds]
+        span = f"{_number(row, found.low)} to {_number(row, found.high)}"
+        asks = [_bound(row, row.must), _bound(row, row.stretch)]
+        lines.append(
+            [row.name, row.unit, *asks, *single, _number(row, found.value), span, str(found.count), mark(row, found)]
+        )
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def counted(scores: Sequence[SceneScore]) -> str:
+    """What was played, in a sentence."""
+    touches = [touch for scene in scores for touch in scene.touches]
+    stopped = [f"{scene.name}: {scene.failure}" for scene in scores if scene.failure]
+    text = (
+        f"{len(scores)} scenes; {len(touches)} contacts judged, {sum(scene.short for scene in scores)} too short, "
+        f"{sum(scene.missed for scene in scores)} meant that never touched; "
+        f"{sum(scene.quiet.seconds for scene in scores if scene.quiet.group == 'free'):.0f} s of free motion."
+    )
+    return text + (f" Stopped early: {'; '.join(stopped)}." if stopped else "")
+
+
+def report(judgement: Judgement, arm: Arm) -> str:
+    """What the command prints."""
+    parts = [counted(judgement.total), "", table(judgement, arm, asked(arm)), table(judgement, arm, stated(arm))]
+    return "\n".join(parts)
+
+
+def _number(row: Row, value: float) -> str:
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "none"
+    return f"{row.scale * value:.3g}"
+
+
+def _bound(row: Row, bound: Bound) -> str:
+    low, high = (f"{row.scale * end:.3g}" for end in bound)
+    if bound == ANY:
+        return ""
+    if bound[0] <= 0.0:
+        return high
+    return f"at least {low}" if bound[1] >= 1.0 else f"{low} to {high}"

@@ -1,0 +1,141 @@
+"""Playing the scenes of the battery and writing down what was felt beside what was true."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import NamedTuple, TypeVar
+
+import mujoco
+import numpy as np
+
+from wam_analysis.contact_battery_scenes import Scene
+from wam_analysis.direct import DirectRun
+from wam_control.contact_estimator import ContactEstimate
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.effects import no_effects
+from wam_description.mjcf import mjcf
+from wam_description.signals import Load
+from wam_description.world import NO_SPRINGS, Obstacles, World
+from wam_driver.safety import Mode
+
+NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
+T, U = TypeVar("T"), TypeVar("U")
+
+
+class Belief(NamedTuple):
+    """One hypothesis of the estimator."""
+
+    cover: str
+    probability: float
+    place: float  # m, NaN where it is not known
+    place_sd: float  # m
+    force: tuple[float, float, float]  # N
+    moment: tuple[float, float, float]  # N m
+
+
+class Record(NamedTuple):
+    """One outer period: the simulator's truth and the estimate.
+
+    Attributes
+    ----------
+    stamp : ns.
+    q, qd : (n,), true, rad and rad/s.
+    load : of the world on the arm, true.
+    torques : (n,), of that load on the joints, N m, by the simulator's kinematics.
+    external : (n,), the same as estimated.
+    external_sd : (n,), its standard deviations; empty where they are not recorded.
+    in_contact : whether something was felt.
+    beliefs : what was felt, the most probable first.
+    """
+
+    stamp: int
+    q: tuple[float, ...]
+    qd: tuple[float, ...]
+    load: Load
+    torques: tuple[float, ...]
+    external: tuple[float, ...]
+    external_sd: tuple[float, ...]
+    in_contact: bool
+    beliefs: tuple[Belief, ...]
+
+
+class Played(NamedTuple):
+    """A scene with its records; `failure` says why it stopped early, '' where it did not."""
+
+    scene: Scene
+    records: list[Record]
+    failure: str
+
+
+class Levers:
+    """Joint torques of a load on a cover by the simulator's kinematics, not by the estimator's."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._model = mujoco.MjModel.from_xml_string(mjcf(arm, 1e-3, World(NOWHERE, NO_SPRINGS), no_effects(arm)))
+        self._data = mujoco.MjData(self._model)
+        self._n = len(arm.joints.names)
+        sites = {name: self._model.site(f"{name}_frame").id for name in arm.covers.names}
+        self._at = {name: (site, int(self._model.site_bodyid[site])) for name, site in sites.items()}
+
+    def torques(self, q: Sequence[float], load: Load) -> tuple[float, ...]:
+        """Torques on the joints, (n,), N m, of a load in pose q, rad."""
+        if not load.cover:
+            return (0.0,) * self._n
+        data, model = self._data, self._model
+        site, body = self._at[load.cover]
+        data.qpos[self._n :] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        rotation = data.site_xmat[site].reshape(3, 3)
+        result = np.zeros(model.nv)
+        force, moment = rotation @ np.array(load.force), rotation @ np.array(load.moment)
+        mujoco.mj_applyFT(model, data, force, moment, data.site_xpos[site], body, result)
+        return tuple(result[self._n :].tolist())
+
+
+def beliefs_of(estimate: ContactEstimate) -> tuple[Belief, ...]:
+    """The hypotheses of an estimate."""
+    return tuple(Belief(h.cover, h.probability, h.place, h.place_sd, h.force, h.moment) for h in estimate.hypotheses)
+
+
+def play(configuration: Configuration, scene: Scene) -> Played:
+    """Play a scene in the loop without ROS."""
+    configured = configuration.with_values(scene.values)
+    run = DirectRun(configured, scene.steps)
+    levers = Levers(configured.shared.arm)
+    records: list[Record] = []
+    done = False
+    while not done:
+        is_outer, stamp = run.driver.is_outer, run.driver.stamp
+        joints = run.driver.true_joint_state
+        load = run.driver.true_contact if is_outer else None
+        done = run.step()
+        if load is None:
+            continue
+        estimate = run.estimate
+        records.append(
+            Record(
+                stamp=stamp,
+                q=tuple(joints.position),
+                qd=tuple(joints.velocity),
+                load=load,
+                torques=levers.torques(joints.position, load),
+                external=estimate.external_torques,
+                external_sd=estimate.torque_sd,
+                in_contact=estimate.in_contact,
+                beliefs=beliefs_of(estimate),
+            )
+        )
+        if run.driver.safety.mode is Mode.FAULT:
+            return Played(scene, records, run.driver.safety.fault)
+    return Played(scene, records, run.scenario.failure)
+
+
+def each(work: Callable[[T], U], items: Iterable[T], processes: int) -> Iterator[U]:
+    """What `work` makes of each item, in order, by several processes."""
+    if processes <= 1:
+        yield from map(work, items)
+        return
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(work, items, chunksize=4)

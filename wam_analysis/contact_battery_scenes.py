@@ -1,0 +1,247 @@
+"""The scenes by which contact estimation is judged: drawn by seed, data alone, the same for every way to play them.
+
+Every scene has an arm of its own that departs from what the controllers know, within the declared range.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wam_analysis.contact_battery_paths import Move, Paths
+from wam_control.scenario import Push, Step
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+
+# the declared range: how far the plant may depart from the configured arm, uniform in +- this
+FRICTION, MASS, STIFFNESS = 0.10, 0.02, 0.10
+PAYLOAD = 0.05  # kg, unknown, in free motion only
+
+RELEASE = 0.05  # s, to let the brakes go
+SETTLE = 0.3  # s, before the first move
+HOLD = 0.32  # s of contact in motion
+REST_HOLD = 0.6  # s of contact at rest
+FREE_SECONDS = 12.0  # length of one scene without contact
+LEVELS = (5.0, 10.0, 20.0)  # N, those that the table names
+WEAKEST, STRONGEST = 1.0, 20.0  # N
+ROUGH = 0.8  # the greatest coefficient of friction, of every fifth pusher
+MARGIN = 0.02  # m from the ends of a link where nothing touches
+KINDS = ("push", "sphere", "flat", "foam")
+
+
+class Planned(NamedTuple):
+    """One contact as it is meant; whether it comes to be, the simulator's contacts say."""
+
+    kind: str
+    cover: str
+    place: float  # m
+    angle: float  # rad, of the force round the cover
+    force: float  # N
+    begin: float  # s since power-up
+    end: float
+    friction: float  # coefficient
+
+
+class Scene(NamedTuple):
+    """What is played: values of a configuration and steps of a scenario.
+
+    Attributes
+    ----------
+    group : 'moving', 'rest', 'dither' or 'free'.
+    values : replaced in the configuration.
+    steps : of the scenario.
+    planned : the contacts that are meant.
+    """
+
+    name: str
+    group: str
+    values: Mapping[str, Any]
+    steps: tuple[Step, ...]
+    planned: tuple[Planned, ...]
+
+
+def dither_switch(configuration: Configuration) -> str:
+    """The parameter that makes the velocity loop dither, '' where it cannot."""
+    names = [name for name in configuration.sections["velocity_loop"] if "dither" in name]
+    amplitudes = [name for name in names if "amplitude" in name or "level" in name or "torque" in name]
+    return amplitudes[0] if amplitudes else ""
+
+
+def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, Any]:
+    """What every scene changes: nothing within reach, fast moves allowed, the estimator's model as configured."""
+    estimator = configuration.sections["contact_estimator"]
+    joints = len(configuration.shared.arm.joints.names)
+    places = [5.0] * len(configuration.sections["driver"]["world.obstacles.positions"])
+    values: dict[str, Any] = {
+        "driver:world.obstacles.positions": places,
+        "force_loop:joint_speed_limit": 3.5,
+        "contact_estimator:use_joint_sensors": joint_sensors,
+    }
+    own = {"observer.mass_scale": [1.0] * joints, "observer.friction_scale": 1.0}
+    values |= {f"contact_estimator:{name}": value for name, value in own.items() if name in estimator}
+    return values
+
+
+class Draw:
+    """Scenes of one seed.
+
+    Parameters
+    ----------
+    configuration : what is judged.
+    seed : of every draw.
+    joint_sensors : whether the estimator feels with the joint sensors.
+    """
+
+    def __init__(self, configuration: Configuration, seed: int, joint_sensors: bool = False) -> None:
+        self._configuration, self._seed = configuration, seed
+        self._arm: Arm = configuration.shared.arm
+        self._paths = Paths(self._arm)
+        self._base = base_values(configuration, joint_sensors)
+
+    def contacts(self, count: int) -> list[Scene]:
+        """Scenes with `count` contacts in motion, two a scene."""
+        return [self._moving(i) for i in range((count + 1) // 2)]
+
+    def resting(self, count: int, dither: Mapping[str, Any] | None = None) -> list[Scene]:
+        """Scenes with `count` contacts at rest, two a scene; the same ones with and without dither."""
+        return [self._resting(i, dither) for i in range((count + 1) // 2)]
+
+    def free(self, seconds: float) -> list[Scene]:
+        """Motion with stops and reversals and an unknown payload, and nothing to touch."""
+        return [self._free(i) for i in range(math.ceil(seconds / FREE_SECONDS - 1e-9))]
+
+    def _random(self, group: int, i: int) -> np.random.Generator:
+        return np.random.default_rng((self._seed, group, i))
+
+    def _moving(self, i: int) -> Scene:
+        random = self._random(0, i)
+        start = self._paths.pose(random)
+        moves = self._paths.moves(random, start, 2)
+        steps, planned = _opening(), []
+        now = RELEASE + SETTLE
+        for number, move in enumerate(moves):
+            begin = now + 0.3 * move.seconds
+            contact = self._contact(random, begin, begin + HOLD)
+            planned.append(contact)
+            push = _push(contact, now) if contact.kind == "push" else None
+            steps.append(Step(f"move {number + 1}", move.seconds, posture=move.posture, push=push))
+            now += move.seconds
+        steps.append(Step("end", 0.1))
+        values = self._values(random, start, planned)
+        return Scene(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), tuple(planned))
+
+    def _resting(self, i: int, dither: Mapping[str, Any] | None) -> Scene:
+        random = self._random(1, i)
+        start = self._paths.pose(random)
+        (move,) = self._paths.moves(random, start, 1)
+        steps, planned = [*_opening(), Step("move", move.seconds, posture=move.posture)], []
+        now = RELEASE + SETTLE + move.seconds
+        for number in range(2):
+            begin = now + 0.6
+            contact = self._contact(random, begin, begin + REST_HOLD)
+            planned.append(contact)
+            push = _push(contact, now) if contact.kind == "push" else None
+            steps.append(Step(f"rest {number + 1}", 0.6 + REST_HOLD + 0.2, push=push))
+            now += steps[-1].seconds
+        values = self._values(random, start, planned) | dict(dither or {})
+        group = "rest" if dither is None else "dither"
+        return Scene(f"seed {self._seed} {group} {i}", group, values, tuple(steps), tuple(planned))
+
+    def _free(self, i: int) -> Scene:
+        random = self._random(2, i)
+        start = self._paths.pose(random)
+        steps, left = _opening(), FREE_SECONDS - RELEASE - SETTLE
+        here = start
+        while left > 0.0:
+            (move,) = self._paths.moves(random, here, 1, before=steps[-1].posture)
+            steps.append(Step("move", move.seconds, posture=move.posture))
+            stop = float(random.choice((0.0, 0.0, 0.1, 0.4)))
+            if stop:
+                steps.append(Step("stop", stop))
+            left -= move.seconds + stop
+            here = move.posture
+        values = self._values(random, start, []) | {"driver:departure.payload": float(random.uniform(0.0, PAYLOAD))}
+        return Scene(f"seed {self._seed} free {i}", "free", values, tuple(steps), ())
+
+    def _contact(self, random: np.random.Generator, begin: float, end: float) -> Planned:
+        covers = self._arm.covers
+        cover = int(random.random() < 0.7) if len(covers.names) > 1 else 0
+        kind = str(random.choice(("push", "sphere", "flat"), p=(0.4, 0.3, 0.3)))
+        level = float(random.choice((*LEVELS, 0.0), p=(0.35, 0.25, 0.2, 0.2)))
+        force = level * float(random.uniform(0.95, 1.05)) if level else float(random.uniform(WEAKEST, STRONGEST))
+        friction = ROUGH if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
+        return Planned(
+            kind=kind,
+            cover=covers.names[cover],
+            place=float(random.uniform(MARGIN, covers.length[cover] - MARGIN)),
+            angle=float(random.uniform(-math.pi, math.pi)),
+            force=force,
+            begin=round(begin, 3),
+            end=round(end, 3),
+            friction=friction if kind != "push" else 0.0,
+        )
+
+    def _values(self, random: np.random.Generator, start: Sequence[float], planned: list[Planned]) -> dict[str, Any]:
+        return {
+            **self._base,
+            "arm.joints.start": list(start),
+            **_departure(random, self._arm),
+            **_pushers(random, [contact for contact in planned if contact.kind in ("sphere", "flat")]),
+        }
+
+
+def _opening() -> list[Step]:
+    return [Step("release", RELEASE, request="enable"), Step("settle", SETTLE)]
+
+
+def _push(contact: Planned, step_begins: float) -> Push:
+    force = (0.0, contact.force * math.cos(contact.angle), contact.force * math.sin(contact.angle))
+    return Push(contact.cover, contact.place, force, contact.begin - step_begins, contact.end - step_begins)
+
+
+def _departure(random: np.random.Generator, arm: Arm) -> dict[str, Any]:
+    def factors(width: float, count: int) -> list[float]:
+        return (1.0 + width * random.uniform(-1.0, 1.0, count)).tolist()
+
+    motors, joints = len(arm.motors.names), len(arm.joints.names)
+    return {
+        "driver:departure.mass": factors(MASS, len(arm.links.names)),
+        "driver:departure.motor_friction": factors(FRICTION, motors),
+        "driver:departure.joint_friction": factors(FRICTION, joints),
+        "driver:departure.stiffness": factors(STIFFNESS, motors),
+    }
+
+
+def _pushers(random: np.random.Generator, contacts: list[Planned]) -> dict[str, Any]:
+    if not contacts:
+        return {}
+    sliding = [float(random.choice((0.0, 1.0))) for _ in contacts]
+    columns: dict[str, list[Any]] = {
+        "names": [f"hand{i}" for i in range(len(contacts))],
+        "shapes": ["sphere" if contact.kind == "sphere" else "box" for contact in contacts],
+        "sizes": [size for contact in contacts for size in _size(random, contact.kind)],
+        "covers": [contact.cover for contact in contacts],
+        "places": [contact.place for contact in contacts],
+        "angles": [contact.angle for contact in contacts],
+        "force": [contact.force for contact in contacts],
+        "begin": [contact.begin for contact in contacts],
+        "end": [contact.end for contact in contacts],
+        "rise": [float(random.uniform(0.01, 0.03)) for _ in contacts],
+        "clearance": [0.01 for _ in contacts],
+        "slide": [share * float(random.uniform(-0.03, 0.03)) for share in sliding],
+        "turn": [share * float(random.uniform(-0.5, 0.5)) for share in sliding],
+        "stiffness": [float(random.uniform(1000.0, 4000.0)) for _ in contacts],
+        "damping": [10.0 for _ in contacts],
+        "friction": [contact.friction for contact in contacts],
+    }
+    return {f"driver:world.pushers.{key}": column for key, column in columns.items()}
+
+
+def _size(random: np.random.Generator, kind: str) -> tuple[float, float, float]:
+    if kind == "sphere":
+        return float(random.uniform(0.02, 0.06)), 0.0, 0.0
+    return float(random.uniform(0.01, 0.03)), 0.04, 0.02
+
+
+__all__ = ["Draw", "Move", "Planned", "Scene", "base_values", "dither_switch"]

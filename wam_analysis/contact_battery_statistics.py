@@ -1,0 +1,74 @@
+"""Numbers with their uncertainty: shares, medians, quantiles and rms of what a battery found."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+Z = 1.96  # of a two-sided 95 % interval
+RESAMPLED = 400
+
+
+class Figure(NamedTuple):
+    """A measured number, its 95 % interval and how many observations it rests on; NaN where there are none."""
+
+    value: float
+    low: float
+    high: float
+    count: int
+
+
+NONE = Figure(math.nan, math.nan, math.nan, 0)
+
+
+def share(hits: int, count: int) -> Figure:
+    """Share of hits with its Wilson interval (1927)."""
+    if count == 0:
+        return NONE
+    p, z2 = hits / count, Z * Z
+    centre = (p + z2 / (2.0 * count)) / (1.0 + z2 / count)
+    half = Z * math.sqrt(p * (1.0 - p) / count + z2 / (4.0 * count * count)) / (1.0 + z2 / count)
+    return Figure(p, max(0.0, centre - half), min(1.0, centre + half), count)
+
+
+def quantile(values: Sequence[float], level: float) -> Figure:
+    """A quantile with its interval by order statistics; infinite values are greatest of all."""
+    n = len(values)
+    if n == 0:
+        return NONE
+    ordered = sorted(values)
+    half = Z * math.sqrt(n * level * (1.0 - level))
+    low, high = (min(max(math.floor(n * level + side * half), 0), n - 1) for side in (-1.0, 1.0))
+    middle = n * level - 0.5
+    lower, upper = (ordered[min(max(k, 0), n - 1)] for k in (math.floor(middle), math.ceil(middle)))
+    value = lower if lower == upper else lower + (middle - math.floor(middle)) * (upper - lower)
+    return Figure(value, ordered[low], ordered[high], n)
+
+
+def rms(sums: Sequence[float], counts: Sequence[int]) -> Figure:
+    """Root mean square of observations that come in correlated groups; the interval resamples the groups.
+
+    Parameters
+    ----------
+    sums : sum of squares of each group.
+    counts : observations of each group.
+    """
+    total = sum(counts)
+    if total == 0:
+        return NONE
+    squares, sizes = np.array(sums), np.array(counts, dtype=float)
+    chosen = np.random.default_rng(0).integers(0, len(squares), (RESAMPLED, len(squares)))
+    spread = np.sqrt(squares[chosen].sum(axis=1) / np.maximum(sizes[chosen].sum(axis=1), 1.0))
+    low, high = np.quantile(spread, (0.025, 0.975)).tolist()
+    return Figure(math.sqrt(float(squares.sum()) / total), low, high, total)
+
+
+def events(count: int, seconds: float) -> Figure:
+    """A count in a time, with its Poisson interval (Byar's approximation), as a count."""
+    if seconds <= 0.0:
+        return NONE
+    low = count * (1.0 - 1.0 / (9.0 * count) - Z / (3.0 * math.sqrt(count))) ** 3 if count else 0.0
+    more = count + 1
+    high = more * (1.0 - 1.0 / (9.0 * more) + Z / (3.0 * math.sqrt(more))) ** 3
+    return Figure(float(count), low, high, round(seconds))

@@ -1,0 +1,109 @@
+"""Pushers of the plant: bodies that the simulator leads so that they press on a link that moves."""
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from wam_description.arm import Arm
+from wam_description.world import Pushers
+
+
+class Pusher:
+    """One hand.  It knows where the link is, as a hand does that rests on it, and so presses evenly.
+
+    Its pose is led, its surface is soft and has friction; the link's pose that it goes by is one step old
+    and carried on by the link's velocity.
+
+    Parameters
+    ----------
+    model, data : of MuJoCo.
+    arm : for the cover's shape.
+    given : all pushers.
+    i : which of them.
+    step : of the plant, s.
+
+    Attributes
+    ----------
+    name : of the body and its geom.
+    surface : stiffness, N/m, damping, N s/m, hardening, 1/m, of its surface.
+    velocity : (3,), m/s, of its surface in the base frame.
+    """
+
+    def __init__(self, model: Any, data: Any, arm: Arm, given: Pushers, i: int, step: float) -> None:
+        self.name = given.names[i]
+        self.surface = (given.stiffness[i], given.damping[i], 0.0)
+        self.velocity = np.zeros(3)
+        self._model, self._data, self._step = model, data, step
+        self._mocap = int(model.body(self.name).mocapid[0])
+        self._away = model.body(self.name).pos.copy()
+        self._is_away = True
+        cover = arm.covers.names.index(given.covers[i])
+        rows = slice(3 * cover, 3 * cover + 3)
+        start, end = np.array(arm.covers.start[rows]), np.array(arm.covers.end[rows])
+        self._slope = (end - start) / (end[0] - start[0])  # of the tube's axis, per place
+        self._axis = self._slope / np.linalg.norm(self._slope)
+        self._origin = start - start[0] * self._slope
+        self._site = model.site(f"{given.covers[i]}_frame").id
+        self._radius = arm.covers.radius[cover]
+        self._height = given.sizes[3 * i] if given.shapes[i] == "sphere" else given.sizes[3 * i + 2]
+        self._place, self._angle = given.places[i], given.angles[i]
+        self._slide, self._turn = given.slide[i], given.turn[i]
+        self._depth, self._clearance = given.force[i] / given.stiffness[i], given.clearance[i]
+        self._begin, self._end, self._rise = given.begin[i], given.end[i], given.rise[i]
+        self._motion, self._quaternion = np.zeros(6), np.zeros(4)
+
+    def lead(self, time: float) -> None:
+        """Go where the hand is at a time, s since power-up."""
+        data = self._data
+        if not self._begin - self._rise <= time <= self._end + self._rise:
+            if not self._is_away:
+                data.mocap_pos[self._mocap] = self._away
+                self._is_away = True
+            return
+        self._is_away = False
+        depth, sinking = self.depth(time)
+        force, across = self._directions(self._angle + self._turn * (time - self._begin))
+        at = self._origin + (self._place + self._slide * (time - self._begin)) * self._slope
+        rotation = data.site_xmat[self._site].reshape(3, 3)
+        mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_SITE, self._site, self._motion, 0)
+        spin, drift = self._motion[:3], self._motion[3:]
+        own = sinking * force + self._slide * self._axis + self._turn * self._radius * across
+        self.velocity = drift + _cross(spin, rotation @ (at - self._radius * force)) + rotation @ own
+        centre = rotation @ (at - (self._radius + self._height - depth) * force)
+        carried = drift + _cross(spin, centre)
+        data.mocap_pos[self._mocap] = data.site_xpos[self._site] + centre + self._step * carried
+        turned = rotation @ np.column_stack((self._axis, across, force))
+        turned += self._step * np.cross(spin, turned.T).T
+        mujoco.mju_mat2Quat(self._quaternion, turned.ravel())
+        data.mocap_quat[self._mocap] = self._quaternion
+
+    def depth(self, time: float) -> tuple[float, float]:
+        """How deep the surface is pressed in, m, negative before it touches, and how fast it sinks, m/s."""
+        coming, leaving = (time - self._begin) / self._rise, (self._end - time) / self._rise
+        nearer, way = (coming, 1.0) if coming < leaving else (leaving, -1.0)
+        if nearer >= 1.0:
+            return self._depth, 0.0
+        size = self._depth if nearer > 0.0 else -self._clearance
+        blend = 0.5 * (1.0 - math.cos(math.pi * nearer))
+        speed = 0.5 * math.pi * math.sin(math.pi * abs(nearer)) / self._rise
+        return size * blend, way * abs(size) * speed
+
+    def _directions(self, angle: float) -> tuple[np.ndarray, np.ndarray]:
+        """Of the force, across the tube, and across both, in the cover's frame."""
+        force = np.array((0.0, math.cos(angle), math.sin(angle)))
+        force -= self._axis * (self._axis @ force)
+        force /= math.sqrt(force @ force)
+        return force, _cross(force, self._axis)
+
+
+def pushers(model: Any, data: Any, arm: Arm, given: Pushers, step: float) -> list[Pusher]:
+    """The pushers that press at all."""
+    return [Pusher(model, data, arm, given, i, step) for i, force in enumerate(given.force) if force > 0.0]
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of two vectors; NumPy's takes ten times as long."""
+    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
+    return np.array((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0))

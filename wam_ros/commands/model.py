@@ -1,0 +1,34 @@
+"""`wam model`: the arm's model as a file for other programs."""
+
+import argparse
+from typing import Any
+
+from wam_description.effects import Effects
+from wam_description.mjcf import mjcf
+from wam_description.parameters import build
+from wam_description.urdf import urdf
+from wam_description.world import World
+from wam_ros.commands import configuration_of, take_configuration
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("format", choices=("urdf", "mjcf"))
+    take_configuration(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Print the model."""
+    configuration = configuration_of(given)
+    shared = configuration.shared
+    if given.format == "urdf":
+        print(urdf(shared.arm))
+        return 0
+
+    def part(prefix: str) -> dict[str, Any]:
+        section = configuration.sections["driver"]
+        return {key.removeprefix(prefix): value for key, value in section.items() if key.startswith(prefix)}
+
+    world, effects = build(World, part("world.")), build(Effects, part("effects."))
+    print(mjcf(shared.arm, shared.timing.substep, world, effects))
+    return 0

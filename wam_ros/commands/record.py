@@ -1,0 +1,25 @@
+"""`wam record`: every topic of a running stack into a bag."""
+
+import argparse
+
+from wam_ros.bring_up import node_class, parameter_file
+from wam_ros.commands import configuration_of, take_configuration
+from wam_ros.run import run as run_node
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("--name", default="", help="name of the bag; default: arm, date and time")
+    parser.add_argument("--directory", help="where the bag goes, instead of the configuration's")
+    take_configuration(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Record until Ctrl-C."""
+    values = {"recorder:name": given.name}
+    if given.directory:
+        values["recorder:directory"] = given.directory
+    configuration = configuration_of(given).with_values(values)
+    with parameter_file(configuration) as file:
+        run_node(node_class("recorder"), ["wam", "--ros-args", "--params-file", str(file)])
+    return 0

@@ -1,0 +1,17 @@
+"""`wam report`: what a recording of the demonstration shows."""
+
+import argparse
+from pathlib import Path
+
+from wam_analysis.demo_report import report
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("bag", type=Path, help="directory of the bag")
+
+
+def run(given: argparse.Namespace) -> int:
+    """Print the report."""
+    print(report(given.bag))
+    return 0
