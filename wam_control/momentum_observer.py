@@ -18,6 +18,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
 
+SETTLED = 2.0  # time constants from the first sample until the estimate counts
 NO_MASS = 1e-6  # kg, the least that a link may have
 
 
@@ -118,7 +119,7 @@ class MomentumObserver:
         self._momentum: list[float] | None = None
         self._known: list[float] = [0.0] * n
         self._bias: list[float] = [0.0] * n
-        self._gap = 0.0
+        self._gap = self._age = 0.0
         self.is_ready = False
 
     def observe(self, state: State, dt: float) -> bool:
@@ -194,8 +195,11 @@ class MomentumObserver:
         if self._cycle:
             self._ring[self._filled % self._cycle] = residual + self._sliding + self._resting
             self._filled += 1
-        # half a cycle of a dither would pass for a push; in the first one the arm still settles
-        self.is_ready = self.is_ready or (before is not None and self._filled >= 2 * self._cycle)
+        # brakes let go with a jolt that a model without elastic cables does not know;
+        # half a cycle of a dither would pass for a push
+        self._age += span
+        settled = self._age > SETTLED * self._parameters.time_constant and self._filled >= 2 * self._cycle
+        self.is_ready = self.is_ready or (before is not None and settled)
         return True
 
     def torques(self) -> tuple[list[float], NDArray[np.float64]]:
@@ -304,7 +308,8 @@ class _Load:
         )
         self._body = RigidBody(dataclasses.replace(arm, links=links))
         low, high = payload
-        self.mass, self.sd = 0.5 * (low + high), 0.5 * (high - low)
+        # the arm without anything in its hand counts as the rule; sd of an even spread, about the least
+        self.mass, self.sd = low, (high - low) / math.sqrt(3.0)
         self._payload = payload
         self.torque: list[float] = [0.0] * n
         self.reset()
