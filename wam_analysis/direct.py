@@ -108,7 +108,9 @@ class DirectRun:
     def _outer(self, stamp: int, motors: State, sensors: State | None) -> bool:
         dt = seconds(self._timing.outer_period_ns)
         self.estimate = estimate = self._estimator.estimate()
-        contact = Contact(estimate.link, estimate.place, estimate.force) if estimate.link else NO_CONTACT
+        contact = NO_CONTACT
+        if estimate.link:
+            contact = Contact(estimate.link, estimate.place, estimate.force, estimate.place_sd, estimate.probability)
         joints = self._transform.joint_state(motors)
         played = self.scenario.step(joints.position, contact, dt)
         self._request(played)
@@ -121,9 +123,11 @@ class DirectRun:
         self._say_joints("joint_states", stamp, joints)
         self._say("gravity_effort", stamp, gravity)
         self._say("external_joint_torques", stamp, external)
+        self._say("external_joint_torques_sd", stamp, estimate.torque_sd)
         frame = estimate.link or "base"
         self._say("contact/wrench", stamp, [*estimate.force, *estimate.moment], frame)
         self._say("contact/point", stamp, [estimate.place, 0.0, 0.0], frame)
+        self._say("contact/spread", stamp, [estimate.place_sd, estimate.probability, estimate.direction_sd], frame)
         self._say("joint_velocity_command", stamp, out.velocity)
         self._say("joint_effort_command", stamp, out.effort)
         self._say("motor_velocity_command", stamp, velocity)
