@@ -19,11 +19,12 @@ CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.y
 ARM = CONFIGURATION.shared.arm
 PARAMETERS = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).inference
 INFERENCE = ContactInference(ARM, RigidBody(ARM), PARAMETERS)
-EXACT = ContactInference(ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, force_scale=1e4, friction=0.0))
+EXACT = ContactInference(ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, force_scale=1e4, miss=0.0, friction=0.0))
 POSE = (0.0, -1.05, 0.0, 0.5)
 SD = 0.02
 S = SD**2 * np.eye(4)
 W = np.linalg.inv(S)
+NOISELESS = 1e6 * W
 
 
 def infer(
@@ -40,7 +41,7 @@ def test_in_plane_force_agrees_with_the_closed_form() -> None:
     """F1 = (m_n2 - tau4)/(L3 s4), x = tau4/F1; with theta3 = 0 axis 2 is parallel to axis 4."""
     x, force = 0.28, 6.0
     tau2, tau4 = (L3 * math.sin(0.5) + x) * force, x * force
-    found = EXACT.infer(POSE, [0.0, tau2, 0.0, tau4], W)[0]
+    found = EXACT.infer(POSE, [0.0, tau2, 0.0, tau4], NOISELESS)[0]
     by_hand = (tau2 - tau4) / (L3 * math.sin(0.5))
     assert found.cover == "outer_link"
     assert found.force == pytest.approx((0.0, by_hand, 0.0), abs=1e-5)
@@ -57,7 +58,7 @@ def test_out_of_plane_force_agrees_with_the_closed_form() -> None:
     tau3 = m_u * u_on_inner + m_n1 * n_on_inner
     across = m_u * c4 - m_n1 * s4  # the rest of the moment, across the inner link
     tau1 = tau3 * math.cos(POSE[1]) + across * math.sin(POSE[1])
-    found = EXACT.infer(POSE, [tau1, 0.0, tau3, 0.0], W)[0]
+    found = EXACT.infer(POSE, [tau1, 0.0, tau3, 0.0], NOISELESS)[0]
     assert found.cover == "outer_link"
     assert found.force == pytest.approx((0.0, 0.0, m_u / (L3 * c4)), abs=1e-5)
     assert found.place == pytest.approx(-m_n1 / found.force[2] - L3 * s4, abs=1e-5)
@@ -79,13 +80,14 @@ def test_any_direction_and_pose_on_the_outer_link() -> None:
         wrong += found[0].cover != "outer_link"
         outer = of(found, "outer_link")
         if not math.isnan(outer.place):
-            errors.append(abs(outer.place - x))
+            errors.append((abs(outer.place - x), outer.place_sd))
             forces.append(np.linalg.norm(np.subtract(outer.force, force)) / size)
             assert outer.direction == pytest.approx(phi, abs=0.1)
     assert len(errors) > 195
     assert wrong <= 2
-    assert max(errors) < 0.02
-    assert np.quantile(errors, 0.95) < 0.002
+    assert max(error for error, _ in errors) < 0.1
+    assert max(error / sd for error, sd in errors) < 2.0
+    assert np.quantile([error for error, _ in errors], 0.9) < 0.02
     assert np.quantile(forces, 0.95) < 0.01
 
 
@@ -160,13 +162,13 @@ def test_unknown_places_always_have_a_reason_and_the_least_force() -> None:
                 assert found.is_lower_bound
             else:
                 assert 0.0 <= found.place <= L4
-                assert 0.0 < found.place_sd < L4 / math.sqrt(12)
+                assert 0.0 < found.place_sd < L4 / 2
     assert seen >= 300
 
 
 def test_a_place_lost_in_noise_leaves_the_force_that_the_longest_lever_needs() -> None:
     tau = torques(POSE, "outer_link", (0.2, 0, 0), (0, 2, 0))
-    outer = of(INFERENCE.infer(POSE, tau.tolist(), np.eye(4) / 0.3**2), "outer_link")
+    outer = of(INFERENCE.infer(POSE, tau.tolist(), np.eye(4) / 1.0**2), "outer_link")
     assert contact_inference.WEAK in outer.reason
     levers = torques(POSE, "outer_link", (L4, 0, 0), (0, 1, 0))
     assert outer.force[1] == pytest.approx(levers @ tau / (levers @ levers), rel=0.03)
@@ -175,7 +177,8 @@ def test_a_place_lost_in_noise_leaves_the_force_that_the_longest_lever_needs() -
 def evidence(q: tuple[float, ...], tau: np.ndarray, cover: str) -> float:
     """Log probability of torques by brute force: every place alike, normal force, twist that goes with it."""
     length, slope = (L3, 0.04064 / L3) if cover == "inner_link" else (L4, 0.0)
-    twist_arm = PARAMETERS.friction * ARM.covers.radius[ARM.covers.names.index(cover)]
+    radius = ARM.covers.radius[ARM.covers.names.index(cover)]
+    twist_arm = PARAMETERS.miss * ARM.covers.radius[ARM.covers.names.index(cover)]
     across = (0.0, 1.0, 0.0), (-slope, 0.0, 1.0)
 
     def levers(x: float) -> np.ndarray:
@@ -183,13 +186,15 @@ def evidence(q: tuple[float, ...], tau: np.ndarray, cover: str) -> float:
 
     first, last = levers(0.0), levers(1.0)
     off = torques(q, cover, (0, 1, 0), (0, 0, 1)) - torques(q, cover, (0, 0, 0), (0, 0, 1))
+    along = torques(q, cover, (0.0, 0.0, 0.0), (1.0, 0.0, slope))
     logs = []
     for x in np.linspace(0.0, length, 2001):
         at = first + x * (last - first)
         prior = np.linalg.inv(PARAMETERS.force_scale**2 * at @ at.T + S)
         force = PARAMETERS.force_scale**2 * at.T @ prior @ tau
         twist = twist_arm**2 * (force @ force) * np.outer(off, off)
-        spread = S + PARAMETERS.force_scale**2 * at @ at.T + twist
+        lean = PARAMETERS.friction * (np.linalg.norm(force) * along + radius * (last - first) @ force)
+        spread = S + PARAMETERS.force_scale**2 * at @ at.T + twist + np.outer(lean, lean)
         logs.append(-0.5 * (tau @ np.linalg.solve(spread, tau) + np.linalg.slogdet(spread)[1]))
     return float(np.logaddexp.reduce(logs) - math.log(len(logs)))
 
@@ -238,8 +243,9 @@ def test_two_contacts_are_not_explained_by_one() -> None:
 
 def test_statistic_respects_the_covariance() -> None:
     covariance = np.array([[1.0, 0.8], [0.8, 1.0]])
-    assert detection_statistic([1.0, 1.0], covariance) == pytest.approx(2 / 1.8)
-    assert detection_statistic([1.0, -1.0], covariance) == pytest.approx(2 / 0.2)
+    precision = np.linalg.inv(covariance)
+    assert detection_statistic([1.0, 1.0], precision) == pytest.approx(2 / 1.8)
+    assert detection_statistic([1.0, -1.0], precision) == pytest.approx(2 / 0.2)
 
 
 def one_joint(arm: Arm) -> Arm:

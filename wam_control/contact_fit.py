@@ -23,7 +23,8 @@ Pair = tuple[float, float]
 LEAST_FORCE = 1e-6  # N, keeps the lean of no force from dividing by zero
 REACH = 8.0  # of the log of probability, below which a place does not matter
 FEW = 6  # places of a peak below which it is looked at more closely
-PARTS = 8  # pieces of a place then
+PARTS = 16  # pieces of it then, half a standard deviation each
+WEAK_PRIOR = 1e-9  # of the force prior: keeps directions that no joint sees from dividing by zero
 SET = 0.9  # probability of the set that is reported
 
 
@@ -36,6 +37,8 @@ class Fit(NamedTuple):
     force : (2,), N, most likely components across the link at `place`.
     force_sd : N, standard deviation of the size of the force, the place unknown.
     direction_sd : rad, standard deviation of its direction round the link, the place unknown.
+    told_sd : m, standard deviation of the place by the torques alone, without what is likely of places and
+        forces; infinite where they do not tell it.
     force_at_end : (2,), N, the force if the place were the end of the link, the longest lever.
     residual : what the best contact leaves unexplained, chi^2.
     probability : of this link among all.
@@ -47,6 +50,7 @@ class Fit(NamedTuple):
     force: Pair
     force_sd: float
     direction_sd: float
+    told_sd: float
     force_at_end: Pair
     residual: float
     probability: float
@@ -108,8 +112,8 @@ class ContactFit:
         log_density = self._log_density(links)
         top = max(map(max, log_density))
         cells: list[Cell] = []
-        for i, values in enumerate(log_density):
-            cells += self._cells(i, values, top)
+        for i, link in enumerate(links):
+            cells += self._cells(i, link, log_density[i], top)
         parts = self._parts(sorted(cells, reverse=True))
         return [self._fit(i, link, *part) for i, (link, part) in enumerate(zip(links, parts, strict=True))]
 
@@ -128,30 +132,33 @@ class ContactFit:
         result: list[list[float]] = (0.5 * (log_density - constant)).tolist()
         return result
 
-    def _cells(self, i: int, values: list[float], top: float) -> list[Cell]:
+    def _cells(self, i: int, link: "_Link", values: list[float], top: float) -> list[Cell]:
         """The places of a link that matter; pieces of them where the peak is narrow.
 
-        A narrow peak is the exponential of a parabola, through the three places around it.
+        A narrow peak is the exponential of a parabola, sought by parabolas through three places, ever nearer.
         """
         row, width, floor = self._row[i], self._widths[i], top - REACH
         cells = [(value, x, width, i) for value, x in zip(values, row, strict=True) if value > floor]
         if not 0 < len(cells) < FEW:
             return cells
         peak = max(range(len(values)), key=values.__getitem__)
-        middle = min(max(peak, 1), len(values) - 2)
-        before, at, after = values[middle - 1 : middle + 2]
-        slope, bend = 0.5 * (after - before), 0.5 * (after + before) - at
-        if bend >= 0.0:
-            return cells
-        start, end = self._ends[i]
-        reach, part = len(cells) * PARTS, 1.0 / PARTS
-        pieces = []
-        for k in range(-reach, reach):
-            step = (k + 0.5) * part
-            value, x = at + step * (slope + step * bend), row[middle] + step * width
-            if value > floor and start < x < end:
-                pieces.append((value, x, part * width, i))
-        return pieces
+        (start, end), x, near = self._ends[i], row[peak], width
+        offset = values[peak] - link.log_density(x)
+        for _ in range(3):
+            x = min(max(x, start), end)
+            before, at, after = link.log_density(x - near), link.log_density(x), link.log_density(x + near)
+            slope, bend = 0.5 * (after - before) / near, (0.5 * (after + before) - at) / (near * near)
+            if bend >= 0.0:
+                return cells
+            step = -0.5 * slope / bend
+            x, near = x + min(max(step, -width), width), 0.25 * near
+        at, sd = link.log_density(x) + offset, math.sqrt(-0.5 / bend)
+        left, right = max(start, x - 4.0 * sd), min(end, x + 4.0 * sd)
+        if left >= right:  # the peak lies beyond the end of the link; all of it is at the end
+            left, right = (end - sd, end) if x > end else (start, start + sd)
+        part = (right - left) / PARTS
+        places = [left + (k + 0.5) * part for k in range(PARTS)]
+        return [(at + bend * (place - x) ** 2, place, part, i) for place in places]
 
     def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float]]:
         """Probability, mean and variance of the place, low and high end of the 90 % set, of each link.
@@ -200,6 +207,7 @@ class ContactFit:
             force=force,
             force_sd=math.sqrt(along),
             direction_sd=min(math.sqrt(about) / size, math.pi),
+            told_sd=link.told_sd(place, force),
             force_at_end=link.force(self._ends[i][1])[0],
             residual=max(0.0, link.rr - explained - self._precision * size * size),
             probability=probability,
@@ -217,6 +225,7 @@ class _Link:
         _, _, a22, a2b1, a2b2 = gram[2][:5]
         b11, b12 = gram[3][3:5]
         self.precision, self.log_widening = precision, log_widening
+        self._slopes = (a1b1, a1b2, a2b1, a2b2, b11, b12, gram[4][4])
         # coefficients of 1, x, x^2 in G^T W G, 11, 12, 22, and in G^T W r, 1, 2
         self.terms = (
             (a11 + precision, 2.0 * a1b1, b11),
@@ -234,6 +243,27 @@ class _Link:
         determinant = n11 * n22 - n12 * n12
         f1, f2 = (n22 * told1 - n12 * told2) / determinant, (n11 * told2 - n12 * told1) / determinant
         return (f1, f2), f1 * told1 + f2 * told2, (n22 / determinant, -n12 / determinant, n11 / determinant)
+
+    def log_density(self, x: float) -> float:
+        """Log of the probability of the torques for a contact at x, up to a constant of the link; see `ContactFit`."""
+        _, explained, (s11, s12, s22) = self.force(x)
+        return 0.5 * (explained + math.log(s11 * s22 - s12 * s12))
+
+    def told_sd(self, x: float, force: Pair) -> float:
+        """Standard deviation of the place, m, by the torques alone, the force unknown: a Schur complement.
+
+        Not by a pseudo-inverse of the whole information, which is small exactly where the place is not told.
+        """
+        (p0, p1, p2), (q0, q1, q2), (s0, s1, s2) = self.terms[:3]
+        a1b1, a1b2, a2b1, a2b2, b11, b12, b22 = self._slopes
+        f1, f2 = force
+        less = self.precision * (1.0 - WEAK_PRIOR)
+        n11, n12, n22 = p0 + x * (p1 + x * p2) - less, q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2) - less
+        v1 = f1 * (a1b1 + x * b11) + f2 * (a1b2 + x * b12)
+        v2 = f1 * (a2b1 + x * b12) + f2 * (a2b2 + x * b22)
+        known = (v1 * v1 * n22 - 2.0 * v1 * v2 * n12 + v2 * v2 * n11) / (n11 * n22 - n12 * n12)
+        information = f1 * f1 * b11 + 2.0 * f1 * f2 * b12 + f2 * f2 * b22 - known
+        return 1.0 / math.sqrt(information) if information > 0.0 else math.inf
 
     def leaning(self, gram: list[list[float]], middle: float, miss: float, friction: float, radius: float) -> "_Link":
         """The same with the lean of the force, as large as at the middle of the link, in the covariance.

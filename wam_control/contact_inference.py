@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 NEAR = math.cos(math.radians(20.0))  # how near to an ambiguous pose or direction it is named
-UNKNOWN = 0.8  # of the spread of a place that may be anywhere on the link
 SMALL = 1e-9  # m, lever arms that are zero but for rounding
 
 MOMENT_ONLY = "sees only the moment: the place is unknown, the force is at least what is given"
@@ -155,8 +154,7 @@ class ContactInference:
     def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, doubt: str) -> Hypothesis:
         start, end = cover.start, cover.end
         length = end[0] - start[0]
-        # a spread nearly as wide as that of a place anywhere on the link says nothing of the place
-        is_unknown = cover.sees_moment_only or fit.place_sd > UNKNOWN * length / math.sqrt(12.0)
+        is_unknown = cover.sees_moment_only or fit.told_sd > length
         reasons = [self._why_unknown(q, cover, fit)] if is_unknown else []
         if doubt:
             reasons.append(doubt)
