@@ -44,9 +44,9 @@ def test_in_plane_force_agrees_with_the_closed_form() -> None:
     found = EXACT.infer(POSE, [0.0, tau2, 0.0, tau4], NOISELESS)[0]
     by_hand = (tau2 - tau4) / (L3 * math.sin(0.5))
     assert found.cover == "outer_link"
-    assert found.force == pytest.approx((0.0, by_hand, 0.0), abs=1e-5)
-    assert found.place == pytest.approx(tau4 / by_hand, abs=1e-5)
-    assert found.place == pytest.approx(x, abs=1e-5)
+    assert found.force == pytest.approx((0.0, by_hand, 0.0), abs=1e-4)
+    assert found.place == pytest.approx(tau4 / by_hand, abs=1e-4)
+    assert found.place == pytest.approx(x, abs=1e-4)
 
 
 def test_out_of_plane_force_agrees_with_the_closed_form() -> None:
@@ -60,8 +60,8 @@ def test_out_of_plane_force_agrees_with_the_closed_form() -> None:
     tau1 = tau3 * math.cos(POSE[1]) + across * math.sin(POSE[1])
     found = EXACT.infer(POSE, [tau1, 0.0, tau3, 0.0], NOISELESS)[0]
     assert found.cover == "outer_link"
-    assert found.force == pytest.approx((0.0, 0.0, m_u / (L3 * c4)), abs=1e-5)
-    assert found.place == pytest.approx(-m_n1 / found.force[2] - L3 * s4, abs=1e-5)
+    assert found.force == pytest.approx((0.0, 0.0, m_u / (L3 * c4)), abs=1e-4)
+    assert found.place == pytest.approx(-m_n1 / found.force[2] - L3 * s4, abs=1e-4)
 
 
 def test_any_direction_and_pose_on_the_outer_link() -> None:

@@ -24,6 +24,7 @@ LEAST_FORCE = 1e-6  # N, keeps the lean of no force from dividing by zero
 REACH = 8.0  # of the log of probability, below which a place does not matter
 FEW = 6  # places of a peak below which it is looked at more closely
 PARTS = 16  # pieces of it then, half a standard deviation each
+ROUNDING = 1e-12  # of a determinant, below which it is lost in rounding
 WEAK_PRIOR = 1e-9  # of the force prior: keeps directions that no joint sees from dividing by zero
 SET = 0.9  # probability of the set that is reported
 
@@ -69,6 +70,7 @@ class ContactFit:
     ----------
     start, end : (links,), m, where each link begins and ends along x.
     radius : (links,), m, of the tubes.
+    weights : (links,), how often each is touched, relatively.
     force_scale : N, sd of each component of the force before anything is felt.
     miss : sd of the distance by which the line of the force misses the axis of the tube, per radius.
     friction : sd of the force of friction along the link, per force.
@@ -80,6 +82,7 @@ class ContactFit:
         start: Sequence[float],
         end: Sequence[float],
         radius: Sequence[float],
+        weights: Sequence[float],
         *,
         force_scale: float,
         miss: float,
@@ -89,6 +92,8 @@ class ContactFit:
         self._ends = list(zip(start, end, strict=True))
         self._radius = list(radius)
         self._miss = [miss * r for r in radius]
+        # logs of the metres over which a touch is spread
+        self._spread = [math.log((b - a) / weight) for (a, b), weight in zip(self._ends, weights, strict=True)]
         self._precision, self._friction = force_scale**-2, friction
         self._widths = [(b - a) / places for a, b in self._ends]
         steps = (np.arange(places) + 0.5) / places  # the middle of each
@@ -103,11 +108,10 @@ class ContactFit:
         ----------
         gram : (links, 7, 7), Z^T S^-1 Z for each link.
         """
+        full = gram.tolist()
         links = [
-            _Link(full, self._precision).leaning(full, 0.5 * (start + end), miss, self._friction, radius)
-            for full, (start, end), miss, radius in zip(
-                gram.tolist(), self._ends, self._miss, self._radius, strict=True
-            )
+            _Link(one, self._precision).leaning(one, 0.5 * (start + end), miss, self._friction, radius)
+            for one, (start, end), miss, radius in zip(full, self._ends, self._miss, self._radius, strict=True)
         ]
         log_density = self._log_density(links)
         top = max(map(max, log_density))
@@ -121,14 +125,13 @@ class ContactFit:
         """Log of the probability of the torques for a contact of any likely force, place by place, up to a constant.
 
         -1/2 (r^T (S + s^2 G G^T)^-1 r + log abs(1 + s^2 G^T W G)), G = A + x B, s the scale of the force;
-        every link is as likely as every other, every place on it as every other.
+        every place of a link is as likely as every other.
         """
         n11, n12, n22, c1, c2 = (np.array([link.terms for link in links]) @ self._powers).transpose(1, 0, 2)
         across = n12 / n11
         rest, left = n22 - across * n12, c2 - across * c1
         log_density = c1 * c1 / n11 + left * left / rest - np.log(n11 * rest)
-        ends = zip(links, self._ends, strict=True)
-        constant = [[link.rr + link.log_widening + 2.0 * math.log(end - start)] for link, (start, end) in ends]
+        constant = [[2.0 * (link.constant + spread)] for link, spread in zip(links, self._spread, strict=True)]
         result: list[list[float]] = (0.5 * (log_density - constant)).tolist()
         return result
 
@@ -171,23 +174,22 @@ class ContactFit:
         outside = SET * total
         result = []
         for i, (start, end) in enumerate(self._ends):
-            mine = [(w, cell[1]) for w, cell in zip(weights, cells, strict=True) if cell[3] == i]
-            mass = sum([w for w, _ in mine])
+            mine = [(w, cell[1], 0.5 * cell[2]) for w, cell in zip(weights, cells, strict=True) if cell[3] == i]
+            mass = sum([w for w, _, _ in mine])
             if mass == 0.0:
                 result.append((0.0, 0.5 * (start + end), (end - start) ** 2 / 12.0, math.nan, math.nan))
                 continue
-            mean = sum([w * x for w, x in mine]) / mass
-            variance = sum([w * x * x for w, x in mine]) / mass - mean * mean
+            mean = sum([w * x for w, x, _ in mine]) / mass
+            variance = sum([w * (x * x + half * half / 3.0) for w, x, half in mine]) / mass - mean * mean
             inside, passed = [], 0.0
             for w, cell in zip(weights, cells, strict=True):
                 if passed >= outside:
                     break
                 passed += w
                 if cell[3] == i:
-                    inside.append(cell[1])
-            half = 0.5 * next(cell[2] for cell in cells if cell[3] == i)
-            low, high = (min(inside) - half, max(inside) + half) if inside else (math.nan, math.nan)
-            result.append((mass / total, mean, max(0.0, variance) + half * half / 3.0, low, high))
+                    inside += [cell[1] - 0.5 * cell[2], cell[1] + 0.5 * cell[2]]
+            low, high = (max(min(inside), start), min(max(inside), end)) if inside else (math.nan, math.nan)
+            result.append((mass / total, mean, max(0.0, variance), low, high))
         return result
 
     def _fit(
@@ -224,7 +226,8 @@ class _Link:
         _, a11, a12, a1b1, a1b2 = gram[1][:5]
         _, _, a22, a2b1, a2b2 = gram[2][:5]
         b11, b12 = gram[3][3:5]
-        self.precision, self.log_widening = precision, log_widening
+        self.precision = precision
+        self.constant = 0.5 * (self.rr + log_widening)  # what the log of the probability lacks at every place
         self._slopes = (a1b1, a1b2, a2b1, a2b2, b11, b12, gram[4][4])
         # coefficients of 1, x, x^2 in G^T W G, 11, 12, 22, and in G^T W r, 1, 2
         self.terms = (
@@ -247,7 +250,7 @@ class _Link:
     def log_density(self, x: float) -> float:
         """Log of the probability of the torques for a contact at x, up to a constant of the link; see `ContactFit`."""
         _, explained, (s11, s12, s22) = self.force(x)
-        return 0.5 * (explained + math.log(s11 * s22 - s12 * s12))
+        return 0.5 * (explained + math.log(max(s11 * s22 - s12 * s12, ROUNDING * s11 * s22)))
 
     def told_sd(self, x: float, force: Pair) -> float:
         """Standard deviation of the place, m, by the torques alone, the force unknown: a Schur complement.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wam_control.contact_fit import ContactFit, Fit
 from wam_description.arm import Arm
-from wam_description.parameters import parameter, require
+from wam_description.parameters import lengths, parameter, require
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
@@ -38,6 +38,9 @@ MORE = "one contact does not explain the torques"
 class InferenceParameters:
     """What is taken for likely before anything is felt."""
 
+    weights: tuple[float, ...] = parameter(
+        "how often each cover is touched, relatively: as the area that it sweeps", low=1e-3, high=1e3
+    )
     force_scale: float = parameter("sd of each component of a contact's force before it is felt", "N", low=0.1)
     miss: float = parameter("sd by which the line of a force misses the tube's axis, per radius", low=0.0, high=2.0)
     friction: float = parameter("sd of the force of friction along a cover, per force", low=0.0, high=2.0)
@@ -113,10 +116,12 @@ class ContactInference:
         self._body, self._parameters = body, parameters
         self._covers = [_cover(arm, body, i) for i in range(len(arm.covers.names))]
         covers = self._covers
+        lengths("inference", arm.covers.names, {"weights": parameters.weights})
         self._fit = ContactFit(
             [cover.start[0] for cover in covers],
             [cover.end[0] for cover in covers],
             arm.covers.radius,
+            parameters.weights,
             force_scale=parameters.force_scale,
             miss=parameters.miss,
             friction=parameters.friction,
