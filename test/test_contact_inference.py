@@ -76,7 +76,7 @@ def test_any_direction_and_pose_on_the_outer_link() -> None:
         )
         x, phi, size = rng.uniform(0.05, L4), rng.uniform(-math.pi, math.pi), rng.uniform(3, 20)
         force = (0.0, size * math.cos(phi), size * math.sin(phi))
-        found = infer(q, "outer_link", (x, 0, 0), force)
+        found = EXACT.infer(q, torques(q, "outer_link", (x, 0, 0), force).tolist(), W)
         wrong += found[0].cover != "outer_link"
         outer = of(found, "outer_link")
         if not math.isnan(outer.place):
@@ -213,7 +213,10 @@ def test_odds_of_the_links_are_those_of_brute_force(cover: str, x: float, force:
     tau = torques(POSE, cover, (x, 0, 0), force)
     found = INFERENCE.infer(POSE, tau.tolist(), W)
     odds = math.log(of(found, "inner_link").probability / of(found, "outer_link").probability)
-    assert odds == pytest.approx(evidence(POSE, tau, "inner_link") - evidence(POSE, tau, "outer_link"), abs=0.6)
+    inner, outer = (
+        evidence(POSE, tau, name) + math.log(w) for name, w in zip(ARM.covers.names, PARAMETERS.weights, strict=True)
+    )
+    assert odds == pytest.approx(inner - outer, abs=0.6)
 
 
 @pytest.mark.parametrize("size", [1.0, 10.0, 100.0])
@@ -265,7 +268,7 @@ def one_joint(arm: Arm) -> Arm:
 
 def test_a_single_joint_reports_what_it_sees() -> None:
     arm = one_joint(ARM)
-    inference = ContactInference(arm, RigidBody(arm), PARAMETERS)
+    inference = ContactInference(arm, RigidBody(arm), dataclasses.replace(PARAMETERS, weights=(1.0,)))
     (found,) = inference.infer([0.4], [1.2], np.array([[SD**-2]]))
     assert found.cover == "outer_link"
     assert found.probability == 1.0

@@ -98,11 +98,12 @@ def differences(rows: Rows, bag: Bag) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("delay", [0, 1])
+@pytest.mark.parametrize(("delay", "dither_cycle"), [(0, 0), (1, 40)])
 def test_lockstep_over_topics_equals_the_loop_without_ros(
-    delay: int, script: Path, tmp_path: Path, domain_id: int
+    delay: int, dither_cycle: int, script: Path, tmp_path: Path, domain_id: int
 ) -> None:
-    configured = configuration(script, tmp_path, "composed", **{"timing.outer_delay": delay})
+    values = {"timing.outer_delay": delay, "timing.dither_cycle": dither_cycle}
+    configured = configuration(script, tmp_path, "composed", **values)
     record_composed(configured, domain_id)
     run = play_directly(configured, script)
     bag = read(tmp_path / "composed")

@@ -19,6 +19,7 @@ from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
 
 SETTLED = 2.0  # time constants from the first sample until the estimate counts
+LOAD_DIVISOR = 4  # samples between two looks at the payload, which needs no more
 NO_MASS = 1e-6  # kg, the least that a link may have
 
 
@@ -318,11 +319,16 @@ class _Load:
         """Forget the motion, not the mass."""
         self._before: list[float] | None = None
         self._bias: list[float] = []
+        self._span, self._keep, self._count = 0.0, 1.0, 0
         self.torque = [0.0] * len(self.torque)
 
     def observe(self, q: list[float], qd: list[float], span: float, keep: float) -> None:
         """Follow one sample of the joints, (n,) rad and rad/s."""
-        body = self._body
+        self._span, self._keep, self._count = self._span + span, self._keep * keep, self._count + 1
+        if self._before is not None and self._count < LOAD_DIVISOR:
+            return
+        span, keep, body = self._span, self._keep, self._body
+        self._span, self._keep, self._count = 0.0, 1.0, 0
         momentum = (body.mass_matrix(q) @ np.array(qd)).tolist()
         bias = (body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)).tolist()
         if self._before is None:
