@@ -79,7 +79,7 @@ def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> Non
     assert felt.link == "outer_link"
     assert felt.place == pytest.approx(0.28, abs=0.03)
     assert abs(felt.place - 0.28) < 2 * felt.place_sd
-    assert np.linalg.norm(np.subtract(felt.force, force)) < 0.05 * size
+    assert np.linalg.norm(np.subtract(felt.force, force)) < 0.1 * size
     assert felt.reason == ""
 
 
