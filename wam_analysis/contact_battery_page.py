@@ -4,8 +4,10 @@ import math
 from collections.abc import Sequence
 
 from wam_analysis.contact_battery import Judgement
+from wam_analysis.contact_battery_scenes import FRICTION, MASS, PAYLOAD, STIFFNESS
 from wam_analysis.contact_battery_score import ANY, FREE_MUST, FREE_STRETCH, Bound, Row, SceneScore, asked, stated
 from wam_analysis.contact_battery_statistics import Figure
+from wam_analysis.contact_battery_touches import EDGE, MOVING, SETTLED, SETTLED_AT_REST, SETTLED_IN_FOAM, SLIDING
 from wam_description.arm import Arm
 
 MET, STRETCH, MARGINAL, MISSED, FEW = "must", "**stretch**", "must, marginal", "**MISSED**", "not enough time"
@@ -24,9 +26,9 @@ def mark(row: Row, found: Figure) -> str:
     if math.isnan(found.value):
         return "no data"
     counts = row.must == (0.0, 0.0)  # a count that must be none: its interval never is
-    if counts and found.count < FREE_MUST and found.value == 0.0:
+    if counts and found.observed < FREE_MUST and found.value == 0.0:
         return FEW
-    if row.stretch != ANY and holds(found.value, row.stretch) and not (counts and found.count < FREE_STRETCH):
+    if row.stretch != ANY and holds(found.value, row.stretch) and not (counts and found.observed < FREE_STRETCH):
         return STRETCH
     if row.must == ANY:
         return "below the aim"
@@ -58,13 +60,13 @@ def table(judgement: Judgement, arm: Arm, rows: Sequence[Row]) -> str:
     lines = [head, ["---"] * len(head)]
     for row in rows:
         found = row.of(judgement.total)
-        if found.count == 0 and row.must == ANY == row.stretch:
+        if found.observed == 0 and row.must == ANY == row.stretch:
             continue
         single = [_number(row, row.of(judgement.scores[seed]).value) for seed in judgement.seeds]
         span = f"{_number(row, found.low)} to {_number(row, found.high)}"
         asks = [_bound(row, row.must), _bound(row, row.stretch)]
         lines.append(
-            [row.name, row.unit, *asks, *single, _number(row, found.value), span, str(found.count), mark(row, found)]
+            [row.name, row.unit, *asks, *single, _number(row, found.value), span, str(found.observed), mark(row, found)]
         )
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
@@ -74,7 +76,8 @@ def counted(scores: Sequence[SceneScore]) -> str:
     touches = [touch for scene in scores for touch in scene.touches]
     stopped = [f"{scene.name}: {scene.failure}" for scene in scores if scene.failure]
     text = (
-        f"{len(scores)} scenes; {len(touches)} contacts judged, {sum(scene.short for scene in scores)} too short, "
+        f"{len(scores)} scenes; {len(touches)} contacts judged, "
+        f"{sum(scene.unfit for scene in scores)} too short or too hard, "
         f"{sum(scene.missed for scene in scores)} meant that never touched; "
         f"{sum(scene.quiet.seconds for scene in scores if scene.quiet.group == 'free'):.0f} s of free motion."
     )
@@ -102,3 +105,62 @@ def _bound(row: Row, bound: Bound) -> str:
     if bound[0] <= 0.0:
         return high
     return f"at least {low}" if bound[1] >= 1.0 else f"{low} to {high}"
+
+
+def page(judgement: Judgement, arm: Arm, command: str, compute: str, picture: str) -> str:
+    """The page of the documentation.
+
+    Parameters
+    ----------
+    command : what writes this page.
+    compute : a sentence on the times.
+    picture : the figure's path, seen from the page.
+    """
+    total = judgement.total
+    parts = [
+        PREFACE.format(command=command),
+        counted(total),
+        "",
+        f"![What the battery found]({picture})",
+        "",
+        "## What must be met",
+        "",
+        table(judgement, arm, asked(arm)),
+        "## What else was found",
+        "",
+        table(judgement, arm, stated(arm)),
+        compute,
+        "",
+        RULES,
+    ]
+    return "\n".join(parts)
+
+
+PREFACE = f"""# Contact estimation, judged
+
+Written by `{{command}}`; nothing here is written by hand.
+
+Each seed draws poses, moves, contacts and an arm. The arm differs from what its controllers know: friction of each
+motor and joint by up to {FRICTION:.0%}, mass of each link by {MASS:.0%}, stiffness of each cable by {STIFFNESS:.0%},
+evenly distributed; in free motion the tool carries up to {1e3 * PAYLOAD:.0f} g that nobody knows of.
+"""
+RULES = f"""## How it is judged
+
+* Truth is what the simulator's contacts say: link, force, centre of force along the link, moment. Torques on the joints
+  come from it by the simulator's own kinematics. What was meant and did not touch is not counted.
+* Contacts: `push`, a force at a point of the link's axis, of an exact size; `sphere` and `flat`, hands with a soft
+  surface that follow the moving link, half of them sliding over it, friction 0 to 0.5, and 0.8 for every fifth; `foam`,
+  a post that stands still and that the arm runs into.
+* An answer is read {SETTLED:g} s after the touch, once for each contact, because samples of one contact err alike
+  ({SETTLED_IN_FOAM:g} s in foam, which stops the arm; {SETTLED_AT_REST:g} s at rest).
+* In motion: the fastest joint is above {MOVING:g} rad/s, at the touch and when the answer is read; some motors may
+  rest. Every motor slides: the slowest is above {SLIDING:g} rad/s.
+* A contact that is not felt, for which no place is given or whose link is wrong counts as infinitely wrong: 'none',
+  where that is the median.
+* Latency counts from the last period without force. Torques are not judged within {EDGE:g} s of a touch that begins or
+  ends.
+* A false alarm is one that begins without touch, from the release of the brakes on.
+* The 90 % set is the estimator's own where it gives one, else the densest one of its hypotheses.
+* 95 %: Wilson for shares, order statistics for quantiles, scenes resampled for rms, Poisson for counts. Marginal: met,
+  but the interval reaches over the limit.
+"""

@@ -1,16 +1,16 @@
 """Playing the scenes of the battery and writing down what was felt beside what was true."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import mujoco
 import numpy as np
 
 from wam_analysis.contact_battery_scenes import Scene
 from wam_analysis.direct import DirectRun
-from wam_control.contact_estimator import ContactEstimate
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
@@ -20,7 +20,8 @@ from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.safety import Mode
 
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
-T, U = TypeVar("T"), TypeVar("U")
+T = TypeVar("T")
+U = TypeVar("U")
 
 
 class Belief(NamedTuple):
@@ -30,6 +31,8 @@ class Belief(NamedTuple):
     probability: float
     place: float  # m, NaN where it is not known
     place_sd: float  # m
+    low: float  # m, ends of the part of this cover in the 90 % set; NaN where it has none or none is given
+    high: float
     force: tuple[float, float, float]  # N
     moment: tuple[float, float, float]  # N m
 
@@ -41,6 +44,7 @@ class Record(NamedTuple):
     ----------
     stamp : ns.
     q, qd : (n,), true, rad and rad/s.
+    thetad : (n,), of the motors, as measured, rad/s.
     load : of the world on the arm, true.
     torques : (n,), of that load on the joints, N m, by the simulator's kinematics.
     external : (n,), the same as estimated.
@@ -52,6 +56,7 @@ class Record(NamedTuple):
     stamp: int
     q: tuple[float, ...]
     qd: tuple[float, ...]
+    thetad: tuple[float, ...]
     load: Load
     torques: tuple[float, ...]
     external: tuple[float, ...]
@@ -94,9 +99,18 @@ class Levers:
         return tuple(result[self._n :].tolist())
 
 
-def beliefs_of(estimate: ContactEstimate) -> tuple[Belief, ...]:
-    """The hypotheses of an estimate."""
-    return tuple(Belief(h.cover, h.probability, h.place, h.place_sd, h.force, h.moment) for h in estimate.hypotheses)
+def belief(cover: str, facts: Mapping[str, Any]) -> Belief:
+    """A hypothesis by the names of what it says; an estimator that gives no 90 % set leaves that out."""
+    return Belief(
+        cover=cover,
+        probability=facts["probability"],
+        place=facts["place"],
+        place_sd=facts["place_sd"],
+        low=facts.get("low", math.nan),
+        high=facts.get("high", math.nan),
+        force=facts["force"],
+        moment=facts["moment"],
+    )
 
 
 def play(configuration: Configuration, scene: Scene) -> Played:
@@ -108,7 +122,7 @@ def play(configuration: Configuration, scene: Scene) -> Played:
     done = False
     while not done:
         is_outer, stamp = run.driver.is_outer, run.driver.stamp
-        joints = run.driver.true_joint_state
+        joints, motors = run.driver.true_joint_state, run.driver.motor_state
         load = run.driver.true_contact if is_outer else None
         done = run.step()
         if load is None:
@@ -119,12 +133,13 @@ def play(configuration: Configuration, scene: Scene) -> Played:
                 stamp=stamp,
                 q=tuple(joints.position),
                 qd=tuple(joints.velocity),
+                thetad=tuple(motors.velocity),
                 load=load,
                 torques=levers.torques(joints.position, load),
                 external=estimate.external_torques,
                 external_sd=estimate.torque_sd,
                 in_contact=estimate.in_contact,
-                beliefs=beliefs_of(estimate),
+                beliefs=tuple(belief(h.cover, h._asdict()) for h in estimate.hypotheses),
             )
         )
         if run.driver.safety.mode is Mode.FAULT:

@@ -9,10 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_battery_paths import Move, Paths
+from wam_analysis.contact_battery_foam import Blow, Foam, foam_values
+from wam_analysis.contact_battery_paths import Paths
 from wam_control.scenario import Push, Step
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
+from wam_description.rigid_body import RigidBody
 
 # the declared range: how far the plant may depart from the configured arm, uniform in +- this
 FRICTION, MASS, STIFFNESS = 0.10, 0.02, 0.10
@@ -27,7 +29,12 @@ LEVELS = (5.0, 10.0, 20.0)  # N, those that the table names
 WEAKEST, STRONGEST = 1.0, 20.0  # N
 ROUGH = 0.8  # the greatest coefficient of friction, of every fifth pusher
 MARGIN = 0.02  # m from the ends of a link where nothing touches
+DITHER_CYCLE = 40  # periods of the loop: 25 Hz
+FOAM_SHARE = 0.15  # of the scenes in motion
 KINDS = ("push", "sphere", "flat", "foam")
+
+
+AWAY = Foam((5.0, 5.0, 5.0), (0.0, 0.0, 0.0), 0.01)  # out of reach
 
 
 class Planned(NamedTuple):
@@ -61,20 +68,18 @@ class Scene(NamedTuple):
     planned: tuple[Planned, ...]
 
 
-def dither_switch(configuration: Configuration) -> str:
-    """The parameter that makes the velocity loop dither, '' where it cannot."""
-    names = [name for name in configuration.sections["velocity_loop"] if "dither" in name]
-    amplitudes = [name for name in names if "amplitude" in name or "level" in name or "torque" in name]
-    return amplitudes[0] if amplitudes else ""
+def dither_values(configuration: Configuration) -> dict[str, Any]:
+    """What makes the arm dither at rest; nothing where it cannot."""
+    shared = configuration.sections["/**"]
+    return {"timing.dither_cycle": DITHER_CYCLE} if "timing.dither_cycle" in shared else {}
 
 
 def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, Any]:
     """What every scene changes: nothing within reach, fast moves allowed, the estimator's model as configured."""
     estimator = configuration.sections["contact_estimator"]
     joints = len(configuration.shared.arm.joints.names)
-    places = [5.0] * len(configuration.sections["driver"]["world.obstacles.positions"])
     values: dict[str, Any] = {
-        "driver:world.obstacles.positions": places,
+        **foam_values(AWAY, WEAKEST, 0.0),
         "force_loop:joint_speed_limit": 3.5,
         "contact_estimator:use_joint_sensors": joint_sensors,
     }
@@ -96,7 +101,7 @@ class Draw:
     def __init__(self, configuration: Configuration, seed: int, joint_sensors: bool = False) -> None:
         self._configuration, self._seed = configuration, seed
         self._arm: Arm = configuration.shared.arm
-        self._paths = Paths(self._arm)
+        self._paths, self._body = Paths(self._arm), RigidBody(self._arm)
         self._base = base_values(configuration, joint_sensors)
 
     def contacts(self, count: int) -> list[Scene]:
@@ -116,6 +121,8 @@ class Draw:
 
     def _moving(self, i: int) -> Scene:
         random = self._random(0, i)
+        if random.random() < FOAM_SHARE:
+            return self._blow(random, i)
         start = self._paths.pose(random)
         moves = self._paths.moves(random, start, 2)
         steps, planned = _opening(), []
@@ -130,6 +137,26 @@ class Draw:
         steps.append(Step("end", 0.1))
         values = self._values(random, start, planned)
         return Scene(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), tuple(planned))
+
+    def _blow(self, random: np.random.Generator, i: int) -> Scene:
+        """The arm runs into foam and goes back."""
+        foam = None
+        while foam is None:
+            start = self._paths.pose(random)
+            (move,) = self._paths.moves(random, start, 1)
+            contact = self._contact(random, RELEASE + SETTLE, RELEASE + SETTLE + move.seconds + 0.5)
+            cover = self._arm.covers.names.index(contact.cover)
+            foam = Blow(self._arm, self._body, start, move).foam(random, cover, contact.place)
+        rough = ROUGH if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
+        contact = contact._replace(kind="foam", force=max(contact.force, 4.0), friction=rough)
+        steps = [
+            *_opening(),
+            Step("blow", move.seconds, posture=move.posture),
+            Step("press", 0.2),
+            Step("back", move.seconds, posture=start),
+        ]
+        values = self._values(random, start, []) | foam_values(foam, contact.force, rough)
+        return Scene(f"seed {self._seed} moving {i}", "moving", values, tuple(steps), (contact,))
 
     def _resting(self, i: int, dither: Mapping[str, Any] | None) -> Scene:
         random = self._random(1, i)
@@ -162,6 +189,8 @@ class Draw:
             left -= move.seconds + stop
             here = move.posture
         values = self._values(random, start, []) | {"driver:departure.payload": float(random.uniform(0.0, PAYLOAD))}
+        if "observer.payload" in self._configuration.sections["contact_estimator"]:
+            values["contact_estimator:observer.payload"] = [0.0, PAYLOAD]
         return Scene(f"seed {self._seed} free {i}", "free", values, tuple(steps), ())
 
     def _contact(self, random: np.random.Generator, begin: float, end: float) -> Planned:
@@ -242,6 +271,3 @@ def _size(random: np.random.Generator, kind: str) -> tuple[float, float, float]:
     if kind == "sphere":
         return float(random.uniform(0.02, 0.06)), 0.0, 0.0
     return float(random.uniform(0.01, 0.03)), 0.04, 0.02
-
-
-__all__ = ["Draw", "Move", "Planned", "Scene", "base_values", "dither_switch"]

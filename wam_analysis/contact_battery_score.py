@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from wam_analysis.contact_battery_run import Played
+from wam_analysis.contact_battery_scenes import KINDS, LEVELS
 from wam_analysis.contact_battery_statistics import NONE, Figure, events, quantile, rms, share
 from wam_analysis.contact_battery_touches import Quiet, Residual, Touch, quiet, residual, touches
 from wam_description.arm import Arm
@@ -17,7 +18,7 @@ FREE_MUST, FREE_STRETCH = 120.0, 600.0  # s without a false alarm
 NEAR = 0.2  # of a force: 5 N are 4 to 6 N
 SURE_SD = 0.02  # m
 SURE_LINK = 0.95
-LEVEL = 0.9  # of the credible set
+IN_MOTION = ("moving", "free")
 ROUGH = 0.8  # coefficient of friction of the hardest contacts
 
 
@@ -26,7 +27,7 @@ class SceneScore(NamedTuple):
 
     name: str
     touches: list[Touch]
-    short: int
+    unfit: int
     missed: int
     residual: Residual
     quiet: Quiet
@@ -55,9 +56,9 @@ class Row(NamedTuple):
 def score(played: Played, arm: Arm) -> SceneScore:
     """Judge a scene."""
     lengths = dict(zip(arm.covers.names, arm.covers.length, strict=True))
-    found, short = touches(played, lengths)
-    missed = max(0, len(played.scene.planned) - len(found) - short)
-    return SceneScore(played.scene.name, found, short, missed, residual(played), quiet(played), played.failure)
+    found, unfit = touches(played, lengths)
+    missed = max(0, len(played.scene.planned) - len(found) - unfit)
+    return SceneScore(played.scene.name, found, unfit, missed, residual(played), quiet(played), played.failure)
 
 
 def touched(scores: Sequence[SceneScore], group: str = "moving") -> list[Touch]:
@@ -73,18 +74,12 @@ def outer(scores: Sequence[SceneScore], arm: Arm, group: str = "moving", force: 
     return [touch for touch in found if force == 0.0 or abs(touch.force - force) <= NEAR * force]
 
 
-def _torque_rms(group: Sequence[str], joint: int) -> Callable[[Sequence[SceneScore]], Figure]:
+def _torque_rms(joint: int, groups: Sequence[str], state: str) -> Callable[..., Figure]:
+    """Of one joint in some groups; `state` is 'moving', 'still' or 'sliding'."""
+
     def of(scores: Sequence[SceneScore]) -> Figure:
-        parts = [scene.residual for scene in scores if scene.residual.group in group]
-        return rms([part.moving[joint] for part in parts], [part.moving_count for part in parts])
-
-    return of
-
-
-def _resting_rms(group: str, joint: int) -> Callable[[Sequence[SceneScore]], Figure]:
-    def of(scores: Sequence[SceneScore]) -> Figure:
-        parts = [scene.residual for scene in scores if scene.residual.group == group]
-        return rms([part.still[joint] for part in parts], [part.still_count for part in parts])
+        parts = [scene.residual for scene in scores if scene.residual.group in groups]
+        return rms([getattr(part, state)[joint] for part in parts], [getattr(part, f"{state}_count") for part in parts])
 
     return of
 
@@ -146,7 +141,7 @@ def _sure_link_share(scores: Sequence[SceneScore]) -> Figure:
 def _coverage(pick: Callable[[Touch], bool], group: str = "moving") -> Callable[..., Figure]:
     def of(scores: Sequence[SceneScore]) -> Figure:
         found = [touch for touch in touched(scores, group) if touch.felt and pick(touch)]
-        return share(sum(touch.credibility <= LEVEL for touch in found), len(found))
+        return share(sum(touch.in_set for touch in found), len(found))
 
     return of
 
@@ -175,6 +170,13 @@ def _felt(arm: Arm, group: str, force: float) -> Callable[..., Figure]:
     return of
 
 
+def _by_kind(arm: Arm, kind: str) -> Callable[..., Figure]:
+    def of(scores: Sequence[SceneScore]) -> Figure:
+        return quantile([abs(touch.error) for touch in outer(scores, arm) if touch.kind == kind], 0.5)
+
+    return of
+
+
 def z_scores(scores: Sequence[SceneScore], arm: Arm) -> list[float]:
     """Error per stated spread of every place that was given."""
     found = [touch for touch in outer(scores, arm) if touch.right_link and math.isfinite(touch.error)]
@@ -184,7 +186,7 @@ def z_scores(scores: Sequence[SceneScore], arm: Arm) -> list[float]:
 def _spread_of_z(arm: Arm) -> Callable[..., Figure]:
     def of(scores: Sequence[SceneScore]) -> Figure:
         found = quantile([abs(z) for z in z_scores(scores, arm)], 0.683)
-        return found if found.count else NONE
+        return found if found.observed else NONE
 
     return of
 
@@ -206,7 +208,7 @@ def asked(arm: Arm) -> list[Row]:
             1.0,
             (0.0, must),
             (0.0, aim),
-            _torque_rms(("moving", "free"), i),
+            _torque_rms(i, IN_MOTION, "moving"),
         )
         for i, (name, must, aim) in enumerate(torque)
     ]
@@ -248,38 +250,25 @@ def stated(arm: Arm) -> list[Row]:
         Row("false alarms between contacts", "", 1.0, ANY, ANY, _between),
     ]
     for i, name in enumerate(arm.joints.names):
-        rows.append(
-            Row(f"external torque in free motion, rms, {name}", "N m", 1.0, ANY, ANY, _torque_rms(("free",), i))
-        )
+        quantity = f"external torque where every motor slides, rms, {name}"
+        rows.append(Row(quantity, "N m", 1.0, ANY, ANY, _torque_rms(i, IN_MOTION, "sliding")))
     for group, words in (("rest", "at rest"), ("dither", "at rest, dithered")):
-        for i, name in enumerate(arm.joints.names):
-            rows.append(Row(f"external torque {words}, rms, {name}", "N m", 1.0, ANY, ANY, _resting_rms(group, i)))
-        for force in (5.0, 10.0, 20.0):
-            rows.append(
-                Row(f"{force:.0f} N on the outer link felt {words}", "%", 100.0, ANY, ANY, _felt(arm, group, force))
-            )
-            rows.append(
-                Row(
-                    f"place on the outer link at {force:.0f} N {words}, median error",
-                    "cm",
-                    100.0,
-                    ANY,
-                    ANY,
-                    _place(arm, force, group=group),
-                )
-            )
-        rows.append(Row(f"90 % set holds the truth {words}", "%", 100.0, ANY, ANY, _coverage(lambda t: True, group)))
-    for kind in ("push", "sphere", "flat", "foam"):
-        rows.append(
-            Row(
-                f"place on the outer link, {kind}, median error",
-                "cm",
-                100.0,
-                ANY,
-                ANY,
-                lambda scores, kind=kind: quantile(
-                    [abs(touch.error) for touch in outer(scores, arm) if touch.kind == kind], 0.5
-                ),
-            )
-        )
-    return rows
+        rows += _at_rest(arm, group, words)
+    return rows + [
+        Row(f"place on the outer link, {kind}, median error", "cm", 100.0, ANY, ANY, _by_kind(arm, kind))
+        for kind in KINDS
+    ]
+
+
+def _at_rest(arm: Arm, group: str, words: str) -> list[Row]:
+    rows = [
+        Row(f"external torque {words}, rms, {name}", "N m", 1.0, ANY, ANY, _torque_rms(i, (group,), "still"))
+        for i, name in enumerate(arm.joints.names)
+    ]
+    for force in LEVELS:
+        name = f"{force:.0f} N on the outer link"
+        place = _place(arm, force, group=group)
+        rows.append(Row(f"{name} felt {words}", "%", 100.0, ANY, ANY, _felt(arm, group, force)))
+        rows.append(Row(f"place, {name} {words}, median error", "cm", 100.0, ANY, ANY, place))
+    coverage = _coverage(lambda touch: True, group)
+    return [*rows, Row(f"90 % set holds the truth {words}", "%", 100.0, ANY, ANY, coverage)]

@@ -16,7 +16,7 @@ class Figure(NamedTuple):
     value: float
     low: float
     high: float
-    count: int
+    observed: int
 
 
 NONE = Figure(math.nan, math.nan, math.nan, 0)

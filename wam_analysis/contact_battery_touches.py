@@ -12,11 +12,15 @@ from wam_description.signals import Load
 
 TOUCHED = 0.3  # N; less counts as nothing
 GAP = 1  # records without a touch that a contact survives
+TOO_MUCH = 25.0  # N; a blow beyond what is judged
 SETTLED = 0.2  # s after the touch when the answer is judged
+SETTLED_IN_FOAM = 0.12  # s, the same where foam soon stops the arm
 SETTLED_AT_REST = 0.4  # s, the same at rest, where a dither has to be averaged
 SHORTEST = 0.12  # s; a shorter touch is counted and not judged
 EDGE = 0.1  # s after a touch begins or ends in which torques are not judged: the observer lags
 MOVING = 0.1  # rad/s of the fastest joint
+SLIDING = 1.0  # rad/s of the slowest motor
+LEVEL = 0.9  # of the credible set
 CELLS = 400  # of a link, for the set that holds the truth
 
 
@@ -25,17 +29,19 @@ class Touch(NamedTuple):
 
     Attributes
     ----------
-    group, kind : of the scene, and 'push', 'sphere', 'flat' or 'foam'.
+    group, kind : of the scene, and 'push', 'sphere', 'flat' or 'foam', '' for a touch that nobody meant.
     friction : coefficient of the pusher's surface.
     cover, place, force : truth when the answer is judged; m and N.
     moving : whether the arm moved then; `began_moving`, whether it did when the touch began.
-    latency : s from the touch to the first alarm; inf where none came, NaN where one was there before.
+    latency : s from the last period without touch to the first alarm; inf where none came, NaN where one
+        was there before.
     felt : whether something was felt when the answer is judged.
     link_probability : of the link that was named, NaN where nothing was felt.
     right_link : whether it is the true one.
     error : m, signed, of the place; inf where no place was given, the wrong link or nothing.
     place_sd : m, as stated, NaN where none was.
     credibility : probability of all that is believed more than the truth; 0.9 bounds the 90 % set; 1 if not felt.
+    in_set : whether the 90 % set holds the truth: the estimator's own set where it gives one.
     moment_error : N m, of the moment about the link's origin, where the link is right, else NaN.
     moment : N m, size of the true moment.
     least_force : N, the estimated force, a lower bound where the place is unknown.
@@ -56,6 +62,7 @@ class Touch(NamedTuple):
     error: float
     place_sd: float
     credibility: float
+    in_set: bool
     moment_error: float
     moment: float
     least_force: float
@@ -88,38 +95,41 @@ def spans(records: Sequence[Record]) -> list[Span]:
 
 
 def touches(played: Played, lengths: dict[str, float]) -> tuple[list[Touch], int]:
-    """Every contact of a scene that lasted, and how many were too short to be judged.
+    """Every contact of a scene, and how many were too short or too hard to be judged.
 
     Parameters
     ----------
     lengths : of the covers, m, by name.
     """
-    records, result, short = played.records, [], 0
+    records, result, unfit = played.records, [], 0
     for span in spans(records):
         first = records[span.first]
-        if records[span.last].stamp - first.stamp < SHORTEST * 1e9:
-            short += 1
+        hardest = max(size(record.load) for record in records[span.first : span.last + 1])
+        if records[span.last].stamp - first.stamp < SHORTEST * 1e9 or hardest > TOO_MUCH:
+            unfit += 1
             continue
-        wait = SETTLED if played.scene.group == "moving" else SETTLED_AT_REST
+        planned = _planned(played.scene.planned, first.stamp * 1e-9)
+        kind = planned.kind if planned else ""
+        wait = SETTLED_IN_FOAM if kind == "foam" else SETTLED if played.scene.group == "moving" else SETTLED_AT_REST
         due = [i for i in range(span.first, span.last) if records[i].stamp - first.stamp <= wait * 1e9]
-        result.append(_judged(played, span, due[-1], lengths))
-    return result, short
+        result.append(_judged(played, span, due[-1], planned, lengths))
+    return result, unfit
 
 
-def _judged(played: Played, span: Span, index: int, lengths: dict[str, float]) -> Touch:
+def _judged(played: Played, span: Span, index: int, planned: Planned | None, lengths: dict[str, float]) -> Touch:
     records = played.records
     now, before = records[index], records[max(span.first - 1, 0)]
-    planned = _planned(played.scene.planned, records[span.first].stamp * 1e-9)
     load, named = now.load, now.beliefs[0] if now.beliefs else None
     truth = load if load.cover else records[index - 1].load
     right = named is not None and named.cover == span.cover
     place_sd = named.place_sd if right and named is not None else math.nan
     error = named.place - truth.place if right and named is not None and not math.isnan(named.place) else math.inf
     own = [belief for belief in now.beliefs if belief.cover == span.cover][:1]
+    believed = credibility(now.beliefs, span.cover, truth.place, lengths)
     moment_error = math.dist(own[0].moment, truth.moment) if right else math.nan
     return Touch(
         group=played.scene.group,
-        kind=planned.kind if planned else "foam",
+        kind=planned.kind if planned else "",
         friction=planned.friction if planned else math.nan,
         cover=span.cover,
         place=truth.place,
@@ -132,7 +142,8 @@ def _judged(played: Played, span: Span, index: int, lengths: dict[str, float]) -
         right_link=right,
         error=error,
         place_sd=place_sd,
-        credibility=credibility(now.beliefs, span.cover, truth.place, lengths),
+        credibility=believed,
+        in_set=_in_set(now.beliefs, span.cover, truth.place, believed),
         moment_error=moment_error,
         moment=math.hypot(*truth.moment),
         least_force=math.hypot(*own[0].force) if own else math.nan,
@@ -154,7 +165,7 @@ def _latency(records: Sequence[Record], span: Span, before: Record) -> float:
         return math.nan
     for record in records[span.first : span.last + 1]:
         if record.in_contact:
-            return (record.stamp - records[span.first].stamp) * 1e-9
+            return (record.stamp - before.stamp) * 1e-9
     return math.inf
 
 
@@ -188,23 +199,32 @@ def credibility(beliefs: Sequence[Belief], cover: str, place: float, lengths: di
     return more + 0.5 * same
 
 
+def _in_set(beliefs: Sequence[Belief], cover: str, place: float, believed: float) -> bool:
+    if all(math.isnan(belief.low) for belief in beliefs):
+        return believed <= LEVEL
+    return any(belief.cover == cover and belief.low <= place <= belief.high for belief in beliefs)
+
+
 class Residual(NamedTuple):
     """Errors of the external torques of one scene, away from the edges of touches.
 
     Attributes
     ----------
     group : 'moving', 'rest', 'dither' or 'free'.
-    moving, still : (k,), sums of squares, N^2 m^2, over the records in which the arm moves and does not.
-    moving_z : (k,), sum of squared errors per stated variance, moving.
-    moving_count, still_count : of records.
+    moving, still, sliding : (n,), sums of squares, N^2 m^2, over the records in which the arm moves, does not,
+        and in which every motor slides.
+    moving_z : (n,), sum of squared errors per stated variance, moving.
+    moving_count, still_count, sliding_count : of records.
     """
 
     group: str
     moving: tuple[float, ...]
     still: tuple[float, ...]
+    sliding: tuple[float, ...]
     moving_z: tuple[float, ...]
     moving_count: int
     still_count: int
+    sliding_count: int
 
 
 def residual(played: Played) -> Residual:
@@ -218,6 +238,7 @@ def residual(played: Played) -> Residual:
     keep &= stamps > stamps[0] + 0.2  # the observer's own beginning
     error = np.array([record.external for record in records]) - np.array([record.torques for record in records])
     moving = np.array([is_moving(record) for record in records])
+    sliding = keep & np.array([min(map(abs, record.thetad)) > SLIDING for record in records])
     square = error**2
     has_sd = all(record.external_sd for record in records)
     variance = np.array([record.external_sd for record in records]) ** 2 if has_sd else np.full_like(square, np.nan)
@@ -226,9 +247,11 @@ def residual(played: Played) -> Residual:
         group=played.scene.group,
         moving=_row(square[keep & moving]),
         still=_row(square[keep & ~moving]),
+        sliding=_row(square[sliding]),
         moving_z=_row(z),
         moving_count=int((keep & moving).sum()),
         still_count=int((keep & ~moving).sum()),
+        sliding_count=int(sliding.sum()),
     )
 
 

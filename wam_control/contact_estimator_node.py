@@ -44,6 +44,8 @@ class ContactEstimatorNode(Node):
         self.create_service(Trigger, "~/tare", self._tare)
         if needs:
             ports.feed(gate, "joint_sensors", lambda m: read_joint_state(m, joints, fields), self._work)
+        elif shared.arm.joint_sensors:
+            ports.listen("joint_sensors", lambda m: None)  # the driver starts when all its listeners are there
 
     def _work(self, stamp: int, inputs: dict[str, Any]) -> None:
         dt = self._timing.period_ns if self._last is None else stamp - self._last

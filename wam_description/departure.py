@@ -3,11 +3,14 @@
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
-from wam_description.arm import Arm
+from wam_description.arm import Arm, Joints, Links, Motors
 from wam_description.parameters import lengths, parameter, require
+
+Shafts = TypeVar("Shafts", Motors, Joints)
 
 
 @dataclass(frozen=True)
@@ -35,11 +38,11 @@ def built(arm: Arm, departure: Departure) -> Arm:
     lengths("departure", arm.joints.names, {"joint_friction": departure.joint_friction})
     by_motor = dict(zip(arm.motors.names, departure.stiffness, strict=True))
     stages = [by_motor[motor] for motor in arm.cables.stage_motors]
-    loaded = dataclasses.replace(arm, links=dataclasses.replace(arm.links, **_masses(arm, departure)))
     return dataclasses.replace(
-        loaded,
-        motors=dataclasses.replace(arm.motors, **_frictions(arm.motors, departure.motor_friction)),
-        joints=dataclasses.replace(arm.joints, **_frictions(arm.joints, departure.joint_friction)),
+        arm,
+        motors=_rubbing(arm.motors, departure.motor_friction),
+        joints=_rubbing(arm.joints, departure.joint_friction),
+        links=_loaded(arm, departure),
         cables=dataclasses.replace(arm.cables, stage_ea=_scaled(arm.cables.stage_ea, stages)),
     )
 
@@ -48,12 +51,16 @@ def _scaled(values: Sequence[float], factors: Sequence[float]) -> tuple[float, .
     return tuple(value * factor for value, factor in zip(values, factors, strict=True))
 
 
-def _frictions(shafts: object, factors: Sequence[float]) -> dict[str, tuple[float, ...]]:
-    levels = ("static_friction", "dynamic_friction", "viscous_friction")
-    return {level: _scaled(getattr(shafts, level), factors) for level in levels}
+def _rubbing(shafts: Shafts, factors: Sequence[float]) -> Shafts:
+    return dataclasses.replace(
+        shafts,
+        static_friction=_scaled(shafts.static_friction, factors),
+        dynamic_friction=_scaled(shafts.dynamic_friction, factors),
+        viscous_friction=_scaled(shafts.viscous_friction, factors),
+    )
 
 
-def _masses(arm: Arm, departure: Departure) -> dict[str, tuple[float, ...]]:
+def _loaded(arm: Arm, departure: Departure) -> Links:
     links = arm.links
     mass = np.multiply(links.mass, departure.mass)
     centre = np.reshape(links.centre, (-1, 3)).astype(float)
@@ -61,16 +68,16 @@ def _masses(arm: Arm, departure: Departure) -> dict[str, tuple[float, ...]]:
     if departure.payload > 0.0:
         lever = np.array(arm.tool) - centre[-1]
         require(
-            np.count_nonzero(lever) <= 1,
-            f"departure.payload is {departure.payload:g} kg, but the tool is not on an axis of the last link's inertia; "
-            "set it to 0",
+            int(np.count_nonzero(lever)) <= 1,
+            f"departure.payload is {departure.payload:g} kg, but the tool is not on an axis of the last link's "
+            "inertia; set it to 0",
         )
         share = departure.payload / (mass[-1] + departure.payload)
         reduced = mass[-1] * share
         inertia[-1] += reduced * (lever @ lever - lever * lever)
         centre[-1] += share * lever
         mass[-1] += departure.payload
-    return {"mass": _row(mass), "centre": _row(centre), "inertia": _row(inertia)}
+    return dataclasses.replace(links, mass=_row(mass), centre=_row(centre), inertia=_row(inertia))
 
 
 def _row(values: np.ndarray) -> tuple[float, ...]:

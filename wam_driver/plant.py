@@ -22,7 +22,7 @@ from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
 from wam_description.signals import Load
 from wam_description.world import Springs, World
-from wam_driver.pusher import Pusher, pushers
+from wam_driver.pusher import pushers
 
 STUCK_ROTOR = 1e-5  # rad/s; below it a rotor counts as stuck: far under one step of any real motion
 STUCK_JOINT = 1e-6  # rad/s; 1e-3 would make the limit cycle of (5.8) vanish

@@ -3,27 +3,92 @@
 import argparse
 import os
 import sys
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import yaml
 
 from wam_analysis.contact_battery import Extent, Judgement, judge, scenes
-from wam_analysis.contact_battery_page import missed, report
+from wam_analysis.contact_battery_bag import recorded, script
+from wam_analysis.contact_battery_figure import figure
+from wam_analysis.contact_battery_page import missed, page, report
+from wam_analysis.contact_battery_run import Played
+from wam_analysis.contact_battery_scenes import Scene, dither_values
+from wam_analysis.contact_battery_score import SceneScore, score
+from wam_analysis.contact_battery_time import sentence, times
+from wam_description.configuration import Configuration
+from wam_ros.bring_up import Composition
 from wam_ros.commands import configuration_of, take_configuration
 
 SEEDS = (1, 2, 3)
 PARTS = ("contact",)
 
 
+def over_topics(
+    configuration: Configuration, drawn: Mapping[int, Sequence[Scene]], _processes: int
+) -> Iterator[tuple[int, SceneScore]]:
+    """Play the scenes of every seed with the nodes, in lockstep, and score what was recorded."""
+    arm = configuration.shared.arm
+    for seed, own in drawn.items():
+        for scene in own:
+            yield seed, score(play_over_topics(configuration, scene), arm)
+
+
+def play_over_topics(configuration: Configuration, scene: Scene, domain_id: int | None = None) -> Played:
+    """Play a scene with the nodes in this process, in lockstep; what was recorded is what counts."""
+    shared = configuration.shared
+    with TemporaryDirectory(prefix="wam_battery_") as folder:
+        steps = Path(folder) / "scene.yaml"
+        steps.write_text(yaml.safe_dump(script(scene)), encoding="utf-8")
+        own = {
+            "nodes": [*shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.timeout": 60.0,
+            "timing.display_divisor": 1,
+            "scenario:script": str(steps),
+            "recorder:directory": folder,
+            "recorder:name": "scene",
+        }
+        with Composition(configuration.with_values({**scene.values, **own}), domain_id=domain_id) as composition:
+            scenario: Any = composition.nodes["scenario"]
+            composition.spin(lambda: scenario.done)
+            failure = str(scenario.failure)
+        return recorded(scene, Path(folder) / "scene", shared.arm, failure)
+
+
+MODES = {"direct": judge, "lockstep": over_topics}
+
+
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("part", choices=PARTS, help="contact: the estimation of contacts on the whole arm")
     parser.add_argument("--seed", type=int, nargs="+", default=list(SEEDS), help="seeds of the battery, default 1 2 3")
-    parser.add_argument("--contacts", type=int, default=300, help="contacts in motion for each seed, default 300")
-    parser.add_argument("--resting", type=int, default=40, help="contacts at rest for each seed, default 40")
+    parser.add_argument("--contacts", type=int, default=200, help="contacts in motion for each seed, default 200")
+    parser.add_argument("--resting", type=int, default=30, help="contacts at rest for each seed, default 30")
     parser.add_argument("--free", type=float, default=120.0, help="seconds of motion without contact for each seed")
     parser.add_argument("--joint-sensors", action="store_true", help="feel with the joint sensors")
+    parser.add_argument(
+        "--mode", choices=tuple(MODES), default="direct", help="direct: without ROS; lockstep: over topics, slower"
+    )
     parser.add_argument("--write", type=Path, help="page to write, for example docs/contact.md")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, help="at a time, default one a core")
     take_configuration(parser)
+
+
+def _write(given: argparse.Namespace, configuration: Configuration, judgement: Judgement, scene: Scene) -> None:
+    """The page, and its picture in a folder of the page's name."""
+    arm, file = configuration.shared.arm, Path(given.write)
+    picture = file.with_suffix("") / "battery.png"
+    figure(judgement.total, arm, picture)
+    defaults = f"--contacts {given.contacts} --resting {given.resting} --free {given.free:g}"
+    seeds = " ".join(map(str, given.seed))
+    sensors = " --joint-sensors" * given.joint_sensors
+    command = f"wam evaluate contact --seed {seeds} {defaults}{sensors} --mode {given.mode} --write {file}"
+    compute = sentence(times(configuration, scene))
+    text = page(judgement, arm, command, compute, f"{picture.parent.name}/{picture.name}")
+    file.write_text(text, encoding="utf-8")
 
 
 def run(given: argparse.Namespace) -> int:
@@ -31,17 +96,18 @@ def run(given: argparse.Namespace) -> int:
     configuration = configuration_of(given)
     arm = configuration.shared.arm
     extent = Extent(given.contacts, given.resting, given.free)
-    drawn = {seed: scenes(configuration, seed, extent, given.joint_sensors) for seed in given.seed}
+    dither = dither_values(configuration)
+    drawn = {seed: scenes(configuration, seed, extent, given.joint_sensors, dither) for seed in given.seed}
     judgement = Judgement(tuple(given.seed), {seed: [] for seed in given.seed})
     whole = sum(map(len, drawn.values()))
-    for number, (seed, scored) in enumerate(judge(configuration, drawn, given.processes), 1):
+    for number, (seed, scored) in enumerate(MODES[given.mode](configuration, drawn, given.processes), 1):
         judgement.scores[seed].append(scored)
         if sys.stderr.isatty():
             print(f"\r{number} of {whole} scenes", end="" if number < whole else "\n", file=sys.stderr, flush=True)
     text = report(judgement, arm)
     print(text)
     if given.write:
-        given.write.write_text(text, encoding="utf-8")
+        _write(given, configuration, judgement, drawn[given.seed[0]][0])
     short = missed(judgement, arm)
     if short:
         print(f"missed: {'; '.join(short)}", file=sys.stderr)

@@ -1,0 +1,357 @@
+"""The judge of contact estimation: it counts what truly touched, knows the truth, scores as by hand."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from contact_truth import torques as torques_by_hand
+
+from wam_analysis.contact_battery import Extent, Judgement, judge, scenes
+from wam_analysis.contact_battery_bag import script
+from wam_analysis.contact_battery_page import FEW, MARGINAL, MET, MISSED, STRETCH, mark, missed, page
+from wam_analysis.contact_battery_run import Belief, Levers, Played, Record, play
+from wam_analysis.contact_battery_scenes import Draw, Planned, Scene, dither_values
+from wam_analysis.contact_battery_score import ANY, Row, SceneScore, asked, score, stated
+from wam_analysis.contact_battery_statistics import Figure, events, quantile, rms, share
+from wam_analysis.contact_battery_touches import Quiet, Touch, credibility, quiet, residual, spans, touches
+from wam_control.scenario import load as load_script
+from wam_description.configuration import Configuration, packaged
+from wam_description.signals import NO_LOAD, Load
+
+CONFIGURATION = Configuration.load(packaged("wam"))
+ARM = CONFIGURATION.shared.arm
+LENGTHS = dict(zip(ARM.covers.names, ARM.covers.length, strict=True))
+PERIOD = 5_000_000  # ns
+ZERO = (0.0, 0.0, 0.0)
+NAN = math.nan
+
+
+def belief(cover: str, probability: float, place: float = NAN, sd: float = NAN, **more: Any) -> Belief:
+    given: dict[str, Any] = {"low": NAN, "high": NAN, "force": (0.0, 5.0, 0.0), "moment": ZERO, **more}
+    return Belief(cover, probability, place, sd, **given)
+
+
+def record(i: int, newtons: float, beliefs: tuple[Belief, ...] = (), speed: float = 1.0, error: float = 0.0) -> Record:
+    load = Load("outer_link", 0.3, (0.0, newtons, 0.0), (0.0, 0.0, 0.3 * newtons)) if newtons else NO_LOAD
+    return Record(
+        stamp=(i + 1) * PERIOD,
+        q=(0.0,) * 4,
+        qd=(speed, 0.0, 0.0, 0.0),
+        thetad=(30.0 * speed, 0.0, 0.0, 0.0),
+        load=load,
+        torques=(0.0,) * 4,
+        external=(error, 0.0, 0.0, 0.0),
+        external_sd=(0.5,) * 4,
+        in_contact=bool(beliefs),
+        beliefs=beliefs,
+    )
+
+
+def story(force: list[float], felt: dict[int, tuple[Belief, ...]], **more: Any) -> Played:
+    planned = (Planned("push", "outer_link", 0.3, 0.0, 5.0, 0.5, 1.0, 0.0),)
+    records = [record(i, newtons, felt.get(i, ()), **more) for i, newtons in enumerate(force)]
+    return Played(Scene("by hand", "moving", {}, (), planned), records, "")
+
+
+# what touched
+
+
+def test_a_touch_is_judged_by_hand_computed_numbers() -> None:
+    outer, inner = belief("outer_link", 0.8, 0.33, 0.02, moment=(0.0, 0.0, 1.2)), belief("inner_link", 0.2)
+    played = story([0.0] * 100 + [5.0] * 60 + [0.0] * 40, dict.fromkeys(range(104, 170), (outer, inner)))
+    ((touch,), unfit) = touches(played, LENGTHS)
+    assert unfit == 0
+    assert (touch.cover, touch.place, touch.force, touch.kind) == ("outer_link", 0.3, 5.0, "push")
+    assert touch.latency == pytest.approx(0.025)  # from record 99, the last without force, to 104
+    assert touch.felt
+    assert touch.right_link
+    assert touch.link_probability == 0.8
+    assert touch.error == pytest.approx(0.03)
+    assert touch.place_sd == 0.02
+    assert touch.moment_error == pytest.approx(0.3)
+    # more believed: places within 1.5 sd, 86.6 % of 80 %; on the inner link the density is 0.2/0.5588 per metre, less
+    assert touch.credibility == pytest.approx(0.8 * math.erf(1.5 / math.sqrt(2.0)), abs=0.02)
+
+
+def test_a_wrong_link_and_an_unfelt_touch_count_as_infinitely_wrong() -> None:
+    force = [0.0] * 100 + [5.0] * 60
+    ((wrong,), _) = touches(story(force, {i: (belief("inner_link", 0.9),) for i in range(100, 160)}), LENGTHS)
+    assert wrong.felt
+    assert not wrong.right_link
+    assert math.isinf(wrong.error)
+    assert wrong.credibility > 0.9
+    ((unfelt,), _) = touches(story(force, {}), LENGTHS)
+    assert math.isinf(unfelt.latency)
+    assert math.isinf(unfelt.error)
+    assert not unfelt.in_set
+
+
+def test_an_alarm_from_before_the_touch_is_no_quick_answer() -> None:
+    felt = {i: (belief("outer_link", 1.0, 0.3, 0.01),) for i in range(90, 160)}
+    played = story([0.0] * 100 + [5.0] * 60, felt)
+    ((touch,), _) = touches(played, LENGTHS)
+    assert math.isnan(touch.latency)
+    assert quiet(played).alarms == 1
+
+
+def test_short_and_violent_touches_are_counted_and_not_judged() -> None:
+    assert touches(story([0.0] * 50 + [5.0] * 10 + [0.0] * 50, {}), LENGTHS) == ([], 1)
+    assert touches(story([0.0] * 50 + [60.0] * 60, {}), LENGTHS) == ([], 1)
+
+
+def test_a_gap_of_one_period_does_not_make_two_touches_and_a_longer_one_does() -> None:
+    assert len(spans(story([5.0] * 40 + [0.0] + [5.0] * 40, {}).records)) == 1
+    assert len(spans(story([5.0] * 40 + [0.0] * 3 + [5.0] * 40, {}).records)) == 2
+
+
+def test_the_estimators_own_set_counts_where_it_gives_one() -> None:
+    force = [0.0] * 100 + [5.0] * 60
+    for low, high, holds in ((0.2, 0.31, True), (0.31, 0.4, False)):
+        given = (belief("outer_link", 1.0, 0.3, 0.01, low=low, high=high),)
+        ((touch,), _) = touches(story(force, dict.fromkeys(range(100, 160), given)), LENGTHS)
+        assert touch.in_set is holds
+
+
+def test_an_alarm_that_ends_late_is_not_a_false_one_and_a_new_one_is() -> None:
+    on = (belief("outer_link", 1.0, 0.3, 0.01),)
+    force = [0.0] * 50 + [5.0] * 50 + [0.0] * 100
+    late = story(force, dict.fromkeys(range(52, 130), on))
+    assert quiet(late) == Quiet("moving", pytest.approx(0.65), 0)  # 50 records before, 80 from 0.1 s after the touch
+    assert quiet(story(force, dict.fromkeys([*range(52, 110), *range(150, 153), *range(160, 170)], on))).alarms == 2
+
+
+def test_torque_errors_count_in_motion_and_at_rest_apart_and_not_near_the_edges_of_a_touch() -> None:
+    played = story([0.0] * 200, {}, error=2.0)
+    found = residual(played)
+    assert found.moving_count == 160 - 1  # 0.2 s of the beginning are the observer's
+    assert found.moving == (4.0 * found.moving_count, 0.0, 0.0, 0.0)
+    assert found.moving_z[0] == pytest.approx(16.0 * found.moving_count)
+    assert found.still_count == found.sliding_count == 0
+    assert residual(story([0.0] * 200, {}, speed=0.05, error=2.0)).still_count == 159
+    touched = residual(story([0.0] * 100 + [5.0] * 50 + [0.0] * 50, {}, error=2.0))
+    assert 159 - 2 * 25 <= touched.moving_count <= 159 - 2 * 22
+
+
+def test_credibility_of_the_truth_is_uniform_where_the_belief_is_right() -> None:
+    random = np.random.default_rng(0)
+    levels = []
+    for _ in range(400):
+        mean, sd = random.uniform(0.15, 0.25), random.uniform(0.005, 0.03)
+        felt = (belief("outer_link", 0.7, mean, sd), belief("inner_link", 0.3))
+        if random.random() < 0.7:
+            levels.append(credibility(felt, "outer_link", random.normal(mean, sd), LENGTHS))
+        else:
+            levels.append(credibility(felt, "inner_link", random.uniform(0.0, 0.5), LENGTHS))
+    assert np.mean(np.array(levels) <= 0.5) == pytest.approx(0.5, abs=0.08)
+    assert np.mean(np.array(levels) <= 0.9) == pytest.approx(0.9, abs=0.12)
+
+
+# numbers and marks
+
+
+def test_intervals_are_those_of_the_textbooks() -> None:
+    found = share(8, 10)  # Wilson 1927, as in Brown, Cai & DasGupta 2001
+    assert (found.value, found.low, found.high) == (0.8, pytest.approx(0.490, abs=2e-3), pytest.approx(0.943, abs=2e-3))
+    assert events(0, 120.0).high == pytest.approx(3.69, abs=0.03)  # exact Poisson, 97.5 %
+    assert events(5, 1.0).low == pytest.approx(1.62, abs=0.03)
+    middle = quantile([float(i) for i in range(1, 102)], 0.5)
+    assert (middle.value, middle.low, middle.high) == (51.0, 41.0, 61.0)
+    assert quantile([1.0, 2.0, 3.0, 4.0], 0.5).value == 2.5
+    assert quantile([1.0, math.inf, math.inf], 0.5).value == math.inf
+    assert rms([4.0, 12.0], [1, 3]).value == 2.0
+    assert math.isnan(share(0, 0).value)
+
+
+def test_the_interval_of_an_rms_is_that_of_its_scenes_not_of_its_samples() -> None:
+    random = np.random.default_rng(1)
+    biases = random.normal(0.0, 1.0, 40)
+    few = rms((1000 * biases**2).tolist(), [1000] * 40)
+    assert few.high - few.low > 0.2
+
+
+def test_marks_tell_a_good_number_from_a_marginal_one() -> None:
+    row = Row("x", "", 1.0, (0.0, 2.0), (0.0, 1.0), lambda scores: Figure(0.0, 0.0, 0.0, 0))
+    assert mark(row, Figure(0.9, 0.8, 1.4, 50)) == STRETCH
+    assert mark(row, Figure(1.5, 1.2, 1.9, 50)) == MET
+    assert mark(row, Figure(1.5, 1.2, 2.1, 50)) == MARGINAL
+    assert mark(row, Figure(2.5, 1.2, 3.1, 50)) == MISSED
+    assert mark(row, Figure(math.nan, math.nan, math.nan, 0)) == "no data"
+    none = row._replace(must=(0.0, 0.0), stretch=(0.0, 0.0))
+    assert mark(none, Figure(0.0, 0.0, 3.7, 60)) == FEW
+    assert mark(none, Figure(0.0, 0.0, 3.7, 130)) == MET
+    assert mark(none, Figure(0.0, 0.0, 3.7, 600)) == STRETCH
+    assert mark(none, Figure(1.0, 0.0, 5.0, 600)) == MISSED
+    assert mark(row._replace(must=ANY, stretch=ANY), Figure(9.0, 8.0, 10.0, 5)) == ""
+
+
+def synthetic(error: float, latency: float, right: float, group: str = "moving") -> list[SceneScore]:
+    """A hundred scenes with a contact of 5 N; a share names the right link, 90 % of the sets hold the truth."""
+    result = []
+    for i in range(100):
+        good = i < 100 * right
+        touch = Touch(
+            group, "push", 0.0, "outer_link", 0.2, 5.0, True, True, latency, True, 0.99, good,
+            error if good else math.inf, 0.015 if good else NAN, 0.5, i % 10 != 0, 0.1, 1.0, 5.0,
+        )  # fmt: skip
+        rest = residual(story([0.0] * 100, {}, error=0.2))
+        result.append(SceneScore(f"scene {i}", [touch], 0, 0, rest, Quiet("free", 2.0, 0), ""))
+    return result
+
+
+def found(name: str, scores: list[SceneScore]) -> Figure:
+    (row,) = [row for row in [*asked(ARM), *stated(ARM)] if row.name == name]
+    return row.of(scores)
+
+
+def test_rows_of_synthetic_contacts_are_those_that_went_in() -> None:
+    scores = synthetic(error=-0.025, latency=0.04, right=0.93)
+    assert found("external torque in motion, rms, joint1", scores).value == pytest.approx(0.2)
+    assert found("false alarms in free motion with stops", scores)[::3] == (0.0, 200)
+    assert found("5 N on the outer link felt within 60 ms", scores).value == 1.0
+    assert found("5 N on the outer link felt within 30 ms", scores).value == 0.0
+    assert found("place on the outer link at 5 N, median error", scores).value == pytest.approx(0.025)
+    assert found("contacts with a stated sd below 2 cm", scores).value == pytest.approx(0.93)
+    assert found("wrong link", scores).value == pytest.approx(0.07)
+    assert found("place: 68 % of the errors are below so many stated sd", scores).value == pytest.approx(25 / 15)
+    assert found("place on the outer link at 10 N, median error", scores).observed == 0
+
+
+def test_a_missed_must_is_named_and_a_met_one_is_not() -> None:
+    bad = missed(Judgement((1,), {1: synthetic(-0.04, 0.07, 0.93)}), ARM)
+    assert "place on the outer link at 5 N, median error" in bad
+    assert "5 N on the outer link felt within 60 ms" in bad
+    assert "wrong link" in bad
+    good = missed(Judgement((1,), {1: synthetic(-0.004, 0.02, 1.0)}), ARM)
+    assert good == []
+
+
+def test_half_the_contacts_without_a_place_is_no_finite_median() -> None:
+    assert found("place on the outer link at 5 N, median error", synthetic(0.01, 0.02, 0.4)).value == math.inf
+
+
+def test_the_page_holds_every_row_that_is_asked() -> None:
+    judgement = Judgement((7,), {7: synthetic(0.01, 0.02, 1.0)})
+    text = page(judgement, ARM, "wam evaluate contact", "", "picture.png")
+    assert all(f"| {row.name} |" in text for row in asked(ARM))
+    assert "| seed 7 |" in text
+
+
+# truth
+
+
+@pytest.mark.parametrize("cover", ["inner_link", "outer_link"])
+def test_torques_of_a_load_are_those_of_virtual_work(cover: str) -> None:
+    random = np.random.default_rng(3)
+    levers = Levers(ARM)
+    for _ in range(5):
+        q, point, force = random.uniform(-1.0, 1.0, 4), random.uniform(-0.1, 0.4, 3), random.uniform(-9.0, 9.0, 3)
+        load = Load(cover, point[0], tuple(force), tuple(np.cross(point, force)))
+        by_hand = torques_by_hand(q, cover, point, force)
+        assert np.abs(np.subtract(levers.torques(q, load), by_hand)).max() < 1e-6
+    assert levers.torques([0.0] * 4, NO_LOAD) == (0.0,) * 4
+
+
+def pick(kind: str, seed: int = 1) -> Scene:
+    """A scene in motion whose first contact is of a kind."""
+    drawn = Draw(CONFIGURATION, seed).contacts(120)
+    return next(scene for scene in drawn if scene.planned[0].kind == kind)
+
+
+@pytest.mark.parametrize("kind", ["push", "sphere", "flat", "foam"])
+def test_contacts_of_every_kind_truly_touch_where_they_are_meant(kind: str) -> None:
+    scene = pick(kind)
+    meant = scene.planned[0]
+    played = play(CONFIGURATION, scene)
+    first = spans(played.records)[0]
+    assert first.cover == meant.cover
+    middle = played.records[first.first + 20].load
+    length = LENGTHS[meant.cover]
+    assert middle.place == pytest.approx(meant.place, abs=0.05 if kind == "foam" else 0.03 if kind == "flat" else 0.015)
+    assert -0.03 < middle.place < length + 0.03
+    across = math.hypot(middle.force[1], middle.force[2])
+    if kind != "foam":
+        assert across == pytest.approx(meant.force, rel=0.2 + meant.friction)
+    while_held = played.records[first.first : first.last + 1]
+    assert all(record.load.cover for record in while_held)  # kept contact
+    assert (while_held[-1].stamp - while_held[0].stamp) * 1e-9 > 0.2
+
+
+def test_a_hand_that_misses_is_not_counted() -> None:
+    scene = pick("sphere")
+    values = dict(scene.values)
+    late = [100.0 for _ in values["driver:world.pushers.begin"]]
+    values |= {"driver:world.pushers.begin": late, "driver:world.pushers.end": [200.0] * len(late)}
+    steps = tuple(step._replace(push=None) for step in scene.steps)
+    missing = scene._replace(values=values, steps=steps)
+    found_there = score(play(CONFIGURATION, missing), ARM)
+    assert found_there.touches == []
+    assert found_there.unfit == 0
+    assert found_there.missed == len(scene.planned)
+    assert len(score(play(CONFIGURATION, scene), ARM).touches) == len(scene.planned)
+
+
+# scenes
+
+
+def test_scenes_are_the_same_for_the_same_seed_and_others_for_another() -> None:
+    extent = Extent(contacts=6, resting=2, free=12.0)
+    first, again, other = (scenes(CONFIGURATION, seed, extent) for seed in (5, 5, 6))
+    assert first == again
+    assert all(a.values != b.values for a, b in zip(first, other, strict=True))
+    more = scenes(CONFIGURATION, 5, extent._replace(contacts=8))
+    assert more[:3] == first[:3]  # a larger battery begins like the smaller one
+
+
+def test_a_seed_gives_the_same_scores_in_one_process_and_in_two() -> None:
+    drawn = {4: scenes(CONFIGURATION, 4, Extent(contacts=4, resting=0, free=0.0))}
+    alone, together = (list(judge(CONFIGURATION, drawn, processes)) for processes in (1, 2))
+    assert repr(alone) == repr(together)
+    assert sum(len(scene.touches) for _, scene in alone) >= 3
+
+
+def test_the_arm_of_every_scene_departs_from_the_configured_one_within_the_declared_range() -> None:
+    drawn = Draw(CONFIGURATION, 2).contacts(40) + Draw(CONFIGURATION, 2).free(24.0)
+    friction = [factor for scene in drawn for factor in scene.values["driver:departure.motor_friction"]]
+    assert 0.9 <= min(friction) < 0.93
+    assert 1.07 < max(friction) <= 1.1
+    assert all(scene.values["contact_estimator:observer.friction_scale"] == 1.0 for scene in drawn)
+    assert 0.0 < max(scene.values.get("driver:departure.payload", 0.0) for scene in drawn) <= 0.05
+    assert not any(scene.values["contact_estimator:use_joint_sensors"] for scene in drawn)
+
+
+def test_dither_is_asked_for_only_where_the_velocity_loop_has_it() -> None:
+    sections = {name: dict(flat) for name, flat in CONFIGURATION.sections.items()}
+    sections["/**"].pop("timing.dither_cycle", None)
+    assert dither_values(CONFIGURATION._replace(sections=sections)) == {}
+    sections["/**"]["timing.dither_cycle"] = 0
+    assert dither_values(CONFIGURATION._replace(sections=sections)) == {"timing.dither_cycle": 40}
+
+
+def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
+    domain_id: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import yaml
+
+    from wam_ros.commands.evaluate import play_over_topics
+
+    scene = pick("sphere")
+    file = tmp_path / "scene.yaml"
+    file.write_text(yaml.safe_dump(script(scene)))
+    assert tuple(load_script(file, ARM)) == scene.steps
+    short = scene._replace(steps=scene.steps[:3])
+    direct = play(CONFIGURATION, short)
+    over = play_over_topics(CONFIGURATION, short, domain_id)
+    assert over.failure == direct.failure == ""
+    assert len(over.records) == len(direct.records)
+    for one, other in zip(direct.records, over.records, strict=True):
+        exact = (one.stamp, one.q, one.qd, one.thetad, one.external, one.in_contact, one.load.force, one.load.moment)
+        assert exact == (
+            other.stamp, other.q, other.qd, other.thetad, other.external, other.in_contact, other.load.force,
+            other.load.moment,
+        )  # fmt: skip
+    (mine,), (theirs,) = (score(played, ARM).touches for played in (direct, over))
+    for name, value in mine._asdict().items():
+        got = getattr(theirs, name)
+        assert got == (pytest.approx(value, rel=1e-4, abs=1e-4, nan_ok=True) if isinstance(value, float) else value)
