@@ -5,6 +5,7 @@ A page is written by hand, but for its blocks between `<!-- generated: NAME -->`
 """
 
 import argparse
+import ast
 import importlib
 import re
 import shutil
@@ -17,16 +18,20 @@ from pathlib import Path
 from typing import Any
 
 from wam_analysis.plant_figure import figure
+from wam_analysis.scorecard import report as scorecard
+from wam_control.force_loop import ForceLoop, ForceLoopParameters
 from wam_description.arm import Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
-from wam_description.parameters import fields
+from wam_description.parameters import ParameterError, fields
 from wam_ros.bring_up import MODULES
 from wam_ros.topics import TOPICS
+from wam_theory.equations import EQUATIONS, Equation
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGURATION = ROOT / "config" / "wam.yaml"
 WRITES_PICTURES = __name__ == "__main__"
+CITED = re.compile(r"\((\d\.\d+)(?:\.[ab])?\)")
 BLOCK = re.compile(r"(<!-- generated: (?P<name>[^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -138,6 +143,66 @@ def constant_row(row: Constant) -> list[str]:
     ]
 
 
+# equations
+
+
+def functions(path: Path) -> Iterator[ast.FunctionDef]:
+    """The public functions of a module."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+            yield node
+
+
+def citing() -> dict[str, list[str]]:
+    """Equation number to the functions, module.name, that cite it in the first line of their docstring."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(ROOT.glob("wam_theory/*.py")):
+        for function in functions(path):
+            summary = (ast.get_docstring(function) or "").split("\n")[0]
+            for number_ in dict.fromkeys(CITED.findall(summary)):
+                found.setdefault(number_, []).append(f"{path.stem}.{function.name}")
+    return found
+
+
+def tests_by_function() -> dict[str, list[str]]:
+    """Name of a function to the tests, file.name, that use it; those of shapes and refusals do not count."""
+    found: dict[str, list[str]] = {}
+    paths = [*sorted(ROOT.glob("test/test_equations_*.py")), ROOT / "test" / "test_stick_slip.py"]
+    for path in paths:
+        named = {function.name: names_in(function) for function in functions(path)}
+        for test, names in named.items():
+            if test.startswith("test_") and not re.search("refus|broadcast", test):
+                through = set().union(*(named[name] for name in names & set(named)))
+                for name in sorted(names | through):
+                    found.setdefault(name, []).append(f"{path.stem}.{test}")
+    return found
+
+
+def names_in(function: ast.FunctionDef) -> set[str]:
+    """Every name and attribute that a function mentions."""
+    return {getattr(node, "id", getattr(node, "attr", "")) for node in ast.walk(function)}
+
+
+def equations() -> str:
+    """Every numbered equation: what it says, what is wrong in its print, its functions and their tests."""
+    citing_, using = citing(), tests_by_function()
+    head = ["", "section", "what", "in print", "function", "test"]
+    return table(head, [equation_row(row, citing_.get(row.number, []), using) for row in EQUATIONS])
+
+
+def equation_row(row: Equation, names: Sequence[str], using: Mapping[str, Sequence[str]]) -> list[str]:
+    """One equation; of its tests the first three."""
+    tests = dict.fromkeys(test for name in names for test in using.get(name.split(".")[1], []))
+    return [
+        f"({row.number})",
+        row.section,
+        row.says,
+        row.correction,
+        row.reason or ", ".join(f"`{name}`" for name in names),
+        ", ".join(f"`{test}`" for test in list(tests)[:3]),
+    ]
+
+
 # pages
 
 
@@ -167,8 +232,42 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
         "plant": plant_study,
+        "refusals": refusals,
+        "guard": lambda: f"```\n{(ROOT / 'docs' / 'guard.txt').read_text(encoding='utf-8')}```\n",
+        "equations": equations,
+        "scorecard": lambda: scorecard(configuration),
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
+
+
+def refusals() -> str:
+    """What the force loop says to some sets that are not stable."""
+    lines = []
+    for name, change in (
+        ("wam", {"force_loop:force_gain": [0.5]}),
+        ("wam", {"force_loop:mode": "joint_torque", "force_loop:torque_gain": [0.05]}),
+        ("testbed", {"force_loop:force_gain": [0.05], "force_loop:guard.mode": "refuse"}),
+        ("testbed", {"force_loop:force_gain": [0.2], "force_loop:guard.mode": "refuse"}),
+    ):
+        configuration = Configuration.load(ROOT / "config" / f"{name}.yaml").with_values(change)
+        shared = configuration.shared
+        given = ", ".join(f"{key.removeprefix('force_loop:')} {value}" for key, value in change.items())
+        try:
+            ForceLoop(shared.arm, configuration.node("force_loop", ForceLoopParameters), shared.timing)
+        except ParameterError as error:
+            lines.append(f"{name}, {given}:\n  {error}")
+        else:
+            raise SystemExit(f"the guard accepts {given} on {name}; the page wants a refusal")
+    return "```\n" + "\n".join(lines) + "\n```\n"
+
+
+def measure_guard() -> None:
+    """Hold the guard against simulation and keep the two tables."""
+    command = [sys.executable, "-m", "wam_ros.cli", "guard"]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"the guard accepted what diverges, docs/guard.txt stays as it was:\n{done.stdout}")
+    (ROOT / "docs" / "guard.txt").write_text(done.stdout.rstrip() + "\n", encoding="utf-8")
 
 
 def filled(text: str) -> str:
@@ -199,10 +298,12 @@ def draw_demonstration() -> None:
 
 
 def main() -> None:
-    """Write the pages, then the picture."""
+    """Measure the guard, write the pages, then the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--pages", action="store_true", help="pages only, without playing the demonstration")
+    parser.add_argument("--pages", action="store_true", help="pages only, without demonstration and guard's trials")
     given = parser.parse_args()
+    if not given.pages:
+        measure_guard()
     for path, text in pages().items():
         path.write_text(text, encoding="utf-8")
         print(path.relative_to(ROOT))

@@ -4,7 +4,7 @@ from wam_analysis.direct import DirectRun
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
 
-configuration = Configuration.load(packaged("wam")).with_values({"force_loop:force_gain": 0.01})
+configuration = Configuration.load(packaged("wam")).with_values({"force_loop:force_gain": [0.01]})
 run = DirectRun(configuration, load(packaged("demo_scenario"), configuration.shared.arm))
 if failure := run.play():
     raise SystemExit(failure)

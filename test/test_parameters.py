@@ -182,13 +182,15 @@ def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
 @pytest.mark.parametrize(
     ("given", "text"),
     [
-        ({"force_gain": 0.02, "contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
-        ({"force_gain": 0.02, "mode": "soft"}, "parameter 'mode' is 'soft'; allowed: one of hybrid"),
-        ({"force_gain": 0.02, "posture_gain": math.nan}, "posture_gain"),
-        ({"force_gain": 0.02, "posture_gain": -1.0}, "posture_gain"),
-        ({"force_gain": 0.02, "posture_gain": "much"}, "Wrong parameter type"),
-        ({"force_gain": 0.02, "timing.mode": "lockstep"}, "timing.mode"),
-        ({"force_gain": 0.02, "force_gian": 0.02}, "undeclared parameter"),
+        ({"force_gain": [0.02], "contact_cover": "hand"}, "contact_cover is 'hand'; allowed: inner_link, outer_link"),
+        ({"force_gain": [0.02], "mode": "soft"}, "parameter 'mode' is 'soft'; allowed: one of hybrid"),
+        ({"force_gain": [0.02], "posture_gain": math.nan}, "posture_gain"),
+        ({"force_gain": [0.02], "posture_gain": -1.0}, "posture_gain"),
+        ({"force_gain": [0.02], "posture_gain": "much"}, "Wrong parameter type"),
+        ({"force_gain": [0.02], "timing.mode": "lockstep"}, "timing.mode"),
+        ({"force_gain": [0.02], "force_gian": 0.02}, "undeclared parameter"),
+        ({"force_gain": [0.5]}, "times the largest linearly stable one"),
+        ({"force_gain": [0.02], "guard.contact_stiffness": 0.5}, "guard.contact_stiffness"),
     ],
 )
 def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, Any], text: str, ros: Any) -> None:
@@ -198,9 +200,9 @@ def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, An
     assert not result.successful
     assert text in result.reason
     assert node._loop.parameters == before
-    assert node.get_parameter("force_gain").value == before.force_gain
-    assert change(ros, "force_loop", force_gain=0.02).successful
-    assert node._loop.parameters.force_gain == 0.02, "the good part alone is taken"
+    assert tuple(node.get_parameter("force_gain").value) == before.force_gain
+    assert change(ros, "force_loop", force_gain=[0.02]).successful
+    assert node._loop.parameters.force_gain == (0.02,), "the good part alone is taken"
 
 
 def test_gains_of_a_wrong_number_are_refused_over_ros(ros: Any) -> None:
@@ -236,6 +238,7 @@ def run_node(name: str, *arguments: str, timeout: float = 20.0) -> subprocess.Co
     [
         ("velocity_loop", "integral_gain:", "integral_gian:", "unknown parameter 'integral_gian'"),
         ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
+        ("force_loop", "force_gain: [1.5e-2]", "force_gain: [0.5]", "times the largest linearly stable one"),
         ("transform", "mode: realtime", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of realtime"),
     ],
 )

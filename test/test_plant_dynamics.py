@@ -19,8 +19,9 @@ from wam_description.rigid_body import RigidBody
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
-from wam_theory.limit_cycles import gamma_b, stiction_cycle_force, stiction_cycle_period
+from wam_theory.regimes import gamma_b
 from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess, simulate
+from wam_theory.stiction import stiction_cycle_force, stiction_cycle_period
 
 STEP = 5e-4  # s, as configured
 FINE = 1.25e-4  # s, for what the step itself would move by 0.1 % or more

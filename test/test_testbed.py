@@ -38,7 +38,7 @@ def configured_testbed(folder: Path, *extra: str, mode: str = "lockstep") -> Con
             "scenario:script": str(script),
             "recorder:directory": str(folder),
             "recorder:name": "bag",
-            "force_loop:force_gain": 0.01,
+            "force_loop:force_gain": [0.01],
         }
     )
 

@@ -60,7 +60,7 @@ class DirectRun:
         servo = node("velocity_loop", VelocityLoopParameters)
         self._velocity_loop = VelocityLoop(arm.motors, servo)
         self._dither = Dither(arm, self._timing, servo.dither)
-        self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters))
+        self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters), self._timing)
         estimation = node("contact_estimator", ContactEstimatorParameters)
         self._estimator = ContactEstimator(arm, self._timing, estimation)
         self.estimate = self._estimator.estimate()

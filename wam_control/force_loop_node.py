@@ -2,11 +2,14 @@
 
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
+from wam_control.guard_report import Report
 from wam_description.arm import seconds
+from wam_description.parameters import ParameterError
 from wam_description.signals import State
 from wam_ros.lockstep import Gate, Need
 from wam_ros.messages import (
@@ -34,11 +37,15 @@ class ForceLoopNode(Node):
     def __init__(self, **ros: Any) -> None:
         super().__init__("force_loop", **ros)
         shared, own = declare(self, PARAMETERS)
-        self._loop = ForceLoop(shared.arm, own)
+        try:
+            self._loop = ForceLoop(shared.arm, own, shared.timing)
+        except ParameterError as error:
+            raise ParameterError(f"node '{self.get_name()}': {error}") from None
         follow(self, own, self._loop.tune)
         self._ports = ports = Ports(self, shared)
         self._outer_period = shared.timing.outer_period_ns
         self._last: int | None = None
+        self._said: Report | None = None
         joints, frames = list(shared.arm.joints.names), (BASE, *shared.arm.covers.names)
         estimated = Need(True, streamed=ports.streamed("contact_estimator"))
         played = Need(True, streamed=ports.streamed("scenario"))
@@ -85,13 +92,25 @@ class ForceLoopNode(Node):
             seconds(dt),
         )
         ports = self._ports
+        for topic, reason in self._loop.refusals.items():
+            ports.refuse(topic, reason)
         ports.publish_joints("joint_velocity_command", stamp, State([], out.velocity, []))
         ports.publish_joints("joint_effort_command", stamp, State([], [], out.effort))
         frame = command.frame if command else BASE
         ports.publish("force_measured", wrench_stamped(stamp, Wrench(frame, out.measured, NO_TORQUE)))
         ports.publish("force_error", wrench_stamped(stamp, Wrench(frame, out.error, NO_TORQUE)))
         ports.publish("force_error_limited", wrench_stamped(stamp, Wrench(frame, out.limited, NO_TORQUE)))
+        self._announce()
         ports.report(stamp)
+
+    def _announce(self) -> None:
+        """Publish what the guard says where it has changed, once the peers are there."""
+        report = self._loop.report
+        if report is self._said or not self._ports.ready:
+            return
+        self._said = report
+        level = DiagnosticStatus.WARN if report.is_warning else DiagnosticStatus.OK
+        self._ports.set_status(level, report.message, peers="connected", **report.facts)
 
     def _tare(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._loop.tare()

@@ -18,6 +18,8 @@ COMMANDS = {
     "call": "ask a running stack: enable, disable, estop, reset_fault, reset, tare",
     "plant": "draw the plant's effects beside the theory, print the differences",
     "evaluate": "judge a part of the stack by a seeded battery: contact",
+    "guard": "hold the stability guard's verdicts against simulation of random sets",
+    "scorecard": "print the arm beside the requisites of chapter 3",
     "model": "write the arm's model",
 }
 

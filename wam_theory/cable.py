@@ -4,9 +4,9 @@ A circuit has two strands under a pretension T0; torque makes one tighter and th
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from wam_theory.arguments import Array, above_zero, zero_or_more
 
 
 def stage_compliance(
@@ -25,9 +25,8 @@ def stage_compliance(
     circuits : parallel circuits.
     ratio : motor turns per turn of the driving pulley.
     """
-    ea, length, radius, circuits, ratio = _positive(
-        ea=(ea, False), length=(length, True), radius=(radius, False), circuits=(circuits, False), ratio=(ratio, False)
-    )
+    ea, radius, circuits, ratio = above_zero(ea=ea, radius=radius, circuits=circuits, ratio=ratio)
+    (length,) = zero_or_more(length=length)
     return length * ratio**2 / (2.0 * ea * radius**2 * circuits)
 
 
@@ -44,9 +43,8 @@ def stiffness_with_reducer(ea: ArrayLike, length: ArrayLike, ratio: ArrayLike, d
     ratio : N.
     distance : C, of the reducer from the motor, m, 0 to L.
     """
-    ea, length, ratio, distance = _positive(
-        ea=(ea, False), length=(length, False), ratio=(ratio, False), distance=(distance, True)
-    )
+    ea, length, ratio = above_zero(ea=ea, length=length, ratio=ratio)
+    (distance,) = zero_or_more(distance=distance)
     if np.any(distance > length):
         raise ValueError(f"distance is {distance.tolist()!r} m; it must not be above length, {length.tolist()!r} m")
     return ratio**2 * ea / (ratio * length + distance * (1.0 - ratio))
@@ -66,9 +64,8 @@ def circuit_torque(stretch: ArrayLike, stiffness: ArrayLike, pretension: ArrayLi
     radius : of the pinion, m.
     """
     x = np.asarray(stretch, dtype=float)
-    stiffness, pretension, radius = _positive(
-        stiffness=(stiffness, False), pretension=(pretension, True), radius=(radius, False)
-    )
+    stiffness, radius = above_zero(stiffness=stiffness, radius=radius)
+    (pretension,) = zero_or_more(pretension=pretension)
     half = stiffness / 2.0
     offset = slack_stretch(stiffness, pretension, radius)
     return half * (np.maximum(x + offset, 0.0) - np.maximum(offset - x, 0.0))
@@ -76,9 +73,8 @@ def circuit_torque(stretch: ArrayLike, stiffness: ArrayLike, pretension: ArrayLi
 
 def slack_stretch(stiffness: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> Array:
     """Stretch at which the loose strand goes slack, x0 = 2 T0 r/k, rad; arguments as in `circuit_torque`."""
-    stiffness, pretension, radius = _positive(
-        stiffness=(stiffness, False), pretension=(pretension, True), radius=(radius, False)
-    )
+    stiffness, radius = above_zero(stiffness=stiffness, radius=radius)
+    (pretension,) = zero_or_more(pretension=pretension)
     return 2.0 * pretension * radius / stiffness
 
 
@@ -87,8 +83,15 @@ def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tup
 
     T0 +- tau/(2 r), and tau/r and zero once the loose strand is slack (section 6.5: no strand goes
     slack where T0 is half of the full-torque tension).
+
+    Parameters
+    ----------
+    torque : at the pinion, N m.
+    pretension : T0, N, zero or more.
+    radius : of the pinion, m, above zero.
     """
-    pretension, radius = _positive(pretension=(pretension, True), radius=(radius, False))
+    (radius,) = above_zero(radius=radius)
+    (pretension,) = zero_or_more(pretension=pretension)
     difference = np.abs(np.asarray(torque, dtype=float)) / radius
     slack = difference > 2.0 * pretension
     return (
@@ -98,16 +101,14 @@ def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tup
 
 
 def stage_loss(torque: ArrayLike, radius: ArrayLike, ea: ArrayLike, circuits: ArrayLike, ratio: ArrayLike) -> Array:
-    """Share of the speed, and of the power, that a stage loses, (T2 - T1)/EA of (6.4) and (6.14).
+    """Share of the speed, and of the power, that a stage loses, (T2 - T1)/EA of (6.4) and (6.14); strain far below 1.
 
     Parameters
     ----------
     torque : at the motor, N m; the stage's own driving shaft carries `ratio` times as much.
     radius, ea, circuits, ratio : of the stage as in `stage_compliance`.
     """
-    radius, ea, circuits, ratio = _positive(
-        radius=(radius, False), ea=(ea, False), circuits=(circuits, False), ratio=(ratio, False)
-    )
+    radius, ea, circuits, ratio = above_zero(radius=radius, ea=ea, circuits=circuits, ratio=ratio)
     return np.abs(np.asarray(torque, dtype=float)) * ratio / (radius * ea * circuits)
 
 
@@ -137,7 +138,8 @@ def creep(travel: ArrayLike, torque: ArrayLike, radius: ArrayLike, ea: ArrayLike
     radius : of the driving pulley, m.
     ea : E A, N.
     """
-    travel, radius, ea = _positive(travel=(travel, True), radius=(radius, False), ea=(ea, False))
+    radius, ea = above_zero(radius=radius, ea=ea)
+    (travel,) = zero_or_more(travel=travel)
     return travel * np.asarray(torque, dtype=float) / (radius * ea)
 
 
@@ -150,18 +152,5 @@ def eccentric_ripple(eccentricity: ArrayLike, pretension: ArrayLike, angle: Arra
     pretension : T, N.
     angle : theta of the pulley, rad.
     """
-    eccentricity, pretension = _positive(eccentricity=(eccentricity, True), pretension=(pretension, True))
+    eccentricity, pretension = zero_or_more(eccentricity=eccentricity, pretension=pretension)
     return 2.0 * eccentricity * pretension * np.sin(np.asarray(angle, dtype=float))
-
-
-def _positive(**arguments: tuple[ArrayLike, bool]) -> tuple[Array, ...]:
-    """Arguments as arrays; each above zero, or at least zero where so marked."""
-    arrays = []
-    for name, (value, zero_allowed) in arguments.items():
-        array = np.asarray(value, dtype=float)
-        allowed = np.all(array >= 0.0) if zero_allowed else np.all(array > 0.0)
-        if not (allowed and np.all(np.isfinite(array))):
-            bound = "at least" if zero_allowed else "above"
-            raise ValueError(f"{name} is {value!r}; it must be {bound} zero")
-        arrays.append(array)
-    return tuple(arrays)

@@ -1,16 +1,110 @@
-"""Open-loop force bandwidth of a transmission (chapter 4)."""
+"""Open-loop bandwidth of a transmission, of position and of force, and the stiffness that is best for it (chapter 4).
+
+Motor J_m, cable k_tr seen at the motor, reducer N at the joint, link J_l, contact k_c at the joint; no
+damping.  All arguments broadcast, results have the shape they broadcast to; SI with radians, or any
+consistent units.  N_m = sqrt(J_l/J_m).
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wam_theory.arguments import Array, above_zero, below_one, zero_or_more
+
+Complex = NDArray[np.complex128]
+
 
 class Resonances(NamedTuple):
     """The two resonances of (4.4), rad/s, omega_1 below omega_2."""
 
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
+    lower: Array
+    upper: Array
+
+
+class SmallRatioResonances(NamedTuple):
+    """Resonances for a vanishing ratio, rad/s: the link on its contact, the rotor on its cable."""
+
+    link_on_contact: Array
+    rotor_on_cable: Array
+
+
+# -------------------------------------------------------------------------------- position (4.2)
+def position_transfer(
+    s: ArrayLike, link_inertia: ArrayLike, transmission_stiffness: ArrayLike, ratio: ArrayLike
+) -> Complex:
+    """Transfer function x_l/x_m of a position-controlled motor, (4.2), and for N = 1 the second (4.1).
+
+    N k_tr/(J_l s^2 + N^2 k_tr), 1/N for slow motion; the print has N^2 k_tr above, which is x_l N/x_m.
+
+    Parameters
+    ----------
+    s : complex frequency, rad/s; j omega for a frequency response.
+    link_inertia : J_l, kg m^2, above zero.
+    transmission_stiffness : k_tr, of a line between motor and reducer at the joint, N m/rad, above zero.
+    ratio : N, motor turns per joint turn, above zero.
+    """
+    jl, ktr, n = above_zero(link_inertia=link_inertia, transmission_stiffness=transmission_stiffness, ratio=ratio)
+    frequency = np.asarray(s, dtype=complex)
+    return n * ktr / (jl * frequency * frequency + n * n * ktr)
+
+
+def position_bandwidth(link_inertia: ArrayLike, transmission_stiffness: ArrayLike, ratio: ArrayLike) -> Array:
+    """Resonance of (4.2), rad/s: N sqrt(k_tr/J_l); with the reducer at the motor it is that of N = 1.
+
+    So a reducer at the joint gives N times the bandwidth for equal k_tr; for equal stress in the lines
+    it is less, `bandwidth_by_place`.
+
+    Parameters
+    ----------
+    link_inertia, transmission_stiffness, ratio : as in `position_transfer`.
+    """
+    jl, ktr, n = above_zero(link_inertia=link_inertia, transmission_stiffness=transmission_stiffness, ratio=ratio)
+    return n * np.sqrt(ktr / jl)
+
+
+def bandwidth_by_place(ratio: ArrayLike, length: ArrayLike, distance: ArrayLike) -> Array:
+    """Position bandwidth with the reducer part of the way over that with it at the motor, at constant stress.
+
+    Square root of the stiffnesses `cable.stiffness_with_reducer`: sqrt(N L/(N L + C (1 - N))), which is
+    sqrt(N) for a reducer at the joint; the factor N of section 4.2 supposes that both lines have one
+    k_tr.  Not in print.
+
+    Parameters
+    ----------
+    ratio : N, above zero.
+    length : L of the line, m, above zero.
+    distance : C, of the reducer from the motor, m, 0 to L.
+    """
+    n, span = above_zero(ratio=ratio, length=length)
+    (c,) = zero_or_more(distance=distance)
+    if not np.all(c <= span):
+        raise ValueError(f"distance is {distance!r} m; it must not be above length, {length!r} m")
+    return np.sqrt(n * span / (n * span + c * (1.0 - n)))
+
+
+# ----------------------------------------------------------------------------------- force (4.3)
+def force_transfer(
+    s: ArrayLike,
+    motor_inertia: ArrayLike,
+    link_inertia: ArrayLike,
+    transmission_stiffness: ArrayLike,
+    contact_stiffness: ArrayLike,
+    ratio: ArrayLike,
+) -> Complex:
+    """Transfer function F_c/F_m from motor torque to contact force, (4.3).
+
+    N k_tr k_c/(J_m J_l s^4 + (J_m k_c + J_l k_tr + N^2 J_m k_tr) s^2 + k_tr k_c); the print has no N
+    above, without which a motor at rest would not be boosted.
+
+    Parameters
+    ----------
+    s : complex frequency, rad/s; j omega for a frequency response.
+    motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio : as in `force_resonances`.
+    """
+    jm, jl, ktr, kc, n = _parts(motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio)
+    square = np.asarray(s, dtype=complex) ** 2
+    return n * ktr * kc / ((jm * jl * square + jm * kc + jl * ktr + n * n * jm * ktr) * square + ktr * kc)
 
 
 def force_resonances(
@@ -22,35 +116,214 @@ def force_resonances(
 ) -> Resonances:
     """Resonances of motor, cable, link and contact, undamped, (4.4).
 
-    Roots of J_m J_l w^4 - (J_m k_c + J_l k_tr + N^2 J_m k_tr) w^2 + k_tr k_c = 0, all arguments
-    broadcast.  The lower root is taken as 2c/(B + sqrt(B^2 - 4c)): the printed form loses its digits
-    to cancellation.
+    Roots of the denominator of `force_transfer`.  The lower root is taken as 2c/(B + sqrt(B^2 - 4c)):
+    the printed form loses its digits to cancellation.
 
     Parameters
     ----------
-    motor_inertia : J_m, at the motor, kg m^2.
-    link_inertia : J_l, at the joint, kg m^2.
-    transmission_stiffness : k_tr, at the motor, N m/rad.
-    contact_stiffness : k_c, at the joint, N m/rad.
-    ratio : N, motor turns per joint turn.
+    motor_inertia : J_m, at the motor, kg m^2, above zero.
+    link_inertia : J_l, at the joint, kg m^2, above zero.
+    transmission_stiffness : k_tr, at the motor, N m/rad, above zero.
+    contact_stiffness : k_c, at the joint, N m/rad, above zero.
+    ratio : N, motor turns per joint turn, above zero.
 
     Raises
     ------
     ValueError
         where an argument is not above zero.
     """
-    arguments = {
-        "motor_inertia": motor_inertia,
-        "link_inertia": link_inertia,
-        "transmission_stiffness": transmission_stiffness,
-        "contact_stiffness": contact_stiffness,
-        "ratio": ratio,
-    }
-    for name, value in arguments.items():
-        if not np.all(np.asarray(value) > 0.0):
-            raise ValueError(f"{name} is {value!r}; it must be above zero")
-    jm, jl, ktr, kc, n = (np.asarray(value, dtype=float) for value in arguments.values())
+    jm, jl, ktr, kc, n = _parts(motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio)
     b = kc / jl + ktr / jm + n * n * ktr / jl
     c = ktr * kc / (jm * jl)
     root = np.sqrt(b * b - 4.0 * c)
     return Resonances(np.sqrt(2.0 * c / (b + root)), np.sqrt((b + root) / 2.0))
+
+
+def soft_contact_bandwidth(
+    motor_inertia: ArrayLike, link_inertia: ArrayLike, contact_stiffness: ArrayLike, ratio: ArrayLike
+) -> Array:
+    """Lower resonance as the contact gets soft, rad/s, (4.5): sqrt(k_c/(J_l + N^2 J_m)), which goes to 0.
+
+    Link and reflected rotor on the contact, which is also the limit of a stiff transmission and an upper
+    bound of omega_1 for every k_tr.  The print states the limit 0 alone.
+
+    Parameters
+    ----------
+    motor_inertia, link_inertia, contact_stiffness, ratio : as in `force_resonances`.
+    """
+    jm, jl, kc, n = above_zero(
+        motor_inertia=motor_inertia, link_inertia=link_inertia, contact_stiffness=contact_stiffness, ratio=ratio
+    )
+    return np.sqrt(kc / (jl + n * n * jm))
+
+
+def hard_contact_bandwidth(motor_inertia: ArrayLike, transmission_stiffness: ArrayLike) -> Array:
+    """Lower resonance as the contact gets hard, rad/s, (4.6): sqrt(k_tr/J_m), the rotor on its cable.
+
+    Upper bound of omega_1 for every k_c and N; the asymptote of section 4.4, where J_t is printed for J_m.
+
+    Parameters
+    ----------
+    motor_inertia, transmission_stiffness : as in `force_resonances`.
+    """
+    jm, ktr = above_zero(motor_inertia=motor_inertia, transmission_stiffness=transmission_stiffness)
+    return np.sqrt(ktr / jm)
+
+
+def small_ratio_resonances(
+    motor_inertia: ArrayLike,
+    link_inertia: ArrayLike,
+    transmission_stiffness: ArrayLike,
+    contact_stiffness: ArrayLike,
+) -> SmallRatioResonances:
+    """Resonances as N vanishes, rad/s, (4.7), the curves of figure 4.9.b; omega_1 is the lower of the two.
+
+    The print gives their squares.  N far below N_m.
+
+    Parameters
+    ----------
+    motor_inertia, link_inertia, transmission_stiffness, contact_stiffness : as in `force_resonances`.
+    """
+    jm, jl, ktr, kc = above_zero(
+        motor_inertia=motor_inertia,
+        link_inertia=link_inertia,
+        transmission_stiffness=transmission_stiffness,
+        contact_stiffness=contact_stiffness,
+    )
+    link, rotor = np.broadcast_arrays(np.sqrt(kc / jl), np.sqrt(ktr / jm))
+    return SmallRatioResonances(link, rotor)
+
+
+def large_ratio_bandwidth(motor_inertia: ArrayLike, contact_stiffness: ArrayLike, ratio: ArrayLike) -> Array:
+    """Lower resonance as N grows, rad/s, (4.8): sqrt(k_c/J_m)/N, which goes to 0.  N far above N_m.
+
+    The print states the limit 0 alone.
+
+    Parameters
+    ----------
+    motor_inertia, contact_stiffness, ratio : as in `force_resonances`.
+    """
+    jm, kc, n = above_zero(motor_inertia=motor_inertia, contact_stiffness=contact_stiffness, ratio=ratio)
+    return np.sqrt(kc / jm) / n
+
+
+# ------------------------------------------------------------------- best stiffness (4.3.2, 4.4)
+def matched_ratio(motor_inertia: ArrayLike, link_inertia: ArrayLike) -> Array:
+    """N_m = sqrt(J_l/J_m), the ratio that matches reflected rotor and link (section 4.1.2).
+
+    Parameters
+    ----------
+    motor_inertia, link_inertia : as in `force_resonances`.
+    """
+    jm, jl = above_zero(motor_inertia=motor_inertia, link_inertia=link_inertia)
+    return np.sqrt(jl / jm)
+
+
+def best_contact_stiffness(
+    motor_inertia: ArrayLike, link_inertia: ArrayLike, transmission_stiffness: ArrayLike
+) -> Array:
+    """Contact stiffness where the curves of (4.7) cross, N m/rad, (4.9): k_tr J_l/J_m.  N far below N_m.
+
+    What it gives for any other N: `fraction_at_crossover`.
+
+    Parameters
+    ----------
+    motor_inertia, link_inertia, transmission_stiffness : as in `force_resonances`.
+    """
+    (ktr,) = above_zero(transmission_stiffness=transmission_stiffness)
+    return ktr * matched_ratio(motor_inertia, link_inertia) ** 2
+
+
+def fraction_at_crossover(ratio: ArrayLike, matched: ArrayLike) -> Array:
+    """Share of the asymptote (4.6) that omega_1 has with the contact stiffness (4.9), for any N; not in print.
+
+    sqrt(1 - u), u = (v sqrt(v^2 + 4) - v^2)/2, v = N/N_m: 1 for small N, 0.62 for N = N_m.
+
+    Parameters
+    ----------
+    ratio : N, zero or more.
+    matched : N_m, above zero.
+    """
+    (n,) = zero_or_more(ratio=ratio)
+    (nm,) = above_zero(matched=matched)
+    v = n / nm
+    return np.sqrt(1.0 - (v * np.sqrt(v * v + 4.0) - v * v) / 2.0)
+
+
+def contact_stiffness_for(
+    fraction: ArrayLike,
+    motor_inertia: ArrayLike,
+    link_inertia: ArrayLike,
+    transmission_stiffness: ArrayLike,
+    ratio: ArrayLike,
+) -> Array:
+    """Contact stiffness that gives a share f of the asymptote (4.6), N m/rad, for any N.
+
+    f^2 k_tr (J_l/J_m + N^2/(1 - f^2)), what section 4.3.2 leaves to numerical solution; for N = 0 and
+    f = 1 it is (4.9).  Not in print.
+
+    Parameters
+    ----------
+    fraction : f, above zero and below one.
+    motor_inertia, link_inertia, transmission_stiffness, ratio : as in `force_resonances`.
+    """
+    (f,) = below_one(fraction=fraction)
+    (ktr,) = above_zero(transmission_stiffness=transmission_stiffness)
+    (n,) = above_zero(ratio=ratio)
+    return f * f * ktr * (matched_ratio(motor_inertia, link_inertia) ** 2 + n * n / (1.0 - f * f))
+
+
+def best_transmission_stiffness(
+    motor_inertia: ArrayLike, link_inertia: ArrayLike, contact_stiffness: ArrayLike
+) -> Array:
+    """Transmission stiffness at the motor for a given contact, N m/rad, (4.10): k_c J_m/J_l.  N far below N_m.
+
+    The print has J_t for J_l.
+
+    Parameters
+    ----------
+    motor_inertia, link_inertia, contact_stiffness : as in `force_resonances`.
+    """
+    (kc,) = above_zero(contact_stiffness=contact_stiffness)
+    return kc / matched_ratio(motor_inertia, link_inertia) ** 2
+
+
+def transmission_stiffness_for(
+    fraction: ArrayLike,
+    motor_inertia: ArrayLike,
+    link_inertia: ArrayLike,
+    contact_stiffness: ArrayLike,
+    ratio: ArrayLike,
+) -> Array:
+    """Transmission stiffness that gives a share f of what a rigid one would, N m/rad, for any N.
+
+    omega_1 is then f sqrt(k_c/M), M = J_l + N^2 J_m, for k_tr = k_c f^2 J_m (M - f^2 J_l)/((1 - f^2) M^2);
+    for N = 0 and f = 1 it is (4.10).  Not in print.
+
+    Parameters
+    ----------
+    fraction : f, above zero and below one.
+    motor_inertia, link_inertia, contact_stiffness, ratio : as in `force_resonances`.
+    """
+    (f,) = below_one(fraction=fraction)
+    jm, jl, kc, n = above_zero(
+        motor_inertia=motor_inertia, link_inertia=link_inertia, contact_stiffness=contact_stiffness, ratio=ratio
+    )
+    total = jl + n * n * jm
+    return kc * f * f * jm * (total - f * f * jl) / ((1.0 - f * f) * total * total)
+
+
+def _parts(
+    motor_inertia: ArrayLike,
+    link_inertia: ArrayLike,
+    transmission_stiffness: ArrayLike,
+    contact_stiffness: ArrayLike,
+    ratio: ArrayLike,
+) -> list[Array]:
+    return above_zero(
+        motor_inertia=motor_inertia,
+        link_inertia=link_inertia,
+        transmission_stiffness=transmission_stiffness,
+        contact_stiffness=contact_stiffness,
+        ratio=ratio,
+    )

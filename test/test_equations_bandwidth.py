@@ -1,0 +1,200 @@
+"""Chapter 4 against the two masses as matrices and against the numbers of sections 4.3 and 4.4."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from wam_theory import resonance
+from wam_theory.cable import stiffness_with_reducer
+from wam_theory.resonance import force_resonances
+
+TESTBED = {"motor_inertia": 4.067e-5, "link_inertia": 0.452, "transmission_stiffness": 8.33, "ratio": 14.0}
+
+
+def eigenvalues(jm: float, jl: float, ktr: float, kc: float, n: float) -> np.ndarray:
+    """Natural frequencies, rad/s, of rotor and link as two masses on two springs."""
+    stiffness = np.array([[ktr, -n * ktr], [-n * ktr, n * n * ktr + kc]])
+    scale = np.diag([jm**-0.5, jl**-0.5])
+    return np.sqrt(np.linalg.eigvalsh(scale @ stiffness @ scale))
+
+
+def test_resonances_are_the_eigenvalues_of_the_two_masses() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        jm, jl, ktr, kc, n = np.array([4e-5, 0.4, 10.0, 1e3, 15.0]) * 10.0 ** rng.uniform(-1, 1, 5)
+        lower, upper = force_resonances(jm, jl, ktr, kc, n)
+        np.testing.assert_allclose([lower, upper], eigenvalues(jm, jl, ktr, kc, n), rtol=1e-6)
+
+
+def test_soft_contact_keeps_its_digits() -> None:
+    """Lower root as the contact vanishes: the link and the reflected rotor on k_c."""
+    jm, jl, n = TESTBED["motor_inertia"], TESTBED["link_inertia"], TESTBED["ratio"]
+    lower = force_resonances(**TESTBED, contact_stiffness=1e-9).lower
+    assert float(lower) == pytest.approx(np.sqrt(1e-9 / (jl + n * n * jm)), rel=1e-12)
+    b = 1e-9 / jl + 8.33 / jm + n * n * 8.33 / jl
+    printed = np.sqrt((b - np.sqrt(b * b - 4 * 8.33 * 1e-9 / (jm * jl))) / 2)
+    assert abs(printed / lower - 1) > 1e-3
+
+
+def test_hard_contact_leaves_the_rotor_on_its_cable() -> None:
+    """The asymptote of section 4.4 is sqrt(k_tr/J_m): 72 Hz for the testbed."""
+    lower = force_resonances(**TESTBED, contact_stiffness=1e9).lower
+    assert float(lower) == pytest.approx(np.sqrt(8.33 / 4.067e-5), rel=1e-4)
+    assert float(lower) / (2 * np.pi) == pytest.approx(72.0, abs=0.5)
+
+
+def test_arguments_broadcast() -> None:
+    found = force_resonances(**TESTBED, contact_stiffness=np.array([100.0, 1000.0]))
+    assert found.lower.shape == (2,)
+    assert float(found.upper[1]) == float(force_resonances(**TESTBED, contact_stiffness=1000.0).upper)
+
+
+@pytest.mark.parametrize("name", [*TESTBED, "contact_stiffness"])
+def test_argument_that_is_not_above_zero_is_refused_by_name(name: str) -> None:
+    for bad in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match=name):
+            force_resonances(**(TESTBED | {"contact_stiffness": 1000.0} | {name: bad}))
+
+
+# ------------------------------------------------------------------------------------- transfers
+JM, JL, KTR, KC, N = 0.002, 0.7, 9.0, 400.0, 6.0
+
+
+def two_masses(s: complex, jm: float, jl: float, ktr: float, kc: float, n: float) -> np.ndarray:
+    """Dynamic stiffness of rotor and link."""
+    return np.array([[jm * s * s + ktr, -n * ktr], [-n * ktr, jl * s * s + n * n * ktr + kc]])
+
+
+@pytest.mark.parametrize("s", [0.3j, 12.0j, 2.0 - 20.0j, -1.0 + 55.0j])
+def test_transfers_solve_the_equations_of_motion(s: complex) -> None:
+    link = np.linalg.solve(two_masses(s, JM, JL, KTR, KC, N), [1.0, 0.0])[1]
+    assert resonance.force_transfer(s, JM, JL, KTR, KC, N) == pytest.approx(KC * link, rel=1e-12)
+    # link alone, moved by the rotor's end of the cable
+    moved = N * KTR / (JL * s * s + N * N * KTR)
+    assert two_masses(s, JM, JL, KTR, 0.0, N)[1] @ [1.0, moved] == pytest.approx(0.0, abs=1e-9)
+    assert resonance.position_transfer(s, JL, KTR, N) == pytest.approx(moved, rel=1e-12)
+
+
+def test_slow_motion_is_geared_down_and_slow_force_up_unlike_in_print() -> None:
+    assert resonance.position_transfer(0.0, JL, KTR, N) == pytest.approx(1.0 / N)  # printed: 1
+    assert resonance.force_transfer(0.0, JM, JL, KTR, KC, N) == pytest.approx(N)  # printed: 1
+    assert resonance.position_transfer(0.0, JL, KTR, 1.0) == 1.0
+
+
+def test_position_bandwidth_is_the_pole_of_its_transfer() -> None:
+    for ratio in (1.0, 6.0):
+        pole = float(resonance.position_bandwidth(JL, KTR, ratio))
+        size = np.abs(resonance.position_transfer(1j * pole * np.array([0.999, 1.0 - 1e-9, 1.001]), JL, KTR, ratio))
+        assert size[1] > 1e5 * size[0]
+        assert size[1] > 1e5 * size[2]
+
+
+def test_reducer_at_the_joint_gives_root_n_at_constant_stress_and_n_for_equal_lines() -> None:
+    ratio, length = 14.0, 0.9
+    for place, gain in ((0.0, 1.0), (length, math.sqrt(ratio))):
+        stiffer = stiffness_with_reducer(1e4, length, ratio, place) / stiffness_with_reducer(1e4, length, ratio, 0.0)
+        assert resonance.bandwidth_by_place(ratio, length, place) == pytest.approx(math.sqrt(stiffer), rel=1e-12)
+        assert math.sqrt(stiffer) == pytest.approx(gain, rel=1e-12)
+    halfway = stiffness_with_reducer(1e4, length, ratio, 0.5) / stiffness_with_reducer(1e4, length, ratio, 0.0)
+    assert resonance.bandwidth_by_place(ratio, length, 0.5) == pytest.approx(math.sqrt(halfway), rel=1e-12)
+    equal = resonance.position_bandwidth(JL, KTR, ratio) / resonance.position_bandwidth(JL, KTR, 1.0)
+    assert equal == pytest.approx(ratio)
+
+
+# ---------------------------------------------------------------------------------------- limits
+def test_limits_are_those_of_the_eigenvalues() -> None:
+    assert resonance.soft_contact_bandwidth(JM, JL, 1e-7, N) == pytest.approx(
+        math.sqrt(1e-7 / (JL + N * N * JM)), rel=1e-12
+    )
+    assert resonance.soft_contact_bandwidth(JM, JL, 1e-3, N) == pytest.approx(
+        eigenvalues(JM, JL, KTR, 1e-3, N)[0], rel=1e-4
+    )
+    assert resonance.hard_contact_bandwidth(JM, KTR) == pytest.approx(eigenvalues(JM, JL, KTR, 1e9, N)[0], rel=1e-5)
+    small = resonance.small_ratio_resonances(JM, JL, KTR, KC)
+    assert sorted(map(float, small)) == pytest.approx(eigenvalues(JM, JL, KTR, KC, 1e-4).tolist(), rel=1e-6)
+    assert resonance.large_ratio_bandwidth(JM, KC, 1e4) == pytest.approx(eigenvalues(JM, JL, KTR, KC, 1e4)[0], rel=1e-4)
+    for kc, lower in ((400.0, "link_on_contact"), (4e4, "rotor_on_cable")):  # (4.7) has its corner at 3150
+        curves = resonance.small_ratio_resonances(JM, JL, KTR, kc)
+        assert getattr(curves, lower) == min(curves)
+        assert min(curves) == pytest.approx(eigenvalues(JM, JL, KTR, kc, 1e-4)[0], rel=1e-5)
+
+
+def test_both_limits_bound_the_bandwidth_everywhere() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        jm, jl, ktr, kc, n = np.array([1e-3, 0.4, 10.0, 1e3, 15.0]) * 10.0 ** rng.uniform(-2, 2, 5)
+        lower = eigenvalues(jm, jl, ktr, kc, n)[0] * (1.0 - 1e-6)
+        assert lower < resonance.hard_contact_bandwidth(jm, ktr)
+        assert lower < resonance.soft_contact_bandwidth(jm, jl, kc, n)
+
+
+# -------------------------------------------------------------------------------- best stiffness
+INCHES = {"motor_inertia": 0.0057 / 16.0, "link_inertia": 4.0, "transmission_stiffness": 2.0 * 262.0 * 0.375**2}
+
+
+def test_best_contact_stiffness_of_the_testbed_is_638_pounds_an_inch() -> None:
+    """Pounds and inches: the print has N_m = 104, 9e5 lb-in/rad and 650 lb/in."""
+    best = float(resonance.best_contact_stiffness(**INCHES))
+    assert resonance.matched_ratio(INCHES["motor_inertia"], INCHES["link_inertia"]) == pytest.approx(105.96, abs=0.005)
+    assert best == pytest.approx(8.27e5, abs=500)
+    assert best / 36.0**2 == pytest.approx(638, abs=0.5)
+    asymptote = math.sqrt(INCHES["transmission_stiffness"] / INCHES["motor_inertia"])
+    at_nine = eigenvalues(*(INCHES[k] for k in INCHES), 9e5, 14.0)[0] / asymptote
+    assert at_nine == pytest.approx(0.954, abs=5e-4)
+    assert resonance.best_transmission_stiffness(INCHES["motor_inertia"], 4.0, best) == pytest.approx(
+        INCHES["transmission_stiffness"]
+    )
+
+
+def test_best_stiffness_is_where_the_two_curves_cross_by_bisection() -> None:
+    low, high = 1.0, 1e6
+    while high - low > 1e-9 * high:
+        kc = math.sqrt(low * high)
+        curves = [float(c) for c in resonance.small_ratio_resonances(JM, JL, KTR, kc)]
+        low, high = (kc, high) if curves[0] < curves[1] else (low, kc)
+    assert resonance.best_contact_stiffness(JM, JL, KTR) == pytest.approx(low, rel=1e-7)
+    assert resonance.best_transmission_stiffness(JM, JL, low) == pytest.approx(KTR, rel=1e-7)
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 1.0, 6.0, 19.0, 60.0])
+def test_stiffness_for_a_share_of_the_asymptote_gives_it_for_every_ratio(ratio: float) -> None:
+    asymptote, rigid = math.sqrt(KTR / JM), math.sqrt(KC / (JL + ratio * ratio * JM))
+    for share in (0.3, 0.9, 0.99):
+        kc = float(resonance.contact_stiffness_for(share, JM, JL, KTR, ratio))
+        assert eigenvalues(JM, JL, KTR, kc, ratio)[0] == pytest.approx(share * asymptote, rel=1e-6)
+        ktr = float(resonance.transmission_stiffness_for(share, JM, JL, KC, ratio))
+        assert eigenvalues(JM, JL, ktr, KC, ratio)[0] == pytest.approx(share * rigid, rel=1e-6)
+    crossover = float(resonance.best_contact_stiffness(JM, JL, KTR))
+    share = float(resonance.fraction_at_crossover(ratio, math.sqrt(JL / JM)))
+    assert eigenvalues(JM, JL, KTR, crossover, ratio)[0] == pytest.approx(share * asymptote, rel=1e-6)
+    assert resonance.contact_stiffness_for(share, JM, JL, KTR, ratio) == pytest.approx(crossover, rel=1e-6)
+
+
+def test_share_at_the_crossover_falls_from_one_to_0_62_at_the_matched_ratio() -> None:
+    assert resonance.fraction_at_crossover([0.0, 1.0], 1.0) == pytest.approx([1.0, (math.sqrt(5.0) - 1.0) / 2.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "names"),
+    [
+        (lambda: resonance.position_transfer(1j, 0.0, 1.0, 1.0), "link_inertia is 0"),
+        (lambda: resonance.position_bandwidth(1.0, 1.0, -1.0), "ratio is -1"),
+        (lambda: resonance.bandwidth_by_place(2.0, 1.0, 1.1), "distance is 1.1 m"),
+        (lambda: resonance.force_transfer(1j, 1.0, 1.0, 1.0, 0.0, 1.0), "contact_stiffness is 0"),
+        (lambda: resonance.soft_contact_bandwidth(1.0, 1.0, 1.0, 0.0), "ratio is 0"),
+        (lambda: resonance.hard_contact_bandwidth(0.0, 1.0), "motor_inertia is 0"),
+        (lambda: resonance.small_ratio_resonances(1.0, 1.0, -1.0, 1.0), "transmission_stiffness is -1"),
+        (lambda: resonance.large_ratio_bandwidth(1.0, math.nan, 1.0), "contact_stiffness is nan"),
+        (lambda: resonance.contact_stiffness_for(1.0, 1.0, 1.0, 1.0, 1.0), "fraction is 1"),
+        (lambda: resonance.transmission_stiffness_for(0.0, 1.0, 1.0, 1.0, 1.0), "fraction is 0"),
+        (lambda: resonance.fraction_at_crossover(-1.0, 1.0), "ratio is -1"),
+        (lambda: resonance.best_contact_stiffness(1.0, 1.0, 0.0), "transmission_stiffness is 0"),
+        (lambda: resonance.best_transmission_stiffness(1.0, 1.0, 0.0), "contact_stiffness is 0"),
+        (lambda: resonance.matched_ratio(1.0, math.inf), "link_inertia is inf"),
+    ],
+)
+def test_a_refusal_names_the_value(call: Callable[[], object], names: str) -> None:
+    with pytest.raises(ValueError, match=names):
+        call()

@@ -1,0 +1,149 @@
+"""The linear loop of chapter 5 against state matrices, polynomial roots and the exact response."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from wam_theory import linear_loop
+from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess, simulate
+
+
+def state_matrices(
+    gain: float, j: float, b: float, ktr: float, kc: float, proportional: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x, v and the integral of the error, for x_m = G_I integral + G_P error; F_c is the output."""
+    a = np.array(
+        [
+            [0.0, 1.0, 0.0],
+            [-(ktr + kc + ktr * proportional * kc) / j, -b / j, ktr * gain / j],
+            [-kc, 0.0, 0.0],
+        ]
+    )
+    return a, np.array([0.0, ktr * proportional / j, 1.0]), np.array([kc, 0.0, 0.0])
+
+
+def test_proportional_error_is_where_force_and_motor_agree() -> None:
+    # F_c = K x_m and x_m = G_P (F_des - F_c): 0.3 (10 - 7.5) = 0.75, times 10 is 7.5
+    assert linear_loop.proportional_error(10.0, 0.3, 10.0) == pytest.approx(2.5)
+    assert linear_loop.proportional_error(10.0, 0.0, 10.0) == 10.0
+
+
+def test_integral_time_constant_is_that_of_a_fast_node() -> None:
+    node, gain = FrictionNode(1e-8, 1e-4, 3.0, 6.0, 0.0, 0.0), 0.25
+    tau = float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(3.0, 6.0)))
+    assert tau == pytest.approx(2.0)
+    force = simulate(node, ForceLoop(gain), 5.0, 10.0).at([tau]).contact_force[0]
+    assert force == pytest.approx(5.0 * (1.0 - math.exp(-1.0)), rel=1e-3)
+
+
+@pytest.mark.parametrize("proportional", [0.0, 0.4])
+def test_closed_loop_is_that_of_the_state_matrices_and_the_printed_one_is_not(proportional: float) -> None:
+    values = (0.3, 0.7, 0.9, 2.0, 5.0, proportional)
+    a, inlet, outlet = state_matrices(*values)
+    for s in (0.02j, 1.3j, 0.4 + 2.0j, -0.1 + 5.0j):
+        expected = outlet @ np.linalg.solve(s * np.eye(3) - a, inlet)
+        assert linear_loop.closed_loop(s, *values) == pytest.approx(expected, rel=1e-12)
+        printed = (0.3 + proportional / s) * 10.0 / np.polyval(linear_loop.characteristic_polynomial(*values), s)
+        assert bool(abs(printed / expected - 1.0) > 0.05) is (proportional > 0.0)
+    np.testing.assert_allclose(linear_loop.characteristic_polynomial(*values) / 0.7, np.poly(a), rtol=1e-12)
+    assert linear_loop.closed_loop(0.0, *values) == 1.0  # no steady error
+
+
+@pytest.mark.parametrize("proportional", [0.0, 0.4])
+def test_routh_gain_puts_two_roots_of_5_14_on_the_axis(proportional: float) -> None:
+    j, b, ktr, kc = 0.7, 0.9, 2.0, 5.0
+    gain = float(linear_loop.routh_gain(j, b, ktr, kc, proportional))
+    for factor, stable in ((0.999, True), (1.001, False)):
+        roots = np.roots([j, b, ktr + kc + proportional * ktr * kc, factor * gain * ktr * kc])
+        assert bool(roots.real.max() < 0.0) is stable
+        assert linear_loop.gain_ratio(factor * gain, j, b, ktr, kc, proportional) == pytest.approx(factor)
+
+
+def test_testbed_gains_of_section_5_6() -> None:
+    j, ktr, kc = 4.0, 14443.0, 12960.0
+    b = 0.05 * 2.0 * math.sqrt(j * (ktr + kc))
+    assert math.sqrt((ktr + kc) / j) / (2.0 * math.pi) == pytest.approx(13.2, abs=0.05)
+    assert linear_loop.routh_gain(j, b, ktr, kc) == pytest.approx(1.21e-3, rel=0.003)
+    assert linear_loop.sampled_margin(j, b, ktr, kc, 0.02).gain == pytest.approx(1.73e-3, rel=0.003)
+    assert linear_loop.sampled_margin(j, b, ktr, kc, 1e-5).gain == pytest.approx(
+        float(linear_loop.routh_gain(j, b, ktr, kc)), rel=1e-4
+    )
+
+
+@pytest.mark.parametrize("delay", [0, 1, 2, 5])
+@pytest.mark.parametrize("period", [0.02, 0.3, 2.0])
+def test_sampled_margin_is_where_the_exact_response_begins_to_grow(delay: int, period: float) -> None:
+    values = (1.3, 0.8, 2.0, 3.0)
+    margin = linear_loop.sampled_margin(*values, period, delay)
+    node = FrictionNode(*values, 0.0, 0.0)
+    sizes = []
+    for factor in (0.97, 1.03):
+        loop = ForceLoop(factor * margin.gain, sample_period=period, delay_samples=delay)
+        times = np.arange(0.0, 300.0 * math.pi / margin.frequency, 0.1 / margin.frequency)
+        error = np.abs(1.0 - simulate(node, loop, 1.0, times[-1] + 1.0).at(times).contact_force)
+        third = len(times) // 3
+        sizes.append(error[-third:].max() / error[third : 2 * third].max())
+    assert sizes[0] < 1.0 < sizes[1]
+
+
+def test_sampled_margin_has_a_pole_on_the_circle_at_its_frequency() -> None:
+    margin = linear_loop.sampled_margin(1.0, 1.0, 2.0, 2.0, 0.2, 1)
+    # the held loop's states x, v, x_m and the command under way, over one period by small steps
+    system = np.array([[0, 1, 0, 0], [-4, -1, 2, 0], [0, 0, 0, 1], [0, 0, 0, 0]], dtype=float)
+    over = np.linalg.matrix_power(np.eye(4) + system * 1e-6 + system @ system * 5e-13, 200_000)
+    over[3] = [-2.0 * margin.gain, 0.0, 0.0, 0.0]
+    poles = np.linalg.eigvals(over)
+    nearest = poles[np.argmin(np.abs(np.abs(np.angle(poles)) - margin.frequency * 0.2))]
+    assert abs(nearest) == pytest.approx(1.0, abs=1e-5)
+    assert np.abs(poles).max() == pytest.approx(1.0, abs=1e-5)
+
+
+TESTBED = (4.0, 33.10755, 14443.0, 12960.0)  # J, b, k_tr, k_c in pounds and inches; zeta 0.05
+
+
+def verdict(gain: float, step: float, delay: int) -> Verdict:
+    """Of the testbed with 8.4 lb-in of friction at 50 Hz."""
+    loop = ForceLoop(gain, sample_period=0.02, delay_samples=delay)
+    return assess(FrictionNode(*TESTBED, 8.4, 8.4), loop, step).verdict
+
+
+def test_one_sample_of_delay_raises_the_frictionless_limit_and_friction_then_lowers_it() -> None:
+    limit = linear_loop.sampled_margin(*TESTBED, 0.02, 1).gain
+    assert limit == pytest.approx(4.89e-3, rel=1e-3)
+    assert limit > 2.8 * linear_loop.sampled_margin(*TESTBED, 0.02).gain
+    assert verdict(0.8 * limit, 4.0, 1) is Verdict.SETTLED
+    assert verdict(0.9 * limit, 4.0, 1) is Verdict.LIMIT_CYCLE
+
+
+def test_at_one_and_a_half_times_the_margin_8_06_lb_settle_and_8_19_diverge() -> None:
+    gain = 1.5 * linear_loop.sampled_margin(*TESTBED, 0.02).gain
+    assert verdict(gain, 8.06 * 36.0, 0) is Verdict.SETTLED
+    assert verdict(gain, 8.19 * 36.0, 0) is Verdict.DIVERGED
+
+
+def test_friction_multiplies_the_gain_that_takes_small_steps_by_3_3() -> None:
+    limit = linear_loop.sampled_margin(*TESTBED, 0.02).gain
+    assert verdict(3.3 * limit, 4.0, 0) is Verdict.SETTLED
+    assert verdict(3.5 * limit, 4.0, 0) is Verdict.DIVERGED
+
+
+@pytest.mark.parametrize(
+    ("call", "names"),
+    [
+        (lambda: linear_loop.series_stiffness(0.0, 1.0), "transmission_stiffness is 0"),
+        (lambda: linear_loop.proportional_error(1.0, -1.0, 1.0), "proportional_gain is -1"),
+        (lambda: linear_loop.integral_time_constant([1.0, -2.0], 1.0), r"gain is \[1.0, -2.0\]"),
+        (lambda: linear_loop.damping_ratio(1.0, -1.0, 1.0, 1.0), "damping is -1"),
+        (lambda: linear_loop.closed_loop(1j, 1.0, 0.0, 1.0, 1.0, 1.0), "inertia is 0"),
+        (lambda: linear_loop.characteristic_polynomial(-1.0, 1.0, 1.0, 1.0, 1.0), "gain is -1"),
+        (lambda: linear_loop.routh_gain(1.0, math.nan, 1.0, 1.0), "damping is nan"),
+        (lambda: linear_loop.gain_ratio(0.0, 1.0, 1.0, 1.0, 1.0), "gain is 0"),
+        (lambda: linear_loop.sampled_margin(1.0, 1.0, 1.0, 1.0, 0.0), "sample_period is 0"),
+        (lambda: linear_loop.sampled_margin(1.0, 1.0, 1.0, 1.0, 0.1, -1), "delay_samples is -1"),
+    ],
+)
+def test_a_refusal_names_the_value(call: Callable[[], object], names: str) -> None:
+    with pytest.raises(ValueError, match=names):
+        call()

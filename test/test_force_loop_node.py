@@ -1,0 +1,92 @@
+"""What the node `force_loop` says and refuses over ROS."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
+from test_nodes import ARM, Listener, start
+
+from wam_description.signals import State
+from wam_ros.messages import Wrench, joint_state, wrench_stamped
+from wam_ros.ports import message_type
+from wam_ros.qos import qos
+from wam_ros.topics import BY_NAME
+
+MS = 1_000_000
+
+
+class Feeder:
+    """A force loop alone, fed with states that stand still."""
+
+    def __init__(self, ros: Any, folder: Path) -> None:
+        self.ros, self.stamp = ros, 0
+        self.node = ros.node("feeder")
+        self._publishers = {
+            name: self.node.create_publisher(message_type(BY_NAME[name]), name, qos(BY_NAME[name]))
+            for name in ("joint_states", "force_command")
+        }
+        self.loop = start(ros, folder, ["force_loop"])["force_loop"]
+        self.heard = Listener(ros, "status", "force_error", "/diagnostics")
+        ros.wait(lambda: all(p.get_subscription_count() for p in self._publishers.values()))
+
+    def feed(self, newtons: float = 0.0) -> None:
+        """One state, with a force asked for."""
+        self.stamp += 5 * MS
+        force = wrench_stamped(self.stamp, Wrench("base", (0.0, 0.0, -newtons), (0.0, 0.0, 0.0)))
+        self._publishers["force_command"].publish(force)
+        state = State([0.0, -1.8, 0.0, 1.45], [0.0] * 4, [1.0] * 4)
+        self._publishers["joint_states"].publish(joint_state(self.stamp, ARM.joints.names, state))
+        before = len(self.heard.seen["force_error"])
+        self.ros.wait(lambda: len(self.heard.seen["force_error"]) > before, what="an answer")
+
+    def set(self, **values: Any) -> Any:
+        """Answer to a set of parameters."""
+        client = self.node.create_client(SetParametersAtomically, "force_loop/set_parameters_atomically")
+        self.ros.wait(client.service_is_ready, what="the parameter service")
+        parameters = [Parameter(key.replace("__", "."), value=v).to_parameter_msg() for key, v in values.items()]
+        future = client.call_async(SetParametersAtomically.Request(parameters=parameters))
+        self.ros.wait(future.done, what="an answer to the set")
+        return future.result().result
+
+    def feed_until(self, condition: Callable[[], bool]) -> None:
+        """States one after the other until a status that was awaited has come."""
+        for _ in range(200):
+            self.feed()
+            if condition():
+                return
+        raise AssertionError([m.message for m in self.heard.seen["status"]])
+
+    def facts(self) -> tuple[DiagnosticStatus, dict[str, str]]:
+        said = self.heard.seen["status"][-1]
+        return said, {pair.key: pair.value for pair in said.values}
+
+
+def test_status_says_domain_margin_stiffness_and_cycle_and_changes_with_the_set(ros: Any, tmp_path: Path) -> None:
+    feeder = Feeder(ros, tmp_path)
+    feeder.feed_until(lambda: any("domain" in m.message for m in feeder.heard.seen["status"]))
+    said, facts = feeder.facts()
+    assert (said.level, said.message, facts["peers"]) == (DiagnosticStatus.OK, "domain I", "connected")
+    assert facts["verdict"] == "accepted"
+    assert float(facts["effective stiffness [N/m]"]) > 1000.0
+    assert float(facts["deadband that removes it [N]"]) > 0.0
+    refused = feeder.set(force_gain=[0.5])
+    assert not refused.successful
+    assert "times the largest linearly stable one" in refused.reason
+    assert feeder.loop._loop.parameters.force_gain == (0.015,)
+    assert feeder.set(force_gain=[0.5], guard__mode="warn").successful
+    feeder.feed_until(lambda: feeder.facts()[0].message != said.message)
+    assert feeder.facts()[0].level == DiagnosticStatus.WARN
+    assert feeder.facts()[0].message.startswith("not stable: force_gain [0.5, 0.5, 0.5]")
+
+
+def test_a_force_above_the_limit_is_counted_and_the_last_good_one_stands(ros: Any, tmp_path: Path) -> None:
+    feeder = Feeder(ros, tmp_path)
+    for newtons in (8.0, 61.0):
+        for _ in range(2):
+            feeder.feed(newtons)
+    assert feeder.heard.seen["force_error"][-1].wrench.force.z < -7.0
+    assert feeder.heard.seen["force_error"][-1].wrench.force.z > -9.0
+    assert feeder.loop._ports.refusals["force_command"] >= 1
