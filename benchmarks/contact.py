@@ -18,7 +18,7 @@ from wam_description.transmission_map import TransmissionMap
 
 POSE = (0.1, -1.05, 0.3, 0.5)  # rad
 SPEED = (1.0, -1.2, 2.0, 1.5)  # rad/s of the motors
-PUSH = (0.3, 2.5, -0.5, 1.1)  # N m, of a push on the outer link
+PLACE, FORCE = 0.28, (0.0, 8.0, 6.0)  # m, N, of a push on the outer link, in the base frame
 PERIOD = 1e-3
 
 
@@ -40,7 +40,8 @@ def felt(arm: Arm, parameters: ContactEstimatorParameters) -> tuple[MomentumObse
     transmission = TransmissionMap.of(arm)
     observer = MomentumObserver(arm, parameters.observer, use_joint_sensors=False)
     body = RigidBody(arm, parameters.observer.mass_scale)
-    torque = body.gravity_torque(POSE) - np.array(PUSH)
+    levers = body.point_jacobian(POSE, arm.covers.names[-1], (PLACE, 0.0, 0.0))
+    torque = body.gravity_torque(POSE) - levers.T @ np.array(FORCE)
     state = State(transmission.motor_positions(POSE), list(SPEED), transmission.motor_torques(torque.tolist()))
     for _ in range(200):
         observer.observe(state, PERIOD)

@@ -110,7 +110,9 @@ class ContactFit:
         """
         full = gram.tolist()
         links = [
-            _Link(one, self._precision).leaning(one, 0.5 * (start + end), miss, self._friction, radius)
+            _Link([row[i:5] for i, row in enumerate(one[:5])], self._precision).leaning(
+                one, 0.5 * (start + end), miss, self._friction, radius
+            )
             for one, (start, end), miss, radius in zip(full, self._ends, self._miss, self._radius, strict=True)
         ]
         log_density = self._log_density(links)
@@ -169,27 +171,31 @@ class ContactFit:
         The set takes the most probable places first, which is how `cells` come.
         """
         top = cells[0][0]
-        weights = [math.exp(cell[0] - top) * cell[2] for cell in cells]
-        total = sum(weights)
-        outside = SET * total
+        sums = [[0.0, 0.0, 0.0] for _ in self._ends]
+        weights = []
+        for value, x, width, i in cells:
+            weight = math.exp(value - top) * width
+            weights.append(weight)
+            mine = sums[i]
+            mine[0] += weight
+            mine[1] += weight * x
+            mine[2] += weight * (x * x + width * width / 12.0)
+        total, passed = sum(weights), 0.0
+        inside = [[math.inf, -math.inf] for _ in self._ends]
+        for weight, (_, x, width, i) in zip(weights, cells, strict=True):
+            if passed >= SET * total:
+                break
+            passed += weight
+            part, half = inside[i], 0.5 * width
+            part[0], part[1] = min(part[0], x - half), max(part[1], x + half)
         result = []
-        for i, (start, end) in enumerate(self._ends):
-            mine = [(w, cell[1], 0.5 * cell[2]) for w, cell in zip(weights, cells, strict=True) if cell[3] == i]
-            mass = sum([w for w, _, _ in mine])
+        for (mass, first, second), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
             if mass == 0.0:
                 result.append((0.0, 0.5 * (start + end), (end - start) ** 2 / 12.0, math.nan, math.nan))
                 continue
-            mean = sum([w * x for w, x, _ in mine]) / mass
-            variance = sum([w * (x * x + half * half / 3.0) for w, x, half in mine]) / mass - mean * mean
-            inside, passed = [], 0.0
-            for w, cell in zip(weights, cells, strict=True):
-                if passed >= outside:
-                    break
-                passed += w
-                if cell[3] == i:
-                    inside += [cell[1] - 0.5 * cell[2], cell[1] + 0.5 * cell[2]]
-            low, high = (max(min(inside), start), min(max(inside), end)) if inside else (math.nan, math.nan)
-            result.append((mass / total, mean, max(0.0, variance), low, high))
+            mean = first / mass
+            ends = (max(low, start), min(high, end)) if low < high else (math.nan, math.nan)
+            result.append((mass / total, mean, max(0.0, second / mass - mean * mean), *ends))
         return result
 
     def _fit(
@@ -219,21 +225,22 @@ class ContactFit:
 
 
 class _Link:
-    """The weighted least squares problem of one link, by its Gram matrix: the force at a place."""
+    """The weighted least squares problem of one link, by the upper triangle of its Gram matrix, without lean."""
 
     def __init__(self, gram: Sequence[Sequence[float]], precision: float, log_widening: float = 0.0) -> None:
-        self.rr, ra1, ra2, rb1, rb2 = gram[0][:5]
-        _, a11, a12, a1b1, a1b2 = gram[1][:5]
-        _, _, a22, a2b1, a2b2 = gram[2][:5]
-        b11, b12 = gram[3][3:5]
+        self.rr, ra1, ra2, rb1, rb2 = gram[0]
+        a11, a12, a1b1, a1b2 = gram[1]
+        a22, a2b1, a2b2 = gram[2]
+        b11, b12 = gram[3]
+        (b22,) = gram[4]
         self.precision = precision
         self.constant = 0.5 * (self.rr + log_widening)  # what the log of the probability lacks at every place
-        self._slopes = (a1b1, a1b2, a2b1, a2b2, b11, b12, gram[4][4])
+        self._slopes = (a1b1, a1b2, a2b1, a2b2, b11, b12, b22)
         # coefficients of 1, x, x^2 in G^T W G, 11, 12, 22, and in G^T W r, 1, 2
         self.terms = (
             (a11 + precision, 2.0 * a1b1, b11),
             (a12, a1b2 + a2b1, b12),
-            (a22 + precision, 2.0 * a2b2, gram[4][4]),
+            (a22 + precision, 2.0 * a2b2, b22),
             (ra1, rb1, 0.0),
             (ra2, rb2, 0.0),
         )
@@ -291,7 +298,7 @@ class _Link:
             for a, b in zip(u[:5], v[:5], strict=True)
         ]
         wide = [
-            [value - a * p - b * q for value, (p, q) in zip(row[:5], pairs, strict=True)]
-            for row, a, b in zip(gram[:5], u, v, strict=False)
+            [value - u[i] * p - v[i] * q for value, (p, q) in zip(gram[i][i:5], pairs[i:], strict=True)]
+            for i in range(5)
         ]
         return _Link(wide, self.precision, math.log(determinant))

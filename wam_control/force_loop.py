@@ -335,8 +335,8 @@ class ForceLoop:
         if is_doubtful:
             self.refused += not self._is_doubtful
             self.refusals["contact/spread"] = (
-                f"the felt place on {contact.cover} has a standard deviation of {contact.place_sd:.2g} m, a probability "
-                f"of {contact.probability:.2f}; allowed: up to place_uncertainty_limit, "
+                f"the felt place on {contact.cover} has a standard deviation of {contact.place_sd:.2g} m, a probability"
+                f" of {contact.probability:.2f}; allowed: up to place_uncertainty_limit, "
                 f"{parameters.place_uncertainty_limit:g} m, and from link_probability_limit, "
                 f"{parameters.link_probability_limit:g}; contact_cover and contact_place are used"
             )
