@@ -1,8 +1,9 @@
-"""A felt contact drawn on the arm: true and estimated force, and where the contact is likely."""
+"""What is felt of a push at rest, by motors, with dither and by joint sensors: a picture and a table."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,8 +25,18 @@ TRUE, FELT, LIKELY = "#222222", "#d62728", "#f2a020"
 METRES_PER_NEWTON = 0.02
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
 POSE = (0.1, -0.9, 0.2, 0.9)  # rad
+Triple = tuple[float, float, float]
 PLACE, FORCE = 0.28, (0.0, 6.0, 8.0)  # m, N
+CYCLE = 40  # periods of the dither: 25 Hz
+WAYS = {
+    "motors": {"timing.dither_cycle": 0, "contact_estimator:use_joint_sensors": False},
+    "motors, dither": {"timing.dither_cycle": CYCLE, "contact_estimator:use_joint_sensors": False},
+    "joint sensors": {"timing.dither_cycle": 0, "contact_estimator:use_joint_sensors": True},
+}
 TITLES = ("(a) at rest: the motors alone", "(b) at rest, with dither")
+SIZES = (5.0, 10.0, 20.0)  # N
+SETTLED = 0.45  # s after power-up when the push begins
+TIP_ROWS = slice(60, 90)  # outer periods between release and push
 
 
 def save(path: Path, configuration: Configuration) -> list[str]:
@@ -33,8 +44,8 @@ def save(path: Path, configuration: Configuration) -> list[str]:
     figure = Figure(figsize=SIZE)
     FigureCanvasAgg(figure)
     said = []
-    for i, (title, cycle) in enumerate(zip(TITLES, (0, 40), strict=True)):
-        run, arm = _pushed(configuration, cycle), configuration.shared.arm
+    for i, (title, way) in enumerate(zip(TITLES, WAYS, strict=False)):
+        run, arm = _pushed(configuration, FORCE, WAYS[way]), configuration.shared.arm
         axes = figure.add_axes((0.5 * i, 0.0, 0.5, 1.0))
         felt, q = run.estimate, run.driver.true_joint_state.position
         draw(axes, arm, q, felt, Contact("outer_link", PLACE, FORCE))
@@ -94,17 +105,49 @@ def _numbers(felt: ContactEstimate) -> str:
     return f"felt: {felt.link} ({felt.probability:.2f}), {place}, {force:.1f} N"
 
 
-def _pushed(configuration: Configuration, cycle: int) -> DirectRun:
+class Felt(NamedTuple):
+    """What one way of feeling makes of one push.
+
+    Attributes
+    ----------
+    way, newtons : which.
+    estimate : what is felt 0.4 s after the push began.
+    force_error : N, size of the error of the force, of the whole force where nothing is felt.
+    tip_motion : m, peak to peak, of the tool before the push.
+    """
+
+    way: str
+    newtons: float
+    estimate: ContactEstimate
+    force_error: float
+    tip_motion: float
+
+
+def study(configuration: Configuration) -> list[Felt]:
+    """Push the resting arm with each force, and feel it in each way."""
+    found = []
+    for way, values in WAYS.items():
+        for newtons in SIZES:
+            force = tuple(newtons / 10.0 * part for part in FORCE)
+            run = _pushed(configuration, (force[0], force[1], force[2]), values)
+            body, felt = RigidBody(configuration.shared.arm), run.estimate
+            n = len(POSE)
+            tips = [body.tool_pose(row.values[:n]).position for row in run.rows["sim/joint_states"][TIP_ROWS]]
+            error = math.dist(felt.force, force)
+            found.append(Felt(way, newtons, felt, error, float(np.linalg.norm(np.ptp(tips, axis=0)))))
+    return found
+
+
+def _pushed(configuration: Configuration, force: Triple, own: Mapping[str, object]) -> DirectRun:
     values = {
-        "timing.dither_cycle": cycle,
-        "contact_estimator:use_joint_sensors": False,
+        **own,
         "arm.joints.start": POSE,
         "driver:world.obstacles.positions": [5.0] * 3,
     }
     steps = [
         Step("release", 0.05, request="enable"),
-        Step("settle", 0.45),
-        Step("rest", 0.4, push=Push("outer_link", PLACE, FORCE, 0.0, 2.0)),
+        Step("settle", SETTLED - 0.05),
+        Step("rest", 0.4, push=Push("outer_link", PLACE, force, 0.0, 2.0)),
     ]
     run = DirectRun(configuration.with_values(values), steps)
     if failure := run.play():
