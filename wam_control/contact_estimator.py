@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_control.contact_inference import (
     ContactInference,
@@ -155,7 +154,7 @@ class ContactEstimator:
         if not observer.is_ready:
             self._in_contact = False
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
-        precision: NDArray[np.float64] = np.linalg.inv(covariance)
+        precision = np.asarray(np.linalg.inv(covariance), np.float64)
         statistic = detection_statistic(torques, precision)
         self._in_contact = statistic > (parameters.release if self._in_contact else parameters.detect)
         if not self._in_contact:

@@ -12,6 +12,7 @@ from wam_description.parameters import parameter, require
 class VelocityLoopParameters:
     """Gains of the velocity servo, one per motor, and the dither on top of it."""
 
+    dither: DitherParameters
     proportional_gain: tuple[float, ...] = parameter("torque per velocity error", "N m s/rad", low=0.0, live=True)
     integral_gain: tuple[float, ...] = parameter("torque per angle error", "N m/rad", low=0.0, live=True)
     command_timeout: float = parameter(
@@ -19,7 +20,6 @@ class VelocityLoopParameters:
         "s",
         low=0.001,
     )
-    dither: DitherParameters
 
     def __post_init__(self) -> None:
         require(
