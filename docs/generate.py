@@ -7,6 +7,7 @@ A page is written by hand, but for its blocks between `<!-- generated: NAME -->`
 import argparse
 import ast
 import importlib
+import math
 import re
 import shutil
 import subprocess
@@ -20,9 +21,12 @@ from typing import Any
 from wam_analysis.batch import processes
 from wam_analysis.figures.catalogue import FIGURES, file_of, numbers
 from wam_analysis.figures.catalogue import table as figures_table
+from wam_analysis import contact_picture
 from wam_analysis.plant_figure import figure
 from wam_analysis.scorecard import report as scorecard
+from wam_control.dither import Dither
 from wam_control.force_loop import ForceLoop, ForceLoopParameters
+from wam_control.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
@@ -246,6 +250,8 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
         "plant": plant_study,
+        "felt": felt,
+        "dither": lambda: dither(configuration),
         "refusals": refusals,
         "guard": lambda: f"```\n{(ROOT / 'docs' / 'guard.txt').read_text(encoding='utf-8')}```\n",
         "figures": figures,
@@ -253,6 +259,50 @@ def blocks() -> dict[str, Callable[[], str]]:
         "scorecard": lambda: scorecard(configuration),
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
+
+
+@cache
+def pushes() -> tuple[contact_picture.Felt, ...]:
+    """What is felt of pushes at rest with config/wam.yaml."""
+    return tuple(contact_picture.study(Configuration.load(CONFIGURATION)))
+
+
+def felt() -> str:
+    """What is felt of a push at rest, in each way."""
+    rows = []
+    for row in pushes():
+        estimate = row.estimate
+        place = estimate.place - contact_picture.PLACE if estimate.in_contact else math.nan
+        sd = max(estimate.torque_sd)
+        known = not math.isnan(place)
+        rows.append(
+            [
+                row.way,
+                f"{row.newtons:g} N",
+                estimate.link.replace("_", " ") or "nothing",
+                f"{100.0 * place:.1f} cm" if known else "–",
+                f"{100.0 * estimate.place_sd:.1f} cm" if known else "–",
+                f"{row.force_error:.1f} N" if estimate.in_contact else "–",
+                f"{sd:.2g} N m",
+            ]
+        )
+    return table(["felt by", "push", "felt", "place, error", "place, sd", "force, error", "largest torque sd"], rows)
+
+
+def dither(configuration: Configuration) -> str:
+    """What the dither costs."""
+    shared = configuration.with_values({"timing.dither_cycle": contact_picture.CYCLE}).shared
+    own = configuration.node("velocity_loop", VelocityLoopParameters).dither
+    cost = Dither(shared.arm, shared.timing, own).cost(contact_picture.POSE)
+    moved = next(row.tip_motion for row in pushes() if row.way == "motors, dither")
+    rows = [
+        ["frequency", f"{1.0 / (shared.timing.dither_cycle * shared.timing.period):g} Hz"],
+        ["amplitude, per static friction of motor and joints", f"{own.level:g}"],
+        ["motion of the tool, peak to peak, on the plant", f"{1e3 * moved:.2g} mm"],
+        ["the same if there were no friction", f"{1e3 * cost.tip_motion:.2g} mm"],
+        ["heat, of what the hottest winding stands for ever", f"{100.0 * max(cost.heat):.2g} %"],
+    ]
+    return table(["the dither", ""], rows)
 
 
 def refusals() -> str:
@@ -323,8 +373,9 @@ def main() -> None:
         path.write_text(text, encoding="utf-8")
         print(path.relative_to(ROOT))
     if not given.pages:
+        contact_picture.save(ROOT / "docs" / "estimator.png", Configuration.load(CONFIGURATION))
         draw_demonstration()
-        print("docs/demo.png\ndocs/demo.txt")
+        print("docs/estimator.png\ndocs/demo.png\ndocs/demo.txt")
 
 
 if __name__ == "__main__":

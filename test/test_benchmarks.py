@@ -17,6 +17,7 @@ ROWS = {
         "everything against mcap-ros2-support",
         "columns against mcap-ros2-support",
     ],
+    "contact.py": ["observe", "infer", "estimate", "update"],
     "plant.py": ["arm free, moving", "arm free, pushed", "arm, every effect on", "in contact", "testbed, moving"],
     "recording.py": ["messages in the bag", "writing a message [us]"],
     "round_trip.py": ["one process, p50", "one process, p99", "two processes, p50", "two processes, p99"],

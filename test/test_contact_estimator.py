@@ -77,9 +77,9 @@ def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> Non
     felt = at_rest("outer_link", 0.28, force)
     assert felt.in_contact
     assert felt.link == "outer_link"
-    assert felt.place == pytest.approx(0.28, abs=0.02)
+    assert felt.place == pytest.approx(0.28, abs=0.03)
     assert abs(felt.place - 0.28) < 2 * felt.place_sd
-    assert np.linalg.norm(np.subtract(felt.force, force)) < 0.05 * size
+    assert np.linalg.norm(np.subtract(felt.force, force)) < 0.1 * size
     assert felt.reason == ""
 
 
@@ -222,3 +222,50 @@ def test_sets_that_do_not_fit_are_refused() -> None:
     hasty = dataclasses.replace(SENSORS, observer=dataclasses.replace(SENSORS.observer, time_constant=1e-3))
     with pytest.raises(ParameterError, match=r"time_constant.*two periods"):
         ContactEstimator(ARM, TIMING, hasty)
+
+
+def loaded(mass: float) -> Plant:
+    """The plant with a mass at the tool, which lies on the x axis of the last link as its centre does."""
+    links, lever = ARM.links, ARM.tool[0] - ARM.links.centre[-3]
+    total = links.mass[-1] + mass
+    moved = mass * links.mass[-1] / total * lever * lever
+    centre = (*links.centre[:-3], links.centre[-3] + lever * mass / total, 0.0, 0.0)
+    inertia = (*links.inertia[:-2], links.inertia[-2] + moved, links.inertia[-1] + moved)
+    heavy = dataclasses.replace(links, mass=(*links.mass[:-1], total), centre=centre, inertia=inertia)
+    start = dataclasses.replace(ARM.joints, start=(0.0, -1.05, 0.0, 0.5))
+    return Plant(dataclasses.replace(ARM, links=heavy, joints=start), NOTHING, no_effects(ARM), DT / SUBSTEPS)
+
+
+def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> None:
+    arm, felt = loaded(0.3), {}
+    for name, payload in (("none", (0.0, 0.0)), ("declared", (0.0, 0.4))):
+        observer = dataclasses.replace(SENSORS.observer, payload=payload)
+        estimator = ContactEstimator(ARM, TIMING, dataclasses.replace(SENSORS, observer=observer))
+        for _ in range(150):
+            for _ in range(SUBSTEPS):
+                arm.step(ZERO)
+            sense(estimator, arm, ZERO)
+        felt[name] = (estimator.estimate(), estimator.tare(), estimator.estimate())
+    before, reason, _ = felt["none"]
+    assert before.in_contact
+    assert "observer.payload" in reason
+    before, reason, after = felt["declared"]
+    assert not before.in_contact
+    assert reason == ""
+    assert before.torque_sd[3] > 3.0 * after.torque_sd[3]
+    assert abs(after.external_torques[3]) < 0.1 * abs(before.external_torques[3])
+
+
+def test_held_motors_feel_nothing_and_joint_sensors_feel_on() -> None:
+    arm = plant((0.0, -1.05, 0.0, 0.5))
+    for parameters, is_felt in ((MOTORS, False), (SENSORS, True)):
+        estimator = ContactEstimator(ARM, TIMING, parameters)
+        estimator.brake(True)
+        push(arm, "outer_link", 0.28, (0.0, 4.0, 3.0))
+        for _ in range(300):
+            for _ in range(SUBSTEPS):
+                arm.step(ZERO)
+            sense(estimator, arm, [0.05] * 4)  # a current that is read though none flows
+        found = estimator.estimate()
+        assert found.in_contact is is_felt
+        assert found.reason == ("" if is_felt else "brakes hold the motors")

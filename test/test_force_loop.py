@@ -296,6 +296,22 @@ def test_the_force_acts_where_contact_is_felt() -> None:
     assert elsewhere.effort == pytest.approx(2.0 * lever(POSE), abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("place_sd", "probability", "is_used"), [(0.01, 0.99, True), (0.05, 0.99, False), (0.01, 0.5, False)]
+)
+def test_a_place_that_is_too_unsure_is_refused_for_the_one_that_is_configured(
+    place_sd: float, probability: float, is_used: bool
+) -> None:
+    loop = Loop(ARM, OWN)
+    contact = Contact("inner_link", 0.4, (0.0, 0.0, 1.0), place_sd, probability)
+    for _ in range(2):
+        out = ask(loop, World(400.0), down(2.0), contact=contact)
+    there = lever(POSE, DOWN, "inner_link", 0.4) if is_used else lever(POSE)
+    assert out.effort == pytest.approx(2.0 * there, abs=1e-6)
+    assert ("contact/spread" in loop.refusals) is not is_used
+    assert loop.refused == (0 if is_used else 1)
+
+
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 @pytest.mark.parametrize("mode", ["hybrid", "open_loop"])
 def test_a_force_in_a_cover_frame_is_the_same_force_in_the_base_frame(feedback: str, mode: str) -> None:

@@ -98,15 +98,16 @@ def differences(rows: Rows, bag: Bag) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("delay", [0, 1])
+@pytest.mark.parametrize(("delay", "dither_cycle"), [(0, 0), (1, 40)])
 def test_lockstep_over_topics_equals_the_loop_without_ros(
-    delay: int, script: Path, tmp_path: Path, domain_id: int
+    delay: int, dither_cycle: int, script: Path, tmp_path: Path, domain_id: int
 ) -> None:
-    configured = configuration(script, tmp_path, "composed", **{"timing.outer_delay": delay})
+    values = {"timing.outer_delay": delay, "timing.dither_cycle": dither_cycle}
+    configured = configuration(script, tmp_path, "composed", **values)
     record_composed(configured, domain_id)
     run = play_directly(configured, script)
     bag = read(tmp_path / "composed")
-    assert len(run.rows) == 22
+    assert len(run.rows) == 24
     assert len(run.rows["motor_states"]) == 801
     assert differences(run.rows, bag) == []
 
@@ -160,7 +161,7 @@ def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_p
     assert outputs[0] == outputs[1]
 
 
-TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0)
+TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0)
 
 
 def test_gate_waits_for_the_command_that_belongs_to_the_state() -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from wam_control.dither import DitherParameters
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Motors
 from wam_description.configuration import Configuration, packaged
@@ -13,7 +14,8 @@ from wam_description.parameters import ParameterError
 INERTIA, CONSTANT, PEAK = 4.0e-5, 0.25, 4.0
 KP, KI = 0.015, 0.8
 ONE = Motors(("motor1",), (INERTIA,), (CONSTANT,), (PEAK,), (1.0,), (0.0,), (0.0,), (0.0,))
-GAINS = VelocityLoopParameters((KP,), (KI,), 0.1)
+STILL = DitherParameters(0.0, (0.0,))
+GAINS = VelocityLoopParameters(STILL, (KP,), (KI,), 0.1)
 DT = 1e-3
 
 
@@ -156,7 +158,7 @@ def test_current_is_clipped_to_the_peak(sign: float) -> None:
 def test_motors_do_not_mix() -> None:
     motors = Configuration.load(packaged("wam")).shared.arm.motors
     kp, ki = (0.01, 0.02, 0.03, 0.04), (0.1, 0.2, 0.3, 0.4)
-    loop = VelocityLoop(motors, VelocityLoopParameters(kp, ki, 0.1))
+    loop = VelocityLoop(motors, VelocityLoopParameters(STILL, kp, ki, 0.1))
     command, speed, feed = [1.0, 2.0, 3.0, 4.0], [0.5, -0.5, 0.0, 8.0], [0.1, 0.0, -0.1, 0.2]
     currents = loop.step(speed, [0.0] * 4, command, 0.0, feed, DT)
     expected = [
@@ -190,10 +192,10 @@ def test_gains_of_a_wrong_number_are_refused(
     proportional: tuple[float, ...], integral: tuple[float, ...], text: str
 ) -> None:
     with pytest.raises(ParameterError, match=text):
-        VelocityLoop(ONE, VelocityLoopParameters(proportional, integral, 0.1))
+        VelocityLoop(ONE, VelocityLoopParameters(STILL, proportional, integral, 0.1))
     loop = VelocityLoop(ONE, GAINS)
     with pytest.raises(ParameterError, match=text):
-        loop.tune(VelocityLoopParameters(proportional, integral, 0.1))
+        loop.tune(VelocityLoopParameters(STILL, proportional, integral, 0.1))
     assert loop.step([0.0], [0.0], [1.0], 0.0, [0.0], DT) == VelocityLoop(ONE, GAINS).step(
         [0.0], [0.0], [1.0], 0.0, [0.0], DT
     ), "the gains in use stay"

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_control.dither import Dither
 from wam_control.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.scenario import Scenario, ScenarioOutput, Step
 from wam_control.transform import Transform
@@ -57,7 +58,9 @@ class DirectRun:
         self.scenario = Scenario(steps)
         self._transform = Transform(arm)
         self._body = RigidBody(arm)
-        self._velocity_loop = VelocityLoop(arm.motors, node("velocity_loop", VelocityLoopParameters))
+        servo = node("velocity_loop", VelocityLoopParameters)
+        self._velocity_loop = VelocityLoop(arm.motors, servo)
+        self._dither = Dither(arm, self._timing, servo.dither)
         self._force_loop = ForceLoop(arm, node("force_loop", ForceLoopParameters), self._timing)
         estimation = node("contact_estimator", ContactEstimatorParameters)
         self._estimator = ContactEstimator(arm, self._timing, estimation)
@@ -97,8 +100,9 @@ class DirectRun:
             if self._timing.outer_delay == 0:
                 self._used = self._newest
         caused, velocity, effort = self._used
+        feedforward = self._dither.added(stamp, effort)
         currents = self._velocity_loop.step(
-            motors.velocity, motors.effort, velocity, seconds(stamp - (caused or stamp)), effort, period
+            motors.velocity, motors.effort, velocity, seconds(stamp - (caused or stamp)), feedforward, period
         )
         self._say("motor_current_command", stamp, currents)
         if not done:
@@ -109,7 +113,9 @@ class DirectRun:
     def _outer(self, stamp: int, motors: State, sensors: State | None) -> bool:
         dt = seconds(self._timing.outer_period_ns)
         self.estimate = estimate = self._estimator.estimate()
-        contact = Contact(estimate.link, estimate.place, estimate.force) if estimate.link else NO_CONTACT
+        contact = NO_CONTACT
+        if estimate.link:
+            contact = Contact(estimate.link, estimate.place, estimate.force, estimate.place_sd, estimate.probability)
         joints = self._transform.joint_state(motors)
         played = self.scenario.step(joints.position, contact, dt)
         self._request(played)
@@ -122,9 +128,11 @@ class DirectRun:
         self._say_joints("joint_states", stamp, joints)
         self._say("gravity_effort", stamp, gravity)
         self._say("external_joint_torques", stamp, external)
+        self._say("external_joint_torques_sd", stamp, estimate.torque_sd)
         frame = estimate.link or "base"
         self._say("contact/wrench", stamp, [*estimate.force, *estimate.moment], frame)
         self._say("contact/point", stamp, [estimate.place, 0.0, 0.0], frame)
+        self._say("contact/spread", stamp, [estimate.place_sd, estimate.probability, estimate.direction_sd], frame)
         self._say("joint_velocity_command", stamp, out.velocity)
         self._say("joint_effort_command", stamp, out.effort)
         self._say("motor_velocity_command", stamp, velocity)

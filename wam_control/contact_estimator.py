@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from wam_control.contact_inference import (
     ContactInference,
     Hypothesis,
@@ -46,6 +48,8 @@ class ContactEstimate(NamedTuple):
     link : name of the touched cover, '' without contact.
     place : m along the cover's x axis, NaN where it cannot be observed.
     place_sd : m, NaN with the place.
+    probability : that this link is touched, NaN without contact.
+    direction_sd : rad, of the angle of the force round the link, NaN without contact.
     force : (3,), N, of the world on the link, in the cover's frame; zeros without contact, the
         least possible force where the place is NaN.
     moment : (3,), N m, of that force about the origin of the cover's frame.
@@ -60,6 +64,8 @@ class ContactEstimate(NamedTuple):
     link: str
     place: float
     place_sd: float
+    probability: float
+    direction_sd: float
     force: tuple[float, float, float]
     moment: tuple[float, float, float]
     hypotheses: tuple[Hypothesis, ...]
@@ -67,6 +73,7 @@ class ContactEstimate(NamedTuple):
 
 
 NOTHING = (0.0, 0.0, 0.0)
+TOO_EARLY = "not enough has been observed"
 
 
 class ContactEstimator:
@@ -95,14 +102,22 @@ class ContactEstimator:
             f"it must be at least two periods, {2.0 * timing.period:g} s",
         )
         self._parameters = parameters
-        self._observer = MomentumObserver(arm, parameters.observer, parameters.use_joint_sensors)
+        self._observer = MomentumObserver(arm, parameters.observer, parameters.use_joint_sensors, timing.dither_cycle)
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
-        self._in_contact = False
+        self._in_contact = self._is_blind = False
         self.refused = 0
 
+    def brake(self, on: bool) -> None:
+        """Say whether brakes hold the motors, which then tell nothing; joint sensors feel on."""
+        self._is_blind = on and not self._parameters.use_joint_sensors
+
+    def tare(self) -> str:
+        """Take what is felt now as the payload, within what is declared; '' or why that cannot be."""
+        return self._observer.weigh()
+
     def reset(self) -> None:
-        """Forget everything seen, e.g. while the brakes hold the motors."""
+        """Forget everything seen."""
         self._observer.reset()
         self._in_contact = False
 
@@ -121,6 +136,9 @@ class ContactEstimator:
         bool
             False where the sample is refused; `refused` counts these.
         """
+        if self._is_blind:
+            self.reset()
+            return True
         state = sensors if self._parameters.use_joint_sensors else motor
         is_taken = state is not None and self._observer.observe(state, dt)
         if not is_taken:
@@ -130,17 +148,18 @@ class ContactEstimator:
     def estimate(self) -> ContactEstimate:
         """Say what touches, from everything observed."""
         observer, parameters = self._observer, self._parameters
-        covariance = observer.covariance()
-        torques = tuple(observer.external_torques)
+        felt, covariance = observer.torques()
+        torques = tuple(felt)
         sd = tuple(math.sqrt(variance) for variance in covariance.diagonal().tolist())
         if not observer.is_ready:
             self._in_contact = False
-            return _nothing(torques, sd, 0.0, "not enough has been observed")
-        statistic = detection_statistic(torques, covariance)
+            return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
+        precision = np.asarray(np.linalg.inv(covariance), np.float64)
+        statistic = detection_statistic(torques, precision)
         self._in_contact = statistic > (parameters.release if self._in_contact else parameters.detect)
         if not self._in_contact:
             return _nothing(torques, sd, statistic, "nothing touches")
-        hypotheses = self._inference.infer(observer.q, torques, covariance)
+        hypotheses = self._inference.infer(observer.q, torques, precision)
         best = hypotheses[0]
         return ContactEstimate(
             external_torques=torques,
@@ -150,6 +169,8 @@ class ContactEstimator:
             link=best.cover,
             place=best.place,
             place_sd=best.place_sd,
+            probability=best.probability,
+            direction_sd=best.direction_sd,
             force=best.force,
             moment=best.moment,
             hypotheses=hypotheses,
@@ -166,6 +187,8 @@ def _nothing(torques: tuple[float, ...], sd: tuple[float, ...], statistic: float
         link="",
         place=math.nan,
         place_sd=math.nan,
+        probability=math.nan,
+        direction_sd=math.nan,
         force=NOTHING,
         moment=NOTHING,
         hypotheses=(),

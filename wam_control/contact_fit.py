@@ -1,180 +1,304 @@
-"""One contact on one straight link, fitted to joint torques in closed form for a given place.
+"""One contact on one of some straight links, found among many places with the force integrated out.
 
-A frictionless contact at place x pushes across the link: tau_ext = (A + x B) f, with f the two
-components of the force across the link, N.  The line of the force may miss the axis of the tube a
-little: friction, or a tube that is not where the model has it.  That adds a twist about the axis,
-a torque t, of unknown size.  Everything that the fit needs of arm and torques are inner products,
-weighted with the inverse covariance: the Gram matrix of (r, A, B, t), 6 by 6.
+A contact at place x pushes across the link, tau_ext = (A + x B) f, with f the two components of
+the force across the link, N.  Friction lets the force lean: across the link it then misses the
+axis of the tube, which adds a twist t about it; along the link it adds a force a, which attacks at
+the surface and so turns the link too.  Both are unknown, of the size of the force times the
+friction.  All that is needed of arm and torques are inner products, weighted with the inverse of
+the covariance: the Gram matrix of Z = (r, A_1, A_2, B_1, B_2, t, a), 7 by 7.
+
+Scalar Python does what is small; only the row of places is numpy's.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Pair = tuple[float, float]
+
+LEAST_FORCE = 1e-6  # N, keeps the lean of no force from dividing by zero
+REACH = 8.0  # of the log of probability, below which a place does not matter
+FEW = 6  # places of a peak below which it is looked at more closely
+PARTS = 16  # pieces of it then, half a standard deviation each
+ROUNDING = 1e-12  # of a determinant, below which it is lost in rounding
+WEAK_PRIOR = 1e-9  # of the force prior: keeps directions that no joint sees from dividing by zero
+SET = 0.9  # probability of the set that is reported
 
 
 class Fit(NamedTuple):
-    """The most likely contact on one link.
+    """What the torques say of a contact on one link.
 
     Attributes
     ----------
-    place : m, where the fit is best.
-    place_sd : m, with the force unknown; infinite where the torques do not hold the place.
-    force : (2,), N, components across the link at `place`.
-    force_at_end : (2,), N, the same if the place were the end of the link, the longest lever.
-    residual : what the contact leaves unexplained, chi^2.
-    log_evidence : log of the probability of the torques, up to a constant of all fits.
+    place, place_sd : m, mean and standard deviation of the place.
+    force : (2,), N, most likely components across the link at `place`.
+    force_sd : N, standard deviation of the size of the force, the place unknown.
+    direction_sd : rad, standard deviation of its direction round the link, the place unknown.
+    told_sd : m, standard deviation of the place by the torques alone, without what is likely of places and
+        forces; infinite where they do not tell it.
+    force_at_end : (2,), N, the force if the place were the end of the link, the longest lever.
+    residual : what the best contact leaves unexplained, chi^2.
+    probability : of this link among all.
+    low, high : m, ends of the part of the link that is in the 90 % set, NaN where none is.
     """
 
     place: float
     place_sd: float
-    force: tuple[float, float]
-    force_at_end: tuple[float, float]
+    force: Pair
+    force_sd: float
+    direction_sd: float
+    told_sd: float
+    force_at_end: Pair
     residual: float
-    log_evidence: float
+    probability: float
+    low: float
+    high: float
 
 
-ITERATIONS = 8
-STEP_END = 1e-4  # m
-WEAK_PRIOR = 1e-9  # of the force prior: keeps directions that no joint sees from dividing by zero
+# a piece of a link: log of the probability of a contact just there, per metre; place and width, m; link
+Cell = tuple[float, float, float, int]
 
 
-class _Link:
-    """The weighted least squares problem of one link, by its Gram matrix."""
-
-    def __init__(self, gram: list[list[float]], precision: float) -> None:
-        self.precision = precision
-        self.rr, self.ra1, self.ra2, self.rb1, self.rb2 = gram[0][:5]
-        self.a11, self.a12, self.a1b1, self.a1b2 = gram[1][1:5]
-        self.a22, self.a2b1, self.a2b2 = gram[2][2:5]
-        self.b11, self.b12 = gram[3][3:5]
-        self.b22 = gram[4][4]
-
-    def normal(self, x: float) -> tuple[float, float, float]:
-        """(11, 12, 22) of G^T W G, G = A + x B."""
-        return (
-            self.a11 + x * (2.0 * self.a1b1 + x * self.b11),
-            self.a12 + x * (self.a1b2 + self.a2b1 + x * self.b12),
-            self.a22 + x * (2.0 * self.a2b2 + x * self.b22),
-        )
-
-    def force(self, x: float) -> tuple[float, float, float]:
-        """Best force at place x, and the part of r^T W r that it explains."""
-        n11, n12, n22 = self.normal(x)
-        n11, n22 = n11 + self.precision, n22 + self.precision
-        c1, c2 = self.ra1 + x * self.rb1, self.ra2 + x * self.rb2
-        determinant = n11 * n22 - n12 * n12
-        f1, f2 = (n22 * c1 - n12 * c2) / determinant, (n11 * c2 - n12 * c1) / determinant
-        return f1, f2, f1 * c1 + f2 * c2
-
-    def survey(self, places: list[float]) -> list[tuple[float, float]]:
-        """(explained, log evidence) of each place.
-
-        Log probability of the torques, up to a constant, for a contact there of any likely force:
-        -1/2 (r^T (S + s^2 G G^T)^-1 r + log abs(1 + s^2 G^T W G)), s the force's scale.
-        """
-        result = []
-        square = self.precision**-2
-        for x in places:
-            n11 = self.a11 + x * (2.0 * self.a1b1 + x * self.b11) + self.precision
-            n12 = self.a12 + x * (self.a1b2 + self.a2b1 + x * self.b12)
-            n22 = self.a22 + x * (2.0 * self.a2b2 + x * self.b22) + self.precision
-            c1, c2 = self.ra1 + x * self.rb1, self.ra2 + x * self.rb2
-            determinant = n11 * n22 - n12 * n12
-            explained = (n22 * c1 * c1 - 2.0 * n12 * c1 * c2 + n11 * c2 * c2) / determinant
-            result.append((explained, -0.5 * (self.rr - explained + math.log(square * determinant))))
-        return result
-
-    def slope(self, x: float, f1: float, f2: float) -> float:
-        """Half the derivative of the explained part by the place, the force always the best."""
-        v1, v2 = self.coupling(x, f1, f2)
-        return f1 * self.rb1 + f2 * self.rb2 - f1 * v1 - f2 * v2
-
-    def coupling(self, x: float, f1: float, f2: float) -> tuple[float, float]:
-        """(B f)^T W G, what place and force have in common."""
-        return (
-            f1 * (self.a1b1 + x * self.b11) + f2 * (self.a1b2 + x * self.b12),
-            f1 * (self.a2b1 + x * self.b12) + f2 * (self.a2b2 + x * self.b22),
-        )
-
-    def information(self, x: float, f1: float, f2: float, precision: float) -> float:
-        """What the torques say of the place, 1/m^2, the force unknown: a Schur complement."""
-        n11, n12, n22 = self.normal(x)
-        n11, n22 = n11 + precision, n22 + precision
-        v1, v2 = self.coupling(x, f1, f2)
-        known = (v1 * v1 * n22 - 2.0 * v1 * v2 * n12 + v2 * v2 * n11) / (n11 * n22 - n12 * n12)
-        return f1 * f1 * self.b11 + 2.0 * f1 * f2 * self.b12 + f2 * f2 * self.b22 - known
-
-
-def fit_contact(
-    gram: list[list[float]], start: float, end: float, *, force_scale: float, twist_arm: float, places: int
-) -> Fit:
-    """Place and force of one contact, by weighted least squares over place and direction at once.
-
-    The start is the best of a row of places, the rest are Gauss-Newton steps in the place alone,
-    the force being linear.  The place stays on the link.
-
-    A link that explains the torques anywhere is more likely than one that does so at a single
-    place: the evidence is averaged over the link, by Laplace's method, cut at the ends, where the
-    place is held by the torques, over the row of places where it is not.
+class ContactFit:
+    """Places, forces and odds of one contact on straight links.
 
     Parameters
     ----------
-    gram : (6, 6), Z^T S^-1 Z, Z = (r, A_1, A_2, B_1, B_2, t): torques, columns of A and B, twist.
-    start, end : m, where the link begins and ends along x.
+    start, end : (links,), m, where each link begins and ends along x.
+    radius : (links,), m, of the tubes.
+    weights : (links,), how often each is touched, relatively.
     force_scale : N, sd of each component of the force before anything is felt.
-    twist_arm : m, sd of the distance by which the line of the force misses the axis of the tube.
-    places : how many places are tried for a start, at least 2.
+    miss : sd of the distance by which the line of the force misses the axis of the tube, per radius.
+    friction : sd of the force of friction along the link, per force.
+    places : how many places of each link are tried, at least 3.
     """
-    precision = 1.0 / force_scale**2
-    f1, f2, _ = _Link(gram, precision).force(0.5 * (start + end))
-    gain = twist_arm**2 * (f1 * f1 + f2 * f2)
-    link = _Link(_with_twist(gram, gain), precision)
-    spacing = (end - start) / (places - 1)
-    row = [start + i * spacing for i in range(places)]
-    tried = link.survey(row)
-    best = max(range(places), key=lambda i: tried[i][0])
-    x = _climb(link, row[best], start, end, spacing)
-    f1, f2, explained = link.force(x)
-    information = link.information(x, f1, f2, precision * WEAK_PRIOR)
-    sd = 1.0 / math.sqrt(information) if information > 0.0 else math.inf
-    if sd < end - start:
-        root = math.sqrt(2.0) * sd
-        inside = 0.5 * (math.erf((end - x) / root) - math.erf((start - x) / root))
-        share = min(1.0, inside * math.sqrt(2.0 * math.pi) * sd / (end - start))
-        log_evidence = link.survey([x])[0][1] + math.log(share)
-    else:
-        most = max(evidence for _, evidence in tried)
-        log_evidence = most + math.log(sum(math.exp(evidence - most) for _, evidence in tried) / places)
-    residual = max(0.0, link.rr - explained - precision * (f1 * f1 + f2 * f2))
-    log_evidence -= 0.5 * math.log1p(gain * gram[5][5])
-    return Fit(x, sd, (f1, f2), link.force(end)[:2], residual, log_evidence)
+
+    def __init__(
+        self,
+        start: Sequence[float],
+        end: Sequence[float],
+        radius: Sequence[float],
+        weights: Sequence[float],
+        *,
+        force_scale: float,
+        miss: float,
+        friction: float,
+        places: int,
+    ) -> None:
+        self._ends = list(zip(start, end, strict=True))
+        self._radius = list(radius)
+        self._miss = [miss * r for r in radius]
+        # logs of the metres over which a touch is spread
+        self._spread = [math.log((b - a) / weight) for (a, b), weight in zip(self._ends, weights, strict=True)]
+        self._precision, self._friction = force_scale**-2, friction
+        self._widths = [(b - a) / places for a, b in self._ends]
+        steps = (np.arange(places) + 0.5) / places  # the middle of each
+        row = np.array([a + (b - a) * steps for a, b in self._ends])
+        self._row = row.tolist()
+        self._powers = np.stack((np.ones_like(row), row, row * row), axis=1)
+
+    def __call__(self, gram: Array) -> list[Fit]:
+        """Fit a contact to each link.
+
+        Parameters
+        ----------
+        gram : (links, 7, 7), Z^T S^-1 Z for each link.
+        """
+        full = gram.tolist()
+        links = [
+            _Link([row[i:5] for i, row in enumerate(one[:5])], self._precision).leaning(
+                one, 0.5 * (start + end), miss, self._friction, radius
+            )
+            for one, (start, end), miss, radius in zip(full, self._ends, self._miss, self._radius, strict=True)
+        ]
+        log_density = self._log_density(links)
+        top = max(map(max, log_density))
+        cells: list[Cell] = []
+        for i, link in enumerate(links):
+            cells += self._cells(i, link, log_density[i], top)
+        parts = self._parts(sorted(cells, reverse=True))
+        return [self._fit(i, link, *part) for i, (link, part) in enumerate(zip(links, parts, strict=True))]
+
+    def _log_density(self, links: "list[_Link]") -> list[list[float]]:
+        """Log of the probability of the torques for a contact of any likely force, place by place, up to a constant.
+
+        -1/2 (r^T (S + s^2 G G^T)^-1 r + log abs(1 + s^2 G^T W G)), G = A + x B, s the scale of the force;
+        every place of a link is as likely as every other.
+        """
+        n11, n12, n22, c1, c2 = (np.array([link.terms for link in links]) @ self._powers).transpose(1, 0, 2)
+        across = n12 / n11
+        rest, left = n22 - across * n12, c2 - across * c1
+        log_density = c1 * c1 / n11 + left * left / rest - np.log(n11 * rest)
+        constant = [[2.0 * (link.constant + spread)] for link, spread in zip(links, self._spread, strict=True)]
+        result: list[list[float]] = (0.5 * (log_density - constant)).tolist()
+        return result
+
+    def _cells(self, i: int, link: "_Link", values: list[float], top: float) -> list[Cell]:
+        """The places of a link that matter; pieces of them where the peak is narrow.
+
+        A narrow peak is the exponential of a parabola, sought by parabolas through three places, ever nearer.
+        """
+        row, width, floor = self._row[i], self._widths[i], top - REACH
+        cells = [(value, x, width, i) for value, x in zip(values, row, strict=True) if value > floor]
+        if not 0 < len(cells) < FEW:
+            return cells
+        peak = max(range(len(values)), key=values.__getitem__)
+        (start, end), x, near = self._ends[i], row[peak], width
+        offset = values[peak] - link.log_density(x)
+        for _ in range(3):
+            x = min(max(x, start), end)
+            before, at, after = link.log_density(x - near), link.log_density(x), link.log_density(x + near)
+            slope, bend = 0.5 * (after - before) / near, (0.5 * (after + before) - at) / (near * near)
+            if bend >= 0.0:
+                return cells
+            step = -0.5 * slope / bend
+            x, near = x + min(max(step, -width), width), 0.25 * near
+        at, sd = link.log_density(x) + offset, math.sqrt(-0.5 / bend)
+        left, right = max(start, x - 4.0 * sd), min(end, x + 4.0 * sd)
+        if left >= right:  # the peak lies beyond the end of the link; all of it is at the end
+            left, right = (end - sd, end) if x > end else (start, start + sd)
+        part = (right - left) / PARTS
+        places = [left + (k + 0.5) * part for k in range(PARTS)]
+        return [(at + bend * (place - x) ** 2, place, part, i) for place in places]
+
+    def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float]]:
+        """Probability, mean and variance of the place, low and high end of the 90 % set, of each link.
+
+        The set takes the most probable places first, which is how `cells` come.
+        """
+        top = cells[0][0]
+        sums = [[0.0, 0.0, 0.0] for _ in self._ends]
+        weights = []
+        for value, x, width, i in cells:
+            weight = math.exp(value - top) * width
+            weights.append(weight)
+            mine = sums[i]
+            mine[0] += weight
+            mine[1] += weight * x
+            mine[2] += weight * (x * x + width * width / 12.0)
+        total, passed = sum(weights), 0.0
+        inside = [[math.inf, -math.inf] for _ in self._ends]
+        for weight, (_, x, width, i) in zip(weights, cells, strict=True):
+            if passed >= SET * total:
+                break
+            passed += weight
+            part, half = inside[i], 0.5 * width
+            part[0], part[1] = min(part[0], x - half), max(part[1], x + half)
+        result = []
+        for (mass, first, second), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
+            if mass == 0.0:
+                result.append((0.0, 0.5 * (start + end), (end - start) ** 2 / 12.0, math.nan, math.nan))
+                continue
+            mean = first / mass
+            ends = (max(low, start), min(high, end)) if low < high else (math.nan, math.nan)
+            result.append((mass / total, mean, max(0.0, second / mass - mean * mean), *ends))
+        return result
+
+    def _fit(
+        self, i: int, link: "_Link", probability: float, place: float, variance: float, low: float, high: float
+    ) -> Fit:
+        force, explained, (s11, s12, s22) = link.force(place)
+        step = 0.5 * self._widths[i]
+        ahead, _, _ = link.force(place + step)
+        d1, d2 = (ahead[0] - force[0]) / step, (ahead[1] - force[1]) / step
+        size = math.hypot(*force) + LEAST_FORCE
+        u1, u2 = force[0] / size, force[1] / size
+        along = u1 * (u1 * s11 + 2.0 * u2 * s12) + u2 * u2 * s22 + (u1 * d1 + u2 * d2) ** 2 * variance
+        about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22 + (u1 * d2 - u2 * d1) ** 2 * variance
+        return Fit(
+            place=place,
+            place_sd=math.sqrt(variance),
+            force=force,
+            force_sd=math.sqrt(along),
+            direction_sd=min(math.sqrt(about) / size, math.pi),
+            told_sd=link.told_sd(place, force),
+            force_at_end=link.force(self._ends[i][1])[0],
+            residual=max(0.0, link.rr - explained - self._precision * size * size),
+            probability=probability,
+            low=low,
+            high=high,
+        )
 
 
-def _climb(link: _Link, x: float, start: float, end: float, longest: float) -> float:
-    """Gauss-Newton steps from place x to where the best force explains most, on the link."""
-    f1, f2, explained = link.force(x)
-    for _ in range(ITERATIONS):
-        information = link.information(x, f1, f2, link.precision)
-        if information <= 0.0:
-            break
-        step = min(longest, max(-longest, link.slope(x, f1, f2) / information))
-        following = min(end, max(start, x + step))
-        trial = link.force(following)
-        while trial[2] < explained and abs(following - x) > STEP_END:
-            following = 0.5 * (x + following)
-            trial = link.force(following)
-        moved = abs(following - x)
-        if trial[2] >= explained:
-            x, (f1, f2, explained) = following, trial
-        if moved <= STEP_END:
-            break
-    return x
+class _Link:
+    """The weighted least squares problem of one link, by the upper triangle of its Gram matrix, without lean."""
 
+    def __init__(self, gram: Sequence[Sequence[float]], precision: float, log_widening: float = 0.0) -> None:
+        self.rr, ra1, ra2, rb1, rb2 = gram[0]
+        a11, a12, a1b1, a1b2 = gram[1]
+        a22, a2b1, a2b2 = gram[2]
+        b11, b12 = gram[3]
+        (b22,) = gram[4]
+        self.precision = precision
+        self.constant = 0.5 * (self.rr + log_widening)  # what the log of the probability lacks at every place
+        self._slopes = (a1b1, a1b2, a2b1, a2b2, b11, b12, b22)
+        # coefficients of 1, x, x^2 in G^T W G, 11, 12, 22, and in G^T W r, 1, 2
+        self.terms = (
+            (a11 + precision, 2.0 * a1b1, b11),
+            (a12, a1b2 + a2b1, b12),
+            (a22 + precision, 2.0 * a2b2, b22),
+            (ra1, rb1, 0.0),
+            (ra2, rb2, 0.0),
+        )
 
-def _with_twist(gram: list[list[float]], variance: float) -> list[list[float]]:
-    """The Gram matrix for the covariance S + variance t t^T (Sherman-Morrison)."""
-    t = gram[5]
-    factor = variance / (1.0 + variance * t[5])
-    return [
-        [value - factor * ti * tj for value, tj in zip(row, t, strict=True)]
-        for row, ti in zip(gram[:5], t, strict=False)
-    ]
+    def force(self, x: float) -> tuple[Pair, float, tuple[float, float, float]]:
+        """Most likely force at place x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
+        (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = self.terms
+        n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
+        told1, told2 = c0 + x * c1, e0 + x * e1
+        determinant = n11 * n22 - n12 * n12
+        f1, f2 = (n22 * told1 - n12 * told2) / determinant, (n11 * told2 - n12 * told1) / determinant
+        return (f1, f2), f1 * told1 + f2 * told2, (n22 / determinant, -n12 / determinant, n11 / determinant)
+
+    def log_density(self, x: float) -> float:
+        """Log of the probability of the torques for a contact at x, up to a constant of the link; see `ContactFit`."""
+        _, explained, (s11, s12, s22) = self.force(x)
+        return 0.5 * (explained + math.log(max(s11 * s22 - s12 * s12, ROUNDING * s11 * s22)))
+
+    def told_sd(self, x: float, force: Pair) -> float:
+        """Standard deviation of the place, m, by the torques alone, the force unknown: a Schur complement.
+
+        Not by a pseudo-inverse of the whole information, which is small exactly where the place is not told.
+        """
+        (p0, p1, p2), (q0, q1, q2), (s0, s1, s2) = self.terms[:3]
+        a1b1, a1b2, a2b1, a2b2, b11, b12, b22 = self._slopes
+        f1, f2 = force
+        less = self.precision * (1.0 - WEAK_PRIOR)
+        n11, n12, n22 = p0 + x * (p1 + x * p2) - less, q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2) - less
+        v1 = f1 * (a1b1 + x * b11) + f2 * (a1b2 + x * b12)
+        v2 = f1 * (a2b1 + x * b12) + f2 * (a2b2 + x * b22)
+        known = (v1 * v1 * n22 - 2.0 * v1 * v2 * n12 + v2 * v2 * n11) / (n11 * n22 - n12 * n12)
+        information = f1 * f1 * b11 + 2.0 * f1 * f2 * b12 + f2 * f2 * b22 - known
+        return 1.0 / math.sqrt(information) if information > 0.0 else math.inf
+
+    def leaning(self, gram: list[list[float]], middle: float, miss: float, friction: float, radius: float) -> "_Link":
+        """The same with the lean of the force, as large as at the middle of the link, in the covariance.
+
+        Twist: the line of the force misses the axis by some part of the radius.  Axial: a force along
+        the surface, which is where the force comes from, one radius off the axis.  With z the two in
+        torques of one standard deviation, S + z z^T has the Gram matrix G - u (1 + v)^-1 u^T,
+        u = Z^T W z, v = z^T W z (Woodbury).
+        """
+        (f1, f2), _, _ = self.force(middle)
+        size = math.hypot(f1, f2) + LEAST_FORCE
+        sd, arm, turn = friction * size, miss * size, friction * radius
+        turn1, turn2 = turn * f1, turn * f2
+        twist, axial = gram[5], gram[6]
+        u = [arm * value for value in twist]
+        v = [sd * a + turn1 * b1 + turn2 * b2 for b1, b2, a in zip(gram[3], gram[4], axial, strict=True)]
+        w11, w12 = 1.0 + arm * u[5], arm * v[5]
+        w22 = 1.0 + sd * v[6] + turn1 * v[3] + turn2 * v[4]
+        determinant = w11 * w22 - w12 * w12
+        pairs = [
+            ((w22 * a - w12 * b) / determinant, (w11 * b - w12 * a) / determinant)
+            for a, b in zip(u[:5], v[:5], strict=True)
+        ]
+        wide = [
+            [value - u[i] * p - v[i] * q for value, (p, q) in zip(gram[i][i:5], pairs[i:], strict=True)]
+            for i in range(5)
+        ]
+        return _Link(wide, self.precision, math.log(determinant))

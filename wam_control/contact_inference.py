@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.contact_fit import Fit, fit_contact
+from wam_control.contact_fit import ContactFit, Fit
 from wam_description.arm import Arm
-from wam_description.parameters import parameter, require
+from wam_description.parameters import lengths, parameter, require
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
@@ -38,9 +38,13 @@ MORE = "one contact does not explain the torques"
 class InferenceParameters:
     """What is taken for likely before anything is felt."""
 
+    weights: tuple[float, ...] = parameter(
+        "how often each cover is touched, relatively: as the area that it sweeps", low=1e-3, high=1e3
+    )
     force_scale: float = parameter("sd of each component of a contact's force before it is felt", "N", low=0.1)
-    miss: float = parameter("sd by which a force misses the tube's axis, per radius: friction", low=0.0, high=2.0)
-    places: int = parameter("places along a link from which the fit may start", low=2, high=200)
+    miss: float = parameter("sd by which the line of a force misses the tube's axis, per radius", low=0.0, high=2.0)
+    friction: float = parameter("sd of the force of friction along a cover, per force", low=0.0, high=2.0)
+    places: int = parameter("places along a link that are tried", low=9, high=200)
     sure: float = parameter("probability above which a link counts as told", low=0.5, high=1.0)
     largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", low=0.0)
 
@@ -54,10 +58,14 @@ class Hypothesis(NamedTuple):
     probability : of this hypothesis among all, 0..1.
     place : m along the cover's x axis, NaN where it cannot be observed.
     place_sd : m, NaN with the place.
+    low, high : m, ends of the part of the cover that is in the 90 % set of places on all covers; NaN
+        where no part is.
     force : (3,), N, of the world on the link, in the cover's frame; where the place is NaN the
         least force that explains the torques, that at the far end of the link.
+    force_sd : N, standard deviation of its size; NaN where it is a lower bound.
     is_lower_bound : True where `force` is that least force.
     direction : rad, angle of the force round the link, from the cover's y to its z axis.
+    direction_sd : rad.
     moment : (3,), N m, of the force about the origin of the cover's frame, in that frame.
     residual : chi^2 that the contact leaves unexplained.
     reason : why the place is not known or the answer not to be trusted, '' where neither.
@@ -67,9 +75,13 @@ class Hypothesis(NamedTuple):
     probability: float
     place: float
     place_sd: float
+    low: float
+    high: float
     force: Triple
+    force_sd: float
     is_lower_bound: bool
     direction: float
+    direction_sd: float
     moment: Triple
     residual: float
     reason: str
@@ -79,8 +91,7 @@ class _Cover(NamedTuple):
     name: str
     start: Triple  # m, ends of the tube's axis in the cover's frame
     end: Triple
-    radius: float  # m
-    points: tuple[Array, Array, Array]  # (3,), m, the axis at x = 0 and x = 1, and one metre beside x = 0
+    wrenches: Array  # (6, 6), rows A_1, A_2, B_1, B_2, twist, axial: force and moment in the cover's frame
     across: Array  # (3, 2), directions across the tube, near the cover's y and z
     directions: list[list[float]]  # the same
     hinge: Array  # (3,), axis of the link's joint in the cover's frame
@@ -88,14 +99,14 @@ class _Cover(NamedTuple):
     sees_moment_only: bool
 
 
-def detection_statistic(torques: Sequence[float], covariance: Array) -> float:
-    """r^T S^-1 r of external torques r, (n,), N m, with covariance S, (n, n)."""
+def detection_statistic(torques: Sequence[float], precision: Array) -> float:
+    """r^T S^-1 r of external torques r, (n,), N m, with the inverse of their covariance S, (n, n)."""
     r = np.array(torques)
-    return float(r @ np.linalg.solve(covariance, r))
+    return float(r @ precision @ r)
 
 
 class ContactInference:
-    """One hypothesis for each cover, by weighted least squares on the arm's own kinematics.
+    """One hypothesis for each cover, from its probability at places along it, by the arm's own kinematics.
 
     The joints, links and covers may be any; reasons name the WAM's poses where the arm has its
     geometry: four joints, an inner cover from shoulder to elbow, an outer one from the elbow on.
@@ -104,66 +115,51 @@ class ContactInference:
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
         self._body, self._parameters = body, parameters
         self._covers = [_cover(arm, body, i) for i in range(len(arm.covers.names))]
+        covers = self._covers
+        lengths("inference", arm.covers.names, {"weights": parameters.weights})
+        self._fit = ContactFit(
+            [cover.start[0] for cover in covers],
+            [cover.end[0] for cover in covers],
+            arm.covers.radius,
+            parameters.weights,
+            force_scale=parameters.force_scale,
+            miss=parameters.miss,
+            friction=parameters.friction,
+            places=parameters.places,
+        )
         self._is_wam = (
             len(arm.joints.names) == 4
             and [cover.joints for cover in self._covers] == [3, 4]
             and self._covers[0].sees_moment_only
         )
 
-    def infer(self, q: Sequence[float], torques: Sequence[float], covariance: Array) -> tuple[Hypothesis, ...]:
+    def infer(self, q: Sequence[float], torques: Sequence[float], precision: Array) -> tuple[Hypothesis, ...]:
         """Explain external torques by one contact.
 
         Parameters
         ----------
         q : (n,), joint angles, rad.
         torques : (n,), external torques, N m.
-        covariance : (n, n), their covariance, N^2 m^2.
+        precision : (n, n), the inverse of their covariance, 1/(N^2 m^2).
 
         Returns
         -------
         tuple of Hypothesis
             one for each cover, the most probable first; probabilities add up to 1.
         """
-        rows = np.concatenate([np.array([torques]), *(self._levers(q, cover) for cover in self._covers)])
-        gram = (rows @ np.linalg.solve(covariance, rows.T)).tolist()
-        fits = [self._fit(gram, i) for i in range(len(self._covers))]
-        best = max(fit.log_evidence for fit in fits)
-        weights = [math.exp(fit.log_evidence - best) for fit in fits]
-        probabilities = [weight / sum(weights) for weight in weights]
-        doubt = self._doubt(q, fits) if max(probabilities) < self._parameters.sure else ""
-        found = [
-            self._hypothesis(q, cover, fit, probability, doubt)
-            for cover, fit, probability in zip(self._covers, fits, probabilities, strict=True)
-        ]
+        rows = np.empty((len(self._covers), 7, len(torques)))
+        rows[:, 0] = torques
+        for i, cover in enumerate(self._covers):
+            np.matmul(cover.wrenches, self._body.cover_jacobian(q, cover.name), out=rows[i, 1:])
+        fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1))
+        doubt = self._doubt(q, fits) if max(fit.probability for fit in fits) < self._parameters.sure else ""
+        found = [self._hypothesis(q, cover, fit, doubt) for cover, fit in zip(self._covers, fits, strict=True)]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
 
-    def _levers(self, q: Sequence[float], cover: _Cover) -> Array:
-        """A_1, A_2, B_1, (zero), B_2, t as rows, (6, n): tau = (A + x B) f + twist t, f across the link."""
-        jacobian, name = self._body.point_jacobian, cover.name
-        across = self._body.cover_pose(q, name).rotation @ cover.across
-        at = np.concatenate([jacobian(q, name, point) for point in cover.points], axis=1)
-        levers = (across.T @ at).reshape(2, 3, -1)
-        differences = (levers[:, 1:] - levers[:, :1]).reshape(4, -1)
-        return np.concatenate((levers[:, 0], differences))
-
-    def _fit(self, gram: list[list[float]], i: int) -> Fit:
-        cover, parameters = self._covers[i], self._parameters
-        first = 1 + 6 * i
-        rows = (0, first, first + 1, first + 2, first + 4, first + 5)
-        return fit_contact(
-            [[gram[j][k] for k in rows] for j in rows],
-            cover.start[0],
-            cover.end[0],
-            force_scale=parameters.force_scale,
-            twist_arm=parameters.miss * cover.radius,
-            places=parameters.places,
-        )
-
-    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, probability: float, doubt: str) -> Hypothesis:
+    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, doubt: str) -> Hypothesis:
         start, end = cover.start, cover.end
         length = end[0] - start[0]
-        # a spread as wide as that of a place anywhere on the link says nothing of the place
-        is_unknown = not fit.place_sd < length / math.sqrt(12.0)
+        is_unknown = cover.sees_moment_only or fit.told_sd > length
         reasons = [self._why_unknown(q, cover, fit)] if is_unknown else []
         if doubt:
             reasons.append(doubt)
@@ -176,12 +172,16 @@ class ContactInference:
         point = _triple([first + share * (last - first) for first, last in zip(start, end, strict=True)])
         return Hypothesis(
             cover=cover.name,
-            probability=probability,
+            probability=fit.probability,
             place=math.nan if is_unknown else place,
             place_sd=math.nan if is_unknown else fit.place_sd,
+            low=fit.low,
+            high=fit.high,
             force=force,
+            force_sd=math.nan if is_unknown else fit.force_sd,
             is_lower_bound=is_unknown,
             direction=math.atan2(f2, f1),
+            direction_sd=fit.direction_sd,
             moment=_cross(point, force),
             residual=fit.residual,
             reason="; ".join(reasons),
@@ -251,8 +251,7 @@ def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
         name=name,
         start=_triple(start.tolist()),
         end=_triple(end.tolist()),
-        radius=covers.radius[i],
-        points=(origin, origin + slope, origin + first),
+        wrenches=_wrenches(origin, slope, axis, across),
         across=across,
         directions=across.tolist(),
         hinge=_hinge(body, name, joints),
@@ -261,13 +260,18 @@ def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
     )
 
 
+def _wrenches(origin: Array, slope: Array, axis: Array, across: Array) -> Array:
+    """Rows A_1, A_2, B_1, B_2, twist, axial of `ContactFit`, as wrenches about the origin of the cover's frame."""
+    at = [np.concatenate((e, np.cross(origin, e))) for e in across.T]
+    per_metre = [np.concatenate((np.zeros(3), np.cross(slope, e))) for e in across.T]
+    twist = np.concatenate((np.zeros(3), axis))
+    axial = np.concatenate((axis, np.cross(origin, axis)))
+    return np.stack((*at, *per_metre, twist, axial))
+
+
 def _hinge(body: RigidBody, name: str, joints: int) -> Array:
-    """Axis of the cover's own joint in the cover's frame, z = 1/2 sum e x (z x e)."""
-    q = [0.0] * len(body.arm.joints.names)
-    rotation = body.cover_pose(q, name).rotation
-    origin = body.point_jacobian(q, name, np.zeros(3))
-    turned = [rotation.T @ (body.point_jacobian(q, name, e) - origin)[:, joints - 1] for e in np.eye(3)]
-    return 0.5 * np.sum(np.cross(np.eye(3), turned), axis=0)
+    """Axis of the cover's own joint in the cover's frame."""
+    return body.cover_jacobian([0.0] * len(body.arm.joints.names), name)[3:, joints - 1]
 
 
 def _sees_moment_only(arm: Arm, body: RigidBody, name: str, origin: Array) -> bool:

@@ -83,7 +83,7 @@ class ForceLoop:
         self._external = np.zeros(self._n)
         self._admitted: ForceCommand | None = None
         self._admitted_torque: Sequence[float] | None = None
-        self._is_forsaken = False
+        self._is_forsaken = self._is_doubtful = False
         self._start([])
         self.refused = 0
         self.refusals: dict[str, str] = {}
@@ -328,10 +328,27 @@ class ForceLoop:
         return self._body.point_jacobian(q, cover, (place, 0.0, 0.0))
 
     def _place(self, contact: Contact) -> tuple[str, float]:
-        """Where the force acts: where it is felt, else where the parameters say."""
-        if not contact.cover or math.isnan(contact.place):
-            return self.parameters.contact_cover, self.parameters.contact_place
+        """Where the force acts: where it is felt for sure, else where the parameters say."""
+        parameters, is_sure = self.parameters, self._is_sure(contact)
+        is_doubtful = bool(contact.cover) and not is_sure
+        if is_doubtful:
+            self.refused += not self._is_doubtful
+            self.refusals["contact/spread"] = (
+                f"the felt place on {contact.cover} has a standard deviation of {contact.place_sd:.2g} m, a probability"
+                f" of {contact.probability:.2f}; allowed: up to place_uncertainty_limit, "
+                f"{parameters.place_uncertainty_limit:g} m, and from link_probability_limit, "
+                f"{parameters.link_probability_limit:g}; contact_cover and contact_place are used"
+            )
+        self._is_doubtful = is_doubtful
+        if not contact.cover or is_doubtful:
+            return parameters.contact_cover, parameters.contact_place
         return contact.cover, contact.place
+
+    def _is_sure(self, contact: Contact) -> bool:
+        """Whether the felt place is sure enough to build on; where nobody says how sure it is, it is."""
+        return place_is_sure(contact.place, contact.place_sd, self.parameters.place_uncertainty_limit) and not (
+            contact.probability < self.parameters.link_probability_limit
+        )
 
     def _measured(self, q: Sequence[float], jacobian: Array, contact: Contact, direction: Array) -> float:
         """F_c: force of the arm on the world along the direction, N."""
@@ -386,7 +403,7 @@ class ForceLoop:
 
         def where() -> list[Touch]:
             cover, place = self._place(contact)
-            sure = place_is_sure(contact.place, math.nan, self.parameters.place_uncertainty_limit)
+            sure = self._is_sure(contact)
             if self.parameters.schedule == "place" and not sure:
                 length = self._arm.covers.length[self._arm.covers.names.index(cover)]
                 return possible_touches(guard, self._joints, cover, length)

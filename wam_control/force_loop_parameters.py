@@ -86,6 +86,9 @@ class ForceLoopParameters:
     place_uncertainty_limit: float = parameter(
         "standard deviation of an estimated place up to which it is sure", "m", low=0.0, live=True
     )
+    link_probability_limit: float = parameter(
+        "probability of the touched link from which its place is sure", low=0.0, high=1.0, live=True
+    )
 
 
 def force_law(parameters: ForceLoopParameters) -> ForceLaw:

@@ -1,8 +1,9 @@
-"""Torques of the world on the joints, from the arm's generalized momentum.
+"""Torques of the world on the joints, from the arm's generalized momentum, and how sure they are.
 
 De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), section III-E.
 """
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +17,10 @@ from wam_description.parameters import parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
+
+SETTLED = 2.0  # time constants from the first sample until the estimate counts
+LOAD_DIVISOR = 4  # samples between two looks at the payload, which needs no more
+NO_MASS = 1e-6  # kg, the least that a link may have
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,14 @@ class ObserverParameters:
     joint_rest_velocity: float = parameter("joint speed above which Coulomb friction is full", "rad/s", low=1e-6)
     motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6)
     joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6)
+    payload: tuple[float, ...] = parameter("least and largest mass that the tool may carry", "kg", low=0.0, high=50.0)
+
+    def __post_init__(self) -> None:
+        low, high = self.payload if len(self.payload) == 2 else (1.0, 0.0)
+        require(
+            low <= high,
+            f"parameter 'observer.payload' is {list(self.payload)}; it needs the least and the largest mass",
+        )
 
 
 class MomentumObserver:
@@ -50,10 +63,25 @@ class MomentumObserver:
     that of the joints the sign of the joint's.  Link side (joint sensors): links alone, tau is the
     strain torque behind the friction.  Motor torques are those that acted in the period that ends.
 
-    Friction errs as a bias, not as noise: its standard deviation goes through the same filter.
+    Friction errs as a bias, not as noise: what is wrong with its level stays wrong, at 1 kHz sample
+    after sample, with the sign of the motion.  So the signed share of Coulomb friction goes through
+    the same filter as the torques, and the share of the time in which a shaft rests.
+
+    A dither of the motor torques (velocity loop) keeps the shafts from resting: torques and shares
+    are averaged over the last `dither_cycle` samples, one whole cycle, in which the sign of friction
+    and the dither itself cancel.
+
+    Parameters
+    ----------
+    arm : the arm as configured.
+    parameters : the nominal model and its uncertainty.
+    use_joint_sensors : whether samples are the joint sensors', else the motors'.
+    dither_cycle : samples in a cycle of the dither, 0 where there is none.
     """
 
-    def __init__(self, arm: Arm, parameters: ObserverParameters, use_joint_sensors: bool) -> None:
+    def __init__(
+        self, arm: Arm, parameters: ObserverParameters, use_joint_sensors: bool, dither_cycle: int = 0
+    ) -> None:
         n = len(arm.joints.names)
         require(
             len(parameters.mass_scale) == n,
@@ -70,20 +98,29 @@ class MomentumObserver:
         rest, rest_joint = parameters.motor_rest_velocity, parameters.joint_rest_velocity
         self._motor_friction = _Friction(arm.motors, parameters, rest, parameters.motor_torque_sd)
         self._joint_friction = _Friction(arm.joints, parameters, rest_joint, 0.0)
-        self._gauge_sd = [parameters.joint_torque_sd] * n
         self._zero = [0.0] * n
+        self._unknown: tuple[list[float], list[float]] = ([0.0] * (2 * n), [0.0] * (2 * n))
+        self._cycle = 0 if use_joint_sensors else dither_cycle
+        self._load: _Load | None = None
+        if parameters.payload[1] > 0.0:
+            self._load = _Load(arm, parameters.payload)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything seen."""
         n = self._n
         self.q: list[float] = [0.0] * n
-        self.external_torques: list[float] = [0.0] * n
-        self._model_torque, self._motor_sd, self._joint_sd = [0.0] * n, [0.0] * n, [0.0] * n
+        self._residual: list[float] = [0.0] * n
+        self._model_torque: list[float] = [0.0] * n
+        self._sliding, self._resting = self._unknown  # of motors, then of joints
+        self._ring = np.zeros((max(1, self._cycle), 5 * n))
+        self._filled = 0
+        if self._load is not None:
+            self._load.reset()
         self._momentum: list[float] | None = None
         self._known: list[float] = [0.0] * n
         self._bias: list[float] = [0.0] * n
-        self._gap = 0.0
+        self._gap = self._age = 0.0
         self.is_ready = False
 
     def observe(self, state: State, dt: float) -> bool:
@@ -111,7 +148,7 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._link_side:
-            return self._update(_Torques(position, velocity, effort, self._zero, self._zero, self._gauge_sd), dt)
+            return self._update(_Torques(position, velocity, effort, self._zero, *self._unknown), dt)
         if not any(effort) and max(map(abs, velocity)) < self._parameters.motor_rest_velocity:
             # at rest without current the brakes or stiction hold: the motors tell nothing
             self.reset()
@@ -120,20 +157,21 @@ class MomentumObserver:
 
     def _from_motors(self, theta: list[float], thetad: list[float], tau_motor: list[float]) -> "_Torques":
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        motor_friction, motor_sd = self._motor_friction.of(thetad)
-        joint_friction, joint_sd = self._joint_friction.of(qd)
+        motor_friction, motor_sliding, motor_resting = self._motor_friction.of(thetad)
+        joint_friction, joint_sliding, joint_resting = self._joint_friction.of(qd)
         through = self._map.joint_torques(motor_friction)
         friction = [through[i] + joint_friction[i] for i in range(self._n)]
-        return _Torques(q, qd, self._map.joint_torques(tau_motor), friction, motor_sd, joint_sd)
+        torques = self._map.joint_torques(tau_motor)
+        return _Torques(q, qd, torques, friction, motor_sliding + joint_sliding, motor_resting + joint_resting)
 
     def _update(self, now: "_Torques", dt: float) -> bool:
-        body, (q, qd, tau, friction, motor_sd, joint_sd) = self._body, now
+        body, (q, qd, tau, friction, sliding, resting) = self._body, now
         momentum = ((body.mass_matrix(q) + self._carried) @ np.array(qd)).tolist()
         bias = (body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)).tolist()
         known = [bias[i] - friction[i] for i in range(self._n)]
         before, span = self._momentum, dt + self._gap
         keep = math.exp(-span / self._parameters.time_constant)
-        residual, model = self.external_torques, self._model_torque
+        residual, model = self._residual, self._model_torque
         if before is None:
             model, keep = [-torque for torque in bias], 0.0
         elif span <= self._parameters.time_constant:
@@ -148,47 +186,84 @@ class MomentumObserver:
         if not math.isfinite(sum(momentum) + sum(known) + sum(residual) + sum(model)):
             self._gap += dt
             return False
-        self._motor_sd = [keep * a + (1.0 - keep) * b for a, b in zip(self._motor_sd, motor_sd, strict=True)]
-        self._joint_sd = [keep * a + (1.0 - keep) * b for a, b in zip(self._joint_sd, joint_sd, strict=True)]
-        self.is_ready = self.is_ready or before is not None
-        self.q, self.external_torques, self._model_torque = q, residual, model
+        take = 1.0 - keep
+        self._sliding = [keep * a + take * b for a, b in zip(self._sliding, sliding, strict=True)]
+        self._resting = [keep * a + take * b for a, b in zip(self._resting, resting, strict=True)]
+        if self._load is not None:
+            self._load.observe(q, qd, span, keep)
+        self.q, self._residual, self._model_torque = q, residual, model
         self._momentum, self._known, self._bias, self._gap = momentum, known, bias, 0.0
+        if self._cycle:
+            self._ring[self._filled % self._cycle] = residual + self._sliding + self._resting
+            self._filled += 1
+        # brakes let go with a jolt that a model without elastic cables does not know;
+        # half a cycle of a dither would pass for a push
+        self._age += span
+        settled = self._age > SETTLED * self._parameters.time_constant and self._filled >= 2 * self._cycle
+        self.is_ready = self.is_ready or (before is not None and settled)
         return True
 
-    def covariance(self) -> NDArray[np.float64]:
-        """Covariance of the external torques, (n, n), N^2 m^2.
+    def torques(self) -> tuple[list[float], NDArray[np.float64]]:
+        """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2.
 
-        M^-T diag(sd_motor^2) M^-1 + diag(sd_joint^2) + diag((u tau_model)^2): friction at the
-        motors mapped as torques are (A.5), friction at the joints or the gauges, and the mass
-        uncertainty u of the torque that carries and moves the links.
+        S = M^-T diag(sd_motor^2) M^-1 + diag(sd_joint^2) + diag((u tau_model)^2) + (u_load tau_load)(...)^T:
+        friction at the motors mapped as torques are (A.5), friction at the joints or the gauges, the
+        mass uncertainty u of the torque that carries and moves the links, the payload.
         """
+        n, residual, sliding, resting = self._n, self._residual, self._sliding, self._resting
+        if self._cycle and self._filled:
+            mean = self._ring[: self._filled].mean(axis=0).tolist()
+            residual, sliding, resting = mean[:n], mean[n : 3 * n], mean[3 * n :]
+            # a shaft that slips in both directions within a cycle rests at both ends of what stiction bears
+            resting = [share * share for share in resting]
         uncertainty = self._parameters.mass_uncertainty
-        joint = [
-            sd * sd + (uncertainty * torque) ** 2 for sd, torque in zip(self._joint_sd, self._model_torque, strict=True)
-        ]
         if self._link_side:
-            return np.diag(joint)
-        weighted = np.array(self._motor_sd)[:, None] * self._motor_from_joint
-        result: NDArray[np.float64] = weighted.T @ weighted + np.diag(joint)
-        return result
+            joint = [self._parameters.joint_torque_sd**2] * n
+        else:
+            joint = self._joint_friction.variance(sliding[n:], resting[n:])
+        total = [
+            variance + (uncertainty * torque) ** 2 for variance, torque in zip(joint, self._model_torque, strict=True)
+        ]
+        covariance: NDArray[np.float64] = np.diag(total)
+        if not self._link_side:
+            motor = self._motor_friction.variance(sliding[:n], resting[:n])
+            covariance += (self._motor_from_joint.T * motor) @ self._motor_from_joint
+        load = self._load
+        if load is None:
+            return list(residual), covariance
+        residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
+        sized = np.array(load.torque) * load.sd
+        return residual, covariance + np.outer(sized, sized)
+
+    def weigh(self) -> str:
+        """Take what is felt now as the payload; '' or why that cannot be."""
+        if self._load is None:
+            return "no payload is declared; set observer.payload to the least and the largest mass"
+        if not self.is_ready:
+            return "not enough has been observed"
+        torques, covariance = self.torques()
+        return self._load.weigh(torques, covariance)
 
 
 class _Torques(NamedTuple):
-    """One sample on the joint side: state, torque, friction, and the sd of friction; each (n,)."""
+    """One sample on the joint side: state, torque, friction; each (n,).
+
+    Signed share of Coulomb friction that acts, and how much each shaft rests, 0..1; motors, then joints, (2 n,).
+    """
 
     q: list[float]
     qd: list[float]
     tau: list[float]
     friction: list[float]
-    motor_sd: list[float]
-    joint_sd: list[float]
+    sliding: list[float]
+    resting: list[float]
 
 
 class _Friction:
-    """Nominal friction of some shafts and its standard deviation, by their own velocities.
+    """Nominal friction of some shafts, by their own velocities, and its variance.
 
-    f = k (F_d s + b v), s = v / v_rest within -1..1; sd^2 = (u_moving k F_d s)^2 +
-    (1 - s^2) (u_rest k F_s)^2 + sd_torque^2, k the friction scale.
+    f = k (F_d s + b v), s = v / v_rest within -1..1; variance (u_moving k F_d s)^2 +
+    (u_rest k F_s d)^2 + sd_torque^2, d = 1 - s^2 the share of rest, k the friction scale.
     """
 
     def __init__(
@@ -199,25 +274,80 @@ class _Friction:
         torque_sd: float,
     ) -> None:
         scale = parameters.friction_scale
-        self._shafts = [
-            (
-                scale * f_dynamic,
-                scale * b,
-                (parameters.moving_uncertainty * scale * f_dynamic) ** 2,
-                (parameters.rest_uncertainty * scale * f_static) ** 2,
-            )
-            for f_static, f_dynamic, b in zip(
-                shafts.static_friction, shafts.dynamic_friction, shafts.viscous_friction, strict=True
-            )
-        ]
+        levels = zip(shafts.static_friction, shafts.dynamic_friction, shafts.viscous_friction, strict=True)
+        self._levels = [(scale * f_dynamic, scale * b) for _, f_dynamic, b in levels]
+        self._moving = [(parameters.moving_uncertainty * scale * f) ** 2 for f in shafts.dynamic_friction]
+        self._rest = [(parameters.rest_uncertainty * scale * f) ** 2 for f in shafts.static_friction]
         self._rest_velocity, self._torque_variance = rest_velocity, torque_sd**2
 
-    def of(self, velocity: Sequence[float]) -> tuple[list[float], list[float]]:
-        """Friction torques and their sd, each (n,), N m, at velocities (n,), rad/s."""
-        friction, sd = [], []
-        for (coulomb, viscous, moving, resting), v in zip(self._shafts, velocity, strict=True):
+    def of(self, velocity: Sequence[float]) -> tuple[list[float], list[float], list[float]]:
+        """Friction torques, N m, signed share of Coulomb friction, share of rest, each (n,), at velocities, rad/s."""
+        friction, sliding, resting = [], [], []
+        for (coulomb, viscous), v in zip(self._levels, velocity, strict=True):
             share = min(1.0, max(-1.0, v / self._rest_velocity))
-            square = share * share
             friction.append(coulomb * share + viscous * v)
-            sd.append(math.sqrt(square * moving + (1.0 - square) * resting + self._torque_variance))
-        return friction, sd
+            sliding.append(share)
+            resting.append(1.0 - share * share)
+        return friction, sliding, resting
+
+    def variance(self, sliding: Sequence[float], resting: Sequence[float]) -> list[float]:
+        """Variance, (n,), N^2 m^2, of friction that slid and rested so much on average."""
+        return [
+            moving * share * share + rest * stuck * stuck + self._torque_variance
+            for moving, rest, share, stuck in zip(self._moving, self._rest, sliding, resting, strict=True)
+        ]
+
+
+class _Load:
+    """What one kilogram at the tool does to the joints, through the filter of the observer; and how much is there."""
+
+    def __init__(self, arm: Arm, payload: tuple[float, ...]) -> None:
+        n = len(arm.links.names)
+        centre = (*arm.links.centre[:-3], *arm.tool)
+        links = dataclasses.replace(
+            arm.links, mass=(NO_MASS,) * (n - 1) + (1.0,), centre=centre, inertia=(0.0,) * (3 * n)
+        )
+        self._body = RigidBody(dataclasses.replace(arm, links=links))
+        low, high = payload
+        # the arm without anything in its hand counts as the rule; sd of an even spread, about the least
+        self.mass, self.sd = low, (high - low) / math.sqrt(3.0)
+        self._payload = payload
+        self.torque: list[float] = [0.0] * n
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the motion, not the mass."""
+        self._before: list[float] | None = None
+        self._bias: list[float] = []
+        self._span, self._keep, self._count = 0.0, 1.0, 0
+        self.torque = [0.0] * len(self.torque)
+
+    def observe(self, q: list[float], qd: list[float], span: float, keep: float) -> None:
+        """Follow one sample of the joints, (n,) rad and rad/s."""
+        self._span, self._keep, self._count = self._span + span, self._keep * keep, self._count + 1
+        if self._before is not None and self._count < LOAD_DIVISOR:
+            return
+        span, keep, body = self._span, self._keep, self._body
+        self._span, self._keep, self._count = 0.0, 1.0, 0
+        momentum = (body.mass_matrix(q) @ np.array(qd)).tolist()
+        bias = (body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)).tolist()
+        if self._before is None:
+            self._bias, keep = bias, 0.0
+        # as a torque of the world: what the load takes from the motors, the other way round
+        terms = zip(self.torque, momentum, self._before or momentum, bias, self._bias, strict=True)
+        self.torque = [keep * t + (1.0 - keep) * (0.5 * (b + a) - (p - o) / span) for t, p, o, b, a in terms]
+        self._before, self._bias = momentum, bias
+
+    def weigh(self, torques: list[float], covariance: NDArray[np.float64]) -> str:
+        """Correct the mass so that it explains torques, (n,), N m, with covariance (n, n); '' or why not."""
+        unit = np.array(self.torque)
+        # the prior, one sd of the declared range, is part of the covariance
+        gain = self.sd**2 * np.linalg.solve(covariance, unit)
+        mass = self.mass + float(gain @ np.array(torques))
+        low, high = self._payload
+        margin = 0.1 * (high - low)
+        if not low - margin <= mass <= high + margin:
+            return f"what is felt would be a payload of {mass:.3g} kg; declared are {low:g} to {high:g} kg"
+        self.mass = min(max(mass, low), high)
+        self.sd *= math.sqrt(max(0.0, 1.0 - float(gain @ unit)))
+        return ""

@@ -3,14 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from wam_control.dither import DitherParameters
 from wam_description.arm import Motors
 from wam_description.parameters import parameter, require
 
 
 @dataclass(frozen=True)
 class VelocityLoopParameters:
-    """Gains of the velocity servo, one per motor."""
+    """Gains of the velocity servo, one per motor, and the dither on top of it."""
 
+    dither: DitherParameters
     proportional_gain: tuple[float, ...] = parameter("torque per velocity error", "N m s/rad", low=0.0, live=True)
     integral_gain: tuple[float, ...] = parameter("torque per angle error", "N m/rad", low=0.0, live=True)
     command_timeout: float = parameter(

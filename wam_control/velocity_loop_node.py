@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from rclpy.node import Node
 
+from wam_control.dither import Dither
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import seconds
 from wam_description.signals import State
@@ -30,8 +31,15 @@ class VelocityLoopNode(Node):
         if shared.timing.mode == "realtime":
             raise_priority(shared.timing.niceness)
         self._loop = VelocityLoop(shared.arm.motors, own)
+        self._dither = Dither(shared.arm, shared.timing, own.dither)
         follow(self, own, self._loop.tune)
         self._ports = ports = Ports(self, shared)
+        cost = self._dither.cost(shared.arm.joints.start)
+        if cost.tip_motion:
+            ports.facts |= {
+                "dither, most tip motion": f"{cost.tip_motion * 1e3:.2g} mm",
+                "dither, heat": f"{max(cost.heat):.2%} of what a winding stands",
+            }
         motors = list(shared.arm.motors.names)
         self._still = _Command(0, [0.0] * len(motors))
         self._period = shared.timing.period_ns
@@ -70,7 +78,7 @@ class VelocityLoopNode(Node):
             motors.effort,
             velocity.values,
             seconds(stamp - velocity.stamp),
-            effort.values,
+            self._dither.added(stamp, effort.values),
             seconds(dt),
         )
         self._ports.publish_motors("motor_current_command", stamp, State([], [], currents))

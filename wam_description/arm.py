@@ -171,6 +171,11 @@ class Timing:
         "scheduling priority of driver and velocity_loop in realtime, where the system grants it", low=-20, high=0
     )
     timeout: float = parameter("longest wait for an answer in lockstep, steady clock", "s", low=0.1)
+    dither_cycle: int = parameter(
+        "inner periods in one cycle of the dither of the motor torques, by which contact is felt at rest; 0: no dither",
+        low=0,
+        high=1000,
+    )
 
     @property
     def period_ns(self) -> int:

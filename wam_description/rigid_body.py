@@ -84,6 +84,23 @@ class RigidBody:
         result[:, self._joint[cover] :] = 0.0
         return result
 
+    def cover_jacobian(self, q: ArrayLike, cover: str) -> Array:
+        """Motion of a cover per joint velocity, seen from the cover.
+
+        Parameters
+        ----------
+        q : (n,), rad.
+        cover : name of the cover.
+
+        Returns
+        -------
+        (6, n), velocity of the origin of the cover's frame, m/rad, and angular velocity, rad/rad, in
+        the cover's frame; its transpose turns a wrench on the cover (force, N, and moment about that
+        origin, N m, in the cover's frame) into joint torques, N m.
+        """
+        local = pin.ReferenceFrame.LOCAL
+        return _columns(pin.computeFrameJacobian(self._model, self._data, _vector(q), self._known(cover), local))
+
     def tool_jacobian(self, q: ArrayLike) -> Array:
         """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in base coordinates."""
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

@@ -20,6 +20,8 @@ class Contact(NamedTuple):
     cover: str  # '' where nothing touches
     place: float  # m along the cover, NaN where it is not known
     force: tuple[float, float, float]  # N, in the cover's frame
+    place_sd: float = float("nan")  # m, standard deviation of the place, NaN where nobody tells it
+    probability: float = float("nan")  # that this cover is touched, of all that may be; NaN where nobody tells it
 
 
 NO_CONTACT = Contact("", float("nan"), (0.0, 0.0, 0.0))

@@ -20,11 +20,13 @@ COMMANDS = {
     "call": "ask a running stack: enable, disable, estop, reset_fault, reset, tare",
     "experiment": "run an experiment of the thesis, record it, print predicted against measured",
     "plant": "draw the plant's effects beside the theory, print the differences",
+    "evaluate": "judge a part of the stack by a seeded battery: contact",
     "guard": "hold the stability guard's verdicts against simulation of random sets",
     "evaluate": "judge a part of the stack by a seeded battery: contact",
     "scorecard": "print the arm beside the requisites of chapter 3",
     "map": "compute the stability map of figure 5.8: the largest stable step over gamma and zeta",
     "figures": "draw the figures of chapters 3 to 6 with the plant's points on them",
+    "scorecard": "print the arm beside the requisites of chapter 3",
     "model": "write the arm's model",
 }
 

@@ -1,7 +1,8 @@
-"""The contact as RViz markers: an arrow for the force, a sphere for the place."""
+"""The contact as RViz markers: an arrow for the force, a sphere for the place, a band where it is likely."""
 
 from collections.abc import Sequence
 from math import isnan
+from typing import NamedTuple
 
 from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
@@ -10,42 +11,60 @@ from visualization_msgs.msg import Marker, MarkerArray
 from wam_ros.messages import header
 
 METRES_PER_NEWTON = 0.02
+HALF = 0.5**0.5  # sine and cosine of 45 deg
+BAND = 0.06  # m, diameter, a little more than the tubes
 RED, GREY = ColorRGBA(r=0.85, g=0.1, b=0.1, a=1.0), ColorRGBA(r=0.5, g=0.5, b=0.5, a=0.6)
+LIKELY = ColorRGBA(r=0.95, g=0.6, b=0.1, a=0.45)
 
 
-def contact_markers(stamp: int, cover: str, place: float, force: Sequence[float]) -> MarkerArray:
-    """Markers of a contact, in the frame of the cover.
+class Likely(NamedTuple):
+    """A part of a cover where the contact is likely, m along it."""
+
+    cover: str
+    low: float
+    high: float
+
+
+def contact_markers(
+    stamp: int, cover: str, place: float, force: Sequence[float], likely: Sequence[Likely]
+) -> MarkerArray:
+    """Markers of a contact, in the frames of the covers; each message replaces those before.
 
     Parameters
     ----------
     stamp : time, ns.
     cover : touched cover, empty without contact, which deletes the markers.
-    place : m along the cover; where it is NaN the markers are grey and stand at the cover's origin.
+    place : m along the cover; where it is NaN arrow and sphere are grey and stand in the middle of what is likely.
     force : (3,), N, of the world on the link; the arrow's tip is at the place.
+    likely : parts of covers that hold the place with 90 % probability in all, drawn as bands.
     """
+    gone = Marker(header=header(stamp, "base"), action=Marker.DELETEALL)
     if not cover:
-        gone = Marker(header=header(stamp, "base"), action=Marker.DELETEALL)
         return MarkerArray(markers=[gone])
-    x = 0.0 if isnan(place) else float(place)
+    mine = next((0.5 * (part.low + part.high) for part in likely if part.cover == cover), 0.0)
+    x = mine if isnan(place) else float(place)
     colour = GREY if isnan(place) else RED
     tip = Point(x=x, y=0.0, z=0.0)
     fx, fy, fz = (METRES_PER_NEWTON * float(component) for component in force)
-    arrow = Marker(
-        header=header(stamp, cover),
-        ns="contact",
-        id=0,
-        type=Marker.ARROW,
-        points=[Point(x=x - fx, y=-fy, z=-fz), tip],
-        scale=Vector3(x=0.01, y=0.02, z=0.03),
-        color=colour,
-    )
-    sphere = Marker(
-        header=header(stamp, cover),
-        ns="contact",
-        id=1,
-        type=Marker.SPHERE,
-        scale=Vector3(x=0.03, y=0.03, z=0.03),
-        color=colour,
-    )
+    arrow = _marker(stamp, cover, "contact", 0, Marker.ARROW, colour, (0.01, 0.02, 0.03))
+    arrow.points = [Point(x=x - fx, y=-fy, z=-fz), tip]
+    sphere = _marker(stamp, cover, "contact", 1, Marker.SPHERE, colour, (0.03, 0.03, 0.03))
     sphere.pose.position = tip
-    return MarkerArray(markers=[arrow, sphere])
+    bands = []
+    for i, part in enumerate(likely):
+        band = _marker(
+            stamp, part.cover, "likely", i, Marker.CYLINDER, LIKELY, (BAND, BAND, float(part.high - part.low))
+        )
+        band.pose.position.x = 0.5 * float(part.low + part.high)
+        band.pose.orientation.y, band.pose.orientation.w = HALF, HALF  # a cylinder stands along z
+        bands.append(band)
+    return MarkerArray(markers=[gone, arrow, sphere, *bands])
+
+
+def _marker(
+    stamp: int, frame: str, group: str, number: int, kind: int, colour: ColorRGBA, size: tuple[float, float, float]
+) -> Marker:
+    x, y, z = size
+    return Marker(
+        header=header(stamp, frame), ns=group, id=number, type=kind, scale=Vector3(x=x, y=y, z=z), color=colour
+    )

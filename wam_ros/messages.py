@@ -137,8 +137,24 @@ def read_contact(message: PointStamped, frames: Sequence[str]) -> float:
     return float(place)
 
 
-def contact_of(wrench: Wrench | None, place: float | None) -> Contact:
-    """The contact that a wrench and a place describe; none where they are missing or in the base frame."""
+def read_spread(message: PointStamped, frames: Sequence[str]) -> tuple[float, float]:
+    """How sure a contact is: standard deviation of its place, m, probability of its cover; NaN where not known.
+
+    Raises
+    ------
+    Refused
+        for a frame that is not one of `frames`, a spread below 0 or a probability outside 0..1.
+    """
+    place_sd, probability = read_contact(message, frames), float(message.point.y)
+    if place_sd < 0.0:
+        raise Refused(f"standard deviation of the place is {place_sd} m; send 0 or more, or NaN where it is not known")
+    if not (isnan(probability) or 0.0 <= probability <= 1.0):
+        raise Refused(f"probability is {probability}; send 0 to 1, or NaN where it is not known")
+    return place_sd, probability
+
+
+def contact_of(wrench: Wrench | None, place: float | None, spread: tuple[float, float] | None = None) -> Contact:
+    """The contact that a wrench, a place and a spread describe; none where they are missing or in the base frame."""
     if wrench is None or place is None or wrench.frame == BASE:
         return NO_CONTACT
-    return Contact(wrench.frame, place, wrench.force)
+    return Contact(wrench.frame, place, wrench.force, *(spread or ()))

@@ -161,6 +161,14 @@ TOPICS: tuple[Topic, ...] = (
         "effort = torque of the world on the joints, N m",
     ),
     Topic(
+        "external_joint_torques_sd",
+        "sensor_msgs/msg/JointState",
+        ("contact_estimator",),
+        (),
+        "outer",
+        "effort = standard deviation of `external_joint_torques`, N m",
+    ),
+    Topic(
         "contact/wrench",
         "geometry_msgs/msg/WrenchStamped",
         ("contact_estimator",),
@@ -177,6 +185,15 @@ TOPICS: tuple[Topic, ...] = (
         "x = distance along the touched link in m, NaN where it cannot be observed",
     ),
     Topic(
+        "contact/spread",
+        "geometry_msgs/msg/PointStamped",
+        ("contact_estimator",),
+        ("force_loop",),
+        "outer",
+        "how sure the contact is: x = standard deviation of the place in m, NaN with it; y = probability that this "
+        "link is touched; z = standard deviation of the force's angle round the link in rad; NaN without contact",
+    ),
+    Topic(
         "contact/in_contact",
         "std_msgs/msg/Bool",
         ("contact_estimator",),
@@ -190,7 +207,7 @@ TOPICS: tuple[Topic, ...] = (
         ("contact_estimator",),
         (),
         "display",
-        "the contact as an arrow and a sphere",
+        "the contact as an arrow and a sphere, and the places that are likely, 90 % in all, as a band along the links",
     ),
     Topic(
         "contact/hypotheses",
@@ -198,7 +215,7 @@ TOPICS: tuple[Topic, ...] = (
         ("contact_estimator",),
         (),
         "display",
-        "one entry a hypothesis: link, place, force, spread, reason where unknown",
+        "one entry a hypothesis: link, place, part of the 90 % set, force, spreads, reason where unknown",
     ),
     Topic(
         "sim/joint_states",
@@ -237,7 +254,7 @@ TOPICS: tuple[Topic, ...] = (
         "status",
         "diagnostic_msgs/msg/DiagnosticStatus",
         ("driver", "transform", "velocity_loop", "gravity", "force_loop", "contact_estimator", "scenario", "recorder"),
-        ("driver", "scenario"),
+        ("driver", "scenario", "contact_estimator"),
         "latched",
         "state of each node, latched by each",
     ),

@@ -1,0 +1,113 @@
+"""Dither: a small alternating motor torque that keeps friction from hiding a touch while the arm rests.
+
+A shaft that slips to and fro bears Coulomb friction in both directions, which cancels over a whole
+cycle; what is left of the torques is what the world does.  A shaft that sticks tells nothing.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_description.arm import Arm, Timing
+from wam_description.parameters import parameter, require
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+
+
+@dataclass(frozen=True)
+class DitherParameters:
+    """Size and shape of the dither; how long it takes is `timing.dither_cycle`."""
+
+    level: float = parameter("amplitude per static friction of motor and joints, seen at the motor", low=0.0, high=3.0)
+    phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", low=-1.0, high=1.0)
+
+
+class DitherCost(NamedTuple):
+    """What the dither costs.
+
+    Attributes
+    ----------
+    tip_motion : m, peak to peak, of the tool without any friction; with friction it is far less.
+    heat : (n,), share of the heat that each winding stands for ever.
+    """
+
+    tip_motion: float
+    heat: tuple[float, ...]
+
+
+class Dither:
+    """Torques of the dither, by the stamp of the state that they answer: the same for every run.
+
+    Parameters
+    ----------
+    arm : the arm; the amplitudes come from its friction.
+    timing : with the cycle, none where `dither_cycle` is 0.
+    parameters : level and phases.
+    """
+
+    def __init__(self, arm: Arm, timing: Timing, parameters: DitherParameters) -> None:
+        n = len(arm.motors.names)
+        require(
+            len(parameters.phase) == n,
+            f"parameter 'dither.phase' has {len(parameters.phase)} values; {n} motors need {n}",
+        )
+        require(
+            timing.dither_cycle == 0 or timing.dither_cycle >= SHORTEST_CYCLE,
+            f"parameter 'timing.dither_cycle' is {timing.dither_cycle}; it must be 0 or at least {SHORTEST_CYCLE}",
+        )
+        self._arm, self._parameters = arm, parameters
+        self._period_ns, cycle = timing.period_ns, timing.dither_cycle
+        self._angular_frequency = 2.0 * math.pi / (cycle * timing.period) if cycle else 0.0
+        self.amplitude = [parameters.level * level if cycle else 0.0 for level in friction_at_motors(arm)]
+        self._torque = [
+            [
+                a * math.sin(2.0 * math.pi * (k / cycle + phase))
+                for a, phase in zip(self.amplitude, parameters.phase, strict=True)
+            ]
+            for k in range(cycle)
+        ]
+
+    def torque(self, stamp: int) -> list[float]:
+        """Torque of each motor, (n,), N m, on top of what else is asked of it, at a stamp, ns; empty without dither."""
+        return self._torque[stamp // self._period_ns % len(self._torque)] if self._torque else []
+
+    def added(self, stamp: int, effort: Sequence[float]) -> Sequence[float]:
+        """Feed-forward torques (n,), N m, with the dither on top."""
+        torque = self.torque(stamp)
+        return [a + b for a, b in zip(effort, torque, strict=True)] if torque else effort
+
+    def cost(self, q: Sequence[float]) -> DitherCost:
+        """What the dither costs in pose q, (n,), rad.
+
+        x = J M^-1 tau/omega^2 with the rotors and pulleys in M, the largest over a cycle; heat
+        (tau_rms/tau_continuous)^2.
+        """
+        arm, transmission = self._arm, TransmissionMap.of(self._arm)
+        heat = tuple(
+            0.5 * (a / most) ** 2 for a, most in zip(self.amplitude, arm.motors.continuous_torque, strict=True)
+        )
+        if not self._torque:
+            return DitherCost(0.0, heat)
+        body, inverse = RigidBody(arm), transmission.motor_from_joint
+        inertia = body.mass_matrix(q) + inverse.T @ np.diag(arm.motors.inertia) @ inverse + np.diag(arm.joints.armature)
+        efforts = np.array([transmission.joint_torques(torque) for torque in self._torque])
+        moved = body.tool_jacobian(q) @ np.linalg.solve(inertia, efforts.T) / self._angular_frequency**2
+        return DitherCost(2.0 * float(np.linalg.norm(moved, axis=0).max()), heat)
+
+
+SHORTEST_CYCLE = 4  # periods; a shorter one is no sine
+
+
+def friction_at_motors(arm: Arm) -> list[float]:
+    """Torque of each motor, (n,), N m, that overcomes its own static friction and its share of the joints'.
+
+    A joint that several motors move is shared among them by what each can give.
+    """
+    inverse = np.abs(TransmissionMap.of(arm).motor_from_joint)
+    share = inverse / inverse.sum(axis=0)
+    joints = np.array(arm.joints.static_friction)
+    borne = np.divide(share * joints, inverse, out=np.zeros_like(share), where=inverse > 0.0)
+    return [float(own + carried) for own, carried in zip(arm.motors.static_friction, borne.sum(axis=1), strict=True)]
