@@ -18,10 +18,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from wam_analysis import contact_picture
 from wam_analysis.batch import processes
 from wam_analysis.figures.catalogue import FIGURES, file_of, numbers
 from wam_analysis.figures.catalogue import table as figures_table
-from wam_analysis import contact_picture
 from wam_analysis.plant_figure import figure
 from wam_analysis.scorecard import report as scorecard
 from wam_control.dither import Dither
