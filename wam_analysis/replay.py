@@ -192,7 +192,7 @@ def _values(columns: Columns, names: Sequence[str]) -> list[Any]:
         forces, torques = columns.force.tolist(), columns.torque.tolist()
         return [(f, tuple(a), tuple(b)) for f, a, b in zip(columns.frames, forces, torques, strict=True)]
     assert isinstance(columns, PointColumns)
-    return [float(x) for x in columns.point[:, 0]]
+    return columns.point.tolist()
 
 
 def _array(columns: JointColumns, field: str, names: Sequence[str]) -> list[list[float]]:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_control.dither import Dither
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
 from wam_control.transform import Transform
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
@@ -46,14 +47,15 @@ def _streamed(shared: Shared, *chain: str) -> bool:
 
 def _velocity_loop(shared: Shared, own: VelocityLoopParameters) -> list[Step]:
     loop, delay = VelocityLoop(shared.arm.motors, own), shared.timing.outer_delay
+    dither = Dither(shared.arm, shared.timing, own.dither)
     still = [0.0] * len(shared.arm.motors.names)
 
     def work(stamp: int, dt: float, inputs: Mapping[str, Any]) -> Said:
         motors = inputs["motor_states"]
         cause, velocity = inputs["motor_velocity_command"] or (stamp, State([], still, []))
         _, effort = inputs["motor_effort_command"] or (stamp, State([], [], still))
-        age = seconds(stamp - cause)
-        currents = loop.step(motors.velocity, motors.effort, velocity.velocity, age, effort.effort, dt)
+        age, feedforward = seconds(stamp - cause), dither.added(stamp, effort.effort)
+        currents = loop.step(motors.velocity, motors.effort, velocity.velocity, age, feedforward, dt)
         return {"motor_current_command": (currents, "")}
 
     needs = {
@@ -109,7 +111,7 @@ def _force_loop(shared: Shared, own: ForceLoopParameters) -> list[Step]:
         out = loop.step(
             inputs["joint_states"],
             inputs.get("joint_sensors"),
-            _contact(inputs["contact/wrench"], inputs["contact/point"]),
+            _contact(inputs["contact/wrench"], inputs["contact/point"], inputs["contact/spread"]),
             external.effort if external else None,
             ForceCommand(frame, force) if asked else None,
             seconds(stamp - cause),
@@ -126,7 +128,8 @@ def _force_loop(shared: Shared, own: ForceLoopParameters) -> list[Step]:
 
     estimated = Need(True, streamed=_streamed(shared, "contact_estimator"))
     played = Need(True, streamed=_streamed(shared, "scenario"))
-    needs = dict.fromkeys(("external_joint_torques", "contact/wrench", "contact/point"), estimated)
+    felt = ("external_joint_torques", "contact/wrench", "contact/point", "contact/spread")
+    needs = dict.fromkeys(felt, estimated)
     needs |= dict.fromkeys(("force_command", "joint_posture_command"), played)
     needs["joint_torque_command"] = Need(True, streamed=False)
     if shared.arm.joint_sensors:
@@ -134,10 +137,10 @@ def _force_loop(shared: Shared, own: ForceLoopParameters) -> list[Step]:
     return [Step("joint_states", needs, work)]
 
 
-def _contact(wrench: Any, place: float | None) -> Contact:
-    if wrench is None or place is None or wrench[0] == BASE:
+def _contact(wrench: Any, point: Any, spread: Any) -> Contact:
+    if wrench is None or point is None or wrench[0] == BASE:
         return NO_CONTACT
-    return Contact(wrench[0], place, wrench[1])
+    return Contact(wrench[0], point[0], wrench[1], *(spread[:2] if spread else ()))
 
 
 def _contact_estimator(shared: Shared, own: ContactEstimatorParameters) -> list[Step]:
@@ -151,8 +154,10 @@ def _contact_estimator(shared: Shared, own: ContactEstimatorParameters) -> list[
         frame = estimate.link or BASE
         return {
             "external_joint_torques": (estimate.external_torques, ""),
+            "external_joint_torques_sd": (estimate.torque_sd, ""),
             "contact/wrench": ([*estimate.force, *estimate.moment], frame),
             "contact/point": ([estimate.place, 0.0, 0.0], frame),
+            "contact/spread": ([estimate.place_sd, estimate.probability, estimate.direction_sd], frame),
         }
 
     needs = {"joint_sensors": Need(outer=False)} if own.use_joint_sensors else {}
