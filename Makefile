@@ -58,7 +58,7 @@ docs: $(STAMPS)/test $(INSTALLED)  ## write the generated pages of docs/ again
 
 constraints: $(STAMPS)/venv  ## pin the newest versions that go together; then make clean test
 	@mkdir -p .cache
-	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[ros,test]'
+	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[ros,test,view]'
 	@$(TIDY)
 	@$(PY) -c 'import json, pathlib, re; file = pathlib.Path("constraints.txt"); \
 	head = [line for line in file.read_text().splitlines() if line.startswith("#")]; \

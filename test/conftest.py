@@ -6,6 +6,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -74,9 +75,9 @@ class RosWorld:
         rclpy.try_shutdown(context=self.context)
 
 
-@pytest.fixture
-def domain_id(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A free ROS domain, locked against other test processes, in the environment of this one."""
+@contextmanager
+def locked_domain() -> Iterator[int]:
+    """A free ROS domain, locked against other test processes."""
     start = os.getpid() + next(_COUNTER)
     for offset in range(_DOMAINS):
         number = 1 + (start + offset) % _DOMAINS
@@ -93,12 +94,26 @@ def domain_id(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         break
     else:
         pytest.fail(f"all {_DOMAINS} ROS domains are in use by other tests; end them")
+    try:
+        yield number
+    finally:
+        os.close(lock)
+
+
+def isolate(monkeypatch: pytest.MonkeyPatch, number: int, folder: Path) -> None:
+    """Environment of this process and its children for a ROS domain of its own."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "ros_log"))
+    monkeypatch.setenv("ROS_LOG_DIR", str(folder / "ros_log"))
     monkeypatch.setenv("ROS_PYTHON_CHECK_FIELDS", "1")
-    yield number
-    os.close(lock)
+
+
+@pytest.fixture
+def domain_id(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A free ROS domain in the environment of this process."""
+    with locked_domain() as number:
+        isolate(monkeypatch, number, tmp_path)
+        yield number
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = sorted(path.name for path in ROOT.glob("benchmarks/*.py"))
 ROWS = {
+    "long_bag.py": ["reading", "analysis", "page"],
     "bag_reading.py": [
         "everything against rosbags",
         "columns against rosbags",

@@ -15,10 +15,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture
 from wam_analysis.bag import Bag, Columns, JointColumns, Messages, PointColumns, WrenchColumns, read
-from wam_analysis.demo_figure import recorded_arm, save
+from wam_analysis.demo_figure import save
 from wam_analysis.demo_report import report, text, verdict
 from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summarize
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ
+from wam_analysis.recorded import recorded_arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact

@@ -3,13 +3,12 @@
 import math
 import os
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import yaml
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -18,14 +17,10 @@ from matplotlib.figure import Figure
 from wam_analysis import arm_picture
 from wam_analysis.bag import Bag
 from wam_analysis.demo_summary import DemoSummary, Touch
-from wam_analysis.demo_traces import Numbers, Signal, Step
+from wam_analysis.demo_traces import Numbers, Signal, Step, Traces
+from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_description.arm import Arm
-from wam_description.configuration import Configuration, packaged
-from wam_description.parameters import ParameterError, build, flatten
 from wam_description.signals import Contact
-from wam_description.world import Obstacles
-
-T = TypeVar("T")
 
 DPI = 200
 SIZE = (10.0, 4.3)  # inches
@@ -46,48 +41,6 @@ STYLE: Any = {
     "ytick.direction": "in",
     "legend.frameon": False,
 }
-
-
-class RecordedArm(NamedTuple):
-    """The arm and its surroundings as they were when the bag was recorded, and what has to be said about them."""
-
-    arm: Arm
-    obstacles: Obstacles
-    note: str
-
-
-def recorded_arm(bag: Bag, namespace: str) -> RecordedArm:
-    """Take the arm from the parameters in the bag, or from the configuration of the package.
-
-    Parameters
-    ----------
-    bag : with the attachment ``parameters.yaml`` as the recorder writes it.
-    namespace : of the arm.
-    """
-    try:
-        flat = _driver_parameters(bag, namespace)
-        return RecordedArm(_group(Arm, flat, "arm."), _group(Obstacles, flat, "world.obstacles."), "")
-    except (ParameterError, yaml.YAMLError, UnicodeDecodeError) as error:
-        reason = str(error).partition("\n")[0]
-    configuration = Configuration.load(packaged("wam"))
-    obstacles = _group(Obstacles, configuration.sections["driver"], "world.obstacles.")
-    note = f"the arm is drawn from configuration 'wam' of the package, not from the bag: {reason}"
-    return RecordedArm(configuration.shared.arm, obstacles, note)
-
-
-def _driver_parameters(bag: Bag, namespace: str) -> Mapping[str, Any]:
-    attached = bag.attachments.get("parameters.yaml")
-    if attached is None:
-        raise ParameterError("it has no attachment parameters.yaml")
-    tree = yaml.safe_load(attached.decode())
-    section = tree.get(f"{namespace}/driver") if isinstance(tree, dict) else None
-    if not isinstance(section, dict) or not isinstance(section.get("ros__parameters"), dict):
-        raise ParameterError(f"its parameters.yaml has no parameters of {namespace}/driver")
-    return flatten(section["ros__parameters"])
-
-
-def _group(cls: type[T], flat: Mapping[str, Any], prefix: str) -> T:
-    return build(cls, {key.removeprefix(prefix): value for key, value in flat.items() if key.startswith(prefix)})
 
 
 def save(path: Path, summary: DemoSummary, bag: Bag, gl: Sequence[str] | None = None) -> tuple[str, ...]:
@@ -116,11 +69,11 @@ def save(path: Path, summary: DemoSummary, bag: Bag, gl: Sequence[str] | None = 
             2, 2, width_ratios=(1.1, 1.3), height_ratios=(1.5, 1.0),
             left=0.005, right=0.985, bottom=0.11, top=0.93, wspace=0.15, hspace=0.09,
         )  # fmt: skip
-        _draw_arm(figure.add_subplot(grid[:, 0]), summary, recorded, gl)
+        draw_arm(figure.add_subplot(grid[:, 0]), summary, recorded, gl)
         above = figure.add_subplot(grid[0, 1])
         below = figure.add_subplot(grid[1, 1], sharex=above)
-        _draw_forces(above, summary)
-        _draw_places(below, summary, recorded.arm)
+        draw_forces(above, summary)
+        draw_places(below, summary, recorded.arm)
         figure.savefig(path, metadata={"Software": None})
     return (recorded.note,) if recorded.note else ()
 
@@ -128,7 +81,19 @@ def save(path: Path, summary: DemoSummary, bag: Bag, gl: Sequence[str] | None = 
 # the arm
 
 
-def _draw_arm(axes: Axes, summary: DemoSummary, recorded: RecordedArm, gl: Sequence[str]) -> None:
+def draw_arm(
+    axes: Axes, summary: DemoSummary, recorded: RecordedArm, gl: Sequence[str], letter: str | None = "(a) "
+) -> None:
+    """The arm in the pose of the summary's moment, and the force on it.
+
+    Parameters
+    ----------
+    axes : to draw into; its place in the figure gives the shape of the view.
+    summary : what the bag shows.
+    recorded : the arm and what it touches.
+    gl : values of MUJOCO_GL to try; () draws with matplotlib.
+    letter : before the title; None for no title.
+    """
     axes.set_axis_off()
     arm, obstacles, moment = recorded.arm, recorded.obstacles, summary.moment
     if moment is None or set(arm.joints.names) - set(moment.names):
@@ -138,8 +103,8 @@ def _draw_arm(axes: Axes, summary: DemoSummary, recorded: RecordedArm, gl: Seque
     if not np.all(np.isfinite(q)):
         axes.text(0.5, 0.5, "the recorded pose is not finite", ha="center", transform=axes.transAxes)
         return
-    box = axes.get_position()
-    view = arm_picture.side_view(arm, q, obstacles, aspect=box.width * SIZE[0] / (box.height * SIZE[1]))
+    box = axes.get_window_extent()
+    view = arm_picture.side_view(arm, q, obstacles, aspect=float(box.width / box.height))
     axes.set_xlim(-view.width / 2.0, view.width / 2.0)
     axes.set_ylim(-view.height / 2.0, view.height / 2.0)
     axes.set_aspect("equal")
@@ -149,9 +114,9 @@ def _draw_arm(axes: Axes, summary: DemoSummary, recorded: RecordedArm, gl: Seque
     else:
         axes.imshow(pixels, extent=(*axes.get_xlim(), *axes.get_ylim()), interpolation="lanczos", zorder=0)
     _draw_contacts(axes, summary, arm, q, view)
-    seconds = (moment.stamp - _zero(summary)) / 1e9
-    title = f"(a) the arm at {seconds:.1f} s and the force on it"
-    axes.text(0.02, 0.985, title, va="top", transform=axes.transAxes, fontsize=11)
+    if letter is not None:
+        title = f"{letter}the arm at {seconds_at(summary, moment.stamp):.1f} s and the force on it"
+        axes.text(0.02, 0.985, title, va="top", transform=axes.transAxes, fontsize=11)
 
 
 def _draw_contacts(axes: Axes, summary: DemoSummary, arm: Arm, q: Sequence[float], view: arm_picture.View) -> None:
@@ -210,13 +175,28 @@ def _zero(summary: DemoSummary) -> int:
     return int(summary.traces.stamp[0]) if len(summary.traces.stamp) else 0
 
 
+def seconds_at(summary: DemoSummary, stamp: int) -> float:
+    """Time on the axes of the pictures, s, of a stamp, ns."""
+    return (stamp - _zero(summary)) / 1e9
+
+
 def _seconds(summary: DemoSummary) -> Numbers:
     seconds: Numbers = (summary.traces.stamp - _zero(summary)) / 1e9
     return seconds
 
 
-def _draw_forces(axes: Axes, summary: DemoSummary) -> None:
-    """Along the force asked for, and magnitudes where none is asked for."""
+def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int = 105, most: int = 0) -> None:
+    """Along the force asked for, and magnitudes where none is asked for.
+
+    Parameters
+    ----------
+    axes : to draw into.
+    summary : what the bag shows.
+    letter : beside the axes.
+    room : letters that fit into its width for the names of the steps, 0 for none.
+    most : points drawn of each line at most, 0 for all.
+    """
+    summary = _thinned(summary, most)
     traces, time = summary.traces, _seconds(summary)
     pressed = traces.asked.acts
 
@@ -238,13 +218,15 @@ def _draw_forces(axes: Axes, summary: DemoSummary) -> None:
     order = [3, 0, 1, 2]
     axes.legend(
         [handles[i] for i in order], [labels[i] for i in order], loc="lower center", bbox_to_anchor=(0.5, 1.0),
-        ncols=4, fontsize=9, handlelength=1.8, columnspacing=1.2, borderaxespad=0.2,
+        ncols=4 if room > 60 else 2, fontsize=9, handlelength=1.8, columnspacing=1.2, borderaxespad=0.2,
     )  # fmt: skip
-    _frame(axes, summary, "(b)")
-    _name_steps(axes, summary)
+    _frame(axes, summary, letter)
+    _name_steps(axes, summary, room)
 
 
-def _draw_places(axes: Axes, summary: DemoSummary, arm: Arm) -> None:
+def draw_places(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c)", most: int = 0) -> None:
+    """Where on its link the arm was touched, true and felt; arguments as in `draw_forces`."""
+    summary = _thinned(summary, most)
     traces, time = summary.traces, _seconds(summary)
     length = max(arm.covers.length) * 100.0
     for signal, colour, width in ((traces.true, TRUE, 1.6), (traces.felt, FELT, 1.0)):
@@ -257,7 +239,21 @@ def _draw_places(axes: Axes, summary: DemoSummary, arm: Arm) -> None:
     axes.set_ylim(0.0, 1.12 * length)
     axes.set_ylabel("place on link [cm]")
     axes.set_xlabel("time [s]")
-    _frame(axes, summary, "(c)")
+    _frame(axes, summary, letter)
+
+
+def _thinned(summary: DemoSummary, most: int) -> DemoSummary:
+    """The summary with so many instants at most, evenly taken."""
+    traces = summary.traces
+    if not most or len(traces.stamp) <= most:
+        return summary
+    rows = np.linspace(0, len(traces.stamp) - 1, most).astype(np.int64)
+
+    def some(signal: Signal) -> Signal:
+        return Signal(signal.frame[rows], signal.force[rows], signal.place[rows])
+
+    signals = map(some, (traces.asked, traces.measured, traces.true, traces.felt, traces.push))
+    return summary._replace(traces=Traces(traces.stamp[rows], *signals))
 
 
 def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
@@ -278,11 +274,11 @@ def _middle(summary: DemoSummary, step: Step | Touch) -> float:
     return ((step.begin + step.end) / 2.0 - _zero(summary)) / 1e9
 
 
-def _name_steps(axes: Axes, summary: DemoSummary) -> None:
+def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:
     """Names of the steps at the top, wrapped to the width of each; too narrow ones go without."""
     whole = summary.steps[-1].end - summary.steps[0].begin if summary.steps else 0
     for step in summary.steps:
-        room = round(105 * (step.end - step.begin) / max(whole, 1))
+        room = round(letters * (step.end - step.begin) / max(whole, 1))
         if room >= 6:
             lines = textwrap.wrap(step.name, room, break_long_words=False)
             axes.text(

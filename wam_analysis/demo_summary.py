@@ -22,6 +22,7 @@ from wam_analysis.demo_traces import (
     traces_of,
     values_of,
 )
+from wam_analysis.runs import runs
 
 NO_LINK = "none"
 NOT_RECORDED = "not recorded"
@@ -153,7 +154,7 @@ def summarize(bag: Bag) -> DemoSummary:
         presses=presses,
         touches=_touches(bag, namespace, traces, steps),
         false_contact=int(np.sum(false)) * period,
-        longest_false_contact=max((end - begin for begin, end in _runs(false)), default=0) * period,
+        longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * period,
         free=int(np.sum(known & ~traces.true.acts)) * period,
         loop=_loop(bag),
         received=received,
@@ -195,16 +196,10 @@ def _median(values: Numbers) -> float:
     return float(np.median(known)) if len(known) else NAN
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Rows [begin, end) of each stretch that is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
 def _contacts(traces: Traces) -> list[tuple[int, int]]:
     """Rows [begin, end) of each true contact, bounces bridged."""
     contacts: list[tuple[int, int]] = []
-    for begin, end in _runs(traces.true.acts):
+    for begin, end in runs(traces.true.acts).tolist():
         if contacts and traces.stamp[begin] - traces.stamp[contacts[-1][1] - 1] <= BOUNCE:
             contacts[-1] = (contacts[-1][0], end)
         else:

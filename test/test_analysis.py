@@ -1,0 +1,403 @@
+"""The analysis of whole bags: two recordings whose friction, ripple and cycle are known, and bags that lack things."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import yaml
+from browser import looked_at
+from conftest import isolate, locked_domain
+from rosbags.rosbag2 import StoragePlugin, Writer
+from test_bag import STORE, joint_state
+from test_lockstep import configuration, record_composed
+
+from wam_analysis.analysis import Analysis, analyse, analyse_bag
+from wam_analysis.analysis_page import page
+from wam_analysis.analysis_plots import timing_plots
+from wam_analysis.analysis_text import SCHEMA, document, json_text, text
+from wam_analysis.bag import Bag, JointColumns, WrenchColumns, read
+from wam_analysis.finding import Finding
+from wam_analysis.prediction import largest_force, node_at, predict
+from wam_analysis.recorded import recorded_parameters
+from wam_description.configuration import Configuration, packaged
+from wam_description.rigid_body import RigidBody
+from wam_ros.cli import main
+
+PRESS = 22.0  # N
+CYCLING = [
+    {"name": "release", "seconds": 0.3, "request": "enable"},
+    {"name": "press", "seconds": 9.0, "force": {"frame": "link", "newtons": [0.0, -PRESS, 0.0]}},
+    {"name": "brake", "seconds": 0.2, "request": "disable"},
+]
+STICTION = {"arm.joints.static_friction": [4.0], "arm.joints.dynamic_friction": [1.0]}
+RIPPLE = 0.012  # N m at motor1, 24 cycles a turn
+MOVING = [
+    {"name": "release", "seconds": 0.1, "request": "enable"},
+    {"name": "out", "seconds": 1.4, "posture": [0.5, -1.3, 0.1, 0.9]},
+    {
+        "name": "back and be pushed",
+        "seconds": 1.4,
+        "posture": [0.0, -0.6, -0.1, 0.4],
+        "push": {"cover": "outer_link", "place": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.3, "end": 0.9},
+    },
+    {"name": "brake", "seconds": 0.1, "request": "disable"},
+]
+
+
+class Recorded(NamedTuple):
+    """A bag with the configuration that it was recorded with."""
+
+    path: Path
+    configuration: Configuration
+    bag: Bag
+    analysis: Analysis
+
+    def finding(self, name: str) -> Finding:
+        (found,) = [one for section in self.analysis.sections for one in section.findings if one.name == name]
+        return found
+
+
+def recorded(configured: Configuration, folder: Path) -> Recorded:
+    with pytest.MonkeyPatch.context() as patch, locked_domain() as number:
+        isolate(patch, number, folder)
+        record_composed(configured, number)
+    bag = read(folder / "bag")
+    return Recorded(folder / "bag", configured, bag, analyse_bag(bag, lambda doing: None))
+
+
+@pytest.fixture(scope="module")
+def cycling(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    """The testbed with much stiction: it cycles about the force."""
+    folder = tmp_path_factory.mktemp("cycling")
+    script = folder / "script.yaml"
+    script.write_text(yaml.safe_dump({"steps": CYCLING}))
+    base = Configuration.load(packaged("testbed"))
+    configured = base.with_values(
+        {
+            "nodes": [*base.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.timeout": 60.0,
+            "timing.outer_divisor": 10,
+            "scenario:script": str(script),
+            "recorder:directory": str(folder),
+            "recorder:name": "bag",
+            "force_loop:force_gain": [8e-3],
+            **STICTION,
+        }
+    )
+    return recorded(configured, folder)
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    """The arm on its way out and back, pushed, with noise on its sensors and a ripple in a motor."""
+    folder = tmp_path_factory.mktemp("moving")
+    script = folder / "script.yaml"
+    script.write_text(yaml.safe_dump({"steps": MOVING}))
+    values = {
+        "driver:effects.ripples.amplitude": [RIPPLE, 0.0, 0.0, 0.0],
+        "driver:sensors.encoder_noise": [2e-6] * 4,
+        "driver:sensors.strain_noise": [0.02] * 4,
+    }
+    return recorded(configuration(script, folder, "bag", **values), folder)
+
+
+# what was planted
+
+
+def test_a_limit_cycle_of_the_testbed_is_found_with_its_size_and_its_period(cycling: Recorded) -> None:
+    size, period = (
+        cycling.finding("press: limit cycle, peak to peak"),
+        cycling.finding("press: period of the limit cycle"),
+    )
+    truth = cycling.bag.topics["/wam/sim/contact/wrench"]
+    assert isinstance(truth, WrenchColumns)
+    rows = (truth.stamp_ns > 3_200_000_000) & (truth.stamp_ns < 9_200_000_000)
+    force, at = truth.force[rows, 1], truth.stamp_ns[rows] / 1e9
+    high = force > (force.min() + force.max()) / 2.0
+    ups = at[1:][high[1:] & ~high[:-1]]
+    assert len(ups) >= 3
+    assert size.measured == pytest.approx(np.median(force[high]) - np.median(force[~high]), rel=0.05)
+    assert period.measured == pytest.approx(float(np.mean(np.diff(ups))), rel=0.02)
+    assert cycling.finding("press: confidence of the limit cycle").measured > 0.8
+
+
+def test_its_prediction_from_the_recorded_parameters_stands_beside_it(cycling: Recorded) -> None:
+    """(5.8) by hand: Omega dF k_c/(k_tr + k_c) over the lever, for the cables and for cables and servo in series."""
+    found = cycling.finding("press: limit cycle, peak to peak")
+    lever, contact, cable = 0.9144, 1751.26835 * 0.9144**2, 14.0**2 / (0.920992366 / (2 * 42258.1053 * 0.009525**2))
+    servo = 14.0**2 * 2.0
+    inertia = 1.62155 * 0.4572**2 + 0.112985
+    damping = 3.74 + 14.0**2 * 1.83e-3
+    sizes = []
+    for stiffness in (cable, 1.0 / (1.0 / cable + 1.0 / servo)):
+        zeta = damping / (2.0 * math.sqrt(inertia * (stiffness + contact)))
+        omega = 1.0 + math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2))
+        sizes.append(omega * 3.0 * contact / (stiffness + contact) / lever)
+    assert found.predicted == pytest.approx(sizes[0], rel=0.01)
+    assert f"in series, {sizes[1]:.3g} N" in found.note
+    assert found.measured == pytest.approx(sizes[1], rel=0.05)  # the motor's own friction is not in it
+
+
+def test_the_friction_of_motors_and_joints_is_identified_in_spite_of_noise(moving: Recorded) -> None:
+    arm = moving.configuration.shared.arm
+    for i, name in enumerate(arm.motors.names):
+        assert moving.finding(f"{name}: dynamic friction").measured == pytest.approx(
+            arm.motors.dynamic_friction[i], rel=0.02
+        )
+    for name, i in (("joint1", 0), ("joint2", 1), ("joint4", 3)):
+        found = moving.finding(f"{name}: dynamic friction")
+        assert found.measured == pytest.approx(arm.joints.dynamic_friction[i], rel=0.02)
+        assert found.predicted == arm.joints.dynamic_friction[i]
+    assert moving.finding("motor4: viscous friction").measured == pytest.approx(1e-4, rel=0.1)
+
+
+def test_a_ripple_is_found_at_its_order(moving: Recorded) -> None:
+    found = moving.finding("motor1: largest ripple")
+    assert found.measured == pytest.approx(RIPPLE, rel=0.05)
+    assert found.predicted == RIPPLE
+    assert found.note.startswith("24 cycles a turn")
+
+
+def test_the_efficiency_is_that_of_the_friction_that_is_configured(moving: Recorded) -> None:
+    found = moving.finding("efficiency, motors to links")
+    assert 40.0 < found.measured < 95.0
+    assert found.measured == pytest.approx(found.predicted, abs=5.0)
+
+
+def test_the_push_is_told_with_its_link_and_force(moving: Recorded) -> None:
+    (contact,) = [section for section in moving.analysis.sections if section.key == "contact"]
+    assert any(line.startswith("back and be pushed: outer_link was touched with 9.2") for line in contact.said)
+    assert moving.finding("contact felt on the right link").measured > 80.0
+
+
+def test_missed_periods_are_counted_from_the_stamps(moving: Recorded) -> None:
+    states = moving.bag.topics["/wam/motor_states"]
+    assert isinstance(states, JointColumns)
+    keep = np.ones(len(states.stamp_ns), dtype=bool)
+    keep[[500, 501, 900]] = False
+    fewer = JointColumns(*(c[keep] if isinstance(c, np.ndarray) else c for c in states))
+    bag = moving.bag._replace(topics={**moving.bag.topics, "/wam/motor_states": fewer})
+    (timing,) = [section for section in analyse_bag(bag, lambda doing: None).sections if section.key == "timing"]
+    found = {finding.name: finding.measured for finding in timing.findings}
+    assert found["motor_states: missed periods"] == 3.0
+    assert "0.003 s" in timing.said[0]
+    assert moving.finding("motor_states: missed periods").measured == 0.0
+
+
+def test_latency_and_jitter_of_a_real_clock_come_from_the_times_of_reception(moving: Recorded) -> None:
+    """The lockstep bag as a clock would have received it: 20 us of jitter, answers after 300 us."""
+    topics = dict(moving.bag.topics)
+    jitter = np.random.default_rng(3).normal(0.0, 20_000.0, len(topics["/wam/motor_states"].log_time_ns))
+    for name, after in (("/wam/motor_states", 0), ("/wam/motor_current_command", 300_000)):
+        columns = topics[name]
+        assert isinstance(columns, JointColumns)
+        received = columns.stamp_ns + 10**18 + after + jitter[: len(columns.stamp_ns)].astype(np.int64)
+        topics[name] = columns._replace(log_time_ns=received)
+    metadata = {**moving.bag.metadata, "recording": {**moving.bag.metadata["recording"], "mode": "realtime"}}
+    found = analyse_bag(moving.bag._replace(topics=topics, metadata=metadata), lambda doing: None)
+    (timing,) = [section for section in found.sections if section.key == "timing"]
+    numbers = {finding.name: finding.measured for finding in timing.findings}
+    assert numbers["latency, state to current at the recorder: median"] == pytest.approx(300.0, rel=0.01)
+    assert numbers["states that were not answered"] == 0.0
+    assert numbers["motor_states: jitter of the reception"] == pytest.approx(0.02 * math.sqrt(2.0), rel=0.1)
+    assert "motor_states: jitter of the reception" not in {f.name for s in moving.analysis.sections for f in s.findings}
+    assert [plot.section for plot in timing_plots(found)] == ["timing"]
+
+
+def test_provenance_names_the_parameters_and_the_counts(moving: Recorded) -> None:
+    said = moving.analysis.provenance
+    total = sum(len(columns.log_time_ns) for columns in moving.bag.topics.values())
+    assert said["messages"] == said["received"] == str(total)
+    assert said["dropped"] == "0"
+    assert len(said["parameters, SHA-256"]) == 64
+
+
+# theory on the arm
+
+
+def test_the_node_of_a_press_has_the_stiffness_and_friction_of_statics(moving: Recorded) -> None:
+    """A force along d stretches the cables by J^T d; what it must overcome follows from virtual work."""
+    arm = moving.configuration.shared.arm
+    q, direction, place = [0.2, -1.1, 0.0, 0.7], np.array([0.0, -1.0, 0.0]), 0.25
+    parameters = recorded_parameters(moving.bag, "/wam")
+    node = node_at(parameters, arm, q, "outer_link", place, direction)
+    assert node is not None
+    body = RigidBody(arm)
+    axis = body.cover_pose(q, "outer_link").rotation @ direction
+    step = 1e-6
+    here = body.point(q, "outer_link", (place, 0.0, 0.0))
+    there = [body.point(np.array(q) + step * unit, "outer_link", (place, 0.0, 0.0)) for unit in np.eye(4)]
+    move = np.array([(point - here) @ axis / step for point in there])
+    matrix = np.reshape(arm.joint_from_motor, (4, 4))
+    stretch = (matrix.T @ move) / np.array([circuit.stiffness for circuit in arm.circuits])  # rad per newton
+    given = move @ (matrix @ stretch)  # m per newton
+    assert 1.0 / node.transmission_stiffness == pytest.approx(given, rel=1e-4)
+    assert node.contact_stiffness == 4000.0
+    assert float(move @ node.joint_per_metre) == pytest.approx(1.0, rel=1e-4)
+    lost = np.abs(node.joint_per_metre) @ np.array(arm.joints.dynamic_friction)
+    assert node.dynamic_friction == pytest.approx(float(lost), rel=1e-6)
+    plain, with_g_p = (predict(node, 1.5e-2, proportional, 0.005, 1) for proportional in (0.0, 1e-3))
+    assert plain.routh_gain < plain.sampled_gain
+    assert with_g_p.gamma == pytest.approx(1.5e-2 / with_g_p.routh_gain)
+    assert with_g_p.routh_gain == pytest.approx(plain.routh_gain + node.damping / node.inertia * 1e-3)
+
+
+def test_the_largest_force_of_the_testbed_is_peak_torque_over_the_lever() -> None:
+    arm = Configuration.load(packaged("testbed")).shared.arm
+    found = largest_force(arm, [0.0], "link", 0.9144, np.array([0.0, -1.0, 0.0]))
+    weight = 1.62155 * 9.80665 * 0.4572 / 14.0
+    assert found.limited_by == "peak torque of motor1"
+    assert found.force == pytest.approx((6.77908974 + weight) * 14.0 / 0.9144, rel=1e-6)
+
+
+def test_where_the_motor_is_strong_the_cable_ends_the_force() -> None:
+    """The loose strand is slack by then, so that the tight one carries all of the torque."""
+    arm = Configuration.load(packaged("testbed")).with_values({"arm.motors.peak_torque": [100.0]}).shared.arm
+    found = largest_force(arm, [0.0], "link", 0.9144, np.array([0.0, -1.0, 0.0]))
+    weight = 1.62155 * 9.80665 * 0.4572 / 14.0
+    assert found.limited_by == "cable of motor1"
+    assert found.force == pytest.approx((756.1976746 * 0.009525 + weight) * 14.0 / 0.9144, rel=1e-6)
+
+
+# bags that lack things, and other people's
+
+
+def topics_of(bag: Bag) -> list[str]:
+    return sorted(name for name, columns in bag.topics.items() if len(columns.log_time_ns))
+
+
+def test_every_topic_may_be_missing(cycling: Recorded) -> None:
+    for name in topics_of(cycling.bag):
+        bag = cycling.bag._replace(topics={k: v for k, v in cycling.bag.topics.items() if k != name})
+        assert text(analyse_bag(bag, lambda doing: None))
+
+
+def test_any_one_topic_alone_is_enough_to_say_something(moving: Recorded) -> None:
+    for name in topics_of(moving.bag):
+        bag = Bag(moving.path, {name: moving.bag.topics[name]}, {}, {}, {})
+        found = analyse_bag(bag, lambda doing: None)
+        assert found.sections[0].said
+        assert json.loads(json_text(found))["schema"] == SCHEMA
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_clock_that_was_reset_does_not_spoil_the_friction(moving: Recorded) -> None:
+    def twice(columns: Any) -> Any:
+        return type(columns)(*(np.concatenate([c, c]) if isinstance(c, np.ndarray) else c for c in columns))
+
+    topics = {
+        name: twice(columns) if hasattr(columns, "stamp_ns") else columns for name, columns in moving.bag.topics.items()
+    }
+    found = analyse_bag(moving.bag._replace(topics=topics), lambda doing: None)
+    numbers = {finding.name: finding.measured for section in found.sections for finding in section.findings}
+    assert numbers["motor_states: stamps that do not rise"] == 1.0
+    assert numbers["motor4: dynamic friction"] == moving.finding("motor4: dynamic friction").measured
+
+
+def test_what_is_missing_is_said(moving: Recorded) -> None:
+    without = {k: v for k, v in moving.bag.topics.items() if k not in {"/wam/motor_states", "/wam/sim/contact/wrench"}}
+    found = analyse_bag(moving.bag._replace(topics=without, attachments={}), lambda doing: None)
+    by_key = {section.key: section for section in found.sections}
+    assert "motor_states" in by_key["friction"].lacking
+    assert "sim/contact/wrench" in by_key["contact"].lacking
+    assert any("parameters.yaml" in line for line in by_key["happened"].said)
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Another robot's bag: only joint states, written by rosbags."""
+    path = tmp_path_factory.mktemp("foreign") / "bag"
+    kind = "sensor_msgs/msg/JointState"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/robot/joint_states", kind, typestore=STORE)
+        for i in range(400):
+            stamp = 1_700_000_000_000_000_000 + i * 10_000_000
+            angles = [math.sin(0.02 * i), 0.1]
+            writer.write(connection, stamp, joint_state(stamp, ["elbow", "wrist"], angles, [0.0, 0.0], []))
+    return path
+
+
+def test_a_foreign_bag_of_joint_states_is_told_as_far_as_it_goes(foreign: Path) -> None:
+    found = analyse(foreign, lambda doing: None)
+    said = text(found)
+    assert "/robot/joint_states: 400 messages of the joints elbow, wrist" in " ".join(said.split())
+    assert "elbow stood" in said or "elbow" in said
+    assert page(found).count("<img") == 1
+    assert document(found)["duration"] == pytest.approx(3.99)
+
+
+# the ways out
+
+
+def test_the_command_writes_text_json_and_page(
+    moving: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["analyse", str(moving.path), "--json", "-", "--quiet"])
+    out, err = capsys.readouterr()
+    assert (ended.value.code, err) == (0, "")
+    found = json.loads(out)
+    assert [section["key"] for section in found["sections"]] == [s.key for s in moving.analysis.sections]
+    with pytest.raises(SystemExit) as ended:
+        main(["analyse", str(moving.path), "--json", str(tmp_path / "a.json")])
+    out, err = capsys.readouterr()
+    assert ended.value.code == 0
+    assert json.loads((tmp_path / "a.json").read_text()) == found
+    assert "What happened" in out
+    assert max(map(len, out.splitlines())) <= 100
+    assert "reading" in err
+    with pytest.raises(SystemExit) as ended:
+        main(["analyse", str(tmp_path / "nothing")])
+    assert ended.value.code == 1
+    assert "does not exist" in capsys.readouterr().err
+
+
+def test_numbers_that_are_not_known_are_null_in_json(moving: Recorded) -> None:
+    found = document(moving.analysis)
+    numbers = [one[key] for s in found["sections"] for one in s["findings"] for key in ("measured", "predicted")]
+    assert None in numbers
+    assert all(number is None or math.isfinite(number) for number in numbers)
+
+
+@pytest.fixture(scope="module")
+def written(moving: Recorded, foreign: Path) -> dict[str, str]:
+    """Pages of a bag with everything and of one with next to nothing."""
+    return {"moving": page(moving.analysis), "foreign": page(analyse(foreign, lambda doing: None))}
+
+
+def test_the_page_is_whole_in_itself(written: dict[str, str], moving: Recorded) -> None:
+    for found in written.values():
+        sources = [part.split('"')[0] for key in ('src="', 'srcset="', 'href="') for part in found.split(key)[1:]]
+        assert all(source.startswith(("data:image/", "#")) for source in sources)
+        assert "<script" not in found
+        assert "@import" not in found
+        assert "default-src 'none'" in found
+    assert written["moving"].count("<img") >= 5
+    assert "encoder_noise" in written["moving"]  # the parameters
+    assert moving.analysis.provenance["parameters, SHA-256"] in written["moving"]
+
+
+@pytest.mark.parametrize("name", ["moving", "foreign"])
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_page_reads_well_in_a_browser(name: str, width: int, written: dict[str, str], tmp_path: Path) -> None:
+    seen = looked_at(written[name], width, tmp_path)
+    assert seen["overflow"] == []
+    assert seen["width"] == width
+    assert seen["scroll"] == seen["room"] >= width - 20  # less a scroll bar
+    assert seen["pictures"]
+    assert all(seen["pictures"])
+    assert seen["requests"] == []
+    assert seen["height"] > 800
+
+
+def test_the_look_sees_what_runs_over_what_is_missing_and_what_is_fetched(tmp_path: Path) -> None:
+    bad = "<!doctype html><body><div style='width: 900px'>wide</div><img src='http://127.0.0.1:9/x.png'></body>"
+    seen = looked_at(bad, 390, tmp_path)
+    assert seen["overflow"] == ["DIV"]
+    assert seen["scroll"] > 390
+    assert seen["pictures"] == [False]
+    assert seen["requests"] == ["http://127.0.0.1:9/x.png"]

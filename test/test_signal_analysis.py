@@ -1,0 +1,427 @@
+"""The analysis functions on signals of known answer, with seeded noise: within 2 %."""
+
+import math
+
+import numpy as np
+import pytest
+
+from wam_analysis.efficiency import backdrivability, efficiency
+from wam_analysis.force_accuracy import dynamic_range, force_accuracy
+from wam_analysis.frequency import bandwidth, believable, fit_poles, frequency_response
+from wam_analysis.friction import identify_friction
+from wam_analysis.limit_cycle import limit_cycle
+from wam_analysis.loop_timing import latency, stamp_timing
+from wam_analysis.response import step_response
+from wam_analysis.ripple import ripple_spectrum
+from wam_analysis.runs import runs, without_short
+from wam_analysis.stability import Verdict, half_cycle_peaks, stability
+from wam_analysis.stick_slip_phases import stick_slip_phases
+from wam_theory.stick_slip import ForceLoop, FrictionNode, simulate
+
+MS = 1_000_000
+PRECISE = pytest.approx
+
+
+def near(value: float) -> object:
+    """What the issue asks for: 2 %."""
+    return PRECISE(value, rel=0.02)
+
+
+def draws(seed: int, n: int, sd: float) -> np.ndarray:
+    return sd * np.random.default_rng(seed).standard_normal(n)
+
+
+# stretches
+
+
+def test_stretches_are_found_at_both_ends_too():
+    mask = np.array([1, 1, 0, 1, 0, 0, 1], dtype=bool)
+    assert runs(mask).tolist() == [[0, 2], [3, 4], [6, 7]]
+    assert runs(np.zeros(3, dtype=bool)).tolist() == []
+
+
+def test_short_stretches_belong_to_their_neighbours_the_shortest_first():
+    mask = np.array([1] * 9 + [0] * 1 + [1] * 2 + [0] * 9, dtype=bool)
+    assert without_short(mask, 3).tolist() == [True] * 12 + [False] * 9
+    merged = np.array([1] * 9 + [0, 0, 1, 0, 0] + [1] * 9, dtype=bool)  # still short once it has swallowed its middle
+    assert without_short(merged, 6).all()
+    chatter = np.tile([True, False], 50_000)
+    assert without_short(np.concatenate(([True] * 9, chatter, [True] * 9)), 5).all()
+
+
+# steps
+
+
+def second_order(zeta: float, omega: float, time: np.ndarray) -> np.ndarray:
+    damped = omega * math.sqrt(1.0 - zeta**2)
+    decay = np.exp(-zeta * omega * time)
+    return 1.0 - decay * (np.cos(damped * time) + zeta * omega / damped * np.sin(damped * time))
+
+
+@pytest.mark.parametrize("sd", [0.0, 0.01])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_second_order_step_has_its_textbook_overshoot_and_peak_time(sd, sign):
+    zeta, omega = 0.3, 12.0
+    time = np.arange(4000) / 1000.0
+    value = 5.0 + sign * 3.0 * (second_order(zeta, omega, time) + draws(1, len(time), sd))
+    found = step_response(time, value, begin=5.0, steady=1.0, band=0.02)
+    assert found.overshoot == near(math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2)))
+    assert found.peak_time == near(math.pi / (omega * math.sqrt(1.0 - zeta**2)))
+    assert found.final == near(5.0 + sign * 3.0)
+
+
+@pytest.mark.parametrize("sd", [0.0, 0.005])
+def test_a_first_order_step_has_its_textbook_rise_and_settling(sd):
+    tau = 0.08
+    time = np.arange(3000) / 1000.0
+    value = 2.0 * (1.0 - np.exp(-time / tau)) + draws(2, len(time), 2.0 * sd)
+    found = step_response(time, value, begin=0.0, steady=1.5, band=0.05)
+    assert found.rise == near(tau * math.log(9.0))
+    assert found.settling == near(tau * math.log(20.0))
+    assert found.overshoot < 0.005
+
+
+def test_a_step_that_keeps_swinging_does_not_settle():
+    time = np.arange(2000) / 1000.0
+    found = step_response(time, 1.0 + 0.1 * np.sin(40.0 * time) - np.exp(-30.0 * time), 0.0, 1.0, 0.02)
+    assert found.settling == math.inf
+    assert found.spread == near(0.1)
+
+
+def test_a_signal_without_a_step_is_refused():
+    with pytest.raises(ValueError, match="no step"):
+        step_response(np.arange(10.0), np.ones(10), 1.0, 3.0, 0.02)
+
+
+# limit cycles
+
+
+def sawtooth(phase: np.ndarray) -> np.ndarray:
+    """Rises for 85 % of the cycle and falls: as the stiction cycle of (5.8) does."""
+    part = phase % 1.0
+    return np.where(part < 0.85, part / 0.85, (1.0 - part) / 0.15) - 0.5
+
+
+@pytest.mark.parametrize("shape", ["sine", "sawtooth", "square"])
+@pytest.mark.parametrize("period", [0.0931, 0.5, 1.37])
+def test_a_planted_cycle_is_recovered_from_noise_and_drift(shape, period):
+    time = np.arange(6000) / 1000.0
+    phase = time / period + 0.3
+    wave = {
+        "sine": 0.5 * np.sin(2 * math.pi * phase),
+        "sawtooth": sawtooth(phase),
+        "square": 0.5 * np.sign(np.sin(2 * math.pi * phase)),
+    }
+    value = 7.0 + 0.2 * time + 1.6 * wave[shape] + draws(3, len(time), 0.05)
+    found = limit_cycle(time, value)
+    assert found.period == near(period)
+    assert found.peak_to_peak == PRECISE(1.6, rel=0.02)
+    assert found.confidence > 0.9
+    assert found.cycles == near(6.0 / period)
+
+
+def test_noise_does_not_add_to_the_height_of_a_plateau() -> None:
+    time = np.arange(6000) / 1000.0
+    value = 0.8 * np.sign(np.sin(2.0 * math.pi * time / 0.7 + 0.1)) + draws(31, len(time), 0.1)
+    assert limit_cycle(time, value).peak_to_peak == near(1.6)
+
+
+def random_walk(n: int) -> np.ndarray:
+    return np.cumsum(draws(5, n, 1.0))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        draws(4, 5000, 1.0),
+        np.exp(-np.arange(5000) / 400.0),
+        np.exp(-np.arange(5000) / 800.0) * np.sin(np.arange(5000) / 20.0),
+        np.ones(5000),
+        np.concatenate([np.zeros(2500), np.ones(2500)]),
+        random_walk(5000),
+    ],
+    ids=["noise", "creep", "ringing", "constant", "step", "random walk"],
+)
+def test_what_does_not_repeat_is_no_cycle(value):
+    assert limit_cycle(np.arange(5000) / 1000.0, value).confidence < 0.5
+
+
+def test_a_growing_oscillation_is_said_to_grow():
+    time = np.arange(4000) / 1000.0
+    found = limit_cycle(time, np.exp(0.4 * time) * np.sin(30.0 * time))
+    assert found.growth > 1.5
+    assert found.confidence < 0.7
+
+
+# stick and slip
+
+
+def test_sticks_and_slips_are_told_apart_and_chatter_is_bridged():
+    velocity = np.concatenate([np.zeros(300), 0.4 * np.ones(100), np.zeros(200), -0.4 * np.ones(50), np.zeros(350)])
+    velocity[150] = 0.3  # one bad sample is no slip
+    found = stick_slip_phases(velocity + draws(6, 1000, 0.002), rest=0.02, shortest=10)
+    assert found.sticks.tolist() == [[0, 300], [400, 600], [650, 1000]]
+    assert found.slips.tolist() == [[300, 400], [600, 650]]
+    assert found.directions.tolist() == [1.0, -1.0]
+    assert (found.stuck, found.reversals) == (0.85, 1)
+
+
+def test_the_exact_staircase_of_stick_and_slip_is_found_again():
+    node = FrictionNode(1.0, 1.0, 2.0, 2.0, 0.8, 1.0)
+    trajectory = simulate(node, ForceLoop(gain=0.05), force=0.5, until=400.0)
+    times = np.arange(0.0, 400.0, 0.02)
+    motion = trajectory.at(times)
+    found = stick_slip_phases(np.asarray(motion.v), rest=1e-9, shortest=3)
+    said = [event for event in trajectory.events if event.kind == "slip" and event.time < 399.0]
+    assert len(said) > 3
+    assert len(found.slips) == len(said)
+    assert np.abs(times[found.slips[:, 0]] - [event.time for event in said]).max() <= 0.04
+
+
+# friction
+
+
+def shaft(static: float, dynamic: float, viscous: float, inertia: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Velocity and torque of a shaft that is driven out and back with stops, 1 kHz, 16 s."""
+    time = np.arange(16_000) / 1000.0
+    drive = 8.0 * np.sin(2.0 * math.pi * time / 4.0) + 4.0 * np.sin(2.0 * math.pi * time / 1.3)
+    velocity = np.where(np.abs(drive) > 2.0, drive - 2.0 * np.sign(drive), 0.0)
+    torque = dynamic * np.sign(velocity) + viscous * velocity + inertia * np.gradient(velocity, 1e-3)
+    edges = np.flatnonzero((velocity[:-1] == 0.0) & (velocity[1:] != 0.0))
+    for edge in edges:  # the torque rises to static friction while it is stuck
+        begin = edge
+        while begin > 0 and velocity[begin - 1] == 0.0:
+            begin -= 1
+        torque[begin : edge + 1] = np.sign(velocity[edge + 1]) * np.linspace(0.2, 1.0, edge + 1 - begin) * static
+    return time, velocity, torque
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.03])
+def test_planted_friction_is_recovered(offset):
+    static, dynamic, viscous, inertia = 0.25, 0.18, 0.012, 0.004
+    time, velocity, torque = shaft(static, dynamic, viscous, inertia)
+    noisy = torque + offset + draws(7, len(time), 0.01)
+    found = identify_friction(time, velocity + draws(8, len(time), 0.02), noisy, rest=0.1, window=0.02)
+    assert found.dynamic == near(dynamic)
+    assert found.viscous == near(viscous)
+    assert found.inertia == near(inertia)
+    assert found.static == near(static)
+    assert found.offset == PRECISE(offset, abs=0.002)
+    assert found.breakaways > 5
+    for value, error, truth in (
+        (found.dynamic, found.dynamic_error, dynamic),
+        (found.viscous, found.viscous_error, viscous),
+        (found.inertia, found.inertia_error, inertia),
+    ):
+        assert abs(value - truth) < 4.0 * error < truth / 2.0
+
+
+def test_impacts_do_not_spoil_the_friction():
+    time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
+    torque[np.random.default_rng(9).integers(0, len(time), 60)] += 5.0
+    found = identify_friction(time, velocity, torque, rest=0.1, window=0.002)
+    assert found.dynamic == near(0.18)
+    assert found.viscous == near(0.012)
+
+
+def test_one_direction_alone_gives_no_offset():
+    time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
+    found = identify_friction(time, velocity, torque, 0.1, 0.02, use=velocity >= 0.0)
+    assert math.isnan(found.offset)
+    assert found.dynamic == near(0.18)
+
+
+def test_a_shaft_at_rest_has_no_friction_to_see():
+    found = identify_friction(np.arange(1000) / 1e3, np.zeros(1000), np.zeros(1000), 0.1, 0.02)
+    assert math.isnan(found.dynamic)
+    assert found.breakaways == 0
+
+
+# frequency
+
+
+def resonator(omega: float, zeta: float, rate: float, put: np.ndarray) -> np.ndarray:
+    """omega^2/(s^2 + 2 zeta omega s + omega^2), its input held for a sample, exactly."""
+    damped = omega * math.sqrt(1.0 - zeta**2)
+    dt, decay = 1.0 / rate, math.exp(-zeta * omega / rate)
+    c, s = math.cos(damped * dt), math.sin(damped * dt)
+    a = decay * np.array(
+        [[c + zeta * omega / damped * s, s / damped], [-(omega**2) / damped * s, c - zeta * omega / damped * s]]
+    )
+    b = np.array([1.0 - a[0, 0], -a[1, 0]])
+    state, out = np.zeros(2), np.empty(len(put))
+    for i, u in enumerate(put):
+        out[i] = state[0]
+        state = a @ state + b * u
+    return out
+
+
+def test_planted_poles_and_coherence_are_recovered_from_noise():
+    omega, zeta, rate = 2.0 * math.pi * 13.2, 0.1, 1000.0
+    put = draws(10, 60_000, 1.0)
+    clean = resonator(omega, zeta, rate, put)
+    got = clean + draws(11, len(put), 0.1 * float(np.std(clean)))
+    found = frequency_response(rate, put, got, 4096)
+    low = found.frequency < 60.0
+    held = np.exp(-1j * np.pi * found.frequency / rate)  # half a sample of delay by the hold
+    weight = np.where(low, found.coherence / (1.0 - np.minimum(found.coherence, 0.9999)), 0.0)
+    poles = fit_poles(found.frequency, found.response / held, weight, 0, 2)
+    assert abs(poles[0]) == near(omega)
+    assert -poles[0].real == near(zeta * omega)
+    assert found.coherence[(found.frequency > 5.0) & (found.frequency < 15.0)].min() > 0.9
+    assert found.coherence[found.frequency > 300.0].mean() < 0.3
+
+
+def test_poles_do_not_drown_in_noise_far_above_them() -> None:
+    """A plain linear fit weighs high frequencies by their power of s and gets these wrong."""
+    frequency = np.linspace(1.0, 120.0, 240)
+    s = 2j * math.pi * frequency
+    omega, zeta = 2.0 * math.pi * 10.0, 0.2
+    response = omega**2 / (s**2 + 2.0 * zeta * omega * s + omega**2)
+    response = response + draws(32, 240, 0.01) + 1j * draws(33, 240, 0.01)
+    poles = fit_poles(frequency, response, np.ones(240), 0, 2)
+    assert abs(poles[0]) == near(omega)
+    assert -poles[0].real == near(zeta * omega)
+
+
+def test_the_bandwidth_is_where_the_response_has_fallen_3_db():
+    rate, tau = 500.0, 0.02
+    put = draws(12, 40_000, 1.0)
+    got = np.empty_like(put)
+    level = 0.0
+    for i, u in enumerate(put):
+        level += (u - level) * (1.0 - math.exp(-1.0 / (rate * tau)))
+        got[i] = level
+    found = frequency_response(rate, put, got, 1000)
+    assert bandwidth(found, believable(found, 0.8, 1e-4)) == PRECISE(1.0 / (2.0 * math.pi * tau), rel=0.1)
+    other = frequency_response(rate, put, draws(13, 40_000, 1.0), 1000)
+    assert math.isnan(bandwidth(other, believable(other, 0.8, 1e-4)))
+
+
+def test_an_input_that_stands_still_is_refused():
+    with pytest.raises(ValueError, match="does not move"):
+        frequency_response(100.0, np.ones(1000), np.ones(1000), 100)
+
+
+# stability
+
+
+def response(
+    gamma: float, step: float, friction: float = 1.0, static: float = 1.0, duration: float = 400.0
+) -> np.ndarray:
+    """Exact error of the node with zeta = 0.25 (J = b = K = 1), from the theory's integrator."""
+    node = FrictionNode(1.0, 1.0, 2.0, 2.0, friction, static)
+    trajectory = simulate(node, ForceLoop(gain=gamma), force=step, until=duration)
+    times = np.arange(0.0, trajectory.until, 0.05)
+    return step - trajectory.at(times).contact_force
+
+
+def test_the_trap_of_the_first_two_peaks_is_not_fallen_into():
+    error = response(1.5, 4.0, duration=250.0)
+    first = half_cycle_peaks(error, 0.01)[:5]
+    assert first == PRECISE([4.00, 2.70, 2.94, 3.06, 3.24], abs=0.01)
+    found = stability(error, 0.01)
+    assert found.verdict is Verdict.DIVERGES
+    assert found.growth > 1.01
+    early = stability(error[: np.flatnonzero(np.abs(error) >= 3.05)[-1]][:300], 0.01)
+    assert early.verdict in {Verdict.UNDECIDED, Verdict.DIVERGES}
+
+
+@pytest.mark.parametrize(("gamma", "step", "verdict"), [
+    (0.2, 5.0, Verdict.SETTLES), (0.8, 6.0, Verdict.SETTLES), (1.5, 3.0, Verdict.SETTLES),
+    (1.5, 6.0, Verdict.DIVERGES), (2.4, 1.5, Verdict.DIVERGES),
+])  # fmt: skip
+def test_the_verdict_agrees_with_the_regimes(gamma, step, verdict):
+    error = response(gamma, step) + draws(14, len(response(gamma, step)), 0.01)
+    assert stability(error, 0.08 * step).verdict is verdict
+
+
+def test_a_limit_cycle_is_neither_settled_nor_divergent():
+    time = np.arange(0.0, 30.0, 0.01)
+    error = (1.0 + 3.0 * np.exp(-time / 3.0)) * np.cos(5.0 * time) + draws(15, len(time), 0.01)
+    found = stability(error, 0.1)
+    assert found.verdict is Verdict.CYCLES
+    assert found.growth == PRECISE(1.0, abs=0.02)
+    assert found.confidence > 0.5
+
+
+def test_two_peaks_decide_nothing():
+    time = np.arange(0.0, 1.6, 0.01)
+    assert stability(np.exp(-0.1 * time) * np.cos(5.0 * time), 0.01).verdict is Verdict.UNDECIDED
+
+
+# power
+
+
+def test_efficiency_is_work_out_over_work_in_both_ways():
+    time = np.arange(10_000) / 1000.0
+    motor = np.sin(time)
+    joint = np.where(motor > 0.0, 0.93 * motor, motor / 0.8)
+    found = efficiency(time, motor, joint)
+    assert found.forward == near(0.93)
+    assert found.back == near(0.8)
+    assert found.forward_put == near(float(np.sum(motor[motor > 0.0])) / 1000.0)
+
+
+def test_backdrivability_finds_mass_friction_and_damping_of_a_driven_point():
+    time, velocity, force = shaft(3.0, 2.4, 0.5, 1.7)
+    found = backdrivability(time, velocity, force + draws(16, len(time), 0.1), 0.1, 0.02)
+    assert found == PRECISE((3.0, 2.4, 0.5, 1.7), rel=0.02)
+
+
+# ripple
+
+
+def test_ripple_of_each_order_is_recovered_at_any_speed():
+    time = np.arange(20_000) / 1000.0
+    angle = 9.0 * np.sin(0.7 * time) + 0.4 * time**2 / 10.0
+    torque = 0.03 * np.sin(24.0 * angle + 0.5) + 0.05 * np.sin(angle - 1.0) + 0.2 + draws(17, len(time), 0.02)
+    found = ripple_spectrum(angle, torque, 30)
+    by_order = dict(zip(found.order.tolist(), zip(found.amplitude, found.phase, strict=True), strict=True))
+    assert by_order[24] == PRECISE((0.03, 0.5), rel=0.02)
+    assert by_order[1] == PRECISE((0.05, -1.0), rel=0.02)
+    assert max(amplitude for order, (amplitude, _) in by_order.items() if order not in {1, 24}) < 0.002
+    assert found.turns > 2.0
+
+
+def test_less_than_a_turn_has_no_spectrum():
+    assert not len(ripple_spectrum(np.linspace(0.0, 6.0, 1000), np.zeros(1000), 10).order)
+
+
+# timing
+
+
+def test_missed_periods_jitter_and_stamps_that_go_back_are_counted():
+    stamp = np.delete(np.arange(1, 1001) * MS, [100, 500, 501])
+    received = stamp + 200_000 + np.abs(draws(18, len(stamp), 50_000.0)).astype(np.int64)
+    found = stamp_timing(np.concatenate([stamp, stamp[-1:]]), np.concatenate([received, received[-1:] + 10]))
+    assert (found.messages, found.missed, found.backwards) == (998, 3, 1)
+    assert found.period == PRECISE(1e-3)
+    assert found.longest_gap == PRECISE(3e-3)
+    assert 20e-6 < found.jitter < 200e-6
+    assert math.isnan(stamp_timing(stamp, None).jitter)
+
+
+def test_latency_pairs_states_and_answers_by_their_stamp():
+    stamp = np.arange(1, 101) * MS
+    delay = np.full(100, 300_000)
+    delay[-2] = 5 * MS
+    answered = np.delete(np.arange(100), [10, 20])
+    found = latency(stamp, stamp + 7 * MS, stamp[answered][::-1], (stamp + 7 * MS + delay)[answered][::-1])
+    assert (found.answered, found.unanswered) == (98, 2)
+    assert found.p50 == PRECISE(300e-6)
+    assert found.worst == PRECISE(5e-3)
+    assert latency(stamp, stamp, stamp + 5, stamp).answered == 0
+
+
+# force
+
+
+def test_force_accuracy_is_bias_and_ripple_and_gives_the_dynamic_range():
+    time = np.arange(4000) / 1000.0
+    held = 5.2 + 0.1 * np.sign(np.sin(10.0 * math.pi * time + 1e-3))
+    found = force_accuracy(np.full(4000, 5.0), held)
+    assert (found.bias, found.ripple) == PRECISE((0.2, 0.1), abs=0.005)
+    assert found.smallest == near(0.3)
+    assert dynamic_range(60.0, "motor1", [found]).ratio == near(200.0)
+    assert math.isnan(dynamic_range(60.0, "motor1", []).ratio)

@@ -1,0 +1,276 @@
+"""The pictures of an analysis, each drawn for a wide and for a narrow page."""
+
+import io
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from wam_analysis import arm_picture
+from wam_analysis.analysis import Analysis
+from wam_analysis.bag import JointColumns, WrenchColumns
+from wam_analysis.demo_figure import ASKED, FELT, MEASURED, TRUE, draw_arm, draw_forces, draw_places, seconds_at
+from wam_analysis.loop_timing import latency
+from wam_analysis.recorded import recorded_arm
+
+Numbers = NDArray[np.float64]
+
+WIDE, NARROW = 9.6, 4.1  # inches
+MOST = {WIDE: 3000, NARROW: 1200}  # points of a line
+PNG_DPI = 130
+SHAFTS = (TRUE, FELT, MEASURED, "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#222222")
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.titlesize": 10.0,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e8eb",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "wam",
+    "path.simplify": True,
+    "path.simplify_threshold": 0.5,
+}
+
+
+class Plot(NamedTuple):
+    """A picture in two widths.
+
+    Attributes
+    ----------
+    section : key of the section to which it belongs.
+    title : below it, says what is seen.
+    kind : 'svg+xml' or 'png'.
+    wide, narrow : its bytes.
+    """
+
+    section: str
+    title: str
+    kind: str
+    wide: bytes
+    narrow: bytes
+
+
+Draw = Callable[[Figure, float], None]
+
+
+def plots(analysis: Analysis) -> Iterator[Plot]:
+    """Every picture that the recording has something for."""
+    summary, recording = analysis.recording.summary, analysis.recording
+    if summary.moment is not None:
+        yield _arm(analysis)
+    if len(summary.traces.stamp):
+        title = "Forces over the whole recording, and where on its link the arm was touched."
+        yield _svg("happened", title, lambda figure, width: _story(figure, width, analysis), 4.6, 5.4)
+    joints = [(name, c) for name, c in recording.bag.topics.items() if isinstance(c, JointColumns) and c.position.size]
+    chosen = _motion_topic(recording.namespace, joints)
+    if chosen is not None:
+        title = f"Positions on {chosen[0]}."
+        yield _svg("happened", title, lambda figure, width: _positions(figure, width, chosen[1]), 2.8, 3.2)
+    wrenches = [(n, c) for n, c in recording.bag.topics.items() if isinstance(c, WrenchColumns) and len(c.stamp_ns)]
+    if wrenches and not len(summary.traces.stamp):
+        name, columns = wrenches[0]
+        yield _svg("happened", f"Forces on {name}.", lambda figure, width: _wrench(figure, width, columns), 2.8, 3.2)
+    if any(len(one.time) for one in analysis.held):
+        title = "Each force that was asked for, from the moment it was: measured by the loop and applied."
+        rows = sum(len(one.time) > 0 for one in analysis.held[:6])
+        wide, narrow = 2.6 * math.ceil(rows / 3), 2.1 * rows
+        yield _svg("force", title, lambda figure, width: _holds(figure, width, analysis), wide, narrow)
+    if analysis.motion.signals is not None:
+        title = (
+            "Torque that each motor does not pass on, over its speed; lines: identified (full), configured (dashed)."
+        )
+        n = analysis.motion.signals.torque.shape[1]
+        wide, narrow = 2.5 * math.ceil(n / 2), 2.2 * n
+        yield _svg("friction", title, lambda figure, width: _friction(figure, width, analysis), wide, narrow)
+    if any(len(found.order) for found in analysis.motion.ripple.values()):
+        title = "Ripple of each motor's torque by the order of its own angle."
+        yield _svg("ripple", title, lambda figure, width: _ripple(figure, analysis), 2.6, 3.0)
+    yield from timing_plots(analysis)
+
+
+def _figure(width: float, height: float, draw: Draw) -> Figure:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    draw(figure, width)
+    return figure
+
+
+def _svg(section: str, title: str, draw: Draw, wide: float, narrow: float) -> Plot:
+    pictures = []
+    with mpl.rc_context(STYLE):
+        for width, height in ((WIDE, wide), (NARROW, narrow)):
+            stream = io.BytesIO()
+            _figure(width, height, draw).savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+            pictures.append(stream.getvalue())
+    return Plot(section, title, "svg+xml", pictures[0], pictures[1])
+
+
+def _arm(analysis: Analysis) -> Plot:
+    """The arm as MuJoCo renders it, or drawn, once for both widths."""
+    recording = analysis.recording
+    recorded = recorded_arm(recording.bag, recording.namespace)
+    figure = Figure(figsize=(5.6, 4.2), dpi=PNG_DPI)
+    FigureCanvasAgg(figure)
+    stream = io.BytesIO()
+    with mpl.rc_context(STYLE):
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        draw_arm(axes, recording.summary, recorded, arm_picture.GL, letter=None)
+        figure.savefig(stream, format="png", metadata={"Software": None})
+    moment = recording.summary.moment
+    seconds = seconds_at(recording.summary, moment.stamp) if moment is not None else 0.0
+    title = f"The arm after {seconds:.1f} s, with the force on it as it was and as it was felt."
+    title += f" ({recorded.note})" if recorded.note else ""
+    return Plot("happened", title, "png", stream.getvalue(), stream.getvalue())
+
+
+def _story(figure: Figure, width: float, analysis: Analysis) -> None:
+    summary = analysis.recording.summary
+    arm = analysis.recording.parameters.arm or recorded_arm(analysis.recording.bag, summary.namespace).arm
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0))
+    is_wide = width > NARROW
+    draw_forces(above, summary, letter="", room=105 if is_wide else 0, most=MOST[width])
+    draw_places(below, summary, arm, letter="", most=MOST[width])
+
+
+def _motion_topic(namespace: str, joints: list[tuple[str, JointColumns]]) -> tuple[str, JointColumns] | None:
+    order = [f"{namespace}/{name}" for name in ("joint_sensors", "joint_states", "sim/joint_states", "motor_states")]
+    ranked = sorted(joints, key=lambda item: order.index(item[0]) if item[0] in order else len(order))
+    return ranked[0] if ranked else None
+
+
+def envelope(time: Numbers, value: Numbers, most: int) -> tuple[Numbers, Numbers]:
+    """A line with at most so many points that looks the same: lowest and highest of each stretch.
+
+    Parameters
+    ----------
+    time, value : (n,).
+    most : points, an even number.
+    """
+    n = len(time)
+    if n <= most:
+        return time, value
+    edges = np.linspace(0, n, most // 2 + 1).astype(np.int64)
+    filled = np.where(np.isfinite(value), value, np.nan)
+    low = np.fmin.reduceat(filled, edges[:-1])
+    high = np.fmax.reduceat(filled, edges[:-1])
+    at = time[(edges[:-1] + edges[1:] - 1) // 2]
+    return np.repeat(at, 2), np.column_stack([low, high]).ravel()
+
+
+def _positions(figure: Figure, width: float, columns: JointColumns) -> None:
+    axes = figure.subplots()
+    time = (columns.stamp_ns - columns.stamp_ns[0]) / 1e9
+    for i, name in enumerate(columns.names[: len(SHAFTS)]):
+        axes.plot(*envelope(time, columns.position[:, i], MOST[width]), color=SHAFTS[i], lw=1.2, label=name)
+    axes.set(xlabel="time [s]", ylabel="position [rad]")
+    _legend(axes, width)
+
+
+def _wrench(figure: Figure, width: float, columns: WrenchColumns) -> None:
+    axes = figure.subplots()
+    time = (columns.stamp_ns - columns.stamp_ns[0]) / 1e9
+    for i, name in enumerate("xyz"):
+        axes.plot(*envelope(time, columns.force[:, i], MOST[width]), color=SHAFTS[i], lw=1.2, label=name)
+    axes.set(xlabel="time [s]", ylabel="force [N]")
+    _legend(axes, width)
+
+
+def _legend(axes: Axes, width: float) -> None:
+    columns = 8 if width > NARROW else 4
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, handlelength=1.4, columnspacing=1.0)
+
+
+def _holds(figure: Figure, width: float, analysis: Analysis) -> None:
+    held = [one for one in analysis.held if len(one.time)][:6]
+    across = min(3, len(held)) if width > NARROW else 1
+    grid = figure.subplots(math.ceil(len(held) / across), across, squeeze=False)
+    for axes, one in zip(grid.flat, held, strict=False):
+        most = MOST[width] // across
+        if len(one.applied):
+            axes.plot(*envelope(one.time_true, one.applied, most), color=TRUE, lw=1.6, label="applied")
+        axes.plot(*envelope(one.time, one.measured, most), color=MEASURED, lw=1.0, ls=(0, (4, 2)), label="measured")
+        axes.axhline(one.hold.asked, color=ASKED, lw=0.9, ls=(0, (1.2, 1.2)), label="asked")
+        axes.set_title(one.hold.name if len(one.hold.name) < 34 else f"{one.hold.name[:32]}…")
+        axes.set_xlabel("time [s]")
+    for row in grid:
+        row[0].set_ylabel("force [N]")
+    for axes in list(grid.flat)[len(held) :]:
+        axes.set_axis_off()
+    grid.flat[0].legend(loc="best")
+
+
+def _friction(figure: Figure, width: float, analysis: Analysis) -> None:
+    signals, arm = analysis.motion.signals, analysis.recording.parameters.arm
+    if signals is None or arm is None:
+        return
+    n = signals.torque.shape[1]
+    across = min(2, n) if width > NARROW else 1
+    grid = figure.subplots(math.ceil(n / across), across, squeeze=False)
+    some = np.flatnonzero(signals.use)
+    some = some[:: max(1, len(some) // (MOST[width] // 2))]
+    for i, (axes, name) in enumerate(zip(grid.flat, arm.motors.names, strict=False)):
+        speed, torque = signals.velocity[some, i], 1e3 * (signals.torque - signals.load)[some, i]
+        axes.plot(speed, torque, ".", color="#9aa3ad", ms=2.0, zorder=2, rasterized=False)
+        found, motors = analysis.motion.friction[name], arm.motors
+        end = max(float(np.max(np.abs(speed), initial=0.0)), 1e-3)
+        for dry, viscous, style, colour in (
+            (found.dynamic, found.viscous, "-", FELT),
+            (motors.dynamic_friction[i], motors.viscous_friction[i], "--", ASKED),
+        ):
+            for sign in (-1.0, 1.0):
+                ends = np.array([0.0, sign * end])
+                axes.plot(ends, 1e3 * (sign * dry + viscous * ends), style, color=colour, lw=1.2, zorder=4)
+        limit = 3.0e3 * max(motors.static_friction[i], found.dynamic if math.isfinite(found.dynamic) else 0.0, 1e-4)
+        axes.set_ylim(-limit, limit)
+        axes.set_title(name)
+        axes.set_xlabel("speed [rad/s]")
+    for row in grid:
+        row[0].set_ylabel("torque [mN m]")
+    for axes in list(grid.flat)[n:]:
+        axes.set_axis_off()
+
+
+def _ripple(figure: Figure, analysis: Analysis) -> None:
+    axes = figure.subplots()
+    for i, (name, found) in enumerate(analysis.motion.ripple.items()):
+        if len(found.order):
+            axes.plot(found.order, 1e3 * found.amplitude, "o-", color=SHAFTS[i], ms=3.0, lw=0.8, label=name)
+    axes.set(xlabel="cycles a turn of the motor", ylabel="amplitude [mN m]", ylim=(0.0, None))
+    axes.legend()
+
+
+def timing_plots(analysis: Analysis) -> Iterator[Plot]:
+    """Intervals of reception and latencies, where a clock was recorded."""
+    recording = analysis.recording
+    states, answers = recording.joints("motor_states"), recording.joints("motor_current_command")
+    if recording.mode != "realtime" or states is None or len(states.stamp_ns) < 3:
+        return
+    intervals = np.diff(np.sort(states.log_time_ns)) / 1e6
+    name = "Time between two motor_states at the recorder."
+
+    def draw(figure: Figure, width: float) -> None:
+        axes = figure.subplots()
+        bars = 80 if width > NARROW else 40
+        last = max(float(np.percentile(intervals, 99.9)), 1e-3)
+        axes.hist(np.clip(intervals, 0.0, last), bars, range=(0.0, last), color=TRUE)
+        axes.set(xlabel="interval [ms]", ylabel="messages", yscale="log")
+
+    yield _svg("timing", name + _latency_words(states, answers), draw, 2.6, 2.8)
+
+
+def _latency_words(states: JointColumns, answers: JointColumns | None) -> str:
+    if answers is None:
+        return ""
+    found = latency(states.stamp_ns, states.log_time_ns, answers.stamp_ns, answers.log_time_ns)
+    return f" Latency to the current command: {1e3 * found.p50:.2f} ms in the median." if found.answered else ""

@@ -1,0 +1,89 @@
+"""Power through the transmission, and what it takes to drive it backwards (3.2.4, 3.2.5)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.friction import identify_friction
+
+Numbers = NDArray[np.float64]
+
+
+class Efficiency(NamedTuple):
+    """Work put in and got out while power flows one way, J, and their ratio; NaN where none flowed.
+
+    `forward` is from the motor to the joint, `back` from the joint to the motor.
+    """
+
+    forward: float
+    forward_put: float
+    forward_got: float
+    back: float
+    back_put: float
+    back_got: float
+
+
+def efficiency(time: Numbers, motor_power: Numbers, joint_power: Numbers) -> Efficiency:
+    """Efficiency as work at the joint over work at the motor, 3.2.4, and the same backwards.
+
+    Parameters
+    ----------
+    time : (n,), s.
+    motor_power : (n,), power of the motor on the transmission, W, less what accelerates the rotor.
+    joint_power : (n,), power of the transmission on the joint, W.
+
+    Notes
+    -----
+    A sample counts as forward where both are above zero, as backward where both are below.
+    """
+    dt = np.diff(time, append=2.0 * time[-1] - time[-2]) if len(time) > 1 else np.zeros(len(time))
+
+    def work(power: Numbers, rows: NDArray[np.bool_]) -> float:
+        return float(np.sum(np.abs(power[rows]) * dt[rows]))
+
+    onward = (motor_power > 0.0) & (joint_power > 0.0)
+    backward = (motor_power < 0.0) & (joint_power < 0.0)
+    put, got = work(motor_power, onward), work(joint_power, onward)
+    back_put, back_got = work(joint_power, backward), work(motor_power, backward)
+    return Efficiency(
+        forward=got / put if put > 0.0 else math.nan,
+        forward_put=put,
+        forward_got=got,
+        back=back_got / back_put if back_put > 0.0 else math.nan,
+        back_put=back_put,
+        back_got=back_got,
+    )
+
+
+class Backdrivability(NamedTuple):
+    """What a hand feels that moves the arm, NaN where it was not to be seen.
+
+    Attributes
+    ----------
+    breakaway : force at which it gives way, N.
+    friction : force of dry friction in motion, N.
+    damping : force per velocity, N s/m.
+    mass : force per acceleration, kg.
+    """
+
+    breakaway: float
+    friction: float
+    damping: float
+    mass: float
+
+
+def backdrivability(time: Numbers, velocity: Numbers, force: Numbers, rest: float, window: float) -> Backdrivability:
+    """Friction, damping and mass felt at a point that is driven from outside (3.2.5).
+
+    Parameters
+    ----------
+    time : (n,), s, at a constant rate.
+    velocity : (n,), of the point along the force, m/s.
+    force : (n,), of the hand on the point, N.
+    rest : speed up to which the point is at rest, m/s.
+    window : of the average, s, as in `identify_friction`.
+    """
+    found = identify_friction(time, velocity, force, rest, window)
+    return Backdrivability(found.static, found.dynamic, found.viscous, found.inertia)

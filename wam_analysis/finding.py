@@ -1,0 +1,57 @@
+"""What an analysis says: numbers with what was predicted for them, and sentences."""
+
+import math
+from typing import NamedTuple
+
+
+class Finding(NamedTuple):
+    """One number.
+
+    Attributes
+    ----------
+    name : what it is, with the part of the arm.
+    unit : '' for a pure number.
+    measured : from the recording; NaN where it was not to be seen.
+    predicted : by the theory for the recorded parameters; NaN where there is no prediction.
+    note : what limits either, '' where nothing.
+    """
+
+    name: str
+    unit: str
+    measured: float
+    predicted: float = math.nan
+    note: str = ""
+
+
+class Section(NamedTuple):
+    """One side of a recording.
+
+    Attributes
+    ----------
+    key : short name, the same in every version of the JSON.
+    title : for people.
+    said : sentences, the most important first.
+    findings : numbers.
+    lacking : topics that would have said more and are not in the bag.
+    """
+
+    key: str
+    title: str
+    said: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    lacking: tuple[str, ...] = ()
+
+
+def shown(value: float, unit: str = "") -> str:
+    """A number with its unit as people read it; '-' where it is not known."""
+    if math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return "none" if value > 0.0 else "-none"
+    text = f"{value:.3g}" if 1e-3 <= abs(value) < 1e4 or value == 0.0 else f"{value:.2e}"
+    return f"{text} {unit}".rstrip()
+
+
+def times(number: int) -> str:
+    """How often, in words: 'once', '3 times', 'never'."""
+    return {0: "never", 1: "once"}.get(number, f"{number} times")

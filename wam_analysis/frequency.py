@@ -1,0 +1,151 @@
+"""Frequency response of what was recorded, how far it can be believed, and its poles."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+
+ROUNDS = 30  # of the iteration of the fit; it settles in a few
+
+
+class FrequencyResponse(NamedTuple):
+    """Response of an output to an input.
+
+    Attributes
+    ----------
+    frequency : (k,), Hz, without zero.
+    response : (k,), complex, output per input.
+    coherence : (k,), 0 to 1: the part of the output that the input explains linearly.
+    excitation : (k,), power of the input over that where it is strongest.
+    segments : how many were averaged; with one only the coherence is 1 whatever was recorded.
+    """
+
+    frequency: Numbers
+    response: Complex
+    coherence: Numbers
+    excitation: Numbers
+    segments: int
+
+
+def frequency_response(rate: float, put: Numbers, got: Numbers, segment: int) -> FrequencyResponse:
+    """Response and coherence by averaging segments (Welch, Hann window, half overlapped).
+
+    Parameters
+    ----------
+    rate : Hz.
+    put, got : (n,), input and output.
+    segment : samples of a segment; the frequencies are `rate`/`segment` apart.
+
+    Raises
+    ------
+    ValueError
+        where the recording is shorter than two segments or the input does not move.
+    """
+    n = len(put)
+    if segment < 8 or n < 2 * segment or len(got) != n:
+        raise ValueError(
+            f"{n} samples of input, {len(got)} of output; two segments of {segment} (at least 8) are needed"
+        )
+    hop = segment // 2
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(segment) + 0.5) / segment)
+    begins = range(0, n - segment + 1, hop)
+    pp, gg, gp = np.zeros(hop + 1), np.zeros(hop + 1), np.zeros(hop + 1, dtype=np.complex128)
+    for begin in begins:
+        a, b = (np.fft.rfft(window * _level(x[begin : begin + segment]))[: hop + 1] for x in (put, got))
+        pp += np.abs(a) ** 2
+        gg += np.abs(b) ** 2
+        gp += b * np.conj(a)
+    if not np.any(pp[1:] > 0.0):
+        raise ValueError("the input does not move; there is no response to it")
+    floor = 1e-30 * float(np.max(pp)), 1e-30 * float(np.max(gg))
+    response = gp / np.maximum(pp, floor[0])
+    coherence = np.abs(gp) ** 2 / np.maximum(pp * gg, max(floor[0] * floor[1], 1e-300))
+    frequency = np.arange(hop + 1) * rate / segment
+    excitation = pp[1:] / np.max(pp[1:])
+    return FrequencyResponse(frequency[1:], response[1:], np.clip(coherence[1:], 0.0, 1.0), excitation, len(begins))
+
+
+def _level(values: Numbers) -> Numbers:
+    result: Numbers = values - np.mean(values)
+    return result
+
+
+def believable(found: FrequencyResponse, least_coherence: float, least_excitation: float) -> Mask:
+    """Frequencies, (k,), at which the input was strong enough and explains the output."""
+    return (found.coherence >= least_coherence) & (found.excitation >= least_excitation)
+
+
+def bandwidth(found: FrequencyResponse, believed: Mask) -> float:
+    """Frequency at which the response falls 3 dB below that at the lowest frequency that is believed, Hz.
+
+    Parameters
+    ----------
+    found : the response.
+    believed : (k,), the frequencies that are looked at, as `believable` finds them.
+
+    Returns
+    -------
+    float
+        NaN where nothing can be believed, infinite where it does not fall as far as can be seen.
+    """
+    rows = np.flatnonzero(believed)
+    if not len(rows):
+        return float("nan")
+    size = np.abs(found.response[rows])
+    below = np.flatnonzero(size < size[0] / np.sqrt(2.0))
+    return float(found.frequency[rows[below[0]]]) if len(below) else float("inf")
+
+
+def fit_poles(frequency: Numbers, response: Complex, weight: Numbers, zeros: int, poles: int) -> Complex:
+    """Poles of the rational function that fits a frequency response best.
+
+    The numerator has degree `zeros`, the denominator `poles`; the linear fit is repeated with the
+    last denominator as weight (Sanathanan and Koerner), which makes it one of the response itself.
+
+    Parameters
+    ----------
+    frequency : (k,), Hz.
+    response : (k,), complex.
+    weight : (k,), zero or more, for example coherence over (1 - coherence).
+    zeros, poles : degrees, zeros at most poles.
+
+    Returns
+    -------
+    (poles,), complex
+        rad/s, the slowest first.
+
+    Raises
+    ------
+    ValueError
+        where there are too few frequencies for the unknowns.
+    """
+    unknowns = zeros + 1 + poles
+    if not 0 <= zeros <= poles or poles < 1 or 2 * int(np.sum(weight > 0.0)) < unknowns:
+        raise ValueError(
+            f"{int(np.sum(weight > 0.0))} frequencies for {zeros} zeros and {poles} poles; "
+            "zeros must not be more than poles, and half as many frequencies as unknowns are needed"
+        )
+    scale = 2.0 * np.pi * float(np.median(frequency[weight > 0.0]))
+    s = 2j * np.pi * frequency / scale
+    powers = s[:, np.newaxis] ** np.arange(poles + 1)
+    last = np.ones(len(s), dtype=np.complex128)
+    denominator = np.ones(poles + 1)
+    for _ in range(ROUNDS):
+        row = np.sqrt(weight) / np.abs(last)
+        columns = row[:, np.newaxis] * np.hstack([powers[:, : zeros + 1], -response[:, np.newaxis] * powers[:, :poles]])
+        wanted = row * response * powers[:, poles]
+        a, b = np.vstack([columns.real, columns.imag]), np.concatenate([wanted.real, wanted.imag])
+        size = np.linalg.norm(a, axis=0)
+        solution = np.linalg.lstsq(a / size, b, rcond=None)[0] / size
+        denominator = np.append(solution[zeros + 1 :], 1.0)
+        now = powers @ denominator
+        if np.allclose(now, last, rtol=1e-10):
+            break
+        last = now
+    found = np.roots(denominator[::-1]).astype(np.complex128) * scale
+    order: Complex = found[np.argsort(np.abs(found), kind="stable")]
+    return order

@@ -1,0 +1,176 @@
+"""Friction of a motor or of a joint, identified from velocity and torque."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.runs import noise
+from wam_analysis.stick_slip_phases import stick_slip_phases
+
+Numbers = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FEWEST = 20  # samples in motion below which nothing is said
+STILL = 0.01  # of the speed of rest: below it the shaft has not begun to move
+PRECISE = 0.01  # of the torque: noise at a breakaway after the line
+JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
+
+
+class Friction(NamedTuple):
+    """What turns against a shaft, N m (or N), with standard errors; NaN where it was not to be seen.
+
+    Attributes
+    ----------
+    static : torque at which the shaft breaks away, median over the breakaways.  Those nearer to dynamic
+        friction than to the upper quartile are left out: what moves off at less was not quite at rest.
+    dynamic : torque of dry friction in motion.
+    viscous : torque per velocity.
+    inertia : torque per acceleration.
+    offset : torque that does not change its sign.
+    static_error, dynamic_error, viscous_error, inertia_error : standard errors of the first four.
+    breakaways : how many were seen.
+    """
+
+    static: float
+    dynamic: float
+    viscous: float
+    inertia: float
+    offset: float
+    static_error: float
+    dynamic_error: float
+    viscous_error: float
+    inertia_error: float
+    breakaways: int
+
+
+def identify_friction(
+    time: Numbers, velocity: Numbers, torque: Numbers, rest: float, window: float, use: Mask | None = None
+) -> Friction:
+    """Identify torque = F_dynamic sgn(v) + b v + J a + c in motion, and F_static where motion begins.
+
+    All columns are averaged by the same triangle of `window` seconds before the fit, so that the
+    acceleration is not drowned in noise and none is favoured; samples whose window holds a change
+    of direction are left out, and then those that the fit explains badly.  At a breakaway the
+    torque is that of a line through the end of the rest, from a quarter of
+    the window where there is no noise to all of it.
+
+    Parameters
+    ----------
+    time : (n,), s, at a constant rate.
+    velocity : (n,), of the shaft, rad/s.
+    torque : (n,), on the shaft, less what it passes on to the load, N m.
+    rest : speed up to which the shaft is at rest, rad/s.
+    window : s.
+    use : (n,), samples that may be used; None for all.
+
+    Returns
+    -------
+    Friction
+    """
+    n = len(time)
+    allowed = np.ones(n, dtype=np.bool_) if use is None else use.copy()
+    allowed &= np.isfinite(velocity) & np.isfinite(torque)
+    if n < FEWEST or int(np.sum(allowed)) < FEWEST:
+        return _UNSEEN
+    velocity, torque = np.where(allowed, velocity, 0.0), np.where(allowed, torque, 0.0)
+    period = float(time[-1] - time[0]) / (n - 1)
+    half = max(1, round(window / period / 2.0))
+    solution, errors = _in_motion(velocity, torque, rest, half, period, allowed)
+    dynamic, viscous, inertia, offset = solution
+    statics = _breakaways(velocity, torque - (0.0 if math.isnan(offset) else offset), rest, 2 * half, allowed)
+    if math.isfinite(dynamic):
+        statics = statics[statics >= dynamic]  # what moved at less was creeping
+        middle = (dynamic + float(np.percentile(statics, 75.0))) / 2.0 if len(statics) else math.nan
+        statics = statics[statics >= middle]
+    else:
+        statics = statics[:0]  # it never slid: what ended its rest was no breakaway
+    static = float(np.median(statics)) if len(statics) else math.nan
+    error = 1.4826 * float(np.median(np.abs(statics - static))) / math.sqrt(len(statics)) if len(statics) else math.nan
+    return Friction(static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics))
+
+
+_NAN = math.nan
+_UNSEEN = Friction(_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0)
+
+
+def _in_motion(
+    velocity: Numbers, torque: Numbers, rest: float, half: int, period: float, allowed: Mask
+) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
+    """Dynamic, viscous, inertia and offset by least squares, and the errors of the first three."""
+    nothing = ((math.nan,) * 4, (math.nan,) * 3)
+    triangle = np.pad(np.concatenate([np.arange(1, half + 2), np.arange(half, 0, -1)]).astype(float), 2)
+    slope = np.gradient(triangle / triangle.sum())
+    triangle /= triangle.sum()
+    if len(velocity) < len(triangle):
+        return nothing
+    reach = np.ones(len(triangle))
+    onward = np.convolve((allowed & (velocity > rest)).astype(float), reach, "same") > len(reach) - 0.5
+    back = np.convolve((allowed & (velocity < -rest)).astype(float), reach, "same") > len(reach) - 0.5
+    rows = np.flatnonzero(onward | back)
+    if len(rows) < FEWEST:
+        return nothing
+    v = np.convolve(velocity, triangle, "same")[rows]
+    acceleration = np.convolve(velocity, slope, "same")[rows] / period
+    columns = np.column_stack([np.where(onward[rows], 1.0, -1.0), v, acceleration, np.ones(len(rows))])
+    wanted = np.convolve(torque, triangle, "same")[rows]
+    return _robust(columns, wanted, len(triangle))
+
+
+def _robust(
+    columns: Numbers, wanted: Numbers, width: int
+) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
+    """Least squares without the samples that fit badly; a column that says nothing gives NaN.
+
+    `width` samples overlap in the averaging, so that the errors count one in so many.
+    """
+    scale = np.sqrt(np.mean(columns**2, axis=0))
+    both = bool(np.ptp(columns[:, 0]) > 0.0)  # one direction only: dry friction and offset look the same
+    used = [i for i in range(4) if scale[i] > 0.0 and (i != 3 or both)]
+    keep = np.ones(len(wanted), dtype=np.bool_)
+    solution, rest = np.zeros(len(used)), wanted
+    for _ in range(4):
+        if int(np.sum(keep)) < FEWEST:
+            break
+        a = columns[keep][:, used] / scale[used]
+        solution = np.linalg.lstsq(a, wanted[keep], rcond=None)[0]
+        rest = wanted - columns[:, used] / scale[used] @ solution
+        middle = float(np.median(rest[keep]))
+        sd = 1.4826 * float(np.median(np.abs(rest[keep] - middle)))
+        keep = np.abs(rest - middle) <= max(JUMP * sd, 1e-12)
+    a = columns[keep][:, used] / scale[used]
+    freedom = max(len(a) / width - len(used), 1.0)
+    covariance = np.linalg.pinv(a.T @ a) * float(np.sum(rest[keep] ** 2)) / freedom
+    found, errors = np.full(4, math.nan), np.full(4, math.nan)
+    found[used] = solution / scale[used]
+    errors[used] = np.sqrt(np.diag(covariance)) / scale[used]
+    return (
+        (float(found[0]), float(found[1]), float(found[2]), float(found[3])),
+        (float(errors[0]), float(errors[1]), float(errors[2])),
+    )
+
+
+def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> Numbers:
+    """Torque against the rest at the end of each stick, with the sign of the slip that follows."""
+    sd = noise(velocity[np.abs(velocity) <= rest])
+    phases = stick_slip_phases(velocity, max(3.0 * sd, STILL * rest), max(window // 4, 1))
+    begins = {int(begin): direction for (begin, _), direction in zip(phases.slips, phases.directions, strict=True)}
+    level = float(np.percentile(np.abs(torque), 90.0))
+    needed = (2.0 * noise(torque) / (PRECISE * level)) ** 2 if level > 0.0 else 0.0
+    length = int(np.clip(needed, max(window // 4, 4), max(window, 4)))
+    found = []
+    for begin, end in phases.sticks:
+        still = np.flatnonzero(np.abs(velocity[begin:end]) <= max(sd, STILL * rest))
+        last = int(begin + still[-1]) + 1 if len(still) else int(begin)
+        first = max(int(begin), last - length)
+        if int(end) not in begins or last - first < 4 or not np.all(allowed[first:last]):
+            continue
+        found.append(begins[int(end)] * _end_of_line(torque[first:last]))
+    return np.array(found, dtype=np.float64)
+
+
+def _end_of_line(values: Numbers) -> float:
+    """Last value of a line through the values."""
+    steps = np.arange(len(values)) + 1.0 - len(values)
+    return float(np.polynomial.polynomial.polyfit(steps, values, 1)[0])

@@ -1,0 +1,187 @@
+"""Each force that was asked for: how it was reached and held, and what the theory says of it."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.demo_traces import Signal
+from wam_analysis.force_accuracy import ForceAccuracy, force_accuracy
+from wam_analysis.limit_cycle import NO_CYCLE, Cycle, limit_cycle
+from wam_analysis.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
+from wam_analysis.recording import Hold, Recording, by_names
+from wam_analysis.response import StepResponse, step_response
+from wam_analysis.runs import noise
+from wam_analysis.stability import Stability, Verdict, stability
+
+Numbers = NDArray[np.float64]
+
+STEADY = 0.4  # part of a hold, at its end, that counts as steady
+CYCLING = 0.7  # part of it in which a limit cycle is looked for
+BAND = 0.05  # of the step: settled within it
+LOUD = 0.1  # of the force: an error that stays within it has settled
+LEAST_STEP = 0.1  # of the force; less is no step
+FEW = 20  # samples below which a signal is not looked at
+UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
+
+
+class HeldForce(NamedTuple):
+    """A hold with its signals along the force, N, and what they show.
+
+    Attributes
+    ----------
+    time, measured : (n,), s from the begin, and the force that the loop measured.
+    time_true, applied : (m,), the same of the simulator's truth; empty where it was not recorded.
+    response : of the measured force; None where there is no step.
+    measured_accuracy, applied_accuracy : in the steady part.
+    cycle : of the applied force in its last 70 %, else of the measured one.
+    stability : of the error.
+    node, predicted, largest : of the theory; None where the bag does not say enough.
+    place : where it pressed, m.
+    """
+
+    hold: Hold
+    time: Numbers
+    measured: Numbers
+    time_true: Numbers
+    applied: Numbers
+    response: StepResponse | None
+    measured_accuracy: ForceAccuracy
+    applied_accuracy: ForceAccuracy
+    cycle: Cycle
+    stability: Stability
+    node: Node | None
+    predicted: Predicted | None
+    largest: LargestForce | None
+    place: float
+
+
+def held_forces(recording: Recording) -> tuple[HeldForce, ...]:
+    """Look at every hold of a recording."""
+    return tuple(_held(recording, hold) for hold in recording.holds)
+
+
+def _held(recording: Recording, hold: Hold) -> HeldForce:
+    time, measured = _measured(recording, hold)
+    traces = recording.summary.traces
+    rows = traces.during(hold.begin, hold.end) & traces.asked.acts
+    time_true = (traces.stamp[rows] - hold.begin) / 1e9
+    applied = traces.along(traces.true, -1.0)[rows]
+    if not np.any(np.isfinite(applied)):
+        time_true, applied = np.empty(0), np.empty(0)
+    duration = (hold.end - hold.begin) / 1e9
+    late, late_true = time >= (1.0 - STEADY) * duration, time_true >= (1.0 - STEADY) * duration
+    swings, swings_true = time >= (1.0 - CYCLING) * duration, time_true >= (1.0 - CYCLING) * duration
+    cover, place = _touched(recording, hold)
+    node, predicted, largest = _theory(recording, hold, cover, place)
+    return HeldForce(
+        hold=hold,
+        time=time,
+        measured=measured,
+        time_true=time_true,
+        applied=applied,
+        response=_response(hold, time, measured, STEADY * duration),
+        measured_accuracy=force_accuracy(np.full(int(np.sum(late)), hold.asked), measured[late]),
+        applied_accuracy=force_accuracy(np.full(int(np.sum(late_true)), hold.asked), applied[late_true]),
+        cycle=_cycle(time_true[swings_true], applied[swings_true])
+        or _cycle(time[swings], measured[swings])
+        or NO_CYCLE,
+        stability=_stability(hold, measured),
+        node=node,
+        predicted=predicted,
+        largest=largest,
+        place=place,
+    )
+
+
+def _measured(recording: Recording, hold: Hold) -> tuple[Numbers, Numbers]:
+    columns = recording.wrench("force_measured")
+    if columns is None:
+        return np.empty(0), np.empty(0)
+    a, b = np.searchsorted(columns.stamp_ns, [hold.begin, hold.end])
+    along: Numbers = columns.force[a:b] @ (hold.force / hold.asked)
+    good = np.isfinite(along)
+    return (columns.stamp_ns[a:b][good] - hold.begin) / 1e9, along[good]
+
+
+def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> StepResponse | None:
+    if len(time) < FEW:
+        return None
+    begin = float(measured[0])
+    if abs(hold.asked - begin) < max(4.0 * noise(measured), LEAST_STEP * hold.asked):
+        return None
+    try:
+        return step_response(time, measured, begin, steady, BAND)
+    except ValueError:
+        return None
+
+
+def _cycle(time: Numbers, value: Numbers) -> Cycle | None:
+    good = np.isfinite(value)
+    return limit_cycle(time[good], value[good]) if int(np.sum(good)) >= FEW and np.mean(good) > 0.95 else None
+
+
+def _stability(hold: Hold, measured: Numbers) -> Stability:
+    if len(measured) < FEW:
+        return UNDECIDED
+    return stability(hold.asked - measured, max(LOUD * hold.asked, 4.0 * noise(measured)))
+
+
+def _touched(recording: Recording, hold: Hold) -> tuple[str, float]:
+    """Cover and place of the contact by the truth, else by the estimate, else as the force loop takes it."""
+    traces, loop = recording.summary.traces, recording.parameters.force_loop
+    rows = traces.during(hold.begin, hold.end)
+    for signal in (traces.true, traces.felt):
+        found = _median_place(signal, rows & signal.acts)
+        if found[0]:
+            return found
+    return (loop.contact_cover, loop.contact_place) if loop is not None else ("", math.nan)
+
+
+def _median_place(signal: Signal, rows: NDArray[np.bool_]) -> tuple[str, float]:
+    if not np.any(rows):
+        return "", math.nan
+    cover = Counter(signal.frame[rows].tolist()).most_common(1)[0][0]
+    places = signal.place[rows & (signal.frame == cover)]
+    places = places[np.isfinite(places)]
+    return (str(cover), float(np.median(places))) if len(places) else ("", math.nan)
+
+
+def _theory(
+    recording: Recording, hold: Hold, cover: str, place: float
+) -> tuple[Node | None, Predicted | None, LargestForce | None]:
+    parameters = recording.parameters
+    arm = parameters.arm
+    if arm is None or cover not in arm.covers.names:
+        return None, None, None
+    joints = next(
+        (columns for name in ("sim/joint_states", "joint_states") if (columns := recording.joints(name)) is not None),
+        None,
+    )
+    positions = None if joints is None else by_names(joints, "position", arm.joints.names)
+    if joints is None or positions is None:
+        return None, None, None
+    middle = (hold.begin + hold.end) // 2
+    row = max(int(np.searchsorted(joints.stamp_ns, middle, side="right")) - 1, 0)
+    q = positions[row].tolist()
+    direction = hold.force
+    if hold.frame not in arm.covers.names or not np.all(np.isfinite(q)):
+        return None, None, None
+    node = node_at(parameters, arm, q, hold.frame, place, direction) if hold.frame == cover else None
+    largest = largest_force(arm, q, hold.frame, place, direction)
+    loop, timing = parameters.force_loop, parameters.timing
+    predicted = None
+    if node is not None and loop is not None and timing is not None and loop.mode == "hybrid":
+        delay = math.ceil(timing.outer_delay / timing.outer_divisor)
+        gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
+        predicted = predict(node, gain, proportional, timing.outer_period_ns / 1e9, delay)
+    return node, predicted, largest
+
+
+def _along(gains: Sequence[float], force: Numbers) -> float:
+    """Gain of the axes x y z, or one for all, in the direction of a force."""
+    share = (force / float(np.linalg.norm(force))) ** 2
+    return float(np.broadcast_to(gains, 3) @ share)

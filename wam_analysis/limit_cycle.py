@@ -1,0 +1,155 @@
+"""Limit cycles in a recording: how large, how long, and how sure."""
+
+import math
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.runs import noise
+
+Numbers = NDArray[np.float64]
+
+PHASES = 192  # of a cycle that are told apart, where there are samples enough
+LEAST = 8  # samples for each of them
+FEWEST = 3  # cycles that make one
+ALIKE = 0.9  # of the highest correlation: the shortest lag that is as good is the period, not a multiple of it
+
+
+class Cycle(NamedTuple):
+    """A periodic motion.
+
+    Attributes
+    ----------
+    peak_to_peak : of the mean cycle, in the unit of the signal; NaN where none was found.
+    period : s; NaN where none was found.
+    cycles : how many of them the recording holds.
+    confidence : 0 to 1: the part of the motion that the mean cycle explains, less what its size
+        changes from the first half to the second.  Noise and single transients are near 0.
+    growth : size of the second half over that of the first; 1 for a limit cycle.
+    shape : (phases,), the mean cycle from its lowest phase on.
+    """
+
+    peak_to_peak: float
+    period: float
+    cycles: float
+    confidence: float
+    growth: float
+    shape: Numbers
+
+
+NO_CYCLE = Cycle(math.nan, math.nan, 0.0, 0.0, math.nan, np.empty(0))
+
+
+def limit_cycle(time: Numbers, value: Numbers) -> Cycle:
+    """Find the cycle that repeats in a signal.
+
+    The period is the lag at which the signal is most like itself, refined over as many cycles as
+    there are; the signal is then folded on it, so that noise averages out and a sawtooth or a jump
+    keeps its height.  A linear drift does not count.
+
+    Parameters
+    ----------
+    time : (n,), s, at a constant rate.
+    value : (n,), the signal, without NaN.
+
+    Returns
+    -------
+    Cycle
+        with confidence 0 where nothing repeats at least three times.
+    """
+    n = len(value)
+    if n < 4 * FEWEST or float(np.ptp(value)) == 0.0:
+        return NO_CYCLE
+    seconds = float(time[-1] - time[0]) / (n - 1)
+    centre = np.linspace(-1.0, 1.0, n)
+    flat = value - np.mean(value)
+    flat = flat - centre * float(centre @ flat) / float(centre @ centre)
+    lag = _period(flat)
+    if math.isnan(lag):
+        return NO_CYCLE
+    phase = np.arange(n) / lag % 1.0
+    phases = max(min(PHASES, n // LEAST), 2)
+    folded = _fold(flat, phase, phases)
+    half = n // 2
+    first, second = (_fold(flat[rows], phase[rows], phases).size for rows in (slice(half), slice(half, n)))
+    growth = second / first if first > 0.0 else math.inf
+    change = abs(second - first) / max(first, second, 1e-300)
+    return Cycle(
+        peak_to_peak=folded.size,
+        period=lag * seconds,
+        cycles=n / lag,
+        confidence=max(0.0, folded.explained - change),
+        growth=growth,
+        shape=np.roll(folded.shape, -int(np.argmin(folded.shape))) + float(np.mean(value)),
+    )
+
+
+def _period(flat: Numbers) -> float:
+    """Lag of the first of the highest peaks of the autocorrelation, in samples, refined; NaN for none."""
+    n = len(flat)
+    size = 1 << (2 * n - 1).bit_length()
+    power = np.abs(np.fft.rfft(flat, size)) ** 2
+    longest = n // FEWEST + 1
+    likeness = np.fft.irfft(power, size)[: n // 2 + 2] / (n - np.arange(n // 2 + 2))
+    negative = np.flatnonzero(likeness[:longest] < 0.0)
+    if not len(negative):
+        return math.nan
+    first = int(negative[0])
+    inner = likeness[first + 1 : longest]
+    peaks = (
+        first
+        + 1
+        + np.flatnonzero((inner >= likeness[first:][: len(inner)]) & (inner > likeness[first + 2 :][: len(inner)]))
+    )
+    peaks = peaks[likeness[peaks] > 0.0]
+    if not len(peaks):
+        return math.nan
+    guess = _top(likeness, int(peaks[likeness[peaks] >= ALIKE * np.max(likeness[peaks])][0]))
+    times = 2
+    while times * guess < n / 2.0 - 1.0:
+        reach = max(2, int(guess / 4.0))
+        middle = round(times * guess)
+        low, high = max(middle - reach, 1), min(middle + reach + 1, len(likeness) - 1)
+        if high - low < 3:
+            break
+        guess = _top(likeness, low + int(np.argmax(likeness[low:high]))) / times
+        times *= 2
+    return guess
+
+
+def _top(values: Numbers, row: int) -> float:
+    """Where the parabola through a sample and its two neighbours is highest."""
+    if not 0 < row < len(values) - 1:
+        return float(row)
+    a, b, c = (float(v) for v in values[row - 1 : row + 2])
+    bend = a - 2.0 * b + c
+    return row + 0.5 * (a - c) / bend if bend < 0.0 else float(row)
+
+
+class _Folded(NamedTuple):
+    """The mean cycle, its peak to peak, and the part of the variance that it explains beyond chance."""
+
+    shape: Numbers
+    size: float
+    explained: float
+
+
+def _fold(flat: Numbers, phase: Numbers, phases: int) -> _Folded:
+    cell = np.minimum((phase * phases).astype(np.int64), phases - 1)
+    count = np.bincount(cell, minlength=phases)
+    shape = np.bincount(cell, flat, phases) / np.maximum(count, 1)
+    known = np.flatnonzero(count)
+    shape = np.interp(np.arange(phases), known, shape[known], period=phases)
+    rest = float(np.sum((flat - shape[cell]) ** 2)) / max(len(flat) - len(known), 1)
+    whole = float(np.sum((flat - np.mean(flat)) ** 2)) / max(len(flat) - 1, 1)
+    scatter = math.sqrt(min(rest, noise(flat) ** 2) / max(len(flat) / phases, 1.0))
+    size = float(np.ptp(shape)) - _luck(np.max(shape) - shape, scatter) - _luck(shape - np.min(shape), scatter)
+    return _Folded(shape, max(size, 0.0), max(0.0, 1.0 - rest / whole) if whole > 0.0 else 0.0)
+
+
+def _luck(below: Numbers, scatter: float) -> float:
+    """How much the highest of the phases on a plateau owes to noise: the expected largest of so many draws."""
+    rivals = int(np.sum(below <= 4.0 * scatter))
+    return scatter * NormalDist().inv_cdf((rivals - 0.375) / (rivals + 0.25)) if rivals > 1 else 0.0

@@ -1,0 +1,108 @@
+"""Timing of the loop from stamps and times of reception."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Times = NDArray[np.int64]
+Numbers = NDArray[np.float64]
+
+
+class StampTiming(NamedTuple):
+    """How regularly a topic came.
+
+    Attributes
+    ----------
+    messages : how many came.
+    period : between two stamps, median, s.
+    missed : periods without a message.
+    longest_gap : between two stamps, s.
+    backwards : stamps that are not later than the one before.
+    interval : between two receptions, mean, s; NaN where they were not recorded.
+    jitter : standard deviation of it, s.
+    jitter_p99 : 99th percentile of |interval - period|, s.
+    worst : longest interval between two receptions, s.
+    """
+
+    messages: int
+    period: float
+    missed: int
+    longest_gap: float
+    backwards: int
+    interval: float
+    jitter: float
+    jitter_p99: float
+    worst: float
+
+
+class Latency(NamedTuple):
+    """Time from the reception of a message to that of its answer, which bears the same stamp, s.
+
+    Attributes
+    ----------
+    answered : messages that were answered.
+    unanswered : messages between the first and the last answered one that were not.
+    p50, p99, worst : s.
+    """
+
+    answered: int
+    unanswered: int
+    p50: float
+    p99: float
+    worst: float
+
+
+def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
+    """Regularity of one topic.
+
+    Parameters
+    ----------
+    stamp : (n,), ns, as the messages bear it.
+    received : (n,), ns, when each came by the clock of the recorder; None where that says nothing,
+        as in lockstep bags, where it is the stamp.
+    """
+    if len(stamp) < 2:
+        return StampTiming(len(stamp), math.nan, 0, math.nan, 0, math.nan, math.nan, math.nan, math.nan)
+    steps = np.diff(stamp)
+    forward = steps[steps > 0]
+    period = float(np.median(forward)) if len(forward) else math.nan
+    skipped = np.rint(forward / period).astype(np.int64) - 1 if len(forward) else np.zeros(0, dtype=np.int64)
+    interval = jitter = p99 = worst = math.nan
+    if received is not None:
+        intervals: Numbers = np.diff(np.sort(received).astype(np.float64)) / 1e9
+        interval, jitter = float(np.mean(intervals)), float(np.std(intervals))
+        p99 = float(np.percentile(np.abs(intervals - period / 1e9), 99.0))
+        worst = float(np.max(intervals))
+    return StampTiming(
+        messages=len(stamp),
+        period=period / 1e9,
+        missed=int(np.sum(np.maximum(skipped, 0))),
+        longest_gap=float(np.max(steps)) / 1e9,
+        backwards=int(np.sum(steps <= 0)),
+        interval=interval,
+        jitter=jitter,
+        jitter_p99=p99,
+        worst=worst,
+    )
+
+
+def latency(stamp: Times, received: Times, answer_stamp: Times, answer_received: Times) -> Latency:
+    """Time from a state to the command that bears its stamp.
+
+    Parameters
+    ----------
+    stamp, received : (n,), ns, of the states.
+    answer_stamp, answer_received : (m,), ns, of the commands; the first answer to a stamp counts.
+    """
+    _, first_state = np.unique(stamp, return_index=True)
+    known, first = np.unique(answer_stamp, return_index=True)
+    common, at_state, at_answer = np.intersect1d(stamp[first_state], known, assume_unique=True, return_indices=True)
+    if not len(common):
+        return Latency(0, 0, math.nan, math.nan, math.nan)
+    asked, given = received[first_state[at_state]], answer_received[first[at_answer]]
+    seconds = (given - asked).astype(np.float64) / 1e9
+    between = (stamp[first_state] >= common[0]) & (stamp[first_state] <= common[-1])
+    p50, p99 = (float(p) for p in np.percentile(seconds, [50.0, 99.0]))
+    return Latency(len(common), int(np.sum(between)) - len(common), p50, p99, float(np.max(seconds)))

@@ -1,0 +1,237 @@
+"""What the theory says of a press with the recorded parameters: the friction node at the contact.
+
+The arm is reduced to the node of figure 5.4 along the force that is asked for: joints move as the
+force loop moves them, dq/dx = J^T d/|J^T d|^2, which carries friction and damping over by power;
+stiffness and inertia are those that a force along d feels.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.recorded import RecordedParameters
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_theory import linear_loop, regimes, stiction
+
+Numbers = NDArray[np.float64]
+
+CERTAIN = 0.1  # left side of (5.11) up to which (5.8) and (5.9) are exact enough to be compared
+
+
+class Node(NamedTuple):
+    """The friction node at the contact, along the force: SI units with N and m.
+
+    Attributes
+    ----------
+    transmission_stiffness, contact_stiffness : k_tr, k_c, N/m; k_c NaN where the surface is not known.
+    driven_stiffness : k_tr in series with what the speed loops give way, N/m; NaN where they are not
+        known.  The integral of a speed loop is a spring about the path that it is asked to follow.
+    inertia : J_l, kg, of the joint side.
+    damping : b, N s/m, of joints, cables and surface together: the motor's own speed counts as slow.
+    static_friction, dynamic_friction : N.
+    joint_per_metre : (n,), dq/dx, rad/m.
+    """
+
+    transmission_stiffness: float
+    driven_stiffness: float
+    contact_stiffness: float
+    inertia: float
+    damping: float
+    static_friction: float
+    dynamic_friction: float
+    joint_per_metre: Numbers
+
+
+class Predicted(NamedTuple):
+    """Chapter 5 for a node under integral force control; NaN where it does not say.
+
+    Attributes
+    ----------
+    gamma, zeta : (5.15), (5.12).
+    regime : in words.
+    time_constant : of the frictionless loop, 1/(G_I K), s, (5.2).
+    routh_gain : largest linearly stable G_I, continuous, m/s/N.
+    sampled_gain : the same with the recorded hold and delay, m/s/N.
+    force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected.
+    actuator_peak_to_peak : Coulomb cycle of the motor, m at the contact, (5.20).
+    is_certain : whether (5.11) is small enough for (5.8), (5.9).
+    driven_peak_to_peak, driven_period : (5.8), (5.9) with the speed loops in series with the cables.
+    """
+
+    gamma: float
+    zeta: float
+    regime: str
+    time_constant: float
+    routh_gain: float
+    sampled_gain: float
+    force_peak_to_peak: float
+    period: float
+    actuator_peak_to_peak: float
+    is_certain: bool
+    driven_peak_to_peak: float
+    driven_period: float
+
+
+def node_at(
+    recorded: RecordedParameters, arm: Arm, q: Sequence[float], cover: str, place: float, direction: Numbers
+) -> Node | None:
+    """The node that a force meets; None where the place cannot press that way.
+
+    Parameters
+    ----------
+    recorded : for what the arm touches.
+    arm : the arm.
+    q : (n,), rad.
+    cover, place : where it touches, m.
+    direction : (3,), of the force, in the cover's frame.
+    """
+    body = RigidBody(arm)
+    size = float(np.linalg.norm(direction))
+    axis = body.cover_pose(q, cover).rotation @ (direction / size)
+    along = axis @ body.point_jacobian(q, cover, (place, 0.0, 0.0))
+    square = float(along @ along)
+    if square <= 1e-6:
+        return None
+    ratio = TransmissionMap.of(arm).motor_from_joint
+    stiffness = ratio.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ ratio
+    inertia = body.mass_matrix(q) + np.diag(arm.joints.armature)
+    gives = float(along @ np.linalg.solve(stiffness, along))
+    moves = along / square
+    cables = np.array([circuit.damping for circuit in arm.circuits])
+    surface = _surface(recorded, arm, cover, place)
+    return Node(
+        transmission_stiffness=1.0 / gives,
+        driven_stiffness=1.0 / (gives + _servo_compliance(recorded, ratio, along)),
+        contact_stiffness=surface.stiffness,
+        inertia=1.0 / float(along @ np.linalg.solve(inertia, along)),
+        damping=float(np.array(arm.joints.viscous_friction) @ moves**2 + cables @ (ratio @ moves) ** 2)
+        + surface.damping,
+        static_friction=float(np.array(arm.joints.static_friction) @ np.abs(moves)),
+        dynamic_friction=float(np.array(arm.joints.dynamic_friction) @ np.abs(moves)),
+        joint_per_metre=moves,
+    )
+
+
+def _servo_compliance(recorded: RecordedParameters, ratio: Numbers, along: Numbers) -> float:
+    """What the speed loops give way along the force, m/N."""
+    loop = recorded.velocity_loop
+    if loop is None or not all(gain > 0.0 for gain in loop.integral_gain):
+        return math.nan
+    return float(along @ np.linalg.solve(ratio.T @ np.diag(loop.integral_gain) @ ratio, along))
+
+
+class _Surface(NamedTuple):
+    stiffness: float
+    damping: float
+
+
+def _surface(recorded: RecordedParameters, arm: Arm, cover: str, place: float) -> _Surface:
+    """What is touched, N/m and N s/m: the spring under the joint, else the obstacles if all are alike."""
+    link = arm.covers.links[arm.covers.names.index(cover)]
+    joint = arm.joints.names[arm.links.names.index(link)]
+    springs = recorded.springs
+    for name, stiffness, lever in zip(springs.joints, springs.stiffness, springs.lever, strict=True):
+        if name == joint and stiffness > 0.0 and place > 0.0:
+            return _Surface(stiffness * (lever / place) ** 2, 0.0)
+    obstacles = recorded.obstacles
+    found = set(zip(obstacles.stiffness, obstacles.damping, strict=True)) if obstacles is not None else set()
+    return _Surface(*found.pop()) if len(found) == 1 else _Surface(math.nan, 0.0)
+
+
+def predict(node: Node, gain: float, proportional_gain: float, sample_period: float, delay_samples: int) -> Predicted:
+    """Chapter 5 for a node.
+
+    Parameters
+    ----------
+    node : with all numbers known.
+    gain, proportional_gain : G_I, m/s/N, and G_P, m/N, which counts in Routh's criterion alone, (5.23).
+    sample_period : of the force loop, s.
+    delay_samples : of the force loop, rounded up.
+    """
+    j, b, ktr, kc = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
+    if not (gain > 0.0 and b > 0.0 and math.isfinite(kc)):
+        nan = math.nan
+        return Predicted(nan, nan, "not known", nan, nan, nan, nan, nan, nan, False, nan, nan)
+    zeta, gamma = (
+        float(linear_loop.damping_ratio(j, b, ktr, kc)),
+        float(linear_loop.gain_ratio(gain, j, b, ktr, kc, proportional_gain)),
+    )
+    fs, fd = node.static_friction, node.dynamic_friction
+    has_stiction = fs > fd
+    driven_force = driven_period = math.nan
+    if math.isfinite(node.driven_stiffness):
+        soft = node.driven_stiffness
+        slow = float(linear_loop.damping_ratio(j, b, soft, kc))
+        driven_force = float(stiction.stiction_cycle_force(soft, kc, fs, fd, slow))
+        driven_period = float(stiction.stiction_cycle_period(gain, soft, kc, fs, fd, slow))
+    certain = float(stiction.stiction_cycle_number(gain, j, b, ktr, kc)) <= CERTAIN
+    return Predicted(
+        gamma=gamma,
+        zeta=zeta,
+        regime=_regime(gamma, zeta, has_stiction),
+        time_constant=float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(ktr, kc))),
+        routh_gain=float(linear_loop.routh_gain(j, b, ktr, kc, proportional_gain)),
+        sampled_gain=linear_loop.sampled_margin(j, b, ktr, kc, sample_period, delay_samples).gain,
+        force_peak_to_peak=float(stiction.stiction_cycle_force(ktr, kc, fs, fd, zeta)),
+        period=float(stiction.stiction_cycle_period(gain, ktr, kc, fs, fd, zeta)),
+        actuator_peak_to_peak=float(regimes.actuator_cycle(fd, ktr, gamma, zeta)),
+        is_certain=certain,
+        driven_peak_to_peak=driven_force,
+        driven_period=driven_period,
+    )
+
+
+def _regime(gamma: float, zeta: float, has_stiction: bool) -> str:
+    """The regime in words (docs of `wam_theory.regimes`)."""
+    if gamma >= float(regimes.gamma_3(zeta)):
+        return "unstable for every step (domain III)"
+    if gamma >= 1.0:
+        return "stable for small steps only (domain II)"
+    if has_stiction:
+        return "stable, with a stiction limit cycle where it comes to a standstill"
+    if gamma >= float(regimes.gamma_b(zeta)):
+        return "stable, the motor cycles about the force (domain I)"
+    if gamma >= float(regimes.gamma_a(zeta)):
+        return "stable, approaches in a staircase from one side"
+    return "stable, slides straight to the force"
+
+
+class LargestForce(NamedTuple):
+    """Largest force that the arm can press with, N, and what gives out first."""
+
+    force: float
+    limited_by: str
+
+
+def largest_force(arm: Arm, q: Sequence[float], cover: str, place: float, direction: Numbers) -> LargestForce:
+    """Largest controllable force by 3.2.1: peak torques of the motors and strength of the cables.
+
+    Parameters
+    ----------
+    arm, q, cover, place, direction : as in `node_at`; gravity is carried beside it.
+    """
+    body = RigidBody(arm)
+    axis = body.cover_pose(q, cover).rotation @ (direction / float(np.linalg.norm(direction)))
+    torque = axis @ body.point_jacobian(q, cover, (place, 0.0, 0.0))
+    transmission = TransmissionMap.of(arm)
+    motor = np.array(transmission.motor_torques(torque.tolist()))  # per newton
+    carried = np.array(transmission.motor_torques(body.gravity_torque(q).tolist()))
+    best = LargestForce(math.inf, "nothing")
+    for i, name in enumerate(arm.motors.names):
+        if abs(motor[i]) < 1e-9:
+            continue
+        circuit = arm.circuits[i]
+        taut = 2.0 * (circuit.breaking_strength - circuit.pretension) * circuit.radius
+        cable = (
+            taut if taut <= 2.0 * circuit.pretension * circuit.radius else circuit.breaking_strength * circuit.radius
+        )
+        for limit, what in ((arm.motors.peak_torque[i], f"peak torque of {name}"), (cable, f"cable of {name}")):
+            room = limit - math.copysign(1.0, motor[i]) * carried[i]
+            if room / abs(motor[i]) < best.force:
+                best = LargestForce(max(room, 0.0) / abs(float(motor[i])), what)
+    return best

@@ -1,0 +1,265 @@
+"""A bag for the Rerun viewer: the arm that moves, the forces on it, and plots.
+
+Rerun comes with the extra 'view' and is imported only when it is needed.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+
+from wam_analysis.arm_picture import side_view
+from wam_analysis.bag import JointColumns
+from wam_analysis.demo_figure import ASKED, FELT, MEASURED, METRES_PER_NEWTON, TRUE
+from wam_analysis.demo_traces import Signal, messages_of, node_of, values_of
+from wam_analysis.recorded import RecordedArm, recorded_arm
+from wam_analysis.recording import Recording, by_names
+from wam_analysis.sections_timing import STAMPED
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
+
+Numbers = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+APPLICATION = "wam_stack"
+TIMELINE = "time"
+DISTANCE = 1.3  # of the eye, in heights of what it sees
+POSES = 100.0  # poses of the arm in a second at most
+COLOURS = {"asked": ASKED, "applied": TRUE, "measured": MEASURED, "estimated": FELT}  # as in all our pictures
+
+
+class NoViewerError(OSError):
+    """Rerun is not installed."""
+
+
+def load_rerun() -> Any:
+    """The module of Rerun.
+
+    Raises
+    ------
+    NoViewerError
+        where it is not installed; the message says how to install it.
+    """
+    try:
+        import rerun
+        import rerun.blueprint
+    except ImportError as error:
+        raise NoViewerError(f"Rerun is not installed ({error}); pip install 'wam_stack[view]', or rerun-sdk") from error
+    return rerun
+
+
+def view(recording: Recording, save: Path | None) -> str:
+    """Log a recording, into a file or into a viewer that is opened.
+
+    Parameters
+    ----------
+    recording : of a bag.
+    save : .rrd file to write; None opens the viewer.
+
+    Returns
+    -------
+    str
+        what was logged, in a line.
+
+    Raises
+    ------
+    NoViewerError
+        where Rerun is not installed.
+    ValueError
+        where the bag has nothing to look at.
+    """
+    rerun = load_rerun()
+    arm = recorded_arm(recording.bag, recording.namespace)
+    joints = _joints(recording, arm.arm)
+    if joints is None and not any(isinstance(c, JointColumns) for c in recording.bag.topics.values()):
+        raise ValueError(f"{recording.bag.path} has no joint states; there is nothing to view")
+    stream = rerun.RecordingStream(APPLICATION, recording_id=recording.bag.path.name)
+    if save is None:
+        stream.spawn(default_blueprint=_blueprint(rerun, arm, joints))
+    else:
+        stream.save(save, default_blueprint=_blueprint(rerun, arm, joints))
+    zero = _zero(recording)
+    poses = 0
+    if joints is not None:
+        poses = _log_arm(rerun, stream, arm, joints, zero)
+        _log_contacts(rerun, stream, recording, arm.arm, joints, zero)
+    _log_plots(rerun, stream, recording, zero)
+    _log_status(rerun, stream, recording, zero)
+    stream.flush()
+    return f"{poses} poses of the arm, {len(recording.summary.traces.stamp)} instants of its forces"
+
+
+def _joints(recording: Recording, arm: Arm) -> tuple[Times, Numbers] | None:
+    """Stamps and angles of the arm's joints, as near to the truth as the bag has them, POSES a second."""
+    for name in ("sim/joint_states", "joint_sensors", "joint_states"):
+        columns = recording.joints(name)
+        angles = None if columns is None else by_names(columns, "position", arm.joints.names)
+        if columns is not None and angles is not None:
+            good = np.flatnonzero(np.all(np.isfinite(angles), axis=1))
+            steps = np.diff(columns.stamp_ns[good])
+            period = float(np.median(steps)) / 1e9 if len(steps) else 1.0
+            some = good[:: max(1, round(1.0 / (POSES * period)))]
+            return columns.stamp_ns[some], angles[some]
+    return None
+
+
+def _zero(recording: Recording) -> int:
+    topics = recording.bag.topics.values()
+    return min((int(c.stamp_ns[0]) for c in topics if isinstance(c, STAMPED) and len(c.stamp_ns)), default=0)
+
+
+def _blueprint(rerun: Any, recorded: RecordedArm, joints: tuple[Times, Numbers] | None) -> Any:
+    """The arm on the left, seen from the side as in our pictures; plots and status on the right."""
+    show = rerun.blueprint
+    eye = None
+    if joints is not None and len(joints[1]):
+        side = side_view(recorded.arm, joints[1][len(joints[1]) // 2].tolist(), recorded.obstacles, aspect=1.0)
+        position = side.centre - DISTANCE * side.height * side.axes[2]
+        eye = show.EyeControls3D(position=position, look_target=side.centre, eye_up=[0.0, 0.0, 1.0])
+    plots = [show.TimeSeriesView(origin=f"/plots/{name}", name=name) for name in ("force", "place", "joints")]
+    right = show.Vertical(*plots, show.TextLogView(origin="/status", name="status"))
+    left = show.Spatial3DView(origin="/arm", name="arm", eye_controls=eye)
+    return show.Blueprint(
+        show.Horizontal(left, right), show.TimePanel(expanded=False, timeline=TIMELINE), collapse_panels=True
+    )
+
+
+def _times(rerun: Any, stamps: Times, zero: int) -> list[Any]:
+    return [rerun.TimeColumn(TIMELINE, duration=(stamps - zero) / 1e9)]
+
+
+def _log_arm(rerun: Any, stream: Any, recorded: RecordedArm, joints: tuple[Times, Numbers], zero: int) -> int:
+    """Covers as capsules that move, obstacles where they stand; returns the number of poses."""
+    arm, covers = recorded.arm, recorded.arm.covers
+    stream.log("arm", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    body = RigidBody(arm)
+    for i, cover in enumerate(covers.names):
+        start, end = (np.array(point[3 * i : 3 * i + 3]) for point in (covers.start, covers.end))
+        axis, angle = _turn(end - start)
+        capsule = rerun.Capsules3D(
+            lengths=[float(np.linalg.norm(end - start))],
+            radii=[covers.radius[i]],
+            translations=[start],
+            rotation_axis_angles=[rerun.RotationAxisAngle(axis=axis, radians=angle)],
+            colors=[(0x87, 0x91, 0x9C)],
+            fill_mode="solid",
+        )
+        stream.log(f"arm/{cover}", capsule, static=True)
+        poses = [body.cover_pose(q, cover) for q in joints[1].tolist()]
+        columns = rerun.Transform3D.columns(
+            translation=[pose.position for pose in poses], mat3x3=[pose.rotation for pose in poses]
+        )
+        stream.send_columns(f"arm/{cover}", _times(rerun, joints[0], zero), columns)
+    _log_obstacles(rerun, stream, recorded)
+    return len(joints[0])
+
+
+def _log_obstacles(rerun: Any, stream: Any, recorded: RecordedArm) -> None:
+    obstacles = recorded.obstacles
+    for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
+        triple = slice(3 * i, 3 * i + 3)
+        centre, sizes = obstacles.positions[triple], obstacles.sizes[triple]
+        quaternion = rerun.Quaternion(xyzw=_quaternion(*obstacles.rotations[triple]))
+        place = {"centers": [centre], "quaternions": [quaternion], "colors": [(0xEC, 0xCA, 0x88)]}
+        if shape == "cylinder":
+            solid = rerun.Cylinders3D(lengths=[2.0 * sizes[1]], radii=[sizes[0]], fill_mode="solid", **place)
+        else:
+            half = (*sizes[:2], sizes[2] if shape == "box" else 0.001)
+            solid = rerun.Boxes3D(half_sizes=[half], fill_mode="solid", **place)
+        stream.log(f"arm/world/{name}", solid, static=True)
+
+
+def _log_contacts(
+    rerun: Any, stream: Any, recording: Recording, arm: Arm, joints: tuple[Times, Numbers], zero: int
+) -> None:
+    """Arrows of the force on the arm where it acts, true and felt, in the frame of the touched cover."""
+    traces = recording.summary.traces
+    if not len(traces.stamp):
+        return
+    rows = np.clip(np.searchsorted(traces.stamp, joints[0], side="right") - 1, 0, len(traces.stamp) - 1)
+    for name, signal in (("applied", traces.true), ("estimated", traces.felt)):
+        for cover in arm.covers.names:
+            origins, vectors = _arrows(signal, rows, cover)
+            if not np.any(vectors):
+                continue
+            path = f"arm/{cover}/{name}"
+            stream.log(path, rerun.Arrows3D.from_fields(colors=[_rgb(COLOURS[name])], radii=[0.004]), static=True)
+            columns = rerun.Arrows3D.columns(origins=origins, vectors=vectors)
+            stream.send_columns(path, _times(rerun, joints[0], zero), columns)
+
+
+def _arrows(signal: Signal, rows: NDArray[np.intp], cover: str) -> tuple[Numbers, Numbers]:
+    """Begin and length of each arrow, m, in the cover's frame; of no length where it is not touched."""
+    there = (signal.frame[rows] == cover) & signal.acts[rows] & np.isfinite(signal.place[rows])
+    origins, vectors = np.zeros((len(rows), 3)), np.zeros((len(rows), 3))
+    origins[there, 0] = signal.place[rows][there]
+    vectors[there] = METRES_PER_NEWTON * signal.force[rows][there]
+    return origins, vectors
+
+
+def _log_plots(rerun: Any, stream: Any, recording: Recording, zero: int) -> None:
+    for path, stamps, values in _series(recording):
+        if np.any(np.isfinite(values)):  # a value that is not known breaks the line
+            name = path.rsplit("/", 1)[-1]
+            colours = {"colors": [_rgb(COLOURS[name])]} if name in COLOURS else {}
+            stream.log(path, rerun.SeriesLines(names=[name], **colours), static=True)
+            columns = rerun.Scalars.columns(scalars=values)
+            stream.send_columns(path, _times(rerun, stamps, zero), columns)
+
+
+def _series(recording: Recording) -> Iterator[tuple[str, Times, Numbers]]:
+    """Path, stamps and values of each line."""
+    traces = recording.summary.traces
+    if len(traces.stamp):
+        signals = {
+            "asked": traces.asked, "applied": traces.true, "measured": traces.measured, "estimated": traces.felt,
+        }  # fmt: skip
+        for name, signal in signals.items():
+            yield f"plots/force/{name}", traces.stamp, signal.size
+        for name in ("applied", "estimated"):
+            yield f"plots/place/{name}", traces.stamp, np.where(signals[name].acts, signals[name].place, math.nan)
+    topics = [name for name, columns in recording.bag.topics.items() if isinstance(columns, JointColumns)]
+    own = f"{recording.namespace}/joint_states"
+    for topic in [own] if own in topics else topics:
+        columns = recording.bag.topics[topic]
+        if isinstance(columns, JointColumns) and columns.position.size:
+            for i, name in enumerate(columns.names):
+                yield f"plots/joints/{name}", columns.stamp_ns, columns.position[:, i]
+
+
+def _log_status(rerun: Any, stream: Any, recording: Recording, zero: int) -> None:
+    for status in messages_of(recording.bag, f"{recording.namespace}/status"):
+        facts = values_of(status)
+        if "stamp" in facts:
+            stream.set_time(TIMELINE, duration=max((int(facts["stamp"]) - zero) / 1e9, 0.0))
+            stream.log(f"status/{node_of(status)}", rerun.TextLog(str(status.message)))
+
+
+def _rgb(colour: str) -> tuple[int, int, int]:
+    red, green, blue = (round(255.0 * channel) for channel in to_rgb(colour))
+    return red, green, blue
+
+
+def _turn(direction: Numbers) -> tuple[list[float], float]:
+    """Axis and angle that turn z into a direction."""
+    unit = direction / float(np.linalg.norm(direction))
+    axis = np.cross([0.0, 0.0, 1.0], unit)
+    size = float(np.linalg.norm(axis))
+    if size < 1e-12:
+        return [1.0, 0.0, 0.0], 0.0 if unit[2] > 0.0 else math.pi
+    return (axis / size).tolist(), math.atan2(size, float(unit[2]))
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> Sequence[float]:
+    """Quaternion x y z w of a turn about fixed x, then y, then z."""
+    cr, sr, cp, sp, cy, sy = (f(a / 2.0) for a in (roll, pitch, yaw) for f in (math.cos, math.sin))
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )

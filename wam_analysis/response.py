@@ -1,0 +1,116 @@
+"""Step responses: rise, settling, overshoot."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.runs import noise, smoothed
+
+Numbers = NDArray[np.float64]
+
+QUIET = 0.1  # part of the settling band that noise may fill after smoothing, four standard deviations of it
+TOP = 0.75  # of the overshoot; what is higher belongs to the parabola through the peak
+
+
+class StepResponse(NamedTuple):
+    """Answer to a step, in the unit of the signal and in seconds from the step.
+
+    Attributes
+    ----------
+    final : mean of the steady end.
+    rise : from 10 % to 90 % of the way to `final`, s; NaN where it does not get there.
+    settling : until the signal stays within the band about `final`, s; infinite where it never does.
+    overshoot : largest excess over `final` as a part of the step, 0 where there is none.
+    peak_time : of the largest excess, s; NaN where there is none.
+    spread : half of the range in the steady end.
+    """
+
+    final: float
+    rise: float
+    settling: float
+    overshoot: float
+    peak_time: float
+    spread: float
+
+
+def step_response(time: Numbers, value: Numbers, begin: float, steady: float, band: float) -> StepResponse:
+    """Rise, settling and overshoot of a recorded step.
+
+    Noise is averaged over as many samples as it takes to bring it well below the band, and the peak
+    is that of a parabola through its top, so that noise does not add to the overshoot.
+
+    Parameters
+    ----------
+    time : (n,), s from the step, rising, at a constant rate.
+    value : (n,), the signal.
+    begin : value before the step.
+    steady : length of the end that counts as steady, s.
+    band : settling band as a part of the step, for example 0.02.
+
+    Raises
+    ------
+    ValueError
+        where there are fewer than eight samples or the signal does not move.
+    """
+    if len(time) != len(value) or len(time) < 8:
+        raise ValueError(f"a step response of {len(value)} samples at {len(time)} times; at least 8 of both are needed")
+    tail = value[time >= time[-1] - steady]
+    final = float(np.mean(tail))
+    step = final - begin
+    if step == 0.0 or not math.isfinite(step):
+        raise ValueError(f"the signal ends at {final:g}, where it began; there is no step to judge")
+    sd = noise(value) / abs(step)
+    width = min(math.ceil((4.0 * sd / (QUIET * band)) ** 2), max(len(value) // 50, 1))
+    part = (smoothed(value, width) - begin) / step  # 0 before, 1 at the end
+    low, high = _crossing(time, part, 0.1), _crossing(time, part, 0.9)
+    peak, at = _peak(time, (value - begin) / step, part)
+    outside = np.flatnonzero(np.abs(part - 1.0) > band)
+    if not len(outside):
+        settling = 0.0
+    elif outside[-1] == len(part) - 1:
+        settling = math.inf
+    else:
+        settling = _between(time, np.abs(part - 1.0), int(outside[-1]), band)
+    return StepResponse(
+        final=final,
+        rise=high - low,
+        settling=settling,
+        overshoot=peak,
+        peak_time=at,
+        spread=float(np.ptp(tail)) / 2.0,
+    )
+
+
+def _crossing(time: Numbers, part: Numbers, level: float) -> float:
+    """When the signal first reaches a level, between two samples; NaN where it does not."""
+    above = np.flatnonzero(part >= level)
+    if not len(above):
+        return math.nan
+    return float(time[0]) if above[0] == 0 else _between(time, part, int(above[0]) - 1, level)
+
+
+def _between(time: Numbers, value: Numbers, row: int, level: float) -> float:
+    """When the line from sample `row` to the next meets a level."""
+    a, b = float(value[row]), float(value[row + 1])
+    share = (level - a) / (b - a) if b != a else 0.0
+    return float(time[row] + share * (time[row + 1] - time[row]))
+
+
+def _peak(time: Numbers, raw: Numbers, part: Numbers) -> tuple[float, float]:
+    """Height over 1 and time of the largest excess: the top of a parabola through the samples about it."""
+    top = int(np.argmax(part))
+    excess = float(part[top]) - 1.0
+    if excess <= 0.0:
+        return 0.0, math.nan
+    below = np.flatnonzero(part < 1.0 + TOP * excess)
+    first = int(below[below < top][-1]) + 1 if np.any(below < top) else 0
+    last = int(below[below > top][0]) if np.any(below > top) else len(part)
+    if last - first < 5 or top in (first, last - 1):
+        return excess, float(time[top])
+    middle = float(time[top])
+    a, b, c = np.polynomial.polynomial.polyfit(time[first:last] - middle, raw[first:last], 2)
+    if c >= 0.0:
+        return excess, middle
+    return max(float(a - b * b / (4.0 * c)) - 1.0, 0.0), middle - float(b / (2.0 * c))

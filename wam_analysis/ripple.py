@@ -1,0 +1,79 @@
+"""Torque ripple by the angle of a pulley."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+
+CELLS = 4  # a turn and order: how finely angles are told apart
+
+
+class Ripple(NamedTuple):
+    """Spectrum over the angle of a pulley.
+
+    Attributes
+    ----------
+    order : (k,), cycles a turn, 1 to k.
+    amplitude : (k,), N m (half of the peak to peak of each).
+    phase : (k,), rad: torque = amplitude sin(order angle + phase).
+    turns : range of the angle in turns; orders are told apart where it is at least 1.
+    rest : standard deviation of what is left, N m.
+    """
+
+    order: NDArray[np.int64]
+    amplitude: Numbers
+    phase: Numbers
+    turns: float
+    rest: float
+
+
+NO_RIPPLE = Ripple(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0), 0.0, math.nan)
+
+
+def ripple_spectrum(angle: Numbers, torque: Numbers, orders: int) -> Ripple:
+    """Amplitude of each order of the angle, by least squares over all orders at once.
+
+    Samples may lie anywhere: the shaft may stand, turn back or turn at any speed, since nothing is
+    resampled; equal angles are averaged first.  A slow drift over the range, up to the third power,
+    is fitted beside the orders.
+
+    Parameters
+    ----------
+    angle : (n,), of the pulley, rad.
+    torque : (n,), N m, in one direction of motion, or less the friction.
+    orders : highest order asked for.
+
+    Returns
+    -------
+    Ripple
+        without any order where the pulley made less than one turn or too few angles were seen.
+    """
+    if not len(angle):
+        return NO_RIPPLE
+    turns = float(np.ptp(angle)) / (2.0 * math.pi)
+    cell = np.floor((angle - np.min(angle)) * (2.0 * CELLS * orders / (2.0 * math.pi))).astype(np.int64)
+    count = np.bincount(cell)
+    seen = np.flatnonzero(count)
+    drift = 4
+    if turns < 1.0 or len(seen) < 2 * orders + drift + 1:
+        return NO_RIPPLE._replace(turns=turns)
+    number = count[seen]
+    at = np.bincount(cell, angle)[seen] / number
+    mean = np.bincount(cell, torque)[seen] / number
+    k = np.arange(1, orders + 1)
+    steady = np.polynomial.chebyshev.chebvander(2.0 * (at - at.min()) / np.ptp(at) - 1.0, drift - 1)
+    columns = np.hstack([np.sin(np.outer(at, k)), np.cos(np.outer(at, k)), steady])
+    weight = np.sqrt(number)[:, np.newaxis]
+    solution = np.linalg.lstsq(weight * columns, weight[:, 0] * mean, rcond=1e-6)[0]
+    sine, cosine = solution[:orders], solution[orders : 2 * orders]
+    rest = mean - columns @ solution
+    return Ripple(
+        order=k,
+        amplitude=np.hypot(sine, cosine),
+        phase=np.arctan2(cosine, sine),
+        turns=turns,
+        rest=float(np.sqrt(np.average(rest**2, weights=number))),
+    )

@@ -1,0 +1,87 @@
+"""Stretches of a recording: where a condition holds without a break."""
+
+import heapq
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Rows = NDArray[np.int64]
+
+
+def runs(mask: Mask) -> Rows:
+    """Rows [begin, end) of each stretch that is true, (k, 2).
+
+    Parameters
+    ----------
+    mask : (n,).
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return edges.reshape(-1, 2).astype(np.int64)
+
+
+def without_short(mask: Mask, shortest: int) -> Mask:
+    """The mask with every stretch, true or false, of fewer samples than `shortest` taken into its neighbours.
+
+    The shortest goes first, so that a burst of bounces does not swallow what lies beside it.  The
+    first and the last stretch have one neighbour only and are kept.
+
+    Parameters
+    ----------
+    mask : (n,).
+    shortest : samples.
+    """
+    kept = mask.copy()
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8))) + 1
+    bounds = np.concatenate(([0], edges, [len(mask)])).tolist()
+    before, after = list(range(-1, len(bounds) - 1)), list(range(1, len(bounds) + 1))  # bounds that still stand
+    queue = [(bounds[i + 1] - bounds[i], i) for i in range(1, len(bounds) - 2) if bounds[i + 1] - bounds[i] < shortest]
+    heapq.heapify(queue)
+    stands = [True] * len(bounds)
+    while queue:
+        length, i = heapq.heappop(queue)
+        j = after[i]
+        if not stands[i] or i == 0 or j >= len(bounds) - 1 or bounds[j] - bounds[i] != length:
+            continue
+        kept[bounds[i] : bounds[j]] = ~kept[bounds[i]]
+        stands[i] = stands[j] = False
+        left, right = before[i], after[j]
+        after[left], before[right] = right, left
+        longer = bounds[right] - bounds[left]
+        if left > 0 and right < len(bounds) - 1 and longer < shortest:
+            heapq.heappush(queue, (longer, left))
+    return kept
+
+
+def noise(value: Numbers) -> float:
+    """Standard deviation of what changes from sample to sample, from second differences.
+
+    Robust against jumps: the median of the absolute second difference.  What moves smoothly does
+    not count.
+
+    Parameters
+    ----------
+    value : (n,), at a constant rate.
+    """
+    if len(value) < 3:
+        return 0.0
+    return float(np.median(np.abs(np.diff(value, 2)))) / 0.6745 / np.sqrt(6.0)
+
+
+def smoothed(value: Numbers, width: int) -> Numbers:
+    """Centred moving mean, narrower towards both ends, (n,).
+
+    Parameters
+    ----------
+    value : (n,).
+    width : samples; the next odd number is taken.
+    """
+    half = min(width // 2, (len(value) - 1) // 2)
+    if half <= 0:
+        return value.astype(np.float64)
+    total = np.concatenate(([0.0], np.cumsum(value)))
+    row = np.arange(len(value))
+    reach = np.minimum(half, np.minimum(row, len(value) - 1 - row))
+    result: Numbers = (total[row + reach + 1] - total[row - reach]) / (2 * reach + 1)
+    return result

@@ -1,0 +1,221 @@
+"""What a recording says of forces: how they were reached and held, cycles and stability, contacts."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED
+from wam_analysis.finding import Finding, Section, shown, times
+from wam_analysis.force_accuracy import dynamic_range
+from wam_analysis.held_force import CYCLING, HeldForce
+from wam_analysis.limit_cycle import FEWEST
+from wam_analysis.recording import Recording
+from wam_analysis.runs import runs
+from wam_analysis.stability import Verdict
+
+SURE = 0.8  # confidence from which a limit cycle is said to be one
+SEEN = 0.02  # of the force: a cycle smaller than that is not worth a sentence
+
+
+def force_section(recording: Recording, held: Sequence[HeldForce]) -> Section:
+    """Forces asked for: reached, held, and the dynamic range (3.2.1)."""
+    lacking = recording.lacking("force_command", "force_measured", "sim/contact/wrench")
+    said, findings = [], []
+    for one in held:
+        said.append(_press_sentence(one))
+        findings += _press_findings(one)
+    if not held:
+        said.append("No constant force was asked for.")
+    accuracies = [one.applied_accuracy if len(one.applied) else one.measured_accuracy for one in held]
+    limits = [one.largest for one in held if one.largest is not None and math.isfinite(one.largest.force)]
+    if limits and accuracies:
+        least = min(limits, key=lambda limit: limit.force)
+        found = dynamic_range(least.force, least.limited_by, accuracies)
+        whose = "applied" if any(len(one.applied) for one in held) else "measured"
+        said.append(
+            f"Dynamic range of force control (3.2.1): {shown(found.ratio)}, from {shown(found.smallest, 'N')} that the "
+            f"{whose} force was off at most to {shown(found.largest, 'N')}, where the {found.limited_by} ends it."
+        )
+        note = f"largest by {found.limited_by}; smallest is bias and ripple of the worst force"
+        findings += [
+            Finding("smallest controllable force", "N", found.smallest),
+            Finding("largest controllable force", "N", math.nan, found.largest, f"by {found.limited_by}"),
+            Finding("dynamic range", "", found.ratio, note=note),
+        ]
+    return Section("force", "Force", tuple(said), tuple(findings), lacking)
+
+
+def _press_sentence(one: HeldForce) -> str:
+    hold, response = one.hold, one.response
+    accuracy = one.applied_accuracy if len(one.applied) else one.measured_accuracy
+    whose = "applied" if len(one.applied) else "measured"
+    text = f"{hold.name}: {shown(hold.asked, 'N')} asked on {hold.frame}"
+    if math.isnan(accuracy.bias):
+        return f"{text}; what came of it was not recorded."
+    text += f", {shown(hold.asked + accuracy.bias, 'N')} {whose} in the end"
+    text += f" ({100.0 * accuracy.bias / hold.asked:+.1f} %, ripple {shown(accuracy.ripple, 'N')})"
+    if response is not None and math.isfinite(response.rise):
+        text += f"; it rose in {shown(response.rise, 's')}"
+        if math.isfinite(response.settling):
+            text += f", settled to 5 % after {shown(response.settling, 's')}"
+        else:
+            text += " and did not settle to 5 %"
+        if response.overshoot > 0.01:
+            text += f", overshot by {100.0 * response.overshoot:.0f} %"
+    return text + ("; it was pushed meanwhile." if hold.disturbed else ".")
+
+
+def _press_findings(one: HeldForce) -> list[Finding]:
+    name, response = one.hold.name, one.response
+    found = []
+    if one.predicted is not None:
+        rise = math.log(9.0) * one.predicted.time_constant
+        note = "predicted without friction, inertia and feed-forward, (5.2)"
+    else:
+        rise, note = math.nan, ""
+    if response is not None:
+        found += [
+            Finding(f"{name}: rise time 10-90 %", "s", response.rise, rise, note),
+            Finding(f"{name}: settling time to 5 %", "s", response.settling),
+            Finding(f"{name}: overshoot", "%", 100.0 * response.overshoot),
+        ]
+    for whose, accuracy, there in (
+        ("applied", one.applied_accuracy, len(one.applied)),
+        ("measured", one.measured_accuracy, len(one.measured)),
+    ):
+        if there:
+            found += [
+                Finding(f"{name}: bias of the {whose} force", "N", accuracy.bias, 0.0, "integral control"),
+                Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
+            ]
+    return found
+
+
+def cycle_section(recording: Recording, held: Sequence[HeldForce]) -> Section:
+    """Limit cycles and stability of the force loop beside chapter 5."""
+    said: list[str] = []
+    findings: list[Finding] = []
+    told: set[str] = set()
+    for one in held:
+        said += [sentence for sentence in _cycle_sentences(one) if sentence not in said]
+        findings += [*_cycle_findings(one), *_theory_findings(one, told)]
+    if not held:
+        said.append("No constant force was asked for, so that there is nothing to judge.")
+    return Section("stability", "Stability and limit cycles", tuple(said), tuple(findings))
+
+
+def _cycle_sentences(one: HeldForce) -> list[str]:
+    name, cycle, predicted, verdict = one.hold.name, one.cycle, one.predicted, one.stability
+    words = {
+        Verdict.SETTLES: "settles",
+        Verdict.CYCLES: "keeps swinging at constant size",
+        Verdict.DIVERGES: f"DIVERGES, by {shown(100.0 * (verdict.growth - 1.0))} % a half cycle",
+        Verdict.UNDECIDED: "is too short to be judged",
+    }
+    text = f"{name}: the force {words[verdict.verdict]}"
+    if cycle.confidence >= SURE and cycle.peak_to_peak > SEEN * one.hold.asked:
+        if verdict.verdict is not Verdict.DIVERGES:
+            text = f"{name}: the force keeps swinging"
+        text += (
+            f"; a limit cycle of {shown(cycle.peak_to_peak, 'N')} peak to peak, every {shown(cycle.period, 's')} "
+            f"(confidence {cycle.confidence:.2f})"
+        )
+    else:
+        text += ", no limit cycle is seen in it"
+    said = [text + "."]
+    if predicted is not None and math.isfinite(predicted.gamma):
+        text = f"The theory says: gamma {shown(predicted.gamma)}, zeta {shown(predicted.zeta)}: {predicted.regime}"
+        if math.isfinite(predicted.period):
+            text += (
+                f"; a stiction cycle would have {shown(predicted.force_peak_to_peak, 'N')} and "
+                f"{shown(predicted.period, 's')}"
+            )
+            if math.isfinite(predicted.driven_period):
+                size, period = shown(predicted.driven_peak_to_peak, "N"), shown(predicted.driven_period, "s")
+                text += f" ({size} and {period} with what the speed loops give way)"
+            text += "" if predicted.is_certain else " if the node had less inertia, (5.11)"
+            if predicted.period * FEWEST > CYCLING * (one.hold.end - one.hold.begin) / 1e9:
+                text += ", too long for this recording to show it"
+        said.append(text + ".")
+    return said
+
+
+def _cycle_findings(one: HeldForce) -> list[Finding]:
+    name, cycle, predicted = one.hold.name, one.cycle, one.predicted
+    seen = cycle.confidence >= SURE
+    force = period = soft_force = soft_period = math.nan
+    note = ""
+    if predicted is not None:
+        force, period = predicted.force_peak_to_peak, predicted.period
+        soft_force, soft_period = predicted.driven_peak_to_peak, predicted.driven_period
+        note = "(5.8), (5.9) corrected" + ("" if predicted.is_certain else "; (5.11) is not small, they need not hold")
+    soft = f"with the speed loops in series, {shown(soft_force, 'N')}; " if math.isfinite(soft_force) else ""
+    slow = f"with the speed loops in series, {shown(soft_period, 's')}" if math.isfinite(soft_period) else ""
+    size, time = (cycle.peak_to_peak, cycle.period) if seen else (0.0, math.nan)
+    return [
+        Finding(f"{name}: limit cycle, peak to peak", "N", size, force, soft + note),
+        Finding(f"{name}: period of the limit cycle", "s", time, period, slow),
+        Finding(f"{name}: confidence of the limit cycle", "", cycle.confidence),
+        Finding(f"{name}: growth per half cycle", "", one.stability.growth, note=str(one.stability.verdict)),
+    ]
+
+
+def _theory_findings(one: HeldForce, told: set[str]) -> list[Finding]:
+    """What the theory says of the loop itself, once where several forces meet the same."""
+    name, predicted = one.hold.name, one.predicted
+    if predicted is None or shown(predicted.gamma) in told:
+        return []
+    told.add(shown(predicted.gamma))
+    actuator = 1e3 * predicted.actuator_peak_to_peak
+    return [
+        Finding(f"{name}: actuator cycle at the contact, peak to peak", "mm", math.nan, actuator, "(5.20)"),
+        Finding(f"{name}: gamma", "", math.nan, predicted.gamma, "(5.15)"),
+        Finding(f"{name}: largest stable gain, continuous", "m/s/N", math.nan, predicted.routh_gain, "(5.15)"),
+        Finding(f"{name}: largest stable gain, as sampled", "m/s/N", math.nan, predicted.sampled_gain, "no friction"),
+    ]
+
+
+def contact_section(recording: Recording) -> Section:
+    """What was felt against what touched."""
+    summary = recording.summary
+    traces = summary.traces
+    lacking = recording.lacking("contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point")
+    said, findings = [], []
+    for touch in summary.touches:
+        if NOT_RECORDED in (touch.link_true, touch.link_felt):
+            continue
+        felt = "nothing" if touch.link_felt in ("base", NO_LINK, "") else touch.link_felt
+        text = f"{touch.step}: {touch.link_true} was touched with {shown(touch.force_true, 'N')}, felt {felt}"
+        if math.isfinite(touch.force_felt):
+            text += f" with {shown(touch.force_felt, 'N')}"
+        if touch.reason:
+            text += f" ({touch.reason})"
+        elif math.isfinite(touch.place_felt):
+            text += f", {100.0 * abs(touch.place_felt - touch.place_true):.1f} cm off"
+        said.append(text + ".")
+    true, sensed = traces.true, traces.felt
+    known = true.is_known & sensed.is_known
+    touching = known & true.acts
+    if np.any(touching):
+        both = touching & sensed.acts & (sensed.frame == true.frame)
+        place = np.abs(sensed.place - true.place)[both]
+        place = place[np.isfinite(place)]
+        force = np.linalg.norm(sensed.force - true.force, axis=1)[both]
+        findings += [
+            Finding("contact felt on the right link", "%", 100.0 * float(np.mean(both[touching])), 100.0),
+            Finding("place, median error", "cm", 100.0 * float(np.median(place)) if len(place) else math.nan, 0.0),
+            Finding("force, median error", "N", float(np.median(force)) if len(force) else math.nan, 0.0),
+        ]
+    if np.any(known):
+        false = known & sensed.acts & ~true.acts
+        count = len(runs(false))
+        seconds = float(np.sum(false)) * summary.period
+        findings.append(Finding("felt without a contact", "s", seconds, 0.0, times(count)))
+        if count:
+            said.append(f"Contact was felt {times(count)}, {shown(seconds, 's')} in all, where nothing touched.")
+    elif np.any(sensed.is_known):
+        said.append(f"Contact was felt {times(len(runs(sensed.acts)))}; the truth is not in this bag.")
+    if not said:
+        said.append("No contact was recorded.")
+    return Section("contact", "Contact", tuple(said), tuple(findings), lacking)

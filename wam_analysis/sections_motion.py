@@ -1,0 +1,301 @@
+"""What a recording says of the transmission: stick and slip, friction, ripple, power."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.efficiency import efficiency
+from wam_analysis.finding import Finding, Section, shown, times
+from wam_analysis.friction import Friction, identify_friction
+from wam_analysis.recording import Recording
+from wam_analysis.ripple import Ripple, ripple_spectrum
+from wam_analysis.sections_frequency import frequency_section
+from wam_analysis.stick_slip_phases import stick_slip_phases
+from wam_analysis.transmission_signals import CABLE, TransmissionSignals, transmission_signals
+from wam_description.arm import Arm
+from wam_description.effects import Effects
+
+Numbers = NDArray[np.float64]
+
+MOTOR_REST = 0.05  # rad/s; a motor that is slower stands
+JOINT_REST = 0.002  # rad/s
+SHORTEST = 0.01  # s; a shorter stick or slip is chatter
+WINDOW = 0.03  # s over which friction is averaged
+ORDERS = 48  # of the ripple, cycles a turn
+FAINT = 3.0  # ripple below so many times the median order is not named
+SLIGHT = 0.05  # of the dry friction: less ripple is not named either
+LEAST_WORK = 1e-3  # J below which no efficiency is given
+
+
+class Motion(NamedTuple):
+    """Sections on the transmission and what their pictures need."""
+
+    sections: tuple[Section, ...]
+    signals: TransmissionSignals | None
+    friction: dict[str, Friction]
+    ripple: dict[str, Ripple]
+
+
+def motion_sections(recording: Recording) -> Motion:
+    """All sections that take motors and joints together."""
+    arm = recording.parameters.arm
+    lacking = recording.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
+    signals = None if arm is None else transmission_signals(recording, arm)
+    stick = _stick_section(recording)
+    if arm is None or signals is None or len(signals.time) < 100:
+        why = "the parameters of the arm" if arm is None else "motor_states with a load beside it"
+        said = (f"Friction, ripple and power cannot be judged: {why} is not in this bag.",)
+        return Motion((stick, Section("friction", "Friction", said, (), lacking)), None, {}, {})
+    friction = _friction_of_motors(signals, arm)
+    joints = _friction_of_joints(signals, arm)
+    ripple = _ripples(signals, arm, friction)
+    sections = (
+        stick,
+        _friction_section(recording, arm, signals, friction, joints),
+        _ripple_section(ripple, friction, recording.parameters.effects),
+        _power_section(arm, signals, friction, joints),
+        frequency_section(recording, arm),
+    )
+    return Motion(sections, signals, friction, ripple)
+
+
+# stick and slip
+
+
+def _stick_section(recording: Recording) -> Section:
+    said, findings = [], []
+    for topic, rest in (("motor_states", MOTOR_REST), ("joint_sensors", JOINT_REST), ("joint_states", JOINT_REST)):
+        columns = recording.joints(topic)
+        if columns is None or not columns.velocity.shape[1] or len(columns.stamp_ns) < 10:
+            continue
+        if topic == "joint_states" and recording.joints("joint_sensors") is not None:
+            continue
+        period = float(np.median(np.diff(columns.stamp_ns))) / 1e9
+        for i, name in enumerate(columns.names):
+            velocity = columns.velocity[:, i]
+            velocity = velocity[np.isfinite(velocity)]
+            if len(velocity) < 10:
+                continue
+            phases = stick_slip_phases(velocity, rest, max(1, round(SHORTEST / period)))
+            findings += [
+                Finding(f"{name}: at rest", "%", 100.0 * phases.stuck, note=f"slower than {rest:g} rad/s"),
+                Finding(f"{name}: slips", "", float(len(phases.slips)), note=f"{phases.reversals} against the last"),
+            ]
+            said.append(
+                f"{name} stood {100.0 * phases.stuck:.0f} % of the time and slipped {times(len(phases.slips))}."
+            )
+    text = tuple(said) or ("No velocity was recorded.",)
+    return Section("stick_slip", "Stick and slip", text, tuple(findings), recording.lacking("motor_states"))
+
+
+# friction
+
+
+def _friction_of_motors(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
+    free = signals.torque - signals.load
+    return {
+        name: identify_friction(signals.time, signals.velocity[:, i], free[:, i], MOTOR_REST, WINDOW, signals.use)
+        for i, name in enumerate(arm.motors.names)
+    }
+
+
+def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
+    """Of the joints: what the cables give less what reaches the links; needs both."""
+    free = signals.cable_torque - signals.strain
+    if signals.load_from != CABLE or not np.any(np.isfinite(free)):
+        return {}
+    return {
+        name: identify_friction(signals.time, signals.joint_velocity[:, i], free[:, i], JOINT_REST, WINDOW, signals.use)
+        for i, name in enumerate(arm.joints.names)
+    }
+
+
+def _friction_section(
+    recording: Recording,
+    arm: Arm,
+    signals: TransmissionSignals,
+    friction: dict[str, Friction],
+    joints: dict[str, Friction],
+) -> Section:
+    alone = signals.load_from == CABLE
+    note = (
+        f"load from the {signals.load_from}" if alone else f"with the joint's part; load from the {signals.load_from}"
+    )
+    findings = []
+    for i, (name, found) in enumerate(friction.items()):
+        findings += _friction_findings(name, found, _of_motor(arm, i, alone), note)
+    for i, (name, found) in enumerate(joints.items()):
+        bearing = arm.joints
+        truth = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
+        findings += _friction_findings(name, found, truth, "cable torque less strain")
+    seen = [name for name, found in {**friction, **joints}.items() if math.isfinite(found.dynamic)]
+    said = [
+        f"{name}: dry friction {shown(found.dynamic, 'N m')}, {_breakaway(found)}, "
+        f"viscous {shown(found.viscous, 'N m s/rad')}."
+        for name, found in {**friction, **joints}.items()
+        if name in seen
+    ]
+    still = [name for name in {**friction, **joints} if name not in seen]
+    if still:
+        said.append(f"Too little motion to tell the friction of {', '.join(still)}.")
+    lacking = recording.lacking("joint_sensors", "sim/joint_states")
+    return Section("friction", "Friction", tuple(said), tuple(findings), lacking)
+
+
+def _breakaway(found: Friction) -> str:
+    return f"breakaway {shown(found.static, 'N m')}" if math.isfinite(found.static) else "no breakaway seen"
+
+
+def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
+    """Static, dynamic and viscous friction that are configured, with the joint's where it is in them."""
+    motors, joints = arm.motors, arm.joints
+    own = [motors.static_friction[i], motors.dynamic_friction[i], motors.viscous_friction[i]]
+    column = np.reshape(arm.joint_from_motor, (len(joints.names), len(motors.names)))[:, i]
+    if not alone and int(np.count_nonzero(column)) == 1:
+        own[0] += float(np.abs(column) @ np.array(joints.static_friction))
+        own[1] += float(np.abs(column) @ np.array(joints.dynamic_friction))
+        own[2] += float(column**2 @ np.array(joints.viscous_friction))
+    elif not alone:
+        own = [math.nan] * 3
+    return own[0], own[1], own[2]
+
+
+def _friction_findings(name: str, found: Friction, configured: tuple[float, float, float], note: str) -> list[Finding]:
+    static, dynamic, viscous = configured
+
+    def with_error(error: float) -> str:
+        return f"+-{shown(error)}; {note}" if math.isfinite(error) else note
+
+    breakaways = f"{found.breakaways} breakaways; {note}"
+    return [
+        Finding(f"{name}: static friction", "N m", found.static, static, breakaways),
+        Finding(f"{name}: dynamic friction", "N m", found.dynamic, dynamic, with_error(found.dynamic_error)),
+        Finding(f"{name}: viscous friction", "N m s/rad", found.viscous, viscous, with_error(found.viscous_error)),
+    ]
+
+
+# ripple
+
+
+def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Friction]) -> dict[str, Ripple]:
+    """Ripple of each motor over its own angle, its friction and inertia taken off."""
+    found = {}
+    for i, name in enumerate(arm.motors.names):
+        known = friction[name]
+        velocity = signals.velocity[:, i]
+        rows = (np.abs(velocity) > MOTOR_REST) & signals.use & signals.sampled
+        if not math.isfinite(known.dynamic) or not np.any(rows):
+            continue
+        rest = signals.torque[:, i] - signals.load[:, i] - known.dynamic * np.sign(velocity)
+        rest = rest - np.nan_to_num(known.viscous) * velocity
+        rest = rest - arm.motors.inertia[i] * np.gradient(velocity, signals.time)
+        rows &= np.abs(rest) < 10.0 * float(np.median(np.abs(rest[rows]))) + 1e-12
+        found[name] = ripple_spectrum(signals.angle[rows, i], rest[rows], ORDERS)
+    return found
+
+
+def _ripple_section(ripple: dict[str, Ripple], friction: dict[str, Friction], effects: Effects | None) -> Section:
+    said, findings = [], []
+    for name, found in ripple.items():
+        if not len(found.order):
+            said.append(f"{name} made {found.turns:.2f} turns, too few to tell its ripple.")
+            continue
+        top = int(np.argmax(found.amplitude))
+        order, amplitude = int(found.order[top]), float(found.amplitude[top])
+        configured = _configured_ripple(effects, name, order)
+        findings.append(
+            Finding(
+                f"{name}: largest ripple",
+                "N m",
+                amplitude,
+                configured,
+                f"{order} cycles a turn, {found.turns:.1f} turns",
+            )
+        )
+        clear = amplitude > FAINT * float(np.median(found.amplitude)) and amplitude > SLIGHT * friction[name].dynamic
+        said.append(
+            f"{name}: {shown(amplitude, 'N m')} at {order} cycles a turn."
+            if clear
+            else f"{name}: no ripple to speak of; the largest order has {shown(amplitude, 'N m')}."
+        )
+    if not ripple:
+        said.append("No motor turned enough to tell its ripple.")
+    return Section("ripple", "Torque ripple by pulley angle", tuple(said), tuple(findings))
+
+
+def _configured_ripple(effects: Effects | None, shaft: str, order: int) -> float:
+    if effects is None:
+        return math.nan
+    ripples = effects.ripples
+    return sum(
+        ratio * amplitude
+        for name, ratio, amplitude, cycles in zip(
+            ripples.shafts, ripples.ratio, ripples.amplitude, ripples.cycles, strict=True
+        )
+        if name == shaft and round(cycles * ratio) == order
+    )
+
+
+# power
+
+
+def _power_section(
+    arm: Arm, signals: TransmissionSignals, friction: dict[str, Friction], joints: dict[str, Friction]
+) -> Section:
+    inertia, speed = np.array(arm.motors.inertia), signals.velocity
+    acceleration = np.gradient(speed, signals.time, axis=0)
+    motor = np.sum((signals.torque - inertia * acceleration) * speed, axis=1)
+    at_links = signals.strain if np.any(np.isfinite(signals.strain)) else signals.cable_torque
+    joint = np.sum(at_links * signals.joint_velocity, axis=1)
+    known = np.isfinite(joint) & np.isfinite(motor)
+    said, findings = [], []
+    if np.any(known):
+        found = efficiency(signals.time[known], motor[known], joint[known])
+        if found.forward_put > LEAST_WORK:
+            rows = known & (motor > 0.0) & (joint > 0.0)
+            expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
+            expected = max(expected, 0.0)
+            note = "friction and cables (6.14), as configured"
+            findings.append(Finding("efficiency, motors to links", "%", 100.0 * found.forward, 100.0 * expected, note))
+            said.append(
+                f"The motors gave {shown(found.forward_put, 'J')} to the transmission while they drove, "
+                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %."
+            )
+        if found.back_put > LEAST_WORK:
+            findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="driven backwards"))
+            said.append(f"Driven backwards, {100.0 * found.back:.0f} % of {shown(found.back_put, 'J')} came back.")
+    findings += _backdrive(arm, friction, joints)
+    if not said:
+        said.append("Too little work was done to tell the efficiency.")
+    return Section("power", "Efficiency and backdrivability", tuple(said), tuple(findings))
+
+
+def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
+    """Power that friction and creep take by the configured parameters, (k,), W."""
+    speed, joint = np.abs(signals.velocity), np.abs(np.nan_to_num(signals.joint_velocity))
+    motors, joints = arm.motors, arm.joints
+    loss = speed @ np.array(motors.dynamic_friction) + speed**2 @ np.array(motors.viscous_friction)
+    loss = loss + joint @ np.array(joints.dynamic_friction) + joint**2 @ np.array(joints.viscous_friction)
+    creep = np.array([circuit.loss_per_torque for circuit in arm.circuits])
+    result: Numbers = loss + np.sum(creep * np.abs(signals.load) * np.abs(signals.load * signals.velocity), axis=1)
+    return result
+
+
+def _backdrive(arm: Arm, friction: dict[str, Friction], joints: dict[str, Friction]) -> list[Finding]:
+    """Torque at each joint, alone, that its own and its motors' dry friction hold against a hand."""
+    matrix = np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names)))
+    motor_per_joint = np.abs(np.linalg.inv(matrix))
+    measured = np.array([friction[name].dynamic for name in arm.motors.names])
+    configured = np.array(arm.motors.dynamic_friction)
+    own = np.array([joints[name].dynamic if name in joints else math.nan for name in arm.joints.names])
+    found = []
+    for i, name in enumerate(arm.joints.names):
+        turns = motor_per_joint[:, i]
+        needed = turns > 1e-9
+        by_motors = float(turns[needed] @ measured[needed])
+        note = "dry friction of the joint and of its motors, felt by a hand that drives it"
+        expected = float(turns @ configured) + arm.joints.dynamic_friction[i]
+        found.append(Finding(f"{name}: torque to drive it backwards", "N m", by_motors + float(own[i]), expected, note))
+    return found

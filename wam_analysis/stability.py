@@ -1,0 +1,110 @@
+"""Whether a recorded response settles, cycles or diverges, judged late and not by its first peaks."""
+
+import math
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+
+TRANSIENT = 2  # first peaks that say nothing: gamma 1.5 gives 4.00, 2.70, 2.94, 3.06, 3.24 ... and diverges
+FEWEST = 3  # peaks after these that a trend needs
+STEADY = 0.01  # growth per half cycle below which a size counts as constant
+FLATTENED = 0.3  # of the decay before: where it has come down to this, the response goes to a cycle, not to rest
+
+
+class Verdict(StrEnum):
+    """What becomes of the response."""
+
+    SETTLES = "settles"
+    CYCLES = "limit cycle"
+    DIVERGES = "diverges"
+    UNDECIDED = "undecided"
+
+
+class Stability(NamedTuple):
+    """The verdict and what it rests on.
+
+    Attributes
+    ----------
+    verdict : see `Verdict`.
+    growth : factor from one half cycle to the next at the end; NaN where there are too few.
+    confidence : 0 to 1, from the scatter about the trend and the number of peaks; 1 where the error
+        has come to rest within the tolerance.
+    peaks : (k,), largest |error| of each half cycle, whole ones only.
+    """
+
+    verdict: Verdict
+    growth: float
+    confidence: float
+    peaks: Numbers
+
+
+def stability(error: Numbers, tolerance: float) -> Stability:
+    """Judge the error of a response.
+
+    The first half cycles are the transient of the step; the verdict is the trend of the last half of
+    those that follow, in the logarithm of the peaks.
+
+    Parameters
+    ----------
+    error : (n,), of the response, at a constant rate, from the step on.
+    tolerance : size of the error that counts as settled, above the noise.
+
+    Raises
+    ------
+    ValueError
+        where `tolerance` is not above zero or the error is not finite.
+    """
+    if not tolerance > 0.0:
+        raise ValueError(f"tolerance is {tolerance!r}; it must be above zero, above the noise of the error")
+    if not np.all(np.isfinite(error)):
+        raise ValueError("the error has values that are not finite; leave them out")
+    peaks = half_cycle_peaks(error, tolerance)
+    quiet = len(error) > 4 and bool(np.all(np.abs(error[-max(len(error) // 5, 2) :]) <= tolerance))
+    if quiet:
+        return Stability(Verdict.SETTLES, math.nan, 1.0, peaks)
+    late = peaks[TRANSIENT:]
+    if len(late) < FEWEST:
+        return Stability(Verdict.UNDECIDED, math.nan, 0.0, peaks)
+    late = late[-max(len(late) // 2 + 1, FEWEST) :]
+    slope, error_of_slope = _trend(np.log(late))
+    sure = abs(slope) / error_of_slope if error_of_slope > 0.0 else math.inf
+    last = _trend(np.log(late[-max(len(late) // 2, FEWEST) :]))[0]
+    if slope > STEADY and sure > 2.0:
+        verdict = Verdict.DIVERGES
+    elif abs(last) <= STEADY or sure <= 2.0 or (slope < 0.0 and last > FLATTENED * slope):
+        verdict = Verdict.CYCLES
+        sure = STEADY / error_of_slope if error_of_slope > 0.0 else math.inf
+    else:
+        verdict = Verdict.SETTLES
+    confidence = (1.0 - math.exp(-sure / 2.0)) * min(1.0, (len(peaks) - TRANSIENT) / 5.0)
+    return Stability(verdict, math.exp(slope), confidence, peaks)
+
+
+def half_cycle_peaks(error: Numbers, tolerance: float) -> Numbers:
+    """Largest |error| between two changes of its sign, (k,), the last half cycle left out.
+
+    Parameters
+    ----------
+    error : (n,).
+    tolerance : an error this small has no sign; noise makes no half cycles.
+    """
+    signed = np.flatnonzero(np.abs(error) > tolerance)
+    if not len(signed):
+        return np.empty(0)
+    changes = np.flatnonzero(np.diff(np.sign(error[signed])))
+    begins = np.concatenate(([0], signed[changes + 1]))
+    result: Numbers = np.maximum.reduceat(np.abs(error), begins).astype(np.float64)
+    return result[:-1]
+
+
+def _trend(values: Numbers) -> tuple[float, float]:
+    """Slope per step of a line through the values, and its standard error."""
+    steps = np.arange(len(values)) - (len(values) - 1) / 2.0
+    square = float(steps @ steps)
+    slope = float(steps @ values) / square
+    rest = values - np.mean(values) - slope * steps
+    return slope, math.sqrt(float(rest @ rest) / max(len(values) - 2, 1) / square)

@@ -1,0 +1,140 @@
+"""Torques and speeds of motors and joints on one time base, and what lies between them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.demo_traces import messages_of, node_of, values_of
+from wam_analysis.recording import Recording, at_stamps, by_names
+from wam_description.arm import Arm
+from wam_description.transmission_map import TransmissionMap
+
+Numbers = NDArray[np.float64]
+
+CABLE = "cable torque of the simulator"
+STRAIN = "strain gauges"
+RELEASE = 200_000_000  # ns after the brakes were released
+SLOWEST = 0.006  # s; cable torques that come less often do not show what a resonance does between
+GRAVITY = "gravity alone, while nothing touches"
+SOURCES = {CABLE: "sim/joint_states", STRAIN: "joint_sensors", GRAVITY: "gravity_effort"}
+
+
+class TransmissionSignals(NamedTuple):
+    """k instants at a constant rate, n motors and joints.
+
+    Attributes
+    ----------
+    time : (k,), s.
+    angle, velocity, torque : (k, n), of the motors, rad, rad/s, N m.
+    load : (k, n), torque that each motor passes on, N m.
+    load_from : where the load comes from: `CABLE`, `STRAIN` or `GRAVITY`.
+    use : (k,), instants at which the load is known.
+    sampled : (k,), instants at which it was recorded; between them it lies on a line.
+    joint_velocity : (k, n), rad/s; NaN where not recorded.
+    cable_torque : (k, n), of the cables on the joints, N m; NaN where not recorded.
+    strain : (k, n), torque on the link side of the joints' friction, N m; NaN where not recorded.
+    """
+
+    time: Numbers
+    angle: Numbers
+    velocity: Numbers
+    torque: Numbers
+    load: Numbers
+    load_from: str
+    use: NDArray[np.bool_]
+    sampled: NDArray[np.bool_]
+    joint_velocity: Numbers
+    cable_torque: Numbers
+    strain: Numbers
+
+
+def transmission_signals(recording: Recording, arm: Arm) -> TransmissionSignals | None:
+    """Bring motors, cables and joints together; None where the bag has no motors or no load."""
+    motors = recording.joints("motor_states")
+    if motors is None:
+        return None
+    names, joints = arm.motors.names, arm.joints.names
+    fields = [by_names(motors, field, names) for field in ("position", "velocity", "effort")]
+    angle, velocity, torque = fields
+    if angle is None or velocity is None or torque is None:
+        return None
+    stamps = motors.stamp_ns
+    cable = _of(recording, "sim/joint_states", "effort", joints, stamps)
+    strain = _of(recording, "joint_sensors", "effort", joints, stamps)
+    speed = _of(recording, "joint_sensors", "velocity", joints, stamps)
+    if not np.any(np.isfinite(speed)):
+        speed = _of(recording, "sim/joint_states", "velocity", joints, stamps)
+    gravity = _of(recording, "gravity_effort", "effort", joints, stamps)
+    at_joints, load_from = next(
+        (
+            (values, name)
+            for values, name in ((cable, CABLE), (strain, STRAIN), (gravity, GRAVITY))
+            if np.any(np.isfinite(values)) and (name != CABLE or _period(recording) <= SLOWEST)
+        ),
+        (cable, ""),
+    )
+    if not load_from:
+        return None
+    forward = np.concatenate(([True], stamps[1:] > np.maximum.accumulate(stamps)[:-1]))  # time that a reset repeats
+    rows = np.flatnonzero(np.all(np.isfinite(at_joints), axis=1) & forward)
+    matrix = TransmissionMap.of(arm).joint_from_motor
+    use = ~_braked(recording, stamps[rows])
+    if load_from == GRAVITY:
+        felt = recording.wrench("contact/wrench")
+        if felt is not None:
+            row = np.maximum(np.searchsorted(felt.stamp_ns, stamps[rows], side="right") - 1, 0)
+            use &= ~np.any(felt.force[row] != 0.0, axis=1)
+    return TransmissionSignals(
+        time=stamps[rows] / 1e9,
+        angle=angle[rows],
+        velocity=velocity[rows],
+        torque=torque[rows],
+        load=at_joints[rows] @ matrix,
+        load_from=load_from,
+        use=use,
+        sampled=_recorded_at(recording, SOURCES[load_from], stamps[rows]),
+        joint_velocity=speed[rows],
+        cable_torque=cable[rows],
+        strain=strain[rows],
+    )
+
+
+def _braked(recording: Recording, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether the brakes held, which is not friction; a little longer, until the cables have taken the load."""
+    braked = np.zeros(len(stamps), dtype=np.bool_)
+    since: int | None = None
+    for status in messages_of(recording.bag, f"{recording.namespace}/status"):
+        facts = values_of(status)
+        if node_of(status) != "driver" or "mode" not in facts or "stamp" not in facts:
+            continue
+        stamp = int(facts["stamp"])
+        if facts["mode"] == "enabled" and since is not None:
+            braked |= (stamps >= since) & (stamps < stamp + RELEASE)
+            since = None
+        elif facts["mode"] != "enabled" and since is None:
+            since = stamp
+    return braked if since is None else braked | (stamps >= since)
+
+
+def _period(recording: Recording) -> float:
+    """Between two messages of the simulator's truth, s."""
+    columns = recording.joints("sim/joint_states")
+    return float(np.median(np.diff(columns.stamp_ns))) / 1e9 if columns is not None else 0.0
+
+
+def _recorded_at(recording: Recording, topic: str, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    columns = recording.joints(topic)
+    return np.zeros(len(stamps), dtype=np.bool_) if columns is None else at_stamps(columns, stamps)[0]
+
+
+def _of(recording: Recording, topic: str, field: str, names: tuple[str, ...], stamps: NDArray[np.int64]) -> Numbers:
+    """A field of another topic at some stamps, (k, n), on the line between its messages; NaN outside of them."""
+    result = np.full((len(stamps), len(names)), np.nan)
+    columns = recording.joints(topic)
+    values = None if columns is None else by_names(columns, field, names)
+    if columns is not None and values is not None and len(columns.stamp_ns) > 1:
+        inside = (stamps >= columns.stamp_ns[0]) & (stamps <= columns.stamp_ns[-1])
+        for i in range(len(names)):
+            result[inside, i] = np.interp(stamps[inside], columns.stamp_ns, values[:, i])
+    return result

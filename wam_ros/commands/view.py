@@ -1,0 +1,23 @@
+"""`wam view`: a recording in the Rerun viewer."""
+
+import argparse
+from pathlib import Path
+
+from wam_analysis.bag import read
+from wam_analysis.recording import recording_of
+from wam_analysis.rerun_view import load_rerun, view
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("bag", type=Path, help="directory of the bag, or its .mcap file")
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write this .rrd file instead of opening the viewer")
+    parser.epilog = "Needs Rerun: pip install 'wam_stack[view]'."
+
+
+def run(given: argparse.Namespace) -> int:
+    """Log the bag."""
+    load_rerun()  # before the work
+    said = view(recording_of(read(given.bag)), given.save)
+    print(f"{given.save or 'viewer'}: {said}")
+    return 0
