@@ -162,7 +162,8 @@ class MomentumObserver:
 
     def _from_motors(self, theta: list[float], thetad: list[float], tau_motor: list[float], dt: float) -> "_Torques":
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        keep = math.exp(-dt / self._parameters.friction_memory)
+        # a dither stops a shaft at both ends of each swing, held there by what the world does
+        keep = 0.0 if self._cycle else math.exp(-dt / self._parameters.friction_memory)
         motor_friction, motor_sliding, motor_resting = self._motor_friction.of(thetad, keep)
         joint_friction, joint_sliding, joint_resting = self._joint_friction.of(qd, keep)
         through = self._map.joint_torques(motor_friction)
