@@ -22,7 +22,7 @@ class Times(NamedTuple):
 
     Attributes
     ----------
-    observe : one sample into the observer.
+    observe : one sample into the observer while something touches.
     estimate : one answer while something touches: covariance, detection, inference.
     reference : ten solutions of a 4 x 4 system by NumPy.
     """
@@ -43,18 +43,22 @@ def times(configuration: Configuration, scene: Scene) -> Times:
     n, period = len(shared.arm.motors.names), seconds(shared.timing.period_ns)
     sensors = run.rows.get("joint_sensors", run.rows["motor_states"])
     observed, estimated = [], []
+    touched = False  # only then does the observer surely do all of its work: brakes would make it rest
     for motor, sensor in zip(run.rows["motor_states"], sensors, strict=True):
         states = [State(*(list(row.values[i * n : i * n + n]) for i in range(3))) for row in (motor, sensor)]
         begin = perf_counter()
         estimator.observe(states[0], states[1], period)
         middle = perf_counter()
-        observed.append(middle - begin)
+        if touched:
+            observed.append(middle - begin)
         if shared.timing.is_outer(motor.stamp):
-            answer = estimator.estimate()
-            if answer.in_contact:
+            touched = estimator.estimate().in_contact
+            if touched:
                 estimated.append(perf_counter() - middle)
     matrix, vector = np.eye(4) + 0.1, np.ones(4)
-    return Times(min(observed), min(estimated, default=float("nan")), _best(lambda: _solve(matrix, vector)))
+    return Times(
+        min(observed, default=float("nan")), min(estimated, default=float("nan")), _best(lambda: _solve(matrix, vector))
+    )
 
 
 def _solve(matrix: np.ndarray, vector: np.ndarray) -> None:

@@ -231,7 +231,7 @@ TOPICS: tuple[Topic, ...] = (
         ("driver",),
         (),
         "outer",
-        "truth: force of the world on the link it loads most, frame = its cover",
+        "truth: force of the world on the link it loads most, moment about the origin of its cover, the frame",
     ),
     Topic(
         "sim/contact/point",

@@ -1,0 +1,188 @@
+"""Hands of the simulator that press on a link, and an arm that departs from the configured one; forces by hand."""
+
+import dataclasses
+import math
+import pickle
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from arms import NOWHERE, WAM, ideal_mjcf
+
+from wam_description.configuration import Configuration, packaged
+from wam_description.departure import Departure, built
+from wam_description.effects import no_effects
+from wam_description.parameters import ParameterError
+from wam_description.world import NO_SPRINGS, Pushers, World
+from wam_driver.plant import Plant
+
+STEP = 5e-4
+AS_CONFIGURED = Departure((1.0,) * 4, (1.0,) * 4, (1.0,) * 4, (1.0,) * 4, 0.0)
+L3 = 0.5588
+
+
+def hand(**values: Any) -> Pushers:
+    """One hand, a frictionless sphere on the outer link where nothing else is said."""
+    given: dict[str, Any] = {
+        "names": "hand", "shapes": "sphere", "covers": "outer_link", "places": 0.25, "angles": 0.6, "force": 8.0,
+        "begin": 0.05, "end": 0.4, "rise": 0.02, "clearance": 0.01, "slide": 0.0, "turn": 0.0, "stiffness": 2000.0,
+        "damping": 10.0, "friction": 0.0,
+    }  # fmt: skip
+    sizes = values.pop("sizes", (0.04, 0.0, 0.0))
+    return Pushers(sizes=sizes, **{key: (value,) for key, value in (given | values).items()})
+
+
+def plant(pushers: Pushers) -> Plant:
+    return Plant(WAM, World(NOWHERE, NO_SPRINGS, pushers), no_effects(WAM), STEP)
+
+
+def run(machine: Plant, seconds: float, torque: float = 0.0) -> None:
+    for _ in range(round(seconds / STEP)):
+        machine.step([0.0, 0.0, 0.0, torque])
+
+
+@pytest.mark.parametrize(("shape", "sizes"), [("sphere", (0.04, 0.0, 0.0)), ("box", (0.02, 0.04, 0.02))])
+@pytest.mark.parametrize("angle", [0.0, 0.6, -2.0])
+def test_a_hand_presses_with_its_force_at_its_place(shape: str, sizes: tuple[float, ...], angle: float) -> None:
+    machine = plant(hand(shapes=shape, sizes=sizes, angles=angle))
+    run(machine, 0.045)
+    assert machine.loads() == []
+    run(machine, 0.155)
+    (load,) = machine.loads()
+    force = 8.0 * np.array((0.0, math.cos(angle), math.sin(angle)))
+    assert load.cover == "outer_link"
+    # a flat side that lies along the tube may carry at its edge
+    assert load.place == pytest.approx(0.25, abs=1e-3 if shape == "sphere" else 0.0201)
+    assert np.abs(np.subtract(load.force, force)).max() < 0.05
+    # the line of the force meets the tube's axis there
+    assert np.abs(np.subtract(load.moment, np.cross((load.place, 0.0, 0.0), force))).max() < 0.02
+    run(machine, 0.25)
+    assert machine.loads() == []
+
+
+def test_on_the_inner_link_the_moment_is_that_of_its_tilted_axis() -> None:
+    machine = plant(hand(covers="inner_link", places=0.3, angles=0.0))
+    run(machine, 0.2)
+    (load,) = machine.loads()
+    axis_point = np.array((0.3, 0.0, 0.3 / L3 * 0.04064))
+    assert np.abs(np.subtract(load.force, (0.0, 8.0, 0.0))).max() < 0.05
+    assert np.abs(np.subtract(load.moment, np.cross(axis_point, load.force))).max() < 0.02
+
+
+def test_a_hand_keeps_contact_with_a_link_that_swings_away_from_it() -> None:
+    machine = plant(hand(begin=0.02))
+    machine.brake(False)
+    forces, speeds = [], []
+    for tick in range(700):
+        swing = math.sin(2.0 * math.pi * 4.0 * tick * STEP)
+        machine.step([0.3 * swing, 0.4 * swing, -0.3 * swing, 0.2 * swing])
+        speeds.append(max(map(abs, machine.qd)))
+        if 120 <= tick < 700:
+            (load,) = machine.loads()
+            forces.append(math.hypot(*load.force))
+    assert max(speeds) > 2.0
+    assert min(forces) == pytest.approx(8.0, rel=0.02)
+    assert max(forces) == pytest.approx(8.0, rel=0.02)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_hand_that_slides_rubs_along_the_link_with_its_friction(way: float) -> None:
+    """Slip is that against the hand: MuJoCo itself takes a led body for one that stands still."""
+    machine = plant(hand(friction=0.4, slide=0.05 * way))
+    run(machine, 0.2)
+    (load,) = machine.loads()
+    assert load.force[0] == pytest.approx(way * 0.4 * 8.0, rel=0.02)
+    resting = plant(hand(friction=0.4))
+    run(resting, 0.2)
+    (load,) = resting.loads()
+    assert abs(load.force[0]) < 0.05 * 8.0
+    assert load.place == pytest.approx(0.25, abs=1e-3)
+
+
+def test_a_hand_that_turns_round_the_link_twists_it() -> None:
+    machine = plant(hand(friction=0.4, turn=0.5, angles=0.0))
+    run(machine, 0.2)
+    (load,) = machine.loads()
+    # a frictionless force has no moment about the axis; friction acts half way into the surface, 4 mm deep
+    assert abs(load.moment[0]) == pytest.approx(0.4 * 8.0 * (WAM.covers.radius[1] - 0.002), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"end": 0.06}, "hand: pushers.end is 0.06 s"),
+        ({"sizes": (0.0, 0.0, 0.0)}, "hand: pushers.sizes of a sphere"),
+        ({"names": ""}, "give each pusher a name"),
+    ],
+)
+def test_hands_that_cannot_be_are_refused(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        hand(**values)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [({"covers": "sleeve"}, "presses on 'sleeve'; covers: inner_link"), ({"names": "outer_link"}, "rename it")],
+)
+def test_hands_that_do_not_fit_the_arm_are_refused(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        plant(hand(**values))
+
+
+def test_a_hand_without_force_is_not_in_the_model() -> None:
+    assert ideal_mjcf(WAM, STEP, NOWHERE).count("mocap") == 0
+    assert plant(hand(force=0.0)).model.nmocap == 0
+    assert plant(hand()).model.nmocap == 1
+
+
+# the arm as it is built
+
+
+def test_an_arm_without_departure_is_the_configured_one() -> None:
+    assert built(WAM, AS_CONFIGURED) == WAM
+
+
+def test_what_departs_is_in_the_compiled_plant() -> None:
+    departure = Departure((1.1, 1.0, 0.9, 1.0), (1.2, 1.0, 1.0, 1.0), (1.0, 0.8, 1.0, 1.0), (1.0, 1.0, 1.0, 1.5), 0.0)
+    arm = built(WAM, departure)
+    before, after = (mujoco.MjModel.from_xml_string(ideal_mjcf(a, STEP, NOWHERE)) for a in (WAM, arm))
+    ratio = [after.body(name).mass[0] / before.body(name).mass[0] for name in WAM.links.names]
+    assert ratio == pytest.approx([1.1, 1.0, 0.9, 1.0])
+    assert (after.dof_frictionloss / before.dof_frictionloss).tolist() == pytest.approx([1.2, 1, 1, 1, 1, 0.8, 1, 1])
+    stiffness = (after.tendon_stiffness / before.tendon_stiffness)[::2].tolist()  # of one strand of each
+    assert stiffness == pytest.approx([1.0, 1.0, 1.0, 1.5])
+
+
+def test_a_payload_weighs_at_the_tool() -> None:
+    """Arm stretched out level: joint 4 carries m g L4 more, and its inertia grows by m L4^2."""
+    stretched = (0.0, -math.pi / 2, 0.0, math.pi / 2)
+    level = dataclasses.replace(WAM, joints=dataclasses.replace(WAM.joints, start=stretched))
+    loaded = built(level, dataclasses.replace(AS_CONFIGURED, payload=0.2))
+    bias, inertia = [], []
+    for arm in (level, loaded):
+        machine = Plant(arm, World(NOWHERE, NO_SPRINGS), no_effects(arm), STEP)
+        mujoco.mj_forward(machine.model, machine.data)
+        bias.append(machine.data.qfrc_bias[7])
+        column = np.zeros(8)
+        mujoco.mj_mulM(machine.model, machine.data, column, np.eye(8)[7])
+        inertia.append(column[7])
+    assert abs(bias[1] - bias[0]) == pytest.approx(0.2 * 9.80665 * 0.4064, rel=1e-6)
+    assert inertia[1] - inertia[0] == pytest.approx(0.2 * 0.4064**2, rel=1e-6)
+
+
+def test_departures_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(ParameterError, match=r"departure.mass.*3 values"):
+        built(WAM, dataclasses.replace(AS_CONFIGURED, mass=(1.0,) * 3))
+    askew = dataclasses.replace(WAM, tool=(0.4, 0.1, 0.0))
+    assert built(askew, AS_CONFIGURED) == askew
+    with pytest.raises(ParameterError, match=r"payload is 0.1 kg.*set it to 0"):
+        built(askew, dataclasses.replace(AS_CONFIGURED, payload=0.1))
+
+
+def test_a_configuration_goes_to_another_process_and_stays_read_only() -> None:
+    configuration = Configuration.load(packaged("wam")).with_values({"driver:seed": 9})
+    copy = pickle.loads(pickle.dumps(configuration))
+    assert copy == configuration
+    with pytest.raises(TypeError):
+        copy.sections["driver"]["seed"] = 3
