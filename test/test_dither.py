@@ -48,6 +48,20 @@ def test_its_amplitude_follows_the_friction_that_each_motor_overcomes() -> None:
     np.testing.assert_allclose(dither.amplitude, [1.5 * level for level in by_hand], rtol=1e-9)
 
 
+def test_joints_2_and_3_are_both_dithered_because_their_motors_are_out_of_phase() -> None:
+    """By hand: joint 2 has 30.4 (tau3 - tau2), joint 3 -15.2 (tau2 + tau3); in phase nothing is left at joint 2."""
+    swings = {}
+    for name, phase in (("configured", PARAMETERS.phase), ("in phase", (0.0,) * 4)):
+        dither = Dither(ARM, TIMING, DitherParameters(PARAMETERS.level, phase))
+        rows = np.array([dither.torque(k * TIMING.period_ns) for k in range(40)])
+        swings[name] = (
+            np.abs(30.4 * (rows[:, 2] - rows[:, 1])).max() / (2 * 30.4 * dither.amplitude[1]),
+            np.abs(15.2 * (rows[:, 1] + rows[:, 2])).max() / (2 * 15.2 * dither.amplitude[1]),
+        )
+    assert min(swings["configured"]) > 0.7
+    assert swings["in phase"][0] == 0.0
+
+
 def test_its_cost_is_below_half_a_percent_of_heat_and_a_few_millimetres() -> None:
     cost = Dither(ARM, TIMING, PARAMETERS).cost(POSE)
     assert 0.0 < max(cost.heat) < 0.005

@@ -181,3 +181,17 @@ def test_worst_motor_torque_for_ten_pounds_is_below_the_continuous_one(arm: Arm,
         force = 10 * 4.4482216 * np.linalg.norm(matrix.T @ body.tool_jacobian(q).T, axis=1)
         worst = max(worst, float(np.max(np.abs(matrix.T @ body.gravity_torque(q)) + force)))
     assert 0.8 * arm.motors.continuous_torque[0] < worst < arm.motors.continuous_torque[0]
+
+
+def test_cover_jacobian_moves_every_point_of_the_cover_as_the_jacobian_of_the_point_does(body: RigidBody) -> None:
+    """v = v_0 + w x p in the cover's frame, and its transpose takes a wrench as virtual work does."""
+    rng = np.random.default_rng(5)
+
+    for cover in body.covers:
+        q, p, force = rng.uniform(-1.5, 1.5, 4), rng.uniform(-0.5, 0.5, 3), rng.normal(size=3)
+        jacobian, rotation = body.cover_jacobian(q, cover), body.cover_pose(q, cover).rotation
+        at_point = rotation.T @ body.point_jacobian(q, cover, p)
+        assert np.allclose(jacobian[:3] + np.cross(jacobian[3:].T, p).T, at_point, atol=1e-12)
+        assert np.allclose(jacobian.T @ [*force, *np.cross(p, force)], at_point.T @ force, atol=1e-12)
+    with pytest.raises(ValueError, match="no cover|not on arm"):
+        body.cover_jacobian([0.0] * 4, "hand")

@@ -39,6 +39,9 @@ class ObserverParameters:
     rest_uncertainty: float = parameter("sd of the friction of what rests, per static friction", low=0.0, high=10.0)
     motor_rest_velocity: float = parameter("motor speed above which Coulomb friction is full", "rad/s", low=1e-6)
     joint_rest_velocity: float = parameter("joint speed above which Coulomb friction is full", "rad/s", low=1e-6)
+    friction_memory: float = parameter(
+        "time in which a shaft that came to rest forgets the way its friction acted", "s", low=1e-4, high=1.0
+    )
     motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6)
     joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6)
     payload: tuple[float, ...] = parameter("least and largest mass that the tool may carry", "kg", low=0.0, high=50.0)
@@ -118,6 +121,8 @@ class MomentumObserver:
         if self._load is not None:
             self._load.reset()
         self._momentum: list[float] | None = None
+        self._motor_friction.reset()
+        self._joint_friction.reset()
         self._known: list[float] = [0.0] * n
         self._bias: list[float] = [0.0] * n
         self._gap = self._age = 0.0
@@ -153,12 +158,14 @@ class MomentumObserver:
             # at rest without current the brakes or stiction hold: the motors tell nothing
             self.reset()
             return True
-        return self._update(self._from_motors(position, velocity, effort), dt)
+        return self._update(self._from_motors(position, velocity, effort, dt), dt)
 
-    def _from_motors(self, theta: list[float], thetad: list[float], tau_motor: list[float]) -> "_Torques":
+    def _from_motors(self, theta: list[float], thetad: list[float], tau_motor: list[float], dt: float) -> "_Torques":
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        motor_friction, motor_sliding, motor_resting = self._motor_friction.of(thetad)
-        joint_friction, joint_sliding, joint_resting = self._joint_friction.of(qd)
+        # a dither stops a shaft at both ends of each swing, held there by what the world does
+        keep = 0.0 if self._cycle else math.exp(-dt / self._parameters.friction_memory)
+        motor_friction, motor_sliding, motor_resting = self._motor_friction.of(thetad, keep)
+        joint_friction, joint_sliding, joint_resting = self._joint_friction.of(qd, keep)
         through = self._map.joint_torques(motor_friction)
         friction = [through[i] + joint_friction[i] for i in range(self._n)]
         torques = self._map.joint_torques(tau_motor)
@@ -262,8 +269,10 @@ class _Torques(NamedTuple):
 class _Friction:
     """Nominal friction of some shafts, by their own velocities, and its variance.
 
-    f = k (F_d s + b v), s = v / v_rest within -1..1; variance (u_moving k F_d s)^2 +
-    (u_rest k F_s d)^2 + sd_torque^2, d = 1 - s^2 the share of rest, k the friction scale.
+    f = k (F_d (s + (1 - |s|) h) + b v), s = v / v_rest within -1..1, h the sign of the last full motion, which fades:
+    a shaft that has just stopped is held as it was slowed down, one that rests long by what nobody knows.
+    Variance (u_moving k F_d s)^2 + (u_rest k F_s d)^2 + sd_torque^2, d = 1 - s^2 the share of rest, k the
+    friction scale.
     """
 
     def __init__(
@@ -279,13 +288,22 @@ class _Friction:
         self._moving = [(parameters.moving_uncertainty * scale * f) ** 2 for f in shafts.dynamic_friction]
         self._rest = [(parameters.rest_uncertainty * scale * f) ** 2 for f in shafts.static_friction]
         self._rest_velocity, self._torque_variance = rest_velocity, torque_sd**2
+        self.reset()
 
-    def of(self, velocity: Sequence[float]) -> tuple[list[float], list[float], list[float]]:
-        """Friction torques, N m, signed share of Coulomb friction, share of rest, each (n,), at velocities, rad/s."""
-        friction, sliding, resting = [], [], []
-        for (coulomb, viscous), v in zip(self._levels, velocity, strict=True):
+    def reset(self) -> None:
+        """Forget the motion."""
+        self._held = [0.0] * len(self._levels)
+
+    def of(self, velocity: Sequence[float], keep: float) -> tuple[list[float], list[float], list[float]]:
+        """Friction torques, N m, signed share of Coulomb friction, share of rest, each (n,), at velocities, rad/s.
+
+        `keep` is the part of what is remembered that outlives the period.
+        """
+        friction, sliding, resting, held = [], [], [], self._held
+        for i, ((coulomb, viscous), v) in enumerate(zip(self._levels, velocity, strict=True)):
             share = min(1.0, max(-1.0, v / self._rest_velocity))
-            friction.append(coulomb * share + viscous * v)
+            held[i] = share if share * share == 1.0 else keep * held[i]
+            friction.append(coulomb * (share + (1.0 - abs(share)) * held[i]) + viscous * v)
             sliding.append(share)
             resting.append(1.0 - share * share)
         return friction, sliding, resting
