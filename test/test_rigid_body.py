@@ -184,7 +184,7 @@ def test_worst_motor_torque_for_ten_pounds_is_below_the_continuous_one(arm: Arm,
 
 
 def test_cover_jacobian_moves_every_point_of_the_cover_as_the_jacobian_of_the_point_does(body: RigidBody) -> None:
-    """v = v_0 + w x p in the cover's frame, and its transpose takes a wrench as virtual work does."""
+    """Velocity is v_0 + w x p in the cover's frame, and its transpose takes a wrench as virtual work does."""
     rng = np.random.default_rng(5)
 
     for cover in body.covers:
@@ -193,5 +193,5 @@ def test_cover_jacobian_moves_every_point_of_the_cover_as_the_jacobian_of_the_po
         at_point = rotation.T @ body.point_jacobian(q, cover, p)
         assert np.allclose(jacobian[:3] + np.cross(jacobian[3:].T, p).T, at_point, atol=1e-12)
         assert np.allclose(jacobian.T @ [*force, *np.cross(p, force)], at_point.T @ force, atol=1e-12)
-    with pytest.raises(ValueError, match="no cover|not on arm"):
+    with pytest.raises(ValueError, match=r"no cover|not on arm"):
         body.cover_jacobian([0.0] * 4, "hand")
