@@ -32,7 +32,7 @@ def felt_while_sliding(arm: Arm, observer: MomentumObserver, ticks: int, frictio
     """Residuals, a row per millisecond, of an arm that all motors drive one way against friction."""
     plant, rows = RigidArm(ARM, POSE, friction), []
     push = np.array([4.0, 5.0, 3.5, 2.0])
-    for k in range(ticks):
+    for _ in range(ticks):
         motor = np.linalg.solve(DRIVE, plant.gravity() + push)
         plant.step(motor, np.zeros(4))
         assert observer.observe(State(*plant.motors(motor)), DT)
