@@ -1,7 +1,6 @@
 """What looks fine but is wrong: each way to fool oneself about contact estimation is walked into here, and shows."""
 
 import dataclasses
-import math
 from pathlib import Path
 
 import numpy as np
