@@ -184,7 +184,7 @@ def test_worst_motor_torque_for_ten_pounds_is_below_the_continuous_one(arm: Arm,
 
 
 def test_cover_jacobian_moves_every_point_of_the_cover_as_the_jacobian_of_the_point_does(body: RigidBody) -> None:
-    """V = v_0 + w x p in the cover's frame, and its transpose takes a wrench as virtual work does."""
+    """Velocity is v_0 + w x p in the cover's frame, and its transpose takes a wrench as virtual work does."""
     rng = np.random.default_rng(5)
 
     for cover in body.covers:

@@ -39,7 +39,7 @@ class InferenceParameters:
     """What is taken for likely before anything is felt."""
 
     weights: tuple[float, ...] = parameter(
-        "how often each cover is touched, relatively: as the area that it sweeps", low=1e-3, high=1e3
+        "how often each cover is touched, relatively; the outer one sweeps more", low=1e-3, high=1e3
     )
     force_scale: float = parameter("sd of each component of a contact's force before it is felt", "N", low=0.1)
     miss: float = parameter("sd by which the line of a force misses the tube's axis, per radius", low=0.0, high=2.0)
