@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_battery_run import Belief, Played, Record
-from wam_analysis.contact_battery_scenes import Planned
+from wam_analysis.contact_battery.run import Belief, Played, Record
+from wam_analysis.contact_battery.scenes import Planned
 from wam_description.signals import Load
 
 TOUCHED = 0.3  # N; less counts as nothing

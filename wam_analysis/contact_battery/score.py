@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from wam_analysis.contact_battery_run import Played
-from wam_analysis.contact_battery_scenes import KINDS, LEVELS
-from wam_analysis.contact_battery_statistics import NONE, Figure, events, quantile, rms, share
-from wam_analysis.contact_battery_touches import Quiet, Residual, Touch, quiet, residual, touches
+from wam_analysis.contact_battery.run import Played
+from wam_analysis.contact_battery.scenes import KINDS, LEVELS
+from wam_analysis.contact_battery.statistics import NONE, Figure, events, quantile, rms, share
+from wam_analysis.contact_battery.touches import Quiet, Residual, Touch, quiet, residual, touches
 from wam_description.arm import Arm
 
 Triple = tuple[float, float, float]

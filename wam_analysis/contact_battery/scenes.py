@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_battery_foam import Blow, Foam, foam_values
-from wam_analysis.contact_battery_paths import Paths
+from wam_analysis.contact_battery.foam import Blow, Foam, foam_values
+from wam_analysis.contact_battery.paths import Paths
 from wam_control.scenario import Push, Step
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
