@@ -131,7 +131,7 @@ class Draw:
             begin = now + 0.3 * move.seconds
             contact = self._contact(random, begin, begin + HOLD)
             planned.append(contact)
-            push = _push(contact, now) if contact.kind == "push" else None
+            push = self._push(contact, now) if contact.kind == "push" else None
             steps.append(Step(f"move {number + 1}", move.seconds, posture=move.posture, push=push))
             now += move.seconds
         steps.append(Step("end", 0.1))
@@ -168,7 +168,7 @@ class Draw:
             begin = now + 0.6
             contact = self._contact(random, begin, begin + REST_HOLD)
             planned.append(contact)
-            push = _push(contact, now) if contact.kind == "push" else None
+            push = self._push(contact, now) if contact.kind == "push" else None
             steps.append(Step(f"rest {number + 1}", 0.6 + REST_HOLD + 0.2, push=push))
             now += steps[-1].seconds
         values = self._values(random, start, planned) | dict(dither or {})
@@ -188,8 +188,9 @@ class Draw:
                 steps.append(Step("stop", stop))
             left -= move.seconds + stop
             here = move.posture
-        values = self._values(random, start, []) | {"driver:departure.payload": float(random.uniform(0.0, PAYLOAD))}
-        if "observer.payload" in self._configuration.sections["contact_estimator"]:
+        values = self._values(random, start, [])
+        if i % 2:  # the others carry nothing, and nothing is declared, as where contacts are judged
+            values["driver:departure.payload"] = float(random.uniform(0.0, PAYLOAD))
             values["contact_estimator:observer.payload"] = [0.0, PAYLOAD]
         return Scene(f"seed {self._seed} free {i}", "free", values, tuple(steps), ())
 
@@ -211,6 +212,12 @@ class Draw:
             friction=friction if kind != "push" else 0.0,
         )
 
+    def _push(self, contact: Planned, step_begins: float) -> Push:
+        cover, place = contact.cover, contact.place
+        force = (0.0, contact.force * math.cos(contact.angle), contact.force * math.sin(contact.angle))
+        begin, end = contact.begin - step_begins, contact.end - step_begins
+        return Push(cover, place, force, begin, end, self._arm.covers.aside(cover, place))
+
     def _values(self, random: np.random.Generator, start: Sequence[float], planned: list[Planned]) -> dict[str, Any]:
         return {
             **self._base,
@@ -222,11 +229,6 @@ class Draw:
 
 def _opening() -> list[Step]:
     return [Step("release", RELEASE, request="enable"), Step("settle", SETTLE)]
-
-
-def _push(contact: Planned, step_begins: float) -> Push:
-    force = (0.0, contact.force * math.cos(contact.angle), contact.force * math.sin(contact.angle))
-    return Push(contact.cover, contact.place, force, contact.begin - step_begins, contact.end - step_begins)
 
 
 def _departure(random: np.random.Generator, arm: Arm) -> dict[str, Any]:
