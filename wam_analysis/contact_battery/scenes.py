@@ -29,7 +29,7 @@ LEVELS = (5.0, 10.0, 20.0)  # N, those that the table names
 WEAKEST, STRONGEST = 1.0, 20.0  # N
 ROUGH = 0.8  # the greatest coefficient of friction, of every fifth pusher
 MARGIN = 0.02  # m from the ends of a link where nothing touches
-DITHER_CYCLE = 40  # periods of the loop: 25 Hz
+DITHER_CYCLE = 0.04  # s: 25 Hz
 FOAM_SHARE = 0.15  # of the scenes in motion
 KINDS = ("push", "sphere", "flat", "foam")
 
@@ -71,7 +71,11 @@ class Scene(NamedTuple):
 def dither_values(configuration: Configuration) -> dict[str, Any]:
     """What makes the arm dither at rest; nothing where it cannot."""
     shared = configuration.sections["/**"]
-    return {"timing.dither_cycle": DITHER_CYCLE} if "timing.dither_cycle" in shared else {}
+    return (
+        {"timing.dither_cycle": round(DITHER_CYCLE / shared["timing.period"])}
+        if "timing.dither_cycle" in shared
+        else {}
+    )
 
 
 def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, Any]:
