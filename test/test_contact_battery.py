@@ -1,6 +1,7 @@
 """The judge of contact estimation: it counts what truly touched, knows the truth, scores as by hand."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +9,15 @@ import numpy as np
 import pytest
 from contact_truth import torques as torques_by_hand
 
-from wam_analysis.contact_battery import Extent, Judgement, judge, scenes
-from wam_analysis.contact_battery_bag import script
-from wam_analysis.contact_battery_page import FEW, MARGINAL, MET, MISSED, STRETCH, mark, missed, page
-from wam_analysis.contact_battery_run import Belief, Levers, Played, Record, play
-from wam_analysis.contact_battery_scenes import Draw, Planned, Scene, dither_values
-from wam_analysis.contact_battery_score import ANY, Row, SceneScore, asked, score, stated
-from wam_analysis.contact_battery_statistics import Figure, events, quantile, rms, share
-from wam_analysis.contact_battery_touches import Quiet, Touch, credibility, quiet, residual, spans, touches
+from wam_analysis.batch import processes
+from wam_analysis.contact_battery.judgement import Extent, Judgement, judge, scenes
+from wam_analysis.contact_battery.over_topics import script
+from wam_analysis.contact_battery.page import FEW, MARGINAL, MET, MISSED, STRETCH, mark, missed, page
+from wam_analysis.contact_battery.run import Belief, Levers, Played, Record, play
+from wam_analysis.contact_battery.scenes import Draw, Planned, Scene, dither_values
+from wam_analysis.contact_battery.score import ANY, Row, SceneScore, asked, score, stated
+from wam_analysis.contact_battery.statistics import Figure, events, quantile, rms, share
+from wam_analysis.contact_battery.touches import Quiet, Touch, credibility, quiet, residual, spans, touches
 from wam_control.scenario import load as load_script
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import NO_LOAD, Load
@@ -305,10 +307,11 @@ def test_scenes_are_the_same_for_the_same_seed_and_others_for_another() -> None:
 
 
 def test_a_seed_gives_the_same_scores_in_one_process_and_in_two() -> None:
-    drawn = {4: scenes(CONFIGURATION, 4, Extent(contacts=4, resting=0, free=0.0))}
-    alone, together = (list(judge(CONFIGURATION, drawn, processes)) for processes in (1, 2))
+    drawn = scenes(CONFIGURATION, 4, Extent(contacts=4, resting=0, free=0.0))
+    with ThreadPoolExecutor(1) as one, processes(2) as two:
+        alone, together = (judge(CONFIGURATION, drawn, executor) for executor in (one, two))
     assert repr(alone) == repr(together)
-    assert sum(len(scene.touches) for _, scene in alone) >= 3
+    assert sum(len(scene.touches) for scene in alone) >= 3
 
 
 def test_the_arm_of_every_scene_departs_from_the_configured_one_within_the_declared_range() -> None:

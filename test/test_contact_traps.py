@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
-from wam_analysis.contact_battery_scenes import Draw
+from wam_analysis.contact_battery.scenes import Draw
 from wam_analysis.direct import DirectRun
 from wam_control.contact_estimator import ContactEstimate, ContactEstimatorParameters
 from wam_control.contact_inference import ContactInference

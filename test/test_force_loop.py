@@ -296,20 +296,26 @@ def test_the_force_acts_where_contact_is_felt() -> None:
     assert elsewhere.effort == pytest.approx(2.0 * lever(POSE), abs=1e-6)
 
 
+@pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 @pytest.mark.parametrize(
     ("place_sd", "probability", "is_used"), [(0.01, 0.99, True), (0.05, 0.99, False), (0.01, 0.5, False)]
 )
-def test_a_place_that_is_too_unsure_is_refused_for_the_one_that_is_configured(
-    place_sd: float, probability: float, is_used: bool
+def test_a_place_that_is_too_unsure_gives_way_to_the_configured_one(
+    place_sd: float, probability: float, is_used: bool, feedback: str
 ) -> None:
-    loop = Loop(ARM, OWN)
+    """A refusal where the estimate is what the loop lives on; with joint sensors the place is only wished for."""
+    loop = Loop(ARM, replace(OWN, feedback=feedback))
     contact = Contact("inner_link", 0.4, (0.0, 0.0, 1.0), place_sd, probability)
     for _ in range(2):
         out = ask(loop, World(400.0), down(2.0), contact=contact)
     there = lever(POSE, DOWN, "inner_link", 0.4) if is_used else lever(POSE)
     assert out.effort == pytest.approx(2.0 * there, abs=1e-6)
-    assert ("contact/spread" in loop.refusals) is not is_used
-    assert loop.refused == (0 if is_used else 1)
+    assert ("contact_cover and contact_place are used" in loop.fallback) is not is_used
+    is_refused = not is_used and feedback == "contact_estimate"
+    assert ("contact/spread" in loop.refusals) is is_refused
+    assert loop.refused == is_refused
+    ask(loop, World(400.0), down(2.0))
+    assert (loop.fallback, loop.refusals) == ("", {})
 
 
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])

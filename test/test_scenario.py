@@ -127,6 +127,14 @@ def test_a_push_is_the_wrench_about_the_origin_of_the_cover() -> None:
     assert outs[45].push_cover == ""
 
 
+def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_path: Path) -> None:
+    """The inner tube is 1.6 in aside at the elbow: a push on the cover's axis would hardly touch it."""
+    push = {"cover": "inner_link", "place": 0.5588, "newtons": [0.0, 10.0, 0.0], "begin": 0.0, "end": 0.1}
+    steps = load(write(tmp_path, {"steps": [{"name": "a", "seconds": 0.2, "push": push}]}), ARM)
+    out = play(Scenario(steps), 1)[0]
+    np.testing.assert_allclose(out.push_torque, [-0.4064, 0.0, 5.588], rtol=1e-9)
+
+
 def test_a_push_does_at_the_joints_what_a_force_at_its_place_does() -> None:
     out = play(Scenario([Step("pushed", 0.2, push=Push("outer_link", 0.3, (1.0, -7.0, 4.0), 0.0, 1.0))]), 1)[0]
     body = RigidBody(ARM)
@@ -169,7 +177,7 @@ def test_a_scenario_file_says_what_the_steps_are(tmp_path: Path) -> None:
         (0.1, -0.7, 0.05, 0.4),
         1.5,
         ForceCommand("outer_link", (0.0, -3.0, 1.0)),
-        Push("inner_link", 0.3, (0.0, 9.0, 2.0), 0.1, 0.4),
+        Push("inner_link", 0.3, (0.0, 9.0, 2.0), 0.1, 0.4, (0.0, 0.04064 * 0.3 / 0.5588)),
         "disable",
     )
 

@@ -185,9 +185,15 @@ class ContactFit:
         for weight, (_, x, width, i) in zip(weights, cells, strict=True):
             if passed >= SET * total:
                 break
+            # of the last place only the part that fills the set, on the side of the others
+            unused = width * max(0.0, passed + weight - SET * total) / weight
             passed += weight
             part, half = inside[i], 0.5 * width
-            part[0], part[1] = min(part[0], x - half), max(part[1], x + half)
+            low, high = x - half, x + half
+            if part[0] > part[1]:
+                part[0], part[1] = low + 0.5 * unused, high - 0.5 * unused
+            else:
+                part[0], part[1] = min(part[0], low + unused), max(part[1], high - unused)
         result = []
         for (mass, first, second), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
             if mass == 0.0:

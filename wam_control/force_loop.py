@@ -68,6 +68,7 @@ class ForceLoop:
     report : what the guard says; a new object where that has changed.
     refused : how many commands were not taken.
     refusals : why a present command is not taken, by topic; the last good one stands.
+    fallback : why a felt contact is not believed and the configured place is used, '' where it is or none is felt.
     """
 
     def __init__(self, arm: Arm, parameters: ForceLoopParameters, timing: Timing) -> None:
@@ -87,6 +88,7 @@ class ForceLoop:
         self._start([])
         self.refused = 0
         self.refusals: dict[str, str] = {}
+        self.fallback = ""
         self.tune(parameters)
 
     def tune(self, parameters: ForceLoopParameters) -> None:
@@ -201,7 +203,7 @@ class ForceLoop:
     ) -> tuple[ForceCommand | None, Sequence[float] | None]:
         """Commands within the limits; in place of another the last good one."""
         own = self.parameters
-        self.refusals = {}
+        self.refusals, self.fallback = {}, ""
         if command is not None and (asked := math.hypot(*command.force)) > own.force_limit:
             self._refuse("force_command", asked, "force_limit", own.force_limit, "N")
         else:
@@ -332,13 +334,15 @@ class ForceLoop:
         parameters, is_sure = self.parameters, self._is_sure(contact)
         is_doubtful = bool(contact.cover) and not is_sure
         if is_doubtful:
-            self.refused += not self._is_doubtful
-            self.refusals["contact/spread"] = (
+            self.fallback = (
                 f"the felt place on {contact.cover} has a standard deviation of {contact.place_sd:.2g} m, a probability"
                 f" of {contact.probability:.2f}; allowed: up to place_uncertainty_limit, "
                 f"{parameters.place_uncertainty_limit:g} m, and from link_probability_limit, "
                 f"{parameters.link_probability_limit:g}; contact_cover and contact_place are used"
             )
+        if is_doubtful and parameters.feedback == "contact_estimate":  # else the place is only wished for
+            self.refused += not self._is_doubtful
+            self.refusals["contact/spread"] = self.fallback
         self._is_doubtful = is_doubtful
         if not contact.cover or is_doubtful:
             return parameters.contact_cover, parameters.contact_place

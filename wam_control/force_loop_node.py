@@ -94,6 +94,7 @@ class ForceLoopNode(Node):
         ports = self._ports
         for topic, reason in self._loop.refusals.items():
             ports.refuse(topic, reason)
+        ports.facts["felt place not used"] = self._loop.fallback or "-"
         ports.publish_joints("joint_velocity_command", stamp, State([], out.velocity, []))
         ports.publish_joints("joint_effort_command", stamp, State([], [], out.effort))
         frame = command.frame if command else BASE

@@ -27,13 +27,17 @@ class ScenarioParameters:
 
 
 class Push(NamedTuple):
-    """A push on a cover, seconds counted from the start of the step."""
+    """A push on a cover, seconds counted from the start of the step.
+
+    It acts on the tube's axis, which may be off the x axis of the cover's frame.
+    """
 
     cover: str
     place: float  # m
     force: tuple[float, float, float]  # N, in the cover's frame
     begin: float  # s
     end: float  # s
+    aside: tuple[float, float] = (0.0, 0.0)  # m, y and z of the tube's axis there
 
 
 class Chirp(NamedTuple):
@@ -119,15 +123,15 @@ class Scenario:
             self._posture = self._on_path(step)
         push = step.push
         pushing = push is not None and push.begin <= self._elapsed + ROUNDING < push.end and not self.done
-        force = push.force if push and pushing else (0.0, 0.0, 0.0)
-        lever = push.place if push and pushing else 0.0
+        force = fx, fy, fz = push.force if push and pushing else (0.0, 0.0, 0.0)
+        x, y, z = (push.place, *push.aside) if push and pushing else (0.0, 0.0, 0.0)
         request = "disable" if self.failure else step.request
         return ScenarioOutput(
             posture=list(self._posture),
             force=NO_FORCE if self.done else self._force(step),
             push_cover=push.cover if push else "",
             push_force=force,
-            push_torque=(0.0, -lever * force[2], lever * force[1]),
+            push_torque=(y * fz - z * fy, z * fx - x * fz, x * fy - y * fx),
             request=request if begins else "",
             settings=step.settings if begins and not self.done else (),
             step=step.name,
@@ -278,7 +282,7 @@ def _push(where: str, body: Any, arm: Arm) -> Push:
     length = arm.covers.length[arm.covers.names.index(body["cover"])]
     require(0.0 <= place <= length, f"{where}: place is {place:g} m; {body['cover']} reaches from 0 to {length:g} m")
     require(0.0 <= begin < end, f"{where}: begin is {begin:g} s, end {end:g} s; end must be later, begin 0 or later")
-    return Push(body["cover"], place, (x, y, z), begin, end)
+    return Push(body["cover"], place, (x, y, z), begin, end, arm.covers.aside(body["cover"], place))
 
 
 def _known(where: str, body: Any, allowed: Sequence[str], needed: Sequence[str]) -> None:

@@ -113,6 +113,13 @@ class Covers:
         spatial = {key: getattr(self, key) for key in ("origin", "rotation", "start", "end")}
         lengths("arm.covers", self.names, spatial, width=3)
 
+    def aside(self, name: str, place: float) -> tuple[float, float]:
+        """How far the tube's axis is off the frame's x axis at a place, m: y and z, m."""
+        at = 3 * self.names.index(name)
+        start, end = self.start[at : at + 3], self.end[at : at + 3]
+        share = (place - start[0]) / (end[0] - start[0]) if end[0] != start[0] else 0.0
+        return start[1] + share * (end[1] - start[1]), start[2] + share * (end[2] - start[2])
+
 
 @dataclass(frozen=True)
 class Arm:

@@ -3,21 +3,23 @@
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import yaml
 
-from wam_analysis.contact_battery import Extent, Judgement, judge, scenes
-from wam_analysis.contact_battery_bag import recorded, script
-from wam_analysis.contact_battery_figure import figure
-from wam_analysis.contact_battery_page import missed, page, report
-from wam_analysis.contact_battery_run import Played
-from wam_analysis.contact_battery_scenes import Scene, dither_values
-from wam_analysis.contact_battery_score import SceneScore, score
-from wam_analysis.contact_battery_time import sentence, times
+from wam_analysis.batch import executor
+from wam_analysis.contact_battery.compute import sentence, times
+from wam_analysis.contact_battery.figure import figure
+from wam_analysis.contact_battery.judgement import Extent, Judgement, judge, scenes
+from wam_analysis.contact_battery.over_topics import recorded, script
+from wam_analysis.contact_battery.page import missed, page, report
+from wam_analysis.contact_battery.run import Played
+from wam_analysis.contact_battery.scenes import Scene, dither_values
+from wam_analysis.contact_battery.score import SceneScore, score
+from wam_analysis.progress import Progress
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
 from wam_ros.commands import configuration_of, take_configuration
@@ -26,14 +28,24 @@ SEEDS = (1, 2, 3)
 PARTS = ("contact",)
 
 
+def without_ros(
+    configuration: Configuration, drawn: Sequence[Scene], processes: int, report: Progress
+) -> list[SceneScore]:
+    """Play scenes in a loop without ROS, several at a time."""
+    with executor(processes, None) as found:
+        return judge(configuration, drawn, found, report)
+
+
 def over_topics(
-    configuration: Configuration, drawn: Mapping[int, Sequence[Scene]], _processes: int
-) -> Iterator[tuple[int, SceneScore]]:
-    """Play the scenes of every seed with the nodes, in lockstep, and score what was recorded."""
-    arm = configuration.shared.arm
-    for seed, own in drawn.items():
-        for scene in own:
-            yield seed, score(play_over_topics(configuration, scene), arm)
+    configuration: Configuration, drawn: Sequence[Scene], _processes: int, report: Progress
+) -> list[SceneScore]:
+    """Play scenes with the nodes, in lockstep, and score what was recorded."""
+    found: list[SceneScore] = []
+    for scene in drawn:
+        report(len(found), len(drawn))
+        found.append(score(play_over_topics(configuration, scene), configuration.shared.arm))
+    report(len(found), len(drawn))
+    return found
 
 
 def play_over_topics(configuration: Configuration, scene: Scene, domain_id: int | None = None) -> Played:
@@ -58,7 +70,7 @@ def play_over_topics(configuration: Configuration, scene: Scene, domain_id: int 
         return recorded(scene, Path(folder) / "scene", shared.arm, failure)
 
 
-MODES = {"direct": judge, "lockstep": over_topics}
+MODES = {"direct": without_ros, "lockstep": over_topics}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,12 +110,12 @@ def run(given: argparse.Namespace) -> int:
     extent = Extent(given.contacts, given.resting, given.free)
     dither = dither_values(configuration)
     drawn = {seed: scenes(configuration, seed, extent, given.joint_sensors, dither) for seed in given.seed}
+    order = [(seed, scene) for seed, own in drawn.items() for scene in own]
+    play = MODES[given.mode]
+    scored = play(configuration, [scene for _, scene in order], given.processes, Progress("scenes", sys.stderr))
     judgement = Judgement(tuple(given.seed), {seed: [] for seed in given.seed})
-    whole = sum(map(len, drawn.values()))
-    for number, (seed, scored) in enumerate(MODES[given.mode](configuration, drawn, given.processes), 1):
-        judgement.scores[seed].append(scored)
-        if sys.stderr.isatty():
-            print(f"\r{number} of {whole} scenes", end="" if number < whole else "\n", file=sys.stderr, flush=True)
+    for (seed, _), scene in zip(order, scored, strict=True):
+        judgement.scores[seed].append(scene)
     text = report(judgement, arm)
     print(text)
     if given.write:

@@ -3,11 +3,11 @@
 import math
 from collections.abc import Sequence
 
-from wam_analysis.contact_battery import Judgement
-from wam_analysis.contact_battery_scenes import FRICTION, MASS, PAYLOAD, STIFFNESS
-from wam_analysis.contact_battery_score import ANY, FREE_MUST, FREE_STRETCH, Bound, Row, SceneScore, asked, stated
-from wam_analysis.contact_battery_statistics import Figure
-from wam_analysis.contact_battery_touches import EDGE, MOVING, SETTLED, SETTLED_AT_REST, SETTLED_IN_FOAM, SLIDING
+from wam_analysis.contact_battery.judgement import Judgement
+from wam_analysis.contact_battery.scenes import FRICTION, MASS, PAYLOAD, STIFFNESS
+from wam_analysis.contact_battery.score import ANY, FREE_MUST, FREE_STRETCH, Bound, Row, SceneScore, asked, stated
+from wam_analysis.contact_battery.statistics import Figure
+from wam_analysis.contact_battery.touches import EDGE, MOVING, SETTLED, SETTLED_AT_REST, SETTLED_IN_FOAM, SLIDING
 from wam_description.arm import Arm
 
 MET, STRETCH, MARGINAL, MISSED, FEW = "must", "**stretch**", "must, marginal", "**MISSED**", "not enough time"

@@ -1,12 +1,13 @@
 """The judge of whole-arm contact estimation: draws scenes, plays them, scores them."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Any, NamedTuple
 
-from wam_analysis.contact_battery_run import each, play
-from wam_analysis.contact_battery_scenes import Draw, Scene
-from wam_analysis.contact_battery_score import SceneScore, score
+from wam_analysis.batch import Report, results
+from wam_analysis.contact_battery.run import play
+from wam_analysis.contact_battery.scenes import Draw, Scene
+from wam_analysis.contact_battery.score import SceneScore, score
 from wam_description.configuration import Configuration
 
 
@@ -56,16 +57,20 @@ def scenes(
     return found + draw.resting(extent.resting, dither) if dither else found
 
 
-def judged(configuration: Configuration, scene: Scene) -> SceneScore:
+class Task(NamedTuple):
+    """A scene and the configuration that it is played with."""
+
+    configuration: Configuration
+    scene: Scene
+
+
+def judged(task: Task) -> SceneScore:
     """Play a scene without ROS and score it."""
-    return score(play(configuration, scene), configuration.shared.arm)
+    return score(play(*task), task.configuration.shared.arm)
 
 
 def judge(
-    configuration: Configuration, drawn: Mapping[int, Sequence[Scene]], processes: int
-) -> Iterator[tuple[int, SceneScore]]:
-    """Play the scenes of every seed, in order; each scene's seed and score as they come."""
-    order = [(seed, scene) for seed, own in drawn.items() for scene in own]
-    scored = each(partial(judged, configuration), [scene for _, scene in order], processes)
-    for (seed, _), scene in zip(order, scored, strict=True):
-        yield seed, scene
+    configuration: Configuration, drawn: Sequence[Scene], executor: Executor, report: Report | None = None
+) -> list[SceneScore]:
+    """Play scenes without ROS; the score of each, in order, the same by any executor."""
+    return results(judged, [Task(configuration, scene) for scene in drawn], executor, report=report)

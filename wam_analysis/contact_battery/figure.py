@@ -12,9 +12,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from wam_analysis.contact_battery_scenes import KINDS
-from wam_analysis.contact_battery_score import IN_MOTION, SceneScore, asked, outer, touched
-from wam_analysis.contact_battery_touches import Touch
+from wam_analysis.contact_battery.scenes import KINDS
+from wam_analysis.contact_battery.score import IN_MOTION, SceneScore, asked, outer, touched
+from wam_analysis.contact_battery.touches import Touch
 from wam_description.arm import Arm
 
 COLOURS = ("#0b6fb8", "#d55e00", "#009e73", "#cc79a7")

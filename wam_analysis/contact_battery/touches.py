@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_battery_run import Belief, Played, Record
-from wam_analysis.contact_battery_scenes import Planned
+from wam_analysis.contact_battery.run import Belief, Played, Record
+from wam_analysis.contact_battery.scenes import DITHER_CYCLE, Planned
 from wam_description.signals import Load
 
 TOUCHED = 0.3  # N; less counts as nothing
@@ -236,7 +236,10 @@ def residual(played: Played) -> Residual:
         for edge in (stamps[span.first], stamps[span.last]):
             keep &= ~((stamps > edge - 0.02) & (stamps < edge + EDGE))
     keep &= stamps > stamps[0] + 0.2  # the observer's own beginning
-    error = np.array([record.external for record in records]) - np.array([record.torques for record in records])
+    truth = np.array([record.torques for record in records])
+    if played.scene.group == "dither":  # a hand that rubs to and fro is felt as it is over a whole cycle, too
+        truth = _over_cycle(truth, round(DITHER_CYCLE / float(stamps[1] - stamps[0])))
+    error = np.array([record.external for record in records]) - truth
     moving = np.array([is_moving(record) for record in records])
     sliding = keep & np.array([min(map(abs, record.thetad)) > SLIDING for record in records])
     square = error**2
@@ -253,6 +256,13 @@ def residual(played: Played) -> Residual:
         still_count=int((keep & ~moving).sum()),
         sliding_count=int(sliding.sum()),
     )
+
+
+def _over_cycle(rows: np.ndarray, count: int) -> np.ndarray:
+    """Mean of the last `count` rows at each."""
+    before = np.concatenate((np.repeat(rows[:1], count, axis=0), rows)).cumsum(axis=0)
+    mean: np.ndarray = (before[count:] - before[:-count]) / count
+    return mean
 
 
 def _row(squares: np.ndarray) -> tuple[float, ...]:

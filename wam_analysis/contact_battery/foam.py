@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_battery_paths import Move
+from wam_analysis.contact_battery.paths import Move
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 

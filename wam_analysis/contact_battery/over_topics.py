@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from wam_analysis.bag import JointColumns, Messages, PointColumns, WrenchColumns, read
-from wam_analysis.contact_battery_run import Belief, Levers, Played, Record, belief
-from wam_analysis.contact_battery_scenes import Scene
+from wam_analysis.contact_battery.run import Belief, Levers, Played, Record, belief
+from wam_analysis.contact_battery.scenes import Scene
 from wam_control.scenario import Step
 from wam_description.arm import Arm
 from wam_description.signals import Load

@@ -1,15 +1,13 @@
 """Playing the scenes of the battery and writing down what was felt beside what was true."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from wam_analysis.contact_battery_scenes import Scene
+from wam_analysis.contact_battery.scenes import Scene
 from wam_analysis.direct import DirectRun
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
@@ -20,8 +18,6 @@ from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.safety import Mode
 
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
-T = TypeVar("T")
-U = TypeVar("U")
 
 
 class Belief(NamedTuple):
@@ -145,12 +141,3 @@ def play(configuration: Configuration, scene: Scene) -> Played:
         if run.driver.safety.mode is Mode.FAULT:
             return Played(scene, records, run.driver.safety.fault)
     return Played(scene, records, run.scenario.failure)
-
-
-def each(work: Callable[[T], U], items: Iterable[T], processes: int) -> Iterator[U]:
-    """What `work` makes of each item, in order, by several processes."""
-    if processes <= 1:
-        yield from map(work, items)
-        return
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(work, items, chunksize=4)

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_battery_foam import Blow, Foam, foam_values
-from wam_analysis.contact_battery_paths import Paths
+from wam_analysis.contact_battery.foam import Blow, Foam, foam_values
+from wam_analysis.contact_battery.paths import Paths
 from wam_control.scenario import Push, Step
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
@@ -29,7 +29,7 @@ LEVELS = (5.0, 10.0, 20.0)  # N, those that the table names
 WEAKEST, STRONGEST = 1.0, 20.0  # N
 ROUGH = 0.8  # the greatest coefficient of friction, of every fifth pusher
 MARGIN = 0.02  # m from the ends of a link where nothing touches
-DITHER_CYCLE = 40  # periods of the loop: 25 Hz
+DITHER_CYCLE = 0.04  # s: 25 Hz
 FOAM_SHARE = 0.15  # of the scenes in motion
 KINDS = ("push", "sphere", "flat", "foam")
 
@@ -71,7 +71,11 @@ class Scene(NamedTuple):
 def dither_values(configuration: Configuration) -> dict[str, Any]:
     """What makes the arm dither at rest; nothing where it cannot."""
     shared = configuration.sections["/**"]
-    return {"timing.dither_cycle": DITHER_CYCLE} if "timing.dither_cycle" in shared else {}
+    return (
+        {"timing.dither_cycle": round(DITHER_CYCLE / shared["timing.period"])}
+        if "timing.dither_cycle" in shared
+        else {}
+    )
 
 
 def base_values(configuration: Configuration, joint_sensors: bool) -> dict[str, Any]:
@@ -131,7 +135,7 @@ class Draw:
             begin = now + 0.3 * move.seconds
             contact = self._contact(random, begin, begin + HOLD)
             planned.append(contact)
-            push = _push(contact, now) if contact.kind == "push" else None
+            push = self._push(contact, now) if contact.kind == "push" else None
             steps.append(Step(f"move {number + 1}", move.seconds, posture=move.posture, push=push))
             now += move.seconds
         steps.append(Step("end", 0.1))
@@ -168,7 +172,7 @@ class Draw:
             begin = now + 0.6
             contact = self._contact(random, begin, begin + REST_HOLD)
             planned.append(contact)
-            push = _push(contact, now) if contact.kind == "push" else None
+            push = self._push(contact, now) if contact.kind == "push" else None
             steps.append(Step(f"rest {number + 1}", 0.6 + REST_HOLD + 0.2, push=push))
             now += steps[-1].seconds
         values = self._values(random, start, planned) | dict(dither or {})
@@ -188,8 +192,9 @@ class Draw:
                 steps.append(Step("stop", stop))
             left -= move.seconds + stop
             here = move.posture
-        values = self._values(random, start, []) | {"driver:departure.payload": float(random.uniform(0.0, PAYLOAD))}
-        if "observer.payload" in self._configuration.sections["contact_estimator"]:
+        values = self._values(random, start, [])
+        if i % 2:  # the others carry nothing, and nothing is declared, as where contacts are judged
+            values["driver:departure.payload"] = float(random.uniform(0.0, PAYLOAD))
             values["contact_estimator:observer.payload"] = [0.0, PAYLOAD]
         return Scene(f"seed {self._seed} free {i}", "free", values, tuple(steps), ())
 
@@ -211,6 +216,12 @@ class Draw:
             friction=friction if kind != "push" else 0.0,
         )
 
+    def _push(self, contact: Planned, step_begins: float) -> Push:
+        cover, place = contact.cover, contact.place
+        force = (0.0, contact.force * math.cos(contact.angle), contact.force * math.sin(contact.angle))
+        begin, end = contact.begin - step_begins, contact.end - step_begins
+        return Push(cover, place, force, begin, end, self._arm.covers.aside(cover, place))
+
     def _values(self, random: np.random.Generator, start: Sequence[float], planned: list[Planned]) -> dict[str, Any]:
         return {
             **self._base,
@@ -222,11 +233,6 @@ class Draw:
 
 def _opening() -> list[Step]:
     return [Step("release", RELEASE, request="enable"), Step("settle", SETTLE)]
-
-
-def _push(contact: Planned, step_begins: float) -> Push:
-    force = (0.0, contact.force * math.cos(contact.angle), contact.force * math.sin(contact.angle))
-    return Push(contact.cover, contact.place, force, contact.begin - step_begins, contact.end - step_begins)
 
 
 def _departure(random: np.random.Generator, arm: Arm) -> dict[str, Any]:

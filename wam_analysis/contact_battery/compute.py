@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_battery_scenes import Scene
+from wam_analysis.contact_battery.scenes import Scene
 from wam_analysis.direct import DirectRun
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
 from wam_description.arm import seconds

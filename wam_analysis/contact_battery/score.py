@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from wam_analysis.contact_battery_run import Played
-from wam_analysis.contact_battery_scenes import KINDS, LEVELS
-from wam_analysis.contact_battery_statistics import NONE, Figure, events, quantile, rms, share
-from wam_analysis.contact_battery_touches import Quiet, Residual, Touch, quiet, residual, touches
+from wam_analysis.contact_battery.run import Played
+from wam_analysis.contact_battery.scenes import KINDS, LEVELS
+from wam_analysis.contact_battery.statistics import NONE, Figure, events, quantile, rms, share
+from wam_analysis.contact_battery.touches import Quiet, Residual, Touch, quiet, residual, touches
 from wam_description.arm import Arm
 
 Triple = tuple[float, float, float]
@@ -20,6 +20,8 @@ SURE_SD = 0.02  # m
 SURE_LINK = 0.95
 IN_MOTION = ("moving", "free")
 ROUGH = 0.8  # coefficient of friction of the hardest contacts
+TORQUE_MUST, TORQUE_AIM = (0.25, 0.35, 0.15, 0.12), (0.10, 0.15, 0.06, 0.05)  # N m, of each joint, moving or dithered
+DITHERED = "at rest, dithered"
 
 
 class SceneScore(NamedTuple):
@@ -200,17 +202,10 @@ def _torque_z(scores: Sequence[SceneScore]) -> Figure:
 def asked(arm: Arm) -> list[Row]:
     """The rows of the table that must be met."""
     last = arm.covers.names[-1]
-    torque = zip(arm.joints.names, (0.25, 0.35, 0.15, 0.12), (0.10, 0.15, 0.06, 0.05), strict=True)
     rows = [
-        Row(
-            f"external torque in motion, rms, {name}",
-            "N m",
-            1.0,
-            (0.0, must),
-            (0.0, aim),
-            _torque_rms(i, IN_MOTION, "moving"),
-        )
-        for i, (name, must, aim) in enumerate(torque)
+        Row(f"external torque {words}, rms, {name}", "N m", 1.0, (0.0, must), (0.0, aim), _torque_rms(i, groups, state))
+        for words, groups, state in (("in motion", IN_MOTION, "moving"), (DITHERED, ("dither",), "still"))
+        for i, (name, must, aim) in enumerate(zip(arm.joints.names, TORQUE_MUST, TORQUE_AIM, strict=True))
     ]
     rows.append(Row("false alarms in free motion with stops", "", 1.0, (0.0, 0.0), (0.0, 0.0), false_alarms))
     for seconds, must, aim in ((0.06, (0.95, 1.0), ANY), (0.03, ANY, (0.99, 1.0))):
@@ -252,7 +247,11 @@ def stated(arm: Arm) -> list[Row]:
     for i, name in enumerate(arm.joints.names):
         quantity = f"external torque where every motor slides, rms, {name}"
         rows.append(Row(quantity, "N m", 1.0, ANY, ANY, _torque_rms(i, IN_MOTION, "sliding")))
-    for group, words in (("rest", "at rest"), ("dither", "at rest, dithered")):
+    for i, name in enumerate(arm.joints.names):
+        rows.append(
+            Row(f"external torque at rest, rms, {name}", "N m", 1.0, ANY, ANY, _torque_rms(i, ("rest",), "still"))
+        )
+    for group, words in (("rest", "at rest"), ("dither", DITHERED)):
         rows += _at_rest(arm, group, words)
     return rows + [
         Row(f"place on the outer link, {kind}, median error", "cm", 100.0, ANY, ANY, _by_kind(arm, kind))
@@ -261,10 +260,7 @@ def stated(arm: Arm) -> list[Row]:
 
 
 def _at_rest(arm: Arm, group: str, words: str) -> list[Row]:
-    rows = [
-        Row(f"external torque {words}, rms, {name}", "N m", 1.0, ANY, ANY, _torque_rms(i, (group,), "still"))
-        for i, name in enumerate(arm.joints.names)
-    ]
+    rows = []
     for force in LEVELS:
         name = f"{force:.0f} N on the outer link"
         place = _place(arm, force, group=group)

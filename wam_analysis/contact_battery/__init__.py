@@ -1,0 +1,1 @@
+"""The judge of whole-arm contact estimation: scenes, how they are played, how they are scored."""
