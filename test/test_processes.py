@@ -276,6 +276,17 @@ def test_help_of_every_command_says_what_it_does(subcommand: str | None, capsys:
         assert all(name in out for name in SUBCOMMANDS)
 
 
+def test_a_reader_who_has_had_enough_is_no_error() -> None:
+    """As in `wam scorecard | head -1`."""
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, "-m", "wam_ros.cli", "scorecard"], stdout=write, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

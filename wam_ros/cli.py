@@ -2,6 +2,8 @@
 
 import argparse
 import importlib
+import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -43,6 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given.ros = rest
     try:
         code = command.run(given)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # whoever read has had enough: `wam ... | head`
+        code = 128 + signal.SIGPIPE
     except (ParameterError, ValueError, OSError) as error:
         parser.exit(1, f"wam {given.command}: {error}\n")
     except KeyboardInterrupt:
