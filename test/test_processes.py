@@ -14,7 +14,7 @@ import pytest
 
 from wam_analysis.bag import read
 from wam_description.configuration import Configuration, packaged
-from wam_ros.cli import main
+from wam_ros.cli import COMMANDS, main
 
 ROOT = Path(__file__).parents[1]
 PATIENCE = 2.0  # s, what the stack may take to end
@@ -264,7 +264,7 @@ def command(capsys: Any, *arguments: str) -> tuple[int, str, str]:
     return (code if isinstance(code, int) else 1, output.out, output.err if isinstance(code, int) else str(code))
 
 
-SUBCOMMANDS = ["demo", "up", "node", "record", "report", "model"]
+SUBCOMMANDS = tuple(COMMANDS)
 
 
 @pytest.mark.parametrize("subcommand", [None, *SUBCOMMANDS])
