@@ -18,6 +18,7 @@ from wam_analysis.contact_battery.scenes import Draw, Planned, Scene, dither_val
 from wam_analysis.contact_battery.score import ANY, Row, SceneScore, asked, score, stated
 from wam_analysis.contact_battery.statistics import Figure, events, quantile, rms, share
 from wam_analysis.contact_battery.touches import Quiet, Touch, credibility, quiet, residual, spans, touches
+from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.scenario import load as load_script
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import NO_LOAD, Load
@@ -139,8 +140,11 @@ def test_torque_errors_count_in_motion_and_at_rest_apart_and_not_near_the_edges_
 def test_a_dithered_arm_is_held_against_the_truth_over_a_whole_cycle() -> None:
     """A hand that rubs to and fro in step with the dither, and an estimate that is its mean."""
     played = story([5.0] * 200, {}, speed=0.0)
-    rubbing = [r._replace(torques=(3.0 * math.sin(2.0 * math.pi * i / 8.0) + 1.0, 0.0, 0.0, 0.0), external=(1.0, 0.0, 0.0, 0.0))
-               for i, r in enumerate(played.records)]  # fmt: skip
+    swing = [1.0 + 3.0 * math.sin(2.0 * math.pi * i / 8.0) for i in range(200)]
+    rubbing = [
+        one._replace(torques=(torque, 0.0, 0.0, 0.0), external=(1.0, 0.0, 0.0, 0.0))
+        for one, torque in zip(played.records, swing, strict=True)
+    ]
     errors = {}
     for group in ("rest", "dither"):
         found = residual(played._replace(scene=played.scene._replace(group=group), records=rubbing))

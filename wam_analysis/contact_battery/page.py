@@ -145,8 +145,8 @@ Written by `{{command}}`; nothing here is written by hand.
 Each seed draws poses, moves, contacts and an arm. The arm differs from what its controllers know: friction of each
 motor and joint by up to {FRICTION:.0%}, mass of each link by {MASS:.0%}, stiffness of each cable by {STIFFNESS:.0%},
 evenly distributed. In every other scene of free motion the tool carries an unknown mass of up to
-{1e3 * PAYLOAD:.0f} g, which is declared; in all others nothing is carried and nothing declared. The estimator is that of the configuration, with the
-masses and the friction that the arm is configured with.
+{1e3 * PAYLOAD:.0f} g, which is declared; in all others nothing is carried and nothing declared.
+The estimator is that of the configuration, with the masses and the friction that the arm is configured with.
 
 The seeds of this page were chosen after the code was frozen. Those that it was tuned with:
 {", ".join(map(str, TUNED))}.
