@@ -13,9 +13,9 @@ import yaml
 from comparing import arguments, machine, save, spread, table
 from speed import lockstep, scenario
 
-from wam_analysis.analysis import TOPICS_READ, analyse_bag
-from wam_analysis.analysis_page import page
 from wam_analysis.bag import raw, read
+from wam_analysis.findings.analysis import TOPICS_READ, analyse_bag
+from wam_analysis.findings.page import page
 from wam_description.configuration import Configuration, packaged
 from wam_ros.bag import BagWriter
 from wam_ros.message_layout import stamp_reader

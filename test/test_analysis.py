@@ -14,13 +14,13 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from test_bag import STORE, joint_state
 from test_lockstep import configuration, record_composed
 
-from wam_analysis.analysis import Analysis, analyse, analyse_bag
-from wam_analysis.analysis_page import page
-from wam_analysis.analysis_plots import timing_plots
-from wam_analysis.analysis_text import SCHEMA, document, json_text, text
 from wam_analysis.bag import Bag, JointColumns, WrenchColumns, read
-from wam_analysis.finding import Finding
-from wam_analysis.prediction import largest_force, node_at, predict
+from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag
+from wam_analysis.findings.finding import Finding
+from wam_analysis.findings.page import page
+from wam_analysis.findings.plots import timing_plots
+from wam_analysis.findings.prediction import largest_force, node_at, predict
+from wam_analysis.findings.text import SCHEMA, document, json_text, text
 from wam_analysis.recorded import recorded_parameters
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody

@@ -20,7 +20,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from wam_analysis.bag import BagError, BoolColumns, JointColumns, Messages, PointColumns, WrenchColumns, read
 from wam_analysis.comparison import compare
-from wam_ros.bag import INFINITE, BagWriter, RecordingError, exact_cdr, policies
+from wam_ros.bag import BagWriter, RecordingError, exact_cdr, policies
+from wam_ros.bag_metadata import INFINITE
 from wam_ros.definitions import DefinitionError, definition, schema, type_hash
 from wam_ros.message_layout import ExactLength, stamp_reader
 from wam_ros.topics import TOPICS

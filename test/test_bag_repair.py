@@ -20,7 +20,8 @@ from rosbags.highlevel import AnyReader
 
 from wam_analysis.bag import BagError, raw, read
 from wam_analysis.bag_file import contents
-from wam_ros.bag import INFINITE, RESERVE, WHOLE, BagWriter, RecordingError, Split
+from wam_ros.bag import RESERVE, WHOLE, BagWriter, RecordingError, Split
+from wam_ros.bag_metadata import INFINITE
 from wam_ros.bag_repair import repair
 from wam_ros.commands.bag import described, told
 

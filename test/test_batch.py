@@ -94,7 +94,7 @@ def test_an_error_names_its_input_and_keeps_what_is_done(tmp_path: Path) -> None
 
 
 SLOW = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from wam_analysis import batch
 
@@ -105,6 +105,7 @@ def piece(n):
     return n
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
     with batch.processes(2) as executor:
         batch.results(piece, range(2), executor, Path("kept"), lambda done, of: Path(f"said.{done}").touch())
 """
@@ -114,7 +115,11 @@ def test_ctrl_c_ends_the_workers_at_once_and_keeps_what_is_done(tmp_path: Path) 
     (tmp_path / "slow.py").write_text(SLOW)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
-        [sys.executable, "slow.py"], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, start_new_session=True
+        [sys.executable, "slow.py"],
+        cwd=tmp_path,
+        env=environment,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
     ) as process:
         try:
             while not (

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from recordings import forces, joints, recorded
 
-from wam_analysis.bag import BagError
+from wam_analysis.bag import BagError, PointColumns
 from wam_analysis.experiments import arm_forces, cables, limit_cycles, step_response, testbed, transmission
 from wam_analysis.experiments.definition import configured, load, names
 from wam_analysis.experiments.evaluation import evaluation_of
@@ -362,6 +362,40 @@ def test_documentation_shows_every_experiment() -> None:
         assert "| predicted | measured |" in block, name
         assert "MISSED" not in block, name
         assert (docs / "experiments" / f"{name}.png").is_file()
+
+
+def test_a_touch_is_judged_by_its_time_link_force_and_place(tmp_path: Path) -> None:
+    time = np.arange(0.0, 3.0, 5e-3)
+    there = (time >= 1.0) & (time < 2.0)
+    felt = (time >= 1.06) & (time < 2.04)
+    elsewhere = (time >= 1.5) & (time < 1.6)
+
+    def wrench(where, newtons):
+        frames = tuple("outer_link" if yes else "base" for yes in where)
+        return forces(time, np.where(where, newtons, 0.0)[:, None] * (0.0, 1.0, 0.0))._replace(frames=frames)
+
+    def place(where, x):
+        stamps = np.round(time * 1e9).astype(np.int64)
+        return PointColumns(stamps, stamps, ("",) * len(time), np.where(where, x, np.nan)[:, None] * (1.0, 0.0, 0.0))
+
+    topics = {
+        "sim/contact/wrench": wrench(there, 12.0),
+        "contact/wrench": wrench(felt & ~elsewhere, 11.4),
+        "sim/contact/point": place(there, 0.28),
+        "contact/point": place(felt & ~elsewhere, 0.31),
+    }
+    run = recorded(load("wam-touch"), 0, topics, (Step("push", 0.0, 3.0, {}),), tmp_path)
+    before, after, right, force, x = arm_forces.touching({"push": run}).rows
+    assert before.measured == 0.0
+    assert after.measured == pytest.approx(0.06, abs=1e-6)
+    assert right.measured == pytest.approx(1.0 - 0.1 / 0.9, abs=0.01)
+    assert not right.agrees
+    assert (force.predicted, force.measured) == pytest.approx((12.0, 11.4))
+    assert x.deviation == pytest.approx(0.03)
+    early = {**topics, "contact/wrench": wrench(time > 0.5, 11.4)}
+    before, after, *_ = arm_forces.touching({"push": recorded(load("wam-touch"), 0, early, (), tmp_path)}).rows
+    assert (before.measured, after.measured) == pytest.approx((0.5, 0.0), abs=0.01)
+    assert not before.agrees
 
 
 # run for real

@@ -318,6 +318,34 @@ def test_a_place_that_is_too_unsure_gives_way_to_the_configured_one(
     assert (loop.fallback, loop.refusals) == ("", {})
 
 
+def test_a_place_once_sure_stands_as_long_as_the_touch() -> None:
+    """Going back and forth between it and the configured one would make a step of the measured force each time."""
+    loop = Loop(ARM, OWN)
+    sure, doubtful = (Contact("inner_link", 0.4, (0.0, 0.0, 1.0), place_sd, 0.99) for place_sd in (0.01, 0.05))
+    there, configured = lever(POSE, DOWN, "inner_link", 0.4), lever(POSE)
+    for contact, expected in (
+        (doubtful, configured),
+        (sure, there),
+        (doubtful, there),
+        (NO_CONTACT, configured),
+        (doubtful, configured),
+    ):
+        out = ask(loop, World(400.0), down(2.0), contact=contact)
+        assert out.effort == pytest.approx(2.0 * expected, abs=1e-6)
+
+
+def test_the_force_of_a_doubtful_estimate_is_not_believed_but_its_torques_are() -> None:
+    world, felt = World(400.0), (0.0, 9.0, 0.0)
+    torques = (-3.0 * lever(POSE)).tolist()  # of a push of 3 N where the parameters say
+    for place_sd, expected in ((0.01, float(rotation("outer_link")[2] @ felt)), (0.05, 3.0)):
+        loop, contact = (
+            Loop(ARM, replace(OWN, feedback="contact_estimate")),
+            Contact(COVER, PLACE, felt, place_sd, 0.99),
+        )
+        out = ask(loop, world, down(5.0), contact=contact, external=torques)
+        assert out.measured == pytest.approx(down(expected), abs=1e-5)
+
+
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 @pytest.mark.parametrize("mode", ["hybrid", "open_loop"])
 def test_a_force_in_a_cover_frame_is_the_same_force_in_the_base_frame(feedback: str, mode: str) -> None:

@@ -12,7 +12,8 @@ from wam_analysis.replay_wirings import WIRINGS
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_ros import cli
-from wam_ros.bag import INFINITE, BagWriter
+from wam_ros.bag import BagWriter
+from wam_ros.bag_metadata import INFINITE
 
 STEPS = {
     "steps": [

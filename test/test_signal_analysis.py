@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from wam_analysis.efficiency import backdrivability, efficiency
-from wam_analysis.force_accuracy import dynamic_range, force_accuracy
-from wam_analysis.frequency import bandwidth, believable, fit_poles, frequency_response
-from wam_analysis.friction import identify_friction
-from wam_analysis.limit_cycle import limit_cycle
-from wam_analysis.loop_timing import latency, stamp_timing
-from wam_analysis.response import step_response
-from wam_analysis.ripple import ripple_spectrum
-from wam_analysis.runs import runs, without_short
-from wam_analysis.stability import Verdict, half_cycle_peaks, stability
-from wam_analysis.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.efficiency import backdrivability, efficiency
+from wam_analysis.measures.force_accuracy import dynamic_range, force_accuracy
+from wam_analysis.measures.frequency import bandwidth, believable, fit_poles, frequency_response
+from wam_analysis.measures.friction import identify_friction
+from wam_analysis.measures.limit_cycle import limit_cycle
+from wam_analysis.measures.loop_timing import latency, stamp_timing
+from wam_analysis.measures.response import step_response
+from wam_analysis.measures.ripple import ripple_spectrum
+from wam_analysis.measures.runs import runs, without_short
+from wam_analysis.measures.stability import Verdict, half_cycle_peaks, stability
+from wam_analysis.measures.stick_slip_phases import stick_slip_phases
 from wam_theory.stick_slip import ForceLoop, FrictionNode, simulate
 
 MS = 1_000_000

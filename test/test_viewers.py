@@ -14,7 +14,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from test_bag import STORE, joint_state, wrench
 
 from wam_analysis.bag import Bag, JointColumns, read
-from wam_analysis.recording import recording_of
+from wam_analysis.findings.recording import recording_of
 from wam_analysis.rerun_view import _arrows, _quaternion, _turn, load_rerun, view
 from wam_description.configuration import Configuration, packaged
 from wam_description.mjcf import rotation_xyz

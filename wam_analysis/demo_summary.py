@@ -22,7 +22,7 @@ from wam_analysis.demo_traces import (
     traces_of,
     values_of,
 )
-from wam_analysis.runs import runs
+from wam_analysis.measures.runs import runs
 
 NO_LINK = "none"
 NOT_RECORDED = "not recorded"

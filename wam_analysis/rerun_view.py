@@ -16,9 +16,9 @@ from wam_analysis.arm_picture import side_view
 from wam_analysis.bag import JointColumns
 from wam_analysis.demo_figure import ASKED, FELT, MEASURED, METRES_PER_NEWTON, TRUE
 from wam_analysis.demo_traces import Signal, messages_of, node_of, values_of
+from wam_analysis.findings.recording import Recording, by_names
+from wam_analysis.findings.timing import STAMPED
 from wam_analysis.recorded import RecordedArm, recorded_arm
-from wam_analysis.recording import Recording, by_names
-from wam_analysis.sections_timing import STAMPED
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 

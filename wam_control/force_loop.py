@@ -68,7 +68,7 @@ class ForceLoop:
     report : what the guard says; a new object where that has changed.
     refused : how many commands were not taken.
     refusals : why a present command is not taken, by topic; the last good one stands.
-    fallback : why a felt contact is not believed and the configured place is used, '' where it is or none is felt.
+    fallback : why a felt contact is not believed and another place is used, '' where it is or none is felt.
     """
 
     def __init__(self, arm: Arm, parameters: ForceLoopParameters, timing: Timing) -> None:
@@ -85,6 +85,7 @@ class ForceLoop:
         self._admitted: ForceCommand | None = None
         self._admitted_torque: Sequence[float] | None = None
         self._is_forsaken = self._is_doubtful = False
+        self._touched: tuple[str, float] | None = None
         self._start([])
         self.refused = 0
         self.refusals: dict[str, str] = {}
@@ -330,23 +331,26 @@ class ForceLoop:
         return self._body.point_jacobian(q, cover, (place, 0.0, 0.0))
 
     def _place(self, contact: Contact) -> tuple[str, float]:
-        """Where the force acts: where it is felt for sure, else where the parameters say."""
+        """Where the force acts: where it is felt for sure, or was in this touch, else where the parameters say."""
         parameters, is_sure = self.parameters, self._is_sure(contact)
         is_doubtful = bool(contact.cover) and not is_sure
+        if not contact.cover:
+            self._touched = None
+        elif is_sure:
+            self._touched = contact.cover, contact.place
         if is_doubtful:
             self.fallback = (
                 f"the felt place on {contact.cover} has a standard deviation of {contact.place_sd:.2g} m, a probability"
                 f" of {contact.probability:.2f}; allowed: up to place_uncertainty_limit, "
                 f"{parameters.place_uncertainty_limit:g} m, and from link_probability_limit, "
-                f"{parameters.link_probability_limit:g}; contact_cover and contact_place are used"
+                f"{parameters.link_probability_limit:g}; "
+                + ("the last sure place is used" if self._touched else "contact_cover and contact_place are used")
             )
         if is_doubtful and parameters.feedback == "contact_estimate":  # else the place is only wished for
             self.refused += not self._is_doubtful
             self.refusals["contact/spread"] = self.fallback
         self._is_doubtful = is_doubtful
-        if not contact.cover or is_doubtful:
-            return parameters.contact_cover, parameters.contact_place
-        return contact.cover, contact.place
+        return self._touched or (parameters.contact_cover, parameters.contact_place)
 
     def _is_sure(self, contact: Contact) -> bool:
         """Whether the felt place is sure enough to build on; where nobody says how sure it is, it is."""
@@ -356,9 +360,10 @@ class ForceLoop:
 
     def _measured(self, q: Sequence[float], jacobian: Array, contact: Contact, direction: Array) -> float:
         """F_c: force of the arm on the world along the direction, N."""
-        if self.parameters.feedback == "contact_estimate":
-            if not contact.cover:
-                return 0.0
+        is_estimated = self.parameters.feedback == "contact_estimate"
+        if is_estimated and not contact.cover:
+            return 0.0
+        if is_estimated and (math.isnan(contact.place) or not self._is_doubtful):
             return -float(direction @ (self._body.cover_pose(q, contact.cover).rotation @ np.array(contact.force)))
         force = np.linalg.pinv(jacobian.T, rcond=SMALLEST_LEVER) @ self._external
         return -float(direction @ force)

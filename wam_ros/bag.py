@@ -14,18 +14,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Final, NamedTuple, Self
 
-import yaml
-
+from wam_ros.bag_metadata import INFINITE, LIBRARY, FileSummary, bag_information, write_metadata, yaml_text
 from wam_ros.definitions import schema, type_hash
 from wam_ros.mcap_writer import McapWriter
 from wam_ros.message_layout import ExactLength
 
-LIBRARY: Final = "wam_stack"
 CHUNK_SIZE: Final = 1024 * 1024  # bytes; half of this is half a second of the arm, a tenth is left on disk
 FLUSH_PERIOD: Final = 0.5  # s; a killed recorder loses at most this and one timer period
 RESERVE: Final = ".reserved"  # file that keeps space for the end of the bag
 RESERVED: Final = 8 * 2**20  # bytes of it; an hour of the arm needs two for its indexes
-INFINITE: Final = {"sec": 9223372036, "nsec": 854775807}
 POLICIES: Final = (
     "history", "depth", "reliability", "durability", "deadline", "lifespan", "liveliness",
     "liveliness_lease_duration", "avoid_ros_namespace_conventions",
@@ -95,15 +92,6 @@ class Split(NamedTuple):
 WHOLE: Final = Split(0, 0.0)  # one file
 
 
-class FileSummary(NamedTuple):
-    """What metadata.yaml says about one file: name, first and last log time in ns, messages."""
-
-    name: str
-    first: int
-    last: int
-    messages: int
-
-
 class BagWriter:
     """Writes a new bag directory ``<path>/`` with ``<name>_0.mcap`` and so on and, on closing, ``metadata.yaml``.
 
@@ -168,7 +156,7 @@ class BagWriter:
         """
         offered = [policies(qos)]
         digest = type_hash(kind)
-        self._define(name, kind, {"offered_qos_profiles": _yaml(offered).strip(), "topic_type_hash": digest})
+        self._define(name, kind, {"offered_qos_profiles": yaml_text(offered).strip(), "topic_type_hash": digest})
         self._lengths.append(ExactLength(kind))
         self._topics.append(
             {
@@ -303,7 +291,7 @@ class BagWriter:
         file = FileSummary(self._file_name(), writer.first, writer.last, sum(writer.counts.values()))
         counts = self._counts + Counter(writer.counts)
         information = self._information([*self._files, file], counts)
-        writer.metadata("rosbag2", {"serialized_metadata": _yaml(information).strip()})
+        writer.metadata("rosbag2", {"serialized_metadata": yaml_text(information).strip()})
         writer.finish()
         self._stream.close()
         self._files.append(file)
@@ -334,51 +322,6 @@ class BagWriter:
 
     def _information(self, files: Sequence[FileSummary], counts: Counter[int]) -> dict[str, Any]:
         return bag_information(files, self._topics, [counts[channel] for channel in self._channels.values()])
-
-
-def bag_information(
-    files: Sequence[FileSummary], topics: Sequence[Mapping[str, Any]], counts: Sequence[int]
-) -> dict[str, Any]:
-    """What metadata.yaml says (version 9 of rosbag2).
-
-    Parameters
-    ----------
-    files : files of the bag in their order.
-    topics : name, type, serialization_format, offered_qos_profiles and type_description_hash of each.
-    counts : messages of each topic.
-    """
-    filled = [file for file in files if file.messages]
-    first = min((file.first for file in filled), default=0)
-    last = max((file.last for file in filled), default=0)
-    return {
-        "version": 9,
-        "storage_identifier": "mcap",
-        **_extent(first, last, sum(file.messages for file in files)),
-        "topics_with_message_count": [
-            {"topic_metadata": topic, "message_count": count} for topic, count in zip(topics, counts, strict=True)
-        ],
-        "compression_format": "",
-        "compression_mode": "",
-        "relative_file_paths": [file.name for file in files],
-        "files": [{"path": file.name, **_extent(file.first, file.last, file.messages)} for file in files],
-        "custom_data": None,
-        "ros_distro": os.environ.get("ROS_DISTRO", "jazzy"),
-    }
-
-
-def _extent(first: int, last: int, count: int) -> dict[str, Any]:
-    return {
-        "duration": {"nanoseconds": last - first if count else 0},
-        "starting_time": {"nanoseconds_since_epoch": first if count else 0},
-        "message_count": count,
-    }
-
-
-def write_metadata(path: Path, information: Mapping[str, Any]) -> None:
-    """Write metadata.yaml of a bag directory, at once or not at all."""
-    temporary = path / "metadata.yaml.tmp"
-    temporary.write_text(_yaml({"rosbag2_bagfile_information": information}), encoding="utf-8")
-    temporary.replace(path / "metadata.yaml")
 
 
 def _reserve(path: Path) -> BinaryIO:
@@ -424,15 +367,3 @@ def _make(path: Path) -> None:
         raise RecordingError(
             f"bag {path} cannot be made: {error.strerror}; give a directory that can be written"
         ) from None
-
-
-class _Plain(yaml.SafeDumper):
-    """YAML without anchors, which rosbag2's reader and people read more easily."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        """Write everything out."""
-        return True
-
-
-def _yaml(value: Any) -> str:
-    return str(yaml.dump(value, Dumper=_Plain, sort_keys=False))

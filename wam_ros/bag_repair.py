@@ -1,6 +1,5 @@
 """Bags made whole: files that were not closed, or are damaged, written again from what can be read of them."""
 
-import contextlib
 import os
 from collections import Counter
 from collections.abc import Iterator
@@ -11,18 +10,14 @@ import numpy as np
 import yaml
 
 from wam_ros import mcap_records as records
-from wam_ros.bag import CHUNK_SIZE, INFINITE, LIBRARY, FileSummary, bag_information, release, write_metadata
+from wam_ros.bag import CHUNK_SIZE, release
+from wam_ros.bag_metadata import LIBRARY, FileSummary, bag_information, topic_information, write_metadata
 from wam_ros.mcap_file import DATA, Batch, McapFile, log_times
 from wam_ros.mcap_records import BROKEN, BagError, Damage
 from wam_ros.mcap_writer import McapWriter
 
 UNFINISHED: Final = ".repaired"  # suffix of a file while it is written
 _MESSAGE_HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
-_QOS = {
-    "history": "keep_last", "depth": 1000, "reliability": "reliable", "durability": "volatile", "deadline": INFINITE,
-    "lifespan": INFINITE, "liveliness": "automatic", "liveliness_lease_duration": INFINITE,
-    "avoid_ros_namespace_conventions": False,
-}  # fmt: skip
 
 
 class Repaired(NamedTuple):
@@ -183,20 +178,5 @@ def _information(files: list[Path]) -> dict[str, Any]:
             summaries.append(FileSummary(path.name, said.first, said.last, sum(said.counts.values())))
             for number, channel in file.channels.items():
                 counts[channel.topic] += said.counts.get(number, 0)
-                topics.setdefault(
-                    channel.topic,
-                    {
-                        "name": channel.topic,
-                        "type": file.schemas[channel.schema].name,
-                        "serialization_format": channel.encoding,
-                        "offered_qos_profiles": _profiles(channel.metadata.get("offered_qos_profiles", "")),
-                        "type_description_hash": channel.metadata.get("topic_type_hash", ""),
-                    },
-                )
+                topics.setdefault(channel.topic, topic_information(channel, file.schemas[channel.schema]))
     return bag_information(summaries, list(topics.values()), [counts[topic] for topic in topics])
-
-
-def _profiles(text: str) -> Any:
-    with contextlib.suppress(yaml.YAMLError):
-        return yaml.safe_load(text) or [_QOS]  # readers drop a topic that offers nothing
-    return [_QOS]

@@ -21,6 +21,7 @@ COMMANDS = {
     "view": "look at a recording in the Rerun viewer, or save it for it",
     "replay": "run a node's recorded inputs through it again, compare what comes out",
     "experiment": "run an experiment of the thesis, record it, print predicted against measured",
+    "samples": "check the small bags in bags/sample, one of each experiment, or make them anew",
     "figures": "draw the figures of chapters 3 to 6 with the plant's points on them",
     "map": "compute the stability map of figure 5.8: the largest stable step over gamma and zeta",
     "scorecard": "print the arm beside the requisites of chapter 3",

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_ros import mcap_records as records
-from wam_ros.mcap_records import HEAD, Bytes, Channel, Chunk, Damage, Schema, Statistics
+from wam_ros.mcap_records import HEAD, Attachment, Bytes, Channel, Chunk, Damage, Schema, Statistics
 
 Offsets = NDArray[np.int64]
 BATCH: Final = 16 * 2**20  # bytes that are decoded together
@@ -187,10 +187,13 @@ class McapFile:
         if crc != self._data_crc:
             raise Damage("its data do not match their checksum")
 
+    def attached(self) -> list[Attachment]:
+        """The attachments."""
+        return [records.attachment(self.content(*extent)) for extent in self._attachments]
+
     def attachments(self) -> dict[str, bytes]:
         """Content of the attachments by name."""
-        found = [records.attachment(self.content(*extent)) for extent in self._attachments]
-        return {item.name: item.data for item in found}
+        return {item.name: item.data for item in self.attached()}
 
     def metadata(self) -> dict[str, dict[str, str]]:
         """Metadata records by name."""

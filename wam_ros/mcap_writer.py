@@ -19,6 +19,7 @@ from wam_ros import mcap_records as records
 from wam_ros.mcap_records import HEAD
 
 _MESSAGE = struct.Struct("<BQHIQQ")  # head of a message record: kind, length, channel, sequence, log and publish time
+FAST: Final = 3
 _WITHOUT_DATA: Final = _MESSAGE.size - HEAD.size
 _GROUPS = (records.SCHEMA, records.CHANNEL, records.STATISTICS, records.CHUNK_INDEX, records.ATTACHMENT_INDEX,
            records.METADATA_INDEX)  # fmt: skip
@@ -39,6 +40,7 @@ class McapWriter:
     stream : new file, unbuffered; the caller closes it.
     library : who writes.
     chunk_size : bytes of records in a chunk, about.
+    level : of the compression by zstd, 1 to 22; what is recorded while an arm runs needs a fast one.
 
     Attributes
     ----------
@@ -47,7 +49,7 @@ class McapWriter:
     position : bytes on disk.
     """
 
-    def __init__(self, stream: FileIO, library: str, chunk_size: int) -> None:
+    def __init__(self, stream: FileIO, library: str, chunk_size: int, level: int = FAST) -> None:
         self.counts: dict[int, int] = {}
         self.first, self.last = 0, 0
         self.position = 0
@@ -56,7 +58,7 @@ class McapWriter:
         self._crc = 0
         self._parts: list[Part] = []
         self._schemas = self._channels = self._chunks = self._attachments = self._metadata = 0
-        self._compressor = zstandard.ZstdCompressor()
+        self._compressor = zstandard.ZstdCompressor(level)
         self._buffer = bytearray()
         self._index: dict[int, list[int]] = {}
         self._put(records.MAGIC + record(records.HEADER, text("ros2") + text(library)))

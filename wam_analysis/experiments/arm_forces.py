@@ -1,5 +1,6 @@
 """The arm itself on foam: force that is asked for, applied, measured and estimated; pressing and sliding."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -15,6 +16,10 @@ FORCE = 0.05  # of what is asked for, at rest
 MOVING = 0.2  # of what is asked for, while sliding: where the motion turns round, so does the friction
 ESTIMATE = 0.05  # of the force that is there
 PLACE = 0.04  # m
+NOWHERE = "base"  # frame of a contact wrench where nothing touches
+FELT = 0.1  # s until a push is felt
+ELSEWHERE = 0.05  # of the time of a push in which another link or none may seem touched
+TOUCH = 0.15  # of the force of a push while the arm moves
 CYCLE = 0.02  # of the force, peak to peak, from which on it counts as a cycle
 
 
@@ -138,3 +143,37 @@ def _panel(found: Along, steps: Sequence[Step]) -> Panel:
 def _remarks(run: Recording) -> tuple[str, ...]:
     friction = run.parameters["driver"]["world.obstacles.friction"]
     return (f"the foam has a friction of {friction[0]:g}: the tube also pulls along itself where it sticks",)
+
+
+def touching(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `wam-touch`: one push, judged while the simulator says that it is there."""
+    (run,) = runs.values()
+    truth, felt = run.forces("sim/contact/wrench"), run.forces("contact/wrench")
+    there = np.linalg.norm(truth.force, axis=1) > 0.0
+    touched, link = truth.time[there], truth.frames[int(np.flatnonzero(there)[0])]
+    begin, end = float(touched[0]), float(touched[-1])
+    right = np.array([frame == link for frame in felt.frames])
+    first = felt.time[right & (felt.time >= begin)]
+    during = (felt.time > begin + FELT) & (felt.time <= end)
+    shares = float(np.mean(right[during]))
+    applied = float(np.linalg.norm(truth.force[there], axis=1).mean())
+    estimated = float(np.linalg.norm(felt.force[during & right], axis=1).mean())
+    places = [
+        float(np.nanmedian(place[(time > begin + FELT) & (time <= end)]))
+        for time, place in (_places(run, "sim/contact/point"), _places(run, "contact/point"))
+    ]
+    quiet = felt.time < begin
+    before = float(np.mean([bool(frame) and frame != NOWHERE for frame in np.array(felt.frames)[quiet]]))
+    rows = [
+        Row("felt before, of the time until then", 0.0, before, "", ELSEWHERE, "chapter 2", True),
+        Row("felt after", 0.0, float(first[0]) - begin if len(first) else math.nan, "s", FELT, "chapter 2", True),
+        Row(f"felt on {link}, of the time after that", 1.0, shares, "", ELSEWHERE, "chapter 2"),
+        Row("force, mean", applied, estimated, "N", TOUCH, "chapter 2"),
+        Row("place, median", places[0], places[1], "m", PLACE, "chapter 2", True),
+    ]
+    force = [np.linalg.norm(each.force, axis=1) for each in (truth, felt)]
+    curves = [
+        Curve("measured", "estimated", felt.time, force[1]),
+        Curve("predicted", "applied", truth.time, force[0]),
+    ]
+    return Result(rows, [Panel("force on the arm", "time [s]", "force [N]", curves)])

@@ -1,7 +1,8 @@
 """An experiment as data: which runs of the stack make it, and who evaluates them.
 
 `config/experiments/NAME.yaml` holds title, section, configuration, evaluation, `include` (sets of
-values in `config/experiments/sets/`), values, and runs with a name, values and the steps of a scenario.
+values in `config/experiments/sets/`), values, runs with a name, values and the steps of a scenario, and the
+sample: which part of which run lies in `bags/sample/NAME`, and who evaluates that.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,8 +16,9 @@ from wam_description.parameters import ParameterError, require
 
 FOLDER = "experiments"
 SETS = "experiments/sets"
-KEYS = ("title", "section", "configuration", "evaluation", "include", "values", "runs")
+KEYS = ("title", "section", "configuration", "evaluation", "include", "values", "runs", "sample")
 RUN_KEYS = ("name", "values", "steps", "stops")
+SAMPLE_KEYS = ("run", "shows", "seconds", "topics", "evaluation")
 
 
 class Run(NamedTuple):
@@ -33,6 +35,26 @@ class Run(NamedTuple):
         return sum(float(step["seconds"]) for step in self.steps)
 
 
+class Sample(NamedTuple):
+    """The part of a run that is kept as a sample.
+
+    Attributes
+    ----------
+    run : its name.
+    shows : what there is to see, for people.
+    begin, end : s of the arm's time.
+    topics : those kept of what was recorded; None is all.
+    evaluation : judges the sample, from a mapping with this one run.
+    """
+
+    run: str
+    shows: str
+    begin: float
+    end: float
+    topics: tuple[str, ...] | None
+    evaluation: str
+
+
 class Experiment(NamedTuple):
     """What is run and how it is judged; `evaluation` is a module and a function of `wam_analysis.experiments`."""
 
@@ -42,6 +64,11 @@ class Experiment(NamedTuple):
     configuration: str
     evaluation: str
     runs: tuple[Run, ...]
+    sample: Sample | None
+
+    def run(self, name: str) -> Run:
+        """The run of a name."""
+        return next(run for run in self.runs if run.name == name)
 
 
 def names() -> list[str]:
@@ -79,7 +106,8 @@ def load(name: str) -> Experiment:
     doubled = sorted({run.name for run in runs if sum(run.name == other.name for other in runs) > 1})
     require(not doubled, f"{path}: several runs are named {', '.join(doubled)}")
     title, section, configuration, evaluation = (str(tree[key]) for key in KEYS[:4])
-    return Experiment(path.stem, title, section, configuration, evaluation, runs)
+    sample = _sample(str(path), tree["sample"], evaluation, [run.name for run in runs]) if "sample" in tree else None
+    return Experiment(path.stem, title, section, configuration, evaluation, runs, sample)
 
 
 def configured(experiment: Experiment, run: Run, directory: Path) -> Configuration:
@@ -116,6 +144,20 @@ def _run(where: str, body: Any, shared: Mapping[str, Any]) -> Run:
         isinstance(body["steps"], list) and bool(body["steps"]), f"{where}: 'steps' must be a list with at least one"
     )
     return Run(name, {**shared, **body.get("values", {})}, tuple(body["steps"]), bool(body.get("stops", False)))
+
+
+def _sample(where: str, body: Any, evaluation: str, runs: Sequence[str]) -> Sample:
+    require(isinstance(body, dict), f"{where}: 'sample' is {body!r}; it must be a mapping with run, shows and seconds")
+    _keys(f"{where}, sample", body, SAMPLE_KEYS, ("run", "shows", "seconds"))
+    name, seconds, topics = str(body["run"]), body["seconds"], body.get("topics")
+    require(name in runs, f"{where}, sample: no run is named '{name}'; there are: {', '.join(runs)}")
+    require(
+        isinstance(seconds, list) and len(seconds) == 2 and 0.0 <= seconds[0] < seconds[1],
+        f"{where}, sample: 'seconds' is {seconds!r}; it must be begin and end, [0.0, 4.0]",
+    )
+    chosen = None if topics is None else tuple(map(str, topics))
+    begin, end = map(float, seconds)
+    return Sample(name, str(body["shows"]), begin, end, chosen, str(body.get("evaluation", evaluation)))
 
 
 def _mapping(path: Path) -> dict[str, Any]:

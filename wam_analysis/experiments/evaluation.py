@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from wam_analysis.bag import BagError
+from wam_analysis.bag_cut import CUT
 from wam_analysis.experiments.definition import Experiment, Run
 from wam_analysis.experiments.recording import Recording, recording
 from wam_analysis.experiments.rows import Result, Row, plain
@@ -17,22 +18,46 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
 
     Parameters
     ----------
-    directory : holds a bag of the name of each run; or the bag of an experiment of one run.
+    directory : holds a bag of the name of each run; or the bag of an experiment of one run; or is the sample of the
+        experiment, which shows a part of it.
 
     Raises
     ------
     BagError
         where a bag is missing or cannot be read.
     """
+    if (directory / "metadata.yaml").is_file() and CUT in (recorded := recording(directory)).bag.metadata:
+        return judged_sample(experiment, recorded)
     bags = {run.name: directory / run.name for run in experiment.runs}
     if len(bags) == 1 and (directory / "metadata.yaml").is_file():
         bags = dict.fromkeys(bags, directory)
     missing = [name for name, bag in bags.items() if not bag.is_dir()]
     if missing:
         raise BagError(f"{directory} has no bag of {', '.join(missing)}; run 'wam experiment {experiment.name}'")
-    recordings = {name: recording(bag) for name, bag in bags.items()}
-    result = evaluation_of(experiment)(recordings)
-    stops = [_stop(run, recordings[run.name]) for run in experiment.runs if run.stops or recordings[run.name].fault]
+    return _judged(experiment, experiment.evaluation, {name: recording(bag) for name, bag in bags.items()})
+
+
+def judged_sample(experiment: Experiment, recorded: Recording) -> Result:
+    """Judge what the sample of an experiment shows.
+
+    Parameters
+    ----------
+    recorded : the sample, or the whole run that it is a part of.
+
+    Raises
+    ------
+    BagError
+        where the experiment has no sample.
+    """
+    if experiment.sample is None:
+        raise BagError(f"experiment {experiment.name} declares no sample; give the bags of its runs")
+    return _judged(experiment, experiment.sample.evaluation, {experiment.sample.run: recorded})
+
+
+def _judged(experiment: Experiment, evaluation: str, recordings: Mapping[str, Recording]) -> Result:
+    result = function_of(evaluation)(recordings)
+    runs = [run for run in experiment.runs if run.name in recordings]
+    stops = [_stop(run, recordings[run.name]) for run in runs if run.stops or recordings[run.name].fault]
     remarks = [
         f"{name.replace('_', ' ')}: the driver stopped the arm at {run.fault_time:.2f} s: {run.fault}"
         for name, run in recordings.items()
@@ -48,7 +73,12 @@ def _stop(run: Run, recorded: Recording) -> Row:
 
 def evaluation_of(experiment: Experiment) -> Evaluation:
     """The function that judges an experiment."""
-    module, _, function = experiment.evaluation.partition(".")
+    return function_of(experiment.evaluation)
+
+
+def function_of(evaluation: str) -> Evaluation:
+    """The function of a name, as ``cables.creeping``."""
+    module, _, function = evaluation.partition(".")
     found: Evaluation = getattr(importlib.import_module(f"wam_analysis.experiments.{module}"), function)
     return found
 

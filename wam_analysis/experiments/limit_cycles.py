@@ -31,17 +31,11 @@ def stiction(runs: Mapping[str, Recording]) -> Result:
     run = runs["without_deadband"]
     link = one_link(run)
     shown = response(run, link, run.steps[-1])
-    node, gain = link.node, link.loop.gain
-    stiffness = node.transmission_stiffness, node.contact_stiffness
-    friction = node.static_friction, node.dynamic_friction
-    number = float(stiction_cycle_number(gain, node.inertia, node.damping, *stiffness))
-    force = float(stiction_cycle_force(*stiffness, *friction, link.zeta)) / link.lever
-    period = float(stiction_cycle_period(gain, *stiffness, *friction, link.zeta))
     found = last_cycle(shown.time, shown.force)
+    rows, remark = _closed_form(link, found)
+    force = float(rows[0].predicted)
     exact, curve = _exact(run, link, shown)
-    rows = [
-        Row("F_c peak to peak", force, found.peak_to_peak, "N", CLOSED_FORM * number, "(5.8)"),
-        Row("period", period, found.period, "s", CLOSED_FORM * number, "(5.9)"),
+    rows += [
         Row("F_c peak to peak, exact", exact.peak_to_peak, found.peak_to_peak, "N", WITHIN, "integrator"),
         Row("period, exact", exact.period, found.period, "s", WITHIN, "integrator"),
     ]
@@ -50,8 +44,32 @@ def stiction(runs: Mapping[str, Recording]) -> Result:
     rows.append(_with_smaller_deadband(runs["with_smaller_deadband"], force))
     quiet = response(runs["with_deadband"], link)
     curves.append(Curve("measured", "with deadband", quiet.time, quiet.force))
-    remark = f"(5.8) and (5.9) hold where (5.11) is far below 1; here it is {number:.3f}"
     return Result(rows, [Panel("stiction limit cycle", "time [s]", "force [N]", curves)], (remark,))
+
+
+def stiction_sample(runs: Mapping[str, Recording]) -> Result:
+    """Some of the cycles of `stiction-limit-cycle`, without their beginning, from which the exact motion starts."""
+    run = runs["without_deadband"]
+    link = one_link(run)
+    shown = response(run, link)
+    rows, remark = _closed_form(link, last_cycle(shown.time, shown.force))
+    curves = [Curve("measured", "without deadband", shown.time, shown.force)]
+    return Result(rows, [Panel("stiction limit cycle", "time [s]", "force [N]", curves)], (remark,))
+
+
+def _closed_form(link: OneLink, found: Cycle) -> tuple[list[Row], str]:
+    """(5.8) and (5.9) beside a cycle, and how far they hold."""
+    node, gain = link.node, link.loop.gain
+    stiffness = node.transmission_stiffness, node.contact_stiffness
+    friction = node.static_friction, node.dynamic_friction
+    number = float(stiction_cycle_number(gain, node.inertia, node.damping, *stiffness))
+    force = float(stiction_cycle_force(*stiffness, *friction, link.zeta)) / link.lever
+    period = float(stiction_cycle_period(gain, *stiffness, *friction, link.zeta))
+    rows = [
+        Row("F_c peak to peak", force, found.peak_to_peak, "N", CLOSED_FORM * number, "(5.8)"),
+        Row("period", period, found.period, "s", CLOSED_FORM * number, "(5.9)"),
+    ]
+    return rows, f"(5.8) and (5.9) hold where (5.11) is far below 1; here it is {number:.3f}"
 
 
 def _with_deadband(run: Recording, force: float) -> list[Row]:
@@ -93,7 +111,7 @@ def actuator(runs: Mapping[str, Recording]) -> Result:
     run = runs["press"]
     link = one_link(run)
     node = link.node
-    shown = response(run, link, run.steps[-1])
+    shown = response(run, link)  # the one step, as much of it as is recorded
     found = last_cycle(shown.time, shown.motor)
     swing = float(actuator_cycle(node.dynamic_friction, node.transmission_stiffness, link.gamma, link.zeta))
     work, power, error, half = half_cycle_work(run, link, shown)

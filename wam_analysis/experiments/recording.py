@@ -9,6 +9,7 @@ import yaml
 from numpy.typing import NDArray
 
 from wam_analysis.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
+from wam_analysis.bag_cut import CUT
 from wam_description.arm import Shared
 from wam_description.parameters import build, fields, flatten
 
@@ -49,7 +50,7 @@ class Recording(NamedTuple):
     Attributes
     ----------
     parameters : flat values of each node, by its name without namespace, as they were at the start.
-    steps : in the order in which they were played.
+    steps : in the order in which they were played; of a bag that was cut only those that are whole in it.
     fault : why the driver stopped, '' where it did not.
     fault_time : s, NaN where it did not.
     outcome : last word of the scenario.
@@ -125,12 +126,23 @@ def recording(path: Path) -> Recording:
     if not isinstance(said, Messages):
         raise BagError(f"{path} has no topic 'status'; record it")
     steps, outcome = _steps(tuple(said.messages))
+    steps = _whole(steps, int(bag.metadata.get(CUT, {}).get("begin_ns", 0)) / 1e9)
     fault, fault_time = "", float("nan")
     for message in said.messages:
         facts = {item.key: item.value for item in message.values}
         if message.name == "driver" and facts.get("fault") and not fault:
             fault, fault_time = facts["fault"], int(facts["stamp"]) / 1e9
     return Recording(bag, namespace, parameters, steps, fault, fault_time, outcome)
+
+
+def _whole(steps: tuple[Step, ...], begin: float) -> tuple[Step, ...]:
+    """Steps that began after a time, s; what those before it have set is set by the first of them."""
+    before = [step for step in steps if step.begin < begin]
+    found = steps[len(before) :]
+    if not before or not found:
+        return found
+    settings = {key: value for step in (*before, found[0]) for key, value in step.settings.items()}
+    return (found[0]._replace(settings=settings), *found[1:])
 
 
 def _steps(messages: tuple[Any, ...]) -> tuple[tuple[Step, ...], str]:

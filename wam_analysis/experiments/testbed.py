@@ -76,6 +76,22 @@ def own_servo(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, [panel])
 
 
+def own_servo_sample(runs: Mapping[str, Recording]) -> Result:
+    """A run of `testbed-own-servo` alone: whether it shakes, by the margin with the velocity loop."""
+    ((name, run),) = runs.items()
+    link, shaken = _shaking(run)
+    share = link.tip_gain(link.loop.gain) / margin_with_servo(run)
+    row = _sense(share, shaken, "with the velocity loop", "wam_control.sampled_loop")
+    shown = _last_step(name.replace("_", " "), run)
+    return Result([row], [Panel("above the margin", "time [s]", "force by deflection [N]", [shown])])
+
+
+def _sense(share: float, shaken: Growth, how: str, law: str) -> Row:
+    """Whether an oscillation does what it should at this share of the marginal gain."""
+    expected = "decays" if share < 1.0 else "grows"
+    return Row(f"at {share:.2f} of it, {how}", expected, "grows" if shaken.rate > 0.0 else "decays", "", 0.0, law)
+
+
 def _last_step(label: str, run: Recording) -> Curve:
     shown = response(run, one_link(run), run.steps[-1])
     return Curve("measured", label, shown.time, shown.force)
@@ -107,11 +123,7 @@ def margin(below: Recording, above: Recording, how: str) -> list[Row]:
         Row(f"frequency at it, {how}", predicted.frequency, frequency, "rad/s", WITHIN, law),
     ]
     for one, shaken in ((link, first), (other, second)):
-        share = one.loop.gain / one.margin.gain
-        expected = "decays" if share < 1.0 else "grows"
-        rows.append(
-            Row(f"at {share:.2f} of it, {how}", expected, "grows" if shaken.rate > 0.0 else "decays", "", 0.0, law)
-        )
+        rows.append(_sense(one.loop.gain / one.margin.gain, shaken, how, law))
     return rows
 
 

@@ -32,16 +32,14 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     """The experiment `frequency-response`."""
     run = runs["chirp"]
     found, low, high = transfer(run), *swept(run)
-    theory = resonances(run)
     gain = 1.0 / np.abs(found.inverse)
     arm = run.shared.arm
     static = 1.0 / (arm.joint_from_motor[0] * joint_stiffness(run))
     inside = (found.frequency > low) & (found.frequency < high)
     lowest = inside & (found.frequency < 2.0 * low)
     predicted = np.abs(response_of(run, found.frequency))
-    expected = {"lower resonance": float(theory.lower) * HZ, "upper resonance": float(theory.upper) * HZ}
     rows = [
-        *(Row(name, at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)") for name, at in expected.items()),
+        *_resonance_rows(run, found),
         Row(
             f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz",
             static,
@@ -65,15 +63,29 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, panels, (remark,))
 
 
+def resonances_sample(runs: Mapping[str, Recording]) -> Result:
+    """The sweep of `frequency-response` from motor and joint alone."""
+    (run,) = runs.values()
+    found = transfer(run)
+    rows = _resonance_rows(run, found)
+    inside = (found.frequency > 0.5 * float(rows[0].predicted)) & (found.frequency < 1.5 * float(rows[1].predicted))
+    gain = Curve("measured", "measured", found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
+    return Result(rows, [Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", [gain], "xy")])
+
+
+def _resonance_rows(run: Recording, found: Transfer) -> list[Row]:
+    theory = resonances(run)
+    expected = {"lower resonance": float(theory.lower) * HZ, "upper resonance": float(theory.upper) * HZ}
+    return [Row(name, at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)") for name, at in expected.items()]
+
+
 def allocation(runs: Mapping[str, Recording]) -> Result:
     """The experiment `stiffness-allocation`."""
     rows, curves = [], []
-    lower: dict[str, float] = {}
     for name, run in runs.items():
-        found, theory = transfer(run), resonances(run)
-        lower[name] = zero_of(found, float(theory.lower) * HZ, _lead(run))
+        found = transfer(run)
         label = name.replace("_", " ")
-        rows.append(Row(f"{label}, lower resonance", float(theory.lower) * HZ, lower[name], "Hz", WITHIN, "(4.4)"))
+        rows.append(_lower_resonance(run, found, label))
         low, high = swept(run)
         inside = (found.frequency > low) & (found.frequency < high)
         curves.append(Curve("measured", label, found.frequency[inside], 1.0 / np.abs(found.inverse[inside])))
@@ -86,6 +98,21 @@ def allocation(runs: Mapping[str, Recording]) -> Result:
         rows.append(Row(f"stiffness at joint over at motor, N {ratio}", softer, stiffness, "", 1e-3, "(4.1)"))
     panel = Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", curves, "xy")
     return Result(rows, [panel])
+
+
+def allocation_sample(runs: Mapping[str, Recording]) -> Result:
+    """One of the sweeps of `stiffness-allocation`, from motor and joint alone."""
+    ((name, run),) = runs.items()
+    found = transfer(run)
+    row = _lower_resonance(run, found, name.replace("_", " "))
+    inside = (found.frequency > 0.5 * float(row.predicted)) & (found.frequency < 3.0 * float(row.predicted))
+    gain = Curve("measured", "measured", found.frequency[inside], 1.0 / np.abs(found.inverse[inside]))
+    return Result([row], [Panel("joint angle over motor torque", "frequency [Hz]", "[rad/(N m)]", [gain], "xy")])
+
+
+def _lower_resonance(run: Recording, found: Transfer, label: str) -> Row:
+    at = float(resonances(run).lower) * HZ
+    return Row(f"{label}, lower resonance", at, zero_of(found, at, _lead(run)), "Hz", WITHIN, "(4.4)")
 
 
 def softening(run: Recording) -> float:

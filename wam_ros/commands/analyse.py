@@ -5,9 +5,9 @@ import sys
 import time
 from pathlib import Path
 
-from wam_analysis.analysis import analyse
-from wam_analysis.analysis_page import page
-from wam_analysis.analysis_text import json_text, text
+from wam_analysis.findings.analysis import analyse
+from wam_analysis.findings.page import page
+from wam_analysis.findings.text import json_text, text
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -59,14 +59,14 @@ def _record(experiment: Experiment, directory: Path) -> bool:
     """Record every run; False where it was interrupted."""
     stop = Stop()
     for i, each in enumerate(experiment.runs):
-        _play(experiment, each, directory, f"{experiment.name} {i + 1}/{len(experiment.runs)} {each.name}", stop)
+        play(experiment, each, directory, f"{experiment.name} {i + 1}/{len(experiment.runs)} {each.name}", stop)
         if stop.is_set:
             print(f"stopped; what was recorded until then is in {directory}")
             return False
     return True
 
 
-def _play(experiment: Experiment, each: Run, directory: Path, label: str, stop: Stop) -> None:
+def play(experiment: Experiment, each: Run, directory: Path, label: str, stop: Stop) -> None:
     """One run in lockstep.
 
     Raises

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from wam_analysis.bag import read
-from wam_analysis.recording import recording_of
+from wam_analysis.findings.recording import recording_of
 from wam_analysis.rerun_view import load_rerun, view
 
 

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.efficiency import efficiency
-from wam_analysis.finding import Finding, Section, shown, times
-from wam_analysis.friction import Friction, identify_friction
-from wam_analysis.recording import Recording
-from wam_analysis.ripple import Ripple, ripple_spectrum
-from wam_analysis.sections_frequency import frequency_section
-from wam_analysis.stick_slip_phases import stick_slip_phases
-from wam_analysis.transmission_signals import CABLE, TransmissionSignals, transmission_signals
+from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.frequency import frequency_section
+from wam_analysis.findings.recording import Recording
+from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals, transmission_signals
+from wam_analysis.measures.efficiency import efficiency
+from wam_analysis.measures.friction import Friction, identify_friction
+from wam_analysis.measures.ripple import Ripple, ripple_spectrum
+from wam_analysis.measures.stick_slip_phases import stick_slip_phases
 from wam_description.arm import Arm
 from wam_description.effects import Effects
 

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wam_analysis.bag import Bag, JointColumns, WrenchColumns, read
-from wam_analysis.finding import Section, shown, times
-from wam_analysis.held_force import HeldForce, held_forces
-from wam_analysis.recording import Recording, recording_of
-from wam_analysis.sections_force import contact_section, cycle_section, force_section
-from wam_analysis.sections_motion import Motion, motion_sections
-from wam_analysis.sections_timing import extent, provenance, timing_section
+from wam_analysis.findings.finding import Section, shown, times
+from wam_analysis.findings.force import contact_section, cycle_section, force_section
+from wam_analysis.findings.held_force import HeldForce, held_forces
+from wam_analysis.findings.motion import Motion, motion_sections
+from wam_analysis.findings.recording import Recording, recording_of
+from wam_analysis.findings.timing import extent, provenance, timing_section
 
 Progress = Callable[[str], None]
 

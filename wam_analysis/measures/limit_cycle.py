@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.runs import noise
+from wam_analysis.measures.runs import noise
 
 Numbers = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ import base64
 import html
 from collections.abc import Iterable, Sequence
 
-from wam_analysis.analysis import Analysis
-from wam_analysis.analysis_plots import Plot, plots
-from wam_analysis.finding import Finding, Section, shown
+from wam_analysis.findings.analysis import Analysis
+from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.plots import Plot, plots
 from wam_analysis.recorded import PARAMETERS
 
 NARROW = 640  # px, up to which the narrow pictures are shown

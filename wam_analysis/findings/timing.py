@@ -7,9 +7,9 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from wam_analysis.bag import Columns, JointColumns, PointColumns, WrenchColumns
-from wam_analysis.finding import Finding, Section, shown
-from wam_analysis.loop_timing import latency, stamp_timing
-from wam_analysis.recording import Recording
+from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.recording import Recording
+from wam_analysis.measures.loop_timing import latency, stamp_timing
 
 STAMPED = (JointColumns, WrenchColumns, PointColumns)
 TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measured", "contact/wrench")

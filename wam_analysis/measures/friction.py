@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.runs import noise
-from wam_analysis.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.runs import noise
+from wam_analysis.measures.stick_slip_phases import stick_slip_phases
 
 Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]

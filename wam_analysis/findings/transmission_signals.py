@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.demo_traces import messages_of, node_of, values_of
-from wam_analysis.recording import Recording, at_stamps, by_names
+from wam_analysis.findings.recording import Recording, at_stamps, by_names
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
 

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from wam_analysis.finding import Finding, Section, shown
-from wam_analysis.frequency import bandwidth, believable, frequency_response
-from wam_analysis.recording import Recording, at_stamps, by_names
+from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.recording import Recording, at_stamps, by_names
+from wam_analysis.measures.frequency import bandwidth, believable, frequency_response
 from wam_description.arm import Arm
 
 COHERENT = 0.8  # coherence from which a response is believed

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.runs import runs, without_short
+from wam_analysis.measures.runs import runs, without_short
 
 Numbers = NDArray[np.float64]
 Rows = NDArray[np.int64]

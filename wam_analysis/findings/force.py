@@ -6,13 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED
-from wam_analysis.finding import Finding, Section, shown, times
-from wam_analysis.force_accuracy import dynamic_range
-from wam_analysis.held_force import CYCLING, HeldForce
-from wam_analysis.limit_cycle import FEWEST
-from wam_analysis.recording import Recording
-from wam_analysis.runs import runs
-from wam_analysis.stability import Verdict
+from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.held_force import CYCLING, HeldForce
+from wam_analysis.findings.recording import Recording
+from wam_analysis.measures.force_accuracy import dynamic_range
+from wam_analysis.measures.limit_cycle import FEWEST
+from wam_analysis.measures.runs import runs
+from wam_analysis.measures.stability import Verdict
 
 SURE = 0.8  # confidence from which a limit cycle is said to be one
 SEEN = 0.02  # of the force: a cycle smaller than that is not worth a sentence

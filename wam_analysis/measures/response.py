@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.runs import noise, smoothed
+from wam_analysis.measures.runs import noise, smoothed
 
 Numbers = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ import math
 import textwrap
 from typing import Any
 
-from wam_analysis.analysis import Analysis
-from wam_analysis.finding import Finding, Section, shown
+from wam_analysis.findings.analysis import Analysis
+from wam_analysis.findings.finding import Finding, Section, shown
 
 WIDTH = 100
 SCHEMA = 1  # of the JSON; a number that changes when a key changes its meaning

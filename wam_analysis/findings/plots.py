@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from wam_analysis import arm_picture
-from wam_analysis.analysis import Analysis
 from wam_analysis.bag import JointColumns, WrenchColumns
 from wam_analysis.demo_figure import ASKED, FELT, MEASURED, TRUE, draw_arm, draw_forces, draw_places, seconds_at
-from wam_analysis.loop_timing import latency
+from wam_analysis.findings.analysis import Analysis
+from wam_analysis.measures.loop_timing import latency
 from wam_analysis.recorded import recorded_arm
 
 Numbers = NDArray[np.float64]

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.demo_traces import Signal
-from wam_analysis.force_accuracy import ForceAccuracy, force_accuracy
-from wam_analysis.limit_cycle import NO_CYCLE, Cycle, limit_cycle
-from wam_analysis.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
-from wam_analysis.recording import Hold, Recording, by_names
-from wam_analysis.response import StepResponse, step_response
-from wam_analysis.runs import noise
-from wam_analysis.stability import Stability, Verdict, stability
+from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
+from wam_analysis.findings.recording import Hold, Recording, by_names
+from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
+from wam_analysis.measures.limit_cycle import NO_CYCLE, Cycle, limit_cycle
+from wam_analysis.measures.response import StepResponse, step_response
+from wam_analysis.measures.runs import noise
+from wam_analysis.measures.stability import Stability, Verdict, stability
 
 Numbers = NDArray[np.float64]
 

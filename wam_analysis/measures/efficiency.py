@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.friction import identify_friction
+from wam_analysis.measures.friction import identify_friction
 
 Numbers = NDArray[np.float64]
 

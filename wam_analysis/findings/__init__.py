@@ -1,0 +1,1 @@
+"""What `wam analyse` finds in a recording, in words, numbers and pictures."""

@@ -1,0 +1,1 @@
+"""What can be measured in signals: pure functions of arrays, no bag and no ROS."""
