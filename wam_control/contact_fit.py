@@ -143,10 +143,12 @@ class ContactFit:
         A narrow peak is the exponential of a parabola, sought by parabolas through three places, ever nearer.
         """
         row, width, floor = self._row[i], self._widths[i], top - REACH
-        cells = [(value, x, width, i) for value, x in zip(values, row, strict=True) if value > floor]
-        if not 0 < len(cells) < FEW:
-            return cells
         top_value = max(values)
+        if top_value <= floor:
+            return []
+        cells = [(value, x, width, i) for value, x in zip(values, row, strict=True) if value > floor]
+        if len(cells) >= FEW:
+            return cells
         peak = values.index(top_value)
         (start, end), x, near, last = self._ends[i], row[peak], width, len(values) - 1
         inside = 0 < peak < last
@@ -272,8 +274,12 @@ class _Link:
 
     def log_density(self, x: float) -> float:
         """Log of the probability of the torques for a contact at x, up to a constant of the link; see `ContactFit`."""
-        _, explained, (s11, s12, s22) = self.force(x)
-        return 0.5 * (explained + math.log(max(s11 * s22 - s12 * s12, ROUNDING * s11 * s22)))
+        (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = self.terms
+        n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
+        told1, told2 = c0 + x * c1, e0 + x * e1
+        determinant = max(n11 * n22 - n12 * n12, ROUNDING * n11 * n22)
+        explained = (told1 * (n22 * told1 - 2.0 * n12 * told2) + n11 * told2 * told2) / determinant
+        return 0.5 * (explained - math.log(determinant))
 
     def told_sd(self, x: float, force: Pair) -> float:
         """Standard deviation of the place, m, by the torques alone, the force unknown: a Schur complement.
