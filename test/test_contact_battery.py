@@ -18,6 +18,7 @@ from wam_analysis.contact_battery.scenes import Draw, Planned, Scene, dither_val
 from wam_analysis.contact_battery.score import ANY, Row, SceneScore, asked, score, stated
 from wam_analysis.contact_battery.statistics import Figure, events, quantile, rms, share
 from wam_analysis.contact_battery.touches import Quiet, Touch, credibility, quiet, residual, spans, touches
+from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.scenario import load as load_script
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import NO_LOAD, Load
@@ -134,6 +135,22 @@ def test_torque_errors_count_in_motion_and_at_rest_apart_and_not_near_the_edges_
     assert residual(story([0.0] * 200, {}, speed=0.05, error=2.0)).still_count == 159
     touched = residual(story([0.0] * 100 + [5.0] * 50 + [0.0] * 50, {}, error=2.0))
     assert 159 - 2 * 25 <= touched.moving_count <= 159 - 2 * 22
+
+
+def test_a_dithered_arm_is_held_against_the_truth_over_a_whole_cycle() -> None:
+    """A hand that rubs to and fro in step with the dither, and an estimate that is its mean."""
+    played = story([5.0] * 200, {}, speed=0.0)
+    swing = [1.0 + 3.0 * math.sin(2.0 * math.pi * i / 8.0) for i in range(200)]
+    rubbing = [
+        one._replace(torques=(torque, 0.0, 0.0, 0.0), external=(1.0, 0.0, 0.0, 0.0))
+        for one, torque in zip(played.records, swing, strict=True)
+    ]
+    errors = {}
+    for group in ("rest", "dither"):
+        found = residual(played._replace(scene=played.scene._replace(group=group), records=rubbing))
+        errors[group] = math.sqrt(found.still[0] / found.still_count)
+    assert errors["rest"] == pytest.approx(3.0 / math.sqrt(2.0), rel=0.02)
+    assert errors["dither"] < 1e-9
 
 
 def test_credibility_of_the_truth_is_uniform_where_the_belief_is_right() -> None:
@@ -321,6 +338,9 @@ def test_the_arm_of_every_scene_departs_from_the_configured_one_within_the_decla
     assert 1.07 < max(friction) <= 1.1
     assert all(scene.values["contact_estimator:observer.friction_scale"] == 1.0 for scene in drawn)
     assert 0.0 < max(scene.values.get("driver:departure.payload", 0.0) for scene in drawn) <= 0.05
+    for scene in drawn:  # what is carried is declared, and only that
+        assert ("driver:departure.payload" in scene.values) is ("contact_estimator:observer.payload" in scene.values)
+    assert CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer.payload == (0.0, 0.0)
     assert not any(scene.values["contact_estimator:use_joint_sensors"] for scene in drawn)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from wam_analysis.batch import executor
-from wam_analysis.contact_battery.compute import sentence, times
+from wam_analysis.contact_battery.compute import section, times
 from wam_analysis.contact_battery.figure import figure
 from wam_analysis.contact_battery.judgement import Extent, Judgement, judge, scenes
 from wam_analysis.contact_battery.over_topics import recorded, script
@@ -79,7 +79,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, nargs="+", default=list(SEEDS), help="seeds of the battery, default 1 2 3")
     parser.add_argument("--contacts", type=int, default=200, help="contacts in motion for each seed, default 200")
     parser.add_argument("--resting", type=int, default=30, help="contacts at rest for each seed, default 30")
-    parser.add_argument("--free", type=float, default=120.0, help="seconds of motion without contact for each seed")
+    parser.add_argument("--free", type=float, default=200.0, help="seconds of motion without contact for each seed")
     parser.add_argument("--joint-sensors", action="store_true", help="feel with the joint sensors")
     parser.add_argument(
         "--mode", choices=tuple(MODES), default="direct", help="direct: without ROS; lockstep: over topics, slower"
@@ -98,7 +98,7 @@ def _write(given: argparse.Namespace, configuration: Configuration, judgement: J
     seeds = " ".join(map(str, given.seed))
     sensors = " --joint-sensors" * given.joint_sensors
     command = f"wam evaluate contact --seed {seeds} {defaults}{sensors} --mode {given.mode} --write {file}"
-    compute = sentence(times(configuration, scene))
+    compute = section(times(configuration, scene))
     text = page(judgement, arm, command, compute, f"{picture.parent.name}/{picture.name}")
     file.write_text(text, encoding="utf-8")
 
