@@ -12,7 +12,7 @@ from contact_truth import torques as torques_by_hand
 from wam_analysis.batch import processes
 from wam_analysis.contact_battery.judgement import Extent, Judgement, judge, scenes
 from wam_analysis.contact_battery.over_topics import script
-from wam_analysis.contact_battery.page import FEW, MARGINAL, MET, MISSED, STRETCH, mark, missed, page
+from wam_analysis.contact_battery.page import FEW, MARGINAL, MET, MISSED, MISSED_MARGINAL, STRETCH, mark, missed, page
 from wam_analysis.contact_battery.run import Belief, Levers, Played, Record, play
 from wam_analysis.contact_battery.scenes import Draw, Planned, Scene, dither_values
 from wam_analysis.contact_battery.score import ANY, Row, SceneScore, asked, score, stated
@@ -179,6 +179,10 @@ def test_intervals_are_those_of_the_textbooks() -> None:
     assert (middle.value, middle.low, middle.high) == (51.0, 41.0, 61.0)
     assert quantile([1.0, 2.0, 3.0, 4.0], 0.5).value == 2.5
     assert quantile([1.0, math.inf, math.inf], 0.5).value == math.inf
+    few = quantile([1.0, 2.0, 3.0], 0.5)
+    assert few.value == 2.0
+    assert math.isnan(few.low)
+    assert math.isnan(few.high), "the interval reaches beyond what was seen"
     assert rms([4.0, 12.0], [1, 3]).value == 2.0
     assert math.isnan(share(0, 0).value)
 
@@ -195,7 +199,9 @@ def test_marks_tell_a_good_number_from_a_marginal_one() -> None:
     assert mark(row, Figure(0.9, 0.8, 1.4, 50)) == STRETCH
     assert mark(row, Figure(1.5, 1.2, 1.9, 50)) == MET
     assert mark(row, Figure(1.5, 1.2, 2.1, 50)) == MARGINAL
-    assert mark(row, Figure(2.5, 1.2, 3.1, 50)) == MISSED
+    assert mark(row, Figure(2.5, 2.2, 3.1, 50)) == MISSED
+    assert mark(row, Figure(2.5, 1.2, 3.1, 50)) == MISSED_MARGINAL
+    assert mark(row, quantile([0.5], 0.5)) == FEW
     assert mark(row, Figure(math.nan, math.nan, math.nan, 0)) == "no data"
     none = row._replace(must=(0.0, 0.0), stretch=(0.0, 0.0))
     assert mark(none, Figure(0.0, 0.0, 3.7, 60)) == FEW

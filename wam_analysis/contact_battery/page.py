@@ -12,7 +12,8 @@ from wam_description.arm import Arm
 
 # every seed that anybody looked at while the estimator, its configuration or the judge was changed
 TUNED = (1, 2, 3, 201, 202, 203, 401)
-MET, STRETCH, MARGINAL, MISSED, FEW = "must", "**stretch**", "must, marginal", "**MISSED**", "not enough time"
+MET, STRETCH, MARGINAL, MISSED = "must", "**stretch**", "must, marginal", "**MISSED**"
+MISSED_MARGINAL, FEW = "**MISSED**, marginal", "not enough"
 
 
 def holds(value: float, bound: Bound) -> bool:
@@ -30,12 +31,15 @@ def mark(row: Row, found: Figure) -> str:
     counts = row.must == (0.0, 0.0)  # a count that must be none: its interval never is
     if counts and found.observed < FREE_MUST and found.value == 0.0:
         return FEW
+    if math.isnan(found.low) or math.isnan(found.high):
+        return FEW
     if row.stretch != ANY and holds(found.value, row.stretch) and not (counts and found.observed < FREE_STRETCH):
         return STRETCH
     if row.must == ANY:
         return "below the aim"
     if not holds(found.value, row.must):
-        return MISSED
+        low, high = row.must
+        return MISSED if counts or found.high < low or found.low > high else MISSED_MARGINAL
     clear = counts or (holds(found.low, row.must) and holds(found.high, row.must))
     return MET if clear else MARGINAL
 
@@ -43,7 +47,7 @@ def mark(row: Row, found: Figure) -> str:
 def missed(judgement: Judgement, arm: Arm) -> list[str]:
     """Rows whose must is missed by all seeds together."""
     total = judgement.total
-    return [row.name for row in asked(arm) if mark(row, row.of(total)) == MISSED]
+    return [row.name for row in asked(arm) if mark(row, row.of(total)) in (MISSED, MISSED_MARGINAL)]
 
 
 def table(judgement: Judgement, arm: Arm, rows: Sequence[Row]) -> str:
