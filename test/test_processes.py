@@ -14,7 +14,7 @@ import pytest
 
 from wam_analysis.bag import read
 from wam_description.configuration import Configuration, packaged
-from wam_ros.cli import main
+from wam_ros.cli import COMMANDS, main
 
 ROOT = Path(__file__).parents[1]
 PATIENCE = 2.0  # s, what the stack may take to end
@@ -264,7 +264,7 @@ def command(capsys: Any, *arguments: str) -> tuple[int, str, str]:
     return (code if isinstance(code, int) else 1, output.out, output.err if isinstance(code, int) else str(code))
 
 
-SUBCOMMANDS = ["demo", "up", "node", "record", "report", "model"]
+SUBCOMMANDS = tuple(COMMANDS)
 
 
 @pytest.mark.parametrize("subcommand", [None, *SUBCOMMANDS])
@@ -274,6 +274,32 @@ def test_help_of_every_command_says_what_it_does(subcommand: str | None, capsys:
     assert out.startswith(f"usage: wam {subcommand or ''}".rstrip())
     if subcommand is None:
         assert all(name in out for name in SUBCOMMANDS)
+
+
+def test_a_battery_that_is_told_to_end_leaves_nothing_behind(tmp_path: Path) -> None:
+    begin = [sys.executable, "-m", "wam_ros.cli", "evaluate", "contact", "--seed", "1"]
+    begin += ["--keep", str(tmp_path / "kept")]
+    with subprocess.Popen(begin, stderr=subprocess.PIPE, text=True, start_new_session=True) as battery:
+        assert battery.stderr is not None
+        assert battery.stderr.readline().startswith("evaluate: 0 of ")
+        wait(lambda: (tmp_path / "kept").exists() and any((tmp_path / "kept").iterdir()), 60.0, "a first scene")
+        battery.terminate()
+        assert battery.wait(10.0) == 128 + signal.SIGTERM
+        assert "leaked" not in battery.stderr.read()
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(battery.pid, 0)  # the session's last process is gone
+        pytest.fail("a worker is left")
+
+
+def test_a_reader_who_has_had_enough_is_no_error() -> None:
+    """As in `wam scorecard | head -1`."""
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, "-m", "wam_ros.cli", "scorecard"], stdout=write, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
 
 
 @pytest.mark.parametrize(

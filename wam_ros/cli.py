@@ -2,6 +2,8 @@
 
 import argparse
 import importlib
+import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -41,13 +43,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if rest and not getattr(command, "TAKES_ROS_ARGUMENTS", False):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     given.ros = rest
+    before = signal.signal(signal.SIGTERM, _end)  # what runs gets to clean up; nodes have a way of their own
     try:
         code = command.run(given)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # whoever read has had enough: `wam ... | head`
+        code = 128 + signal.SIGPIPE
     except (ParameterError, ValueError, OSError) as error:
         parser.exit(1, f"wam {given.command}: {error}\n")
     except KeyboardInterrupt:
-        code = 130
+        code = 128 + signal.SIGINT
+    finally:
+        signal.signal(signal.SIGTERM, before)
     sys.exit(code or 0)
+
+
+def _end(number: int, frame: object) -> None:
+    sys.exit(128 + number)
 
 
 def _parser(command: Any) -> argparse.ArgumentParser:
