@@ -375,10 +375,20 @@ def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
     assert over.failure == direct.failure == ""
     assert len(over.records) == len(direct.records)
     for one, other in zip(direct.records, over.records, strict=True):
-        exact = (one.stamp, one.q, one.qd, one.thetad, one.external, one.in_contact, one.load.force, one.load.moment)
+        exact = (
+            one.stamp,
+            one.q,
+            one.qd,
+            one.thetad,
+            one.external,
+            one.external_sd,
+            one.in_contact,
+            one.load.force,
+            one.load.moment,
+        )
         assert exact == (
-            other.stamp, other.q, other.qd, other.thetad, other.external, other.in_contact, other.load.force,
-            other.load.moment,
+            other.stamp, other.q, other.qd, other.thetad, other.external, other.external_sd, other.in_contact,
+            other.load.force, other.load.moment,
         )  # fmt: skip
     (mine,), (theirs,) = (score(played, ARM).touches for played in (direct, over))
     for name, value in mine._asdict().items():
