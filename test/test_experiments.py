@@ -437,6 +437,33 @@ def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, domain_id: int, ca
     assert "the driver stopped the arm at" in said
 
 
+class StopAfter:
+    """As `wam_ros.run.Stop`, which a signal sets; here after so many callbacks, whatever the clock says."""
+
+    def __init__(self, callbacks: int) -> None:
+        self._left = callbacks
+
+    @property
+    def is_set(self) -> bool:
+        self._left -= 1
+        return self._left < 0
+
+
+def test_an_interrupted_run_is_stopped_and_is_not_judged(tmp_path: Path, domain_id: int, capfd, monkeypatch) -> None:
+    monkeypatch.setattr("wam_ros.commands.experiment.Stop", lambda: StopAfter(3000))
+    assert run_command("stiction-limit-cycle", "--directory", str(tmp_path), "--name", "mine") == 130
+    said = capfd.readouterr().err
+    assert "without_deadband: stopped" in said
+    assert "done" not in said
+    file = tmp_path / "short.yaml"  # an experiment of this one run
+    whole = yaml.safe_load(packaged("experiments/stiction-limit-cycle").read_text())
+    file.write_text(yaml.safe_dump({**whole, "runs": whole["runs"][:1]}))
+    assert run_command(str(file), "--evaluate", str(tmp_path / "mine")) == 1
+    said = capfd.readouterr().err
+    assert "run 'without_deadband' ended in step 'press', 0 of 1 steps are finished; " in said
+    assert "'wam experiment short' runs it again" in said
+
+
 def test_bags_that_are_missing_are_named(tmp_path: Path, capfd) -> None:
     assert run_command("wam-slide", "--evaluate", str(tmp_path)) == 1
     assert "has no bag of slide; run 'wam experiment wam-slide'" in capfd.readouterr().err

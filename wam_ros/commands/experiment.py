@@ -87,8 +87,9 @@ def play(experiment: Experiment, each: Run, directory: Path, label: str, stop: S
             return stop.is_set or bool(scenario.done)
 
         composition.spin(is_over)
-        failure, fault = scenario.failure, driver.driver.safety.fault
-    _say(f"{label}: " + (f"stopped by the driver: {fault}" if fault else "done"), end="\n")
+        failure, fault, is_done = scenario.failure, driver.driver.safety.fault, bool(scenario.done)
+    ended = f"stopped by the driver: {fault}" if fault else "done" if is_done else "stopped"
+    _say(f"{label}: {ended}", end="\n")
     if failure and not fault:
         raise ValueError(f"{label}: {failure}")
 
