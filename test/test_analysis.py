@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,13 +17,16 @@ from test_lockstep import configuration, record_composed
 
 from wam_analysis.bag import Bag, JointColumns, WrenchColumns, read
 from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag
-from wam_analysis.findings.finding import Finding
+from wam_analysis.findings.finding import Finding, Section
+from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
 from wam_analysis.findings.plots import timing_plots
 from wam_analysis.findings.prediction import largest_force, node_at, predict
 from wam_analysis.findings.text import SCHEMA, document, json_text, text
 from wam_analysis.recorded import recorded_parameters
+from wam_control.force_loop import ForceLoop
 from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_ros.cli import main
 
@@ -103,6 +107,11 @@ def moving(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
         "driver:sensors.strain_noise": [0.02] * 4,
     }
     return recorded(configuration(script, folder, "bag", **values), folder)
+
+
+def section_of(recorded: Recorded, key: str) -> Section:
+    (found,) = [section for section in recorded.analysis.sections if section.key == key]
+    return found
 
 
 # what was planted
@@ -244,6 +253,40 @@ def test_the_node_of_a_press_has_the_stiffness_and_friction_of_statics(moving: R
     assert plain.routh_gain < plain.sampled_gain
     assert with_g_p.gamma == pytest.approx(1.5e-2 / with_g_p.routh_gain)
     assert with_g_p.routh_gain == pytest.approx(plain.routh_gain + node.damping / node.inertia * 1e-3)
+
+
+def test_the_verdict_on_a_press_is_that_of_the_guard_and_chapter_five_names_its_source(moving: Recorded) -> None:
+    """A gain with which every press settles though an ideal velocity source would be in domain III."""
+    recorded_set = recorded_parameters(moving.bag, "/wam")
+    assert recorded_set.force_loop is not None
+    assert recorded_set.arm is not None
+    assert recorded_set.timing is not None
+    q, place, direction = [0.0, -1.8, 0.0, 1.45], 0.28, np.array([0.0, -1.0, 0.0])
+    node = node_at(recorded_set, recorded_set.arm, q, "outer_link", place, direction)
+    assert node is not None
+    assert predict(node, 0.12, 0.0, 0.005, 1).regime == "unstable for every step (domain III)"
+    for gain, words in ((0.12, "domain I; the gains may be "), (2.0, "NOT stable")):
+        own = replace(recorded_set.force_loop, force_gain=(gain,), contact_cover="outer_link", contact_place=place)
+        found = guarded(recorded_set._replace(force_loop=own), q, "outer_link", place, direction, math.nan)
+        assert found is not None
+        assert words in sentence(found)
+        loop = replace(own, guard=replace(own.guard, mode="refuse"))  # the force loop itself takes it or does not
+        if gain < 1.0:
+            taken = ForceLoop(recorded_set.arm, loop, recorded_set.timing).judgement
+            assert taken is not None
+            assert found.judgement.scale >= taken.scale  # of one axis; the loop takes the worst of two
+        else:
+            with pytest.raises(ParameterError, match=r"times the largest linearly stable"):
+                ForceLoop(recorded_set.arm, loop, recorded_set.timing)
+
+
+def test_a_press_is_told_by_the_loop_as_it_is_before_the_ideal_one(cycling: Recorded) -> None:
+    said = " ".join(section_of(cycling, "stability").said)
+    assert said.index("The sampled loop with its speed loops") < said.index("Chapter 5, for an ideal velocity source:")
+    assert "The theory says" not in said
+    margin = cycling.finding("press: margin of the gains, looked for up to 10 times").predicted
+    gain = cycling.finding("press: largest stable gain, with the speed loops").predicted
+    assert gain == pytest.approx(8e-3 * margin)
 
 
 def test_the_largest_force_of_the_testbed_is_peak_torque_over_the_lever() -> None:

@@ -7,12 +7,15 @@ import numpy as np
 
 from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED
 from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.guarded import Guarded
+from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import CYCLING, HeldForce
 from wam_analysis.findings.recording import Recording
 from wam_analysis.measures.force_accuracy import dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
 from wam_analysis.measures.runs import runs
 from wam_analysis.measures.stability import Verdict
+from wam_control.stability_guard import LARGEST
 
 SURE = 0.8  # confidence from which a limit cycle is said to be one
 SEEN = 0.02  # of the force: a cycle smaller than that is not worth a sentence
@@ -124,8 +127,13 @@ def _cycle_sentences(one: HeldForce) -> list[str]:
     else:
         text += ", no limit cycle is seen in it"
     said = [text + "."]
+    if one.guarded is not None:
+        said.append(guard_sentence(one.guarded))
     if predicted is not None and math.isfinite(predicted.gamma):
-        text = f"The theory says: gamma {shown(predicted.gamma)}, zeta {shown(predicted.zeta)}: {predicted.regime}"
+        text = (
+            f"Chapter 5, for an ideal velocity source: gamma {shown(predicted.gamma)}, zeta {shown(predicted.zeta)}: "
+            f"{predicted.regime}"
+        )
         if math.isfinite(predicted.period):
             text += (
                 f"; a stiction cycle would have {shown(predicted.force_peak_to_peak, 'N')} and "
@@ -164,16 +172,44 @@ def _cycle_findings(one: HeldForce) -> list[Finding]:
 def _theory_findings(one: HeldForce, told: set[str]) -> list[Finding]:
     """What the theory says of the loop itself, once where several forces meet the same."""
     name, predicted = one.hold.name, one.predicted
-    if predicted is None or shown(predicted.gamma) in told:
+    margin = one.guarded.judgement.scale if one.guarded is not None else math.nan
+    key = f"{shown(predicted.gamma) if predicted is not None else ''} {shown(margin)}"
+    if key in told:
         return []
-    told.add(shown(predicted.gamma))
+    told.add(key)
+    found = _margin_findings(name, one.guarded)
+    if predicted is None:
+        return found
     actuator = 1e3 * predicted.actuator_peak_to_peak
+    ideal = "for an ideal velocity source, without friction"
     return [
+        *found,
         Finding(f"{name}: actuator cycle at the contact, peak to peak", "mm", math.nan, actuator, "(5.20)"),
-        Finding(f"{name}: gamma", "", math.nan, predicted.gamma, "(5.15)"),
-        Finding(f"{name}: largest stable gain, continuous", "m/s/N", math.nan, predicted.routh_gain, "(5.15)"),
-        Finding(f"{name}: largest stable gain, as sampled", "m/s/N", math.nan, predicted.sampled_gain, "no friction"),
+        Finding(f"{name}: gamma", "", math.nan, predicted.gamma, f"(5.15), {ideal}"),
+        Finding(
+            f"{name}: largest stable gain, continuous", "m/s/N", math.nan, predicted.routh_gain, f"(5.15), {ideal}"
+        ),
+        Finding(
+            f"{name}: largest stable gain, as sampled",
+            "m/s/N",
+            math.nan,
+            predicted.sampled_gain,
+            f"no friction, {ideal}",
+        ),
     ]
+
+
+def _margin_findings(name: str, found: Guarded | None) -> list[Finding]:
+    """Margin of the loop as it is, by the stability guard."""
+    if found is None:
+        return []
+    scale = found.judgement.scale
+    note = f"domain {found.judgement.domain}; stability guard, against {shown(found.surface, 'N/m')}"
+    said = [Finding(f"{name}: margin of the gains, looked for up to {LARGEST:g} times", "", math.nan, scale, note)]
+    if scale < LARGEST:
+        label = f"{name}: largest stable gain, with the speed loops"
+        said.append(Finding(label, "m/s/N", math.nan, scale * found.gain, "sampled; no friction"))
+    return said
 
 
 def contact_section(recording: Recording) -> Section:

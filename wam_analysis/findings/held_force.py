@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.demo_traces import Signal
+from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
 from wam_analysis.findings.recording import Hold, Recording, by_names
 from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
@@ -40,6 +41,7 @@ class HeldForce(NamedTuple):
     cycle : of the applied force in its last 70 %, else of the measured one.
     stability : of the error.
     node, predicted, largest : of the theory; None where the bag does not say enough.
+    guarded : the loop as the stability guard judges it; None likewise.
     place : where it pressed, m.
     """
 
@@ -56,6 +58,7 @@ class HeldForce(NamedTuple):
     node: Node | None
     predicted: Predicted | None
     largest: LargestForce | None
+    guarded: Guarded | None
     place: float
 
 
@@ -76,7 +79,7 @@ def _held(recording: Recording, hold: Hold) -> HeldForce:
     late, late_true = time >= (1.0 - STEADY) * duration, time_true >= (1.0 - STEADY) * duration
     swings, swings_true = time >= (1.0 - CYCLING) * duration, time_true >= (1.0 - CYCLING) * duration
     cover, place = _touched(recording, hold)
-    node, predicted, largest = _theory(recording, hold, cover, place)
+    theory = _theory(recording, hold, cover, place)
     return HeldForce(
         hold=hold,
         time=time,
@@ -90,9 +93,10 @@ def _held(recording: Recording, hold: Hold) -> HeldForce:
         or _cycle(time[swings], measured[swings])
         or NO_CYCLE,
         stability=_stability(hold, measured),
-        node=node,
-        predicted=predicted,
-        largest=largest,
+        node=theory.node,
+        predicted=theory.predicted,
+        largest=theory.largest,
+        guarded=theory.guarded,
         place=place,
     )
 
@@ -150,26 +154,34 @@ def _median_place(signal: Signal, rows: NDArray[np.bool_]) -> tuple[str, float]:
     return (str(cover), float(np.median(places))) if len(places) else ("", math.nan)
 
 
-def _theory(
-    recording: Recording, hold: Hold, cover: str, place: float
-) -> tuple[Node | None, Predicted | None, LargestForce | None]:
+class _Theory(NamedTuple):
+    node: Node | None
+    predicted: Predicted | None
+    largest: LargestForce | None
+    guarded: Guarded | None
+
+
+NO_THEORY = _Theory(None, None, None, None)
+
+
+def _theory(recording: Recording, hold: Hold, cover: str, place: float) -> _Theory:
     parameters = recording.parameters
     arm = parameters.arm
     if arm is None or cover not in arm.covers.names:
-        return None, None, None
+        return NO_THEORY
     joints = next(
         (columns for name in ("sim/joint_states", "joint_states") if (columns := recording.joints(name)) is not None),
         None,
     )
     positions = None if joints is None else by_names(joints, "position", arm.joints.names)
     if joints is None or positions is None:
-        return None, None, None
+        return NO_THEORY
     middle = (hold.begin + hold.end) // 2
     row = max(int(np.searchsorted(joints.stamp_ns, middle, side="right")) - 1, 0)
     q = positions[row].tolist()
     direction = hold.force
     if hold.frame not in arm.covers.names or not np.all(np.isfinite(q)):
-        return None, None, None
+        return NO_THEORY
     node = node_at(parameters, arm, q, hold.frame, place, direction) if hold.frame == cover else None
     largest = largest_force(arm, q, hold.frame, place, direction)
     loop, timing = parameters.force_loop, parameters.timing
@@ -178,7 +190,8 @@ def _theory(
         delay = math.ceil(timing.outer_delay / timing.outer_divisor)
         gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
         predicted = predict(node, gain, proportional, timing.outer_period_ns / 1e9, delay)
-    return node, predicted, largest
+    found = None if node is None else guarded(parameters, q, cover, place, direction, node.contact_stiffness)
+    return _Theory(node, predicted, largest, found)
 
 
 def _along(gains: Sequence[float], force: Numbers) -> float:
