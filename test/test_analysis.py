@@ -225,6 +225,63 @@ def test_provenance_names_the_parameters_and_the_counts(moving: Recorded) -> Non
     assert len(said["parameters, SHA-256"]) == 64
 
 
+# forces
+
+
+def pressed(touch: float, impact: float) -> Section:
+    """A press of 5 N from 1 s on, in contact from `touch` s on; its force swings to `impact` N for 0.04 s at first."""
+    stamps = np.arange(0, 4_000_000_000, 5_000_000)
+    time = stamps / 1e9
+    asked = np.where(time >= 1.0, -5.0, 0.0)
+    since = time - max(touch, 1.0)
+    pressing = 5.0 * np.clip(since / 0.01, 0.2, 1.0) + (impact - 5.0) * np.sin(np.pi * np.clip(since / 0.04, 0.0, 1.0))
+    force = -np.where(since >= 0.0, pressing, np.where(time >= touch, 1.0, 0.0))
+
+    def wrench(force_y: Any) -> WrenchColumns:
+        forces = np.column_stack([0.0 * time, force_y, 0.0 * time])
+        return WrenchColumns(stamps, stamps, ("outer_link",) * len(time), forces, np.zeros_like(forces))
+
+    columns = {"force_command": asked, "force_measured": force, "sim/contact/wrench": -force}
+    topics: dict[str, Any] = {f"/wam/{name}": wrench(force_y) for name, force_y in columns.items()}
+    analysis = analyse_bag(Bag(Path("made"), topics, {}, {}, {}), lambda doing: None)
+    return next(section for section in analysis.sections if section.key == "force")
+
+
+@pytest.mark.parametrize(
+    ("touch", "words"), [(1.3, "touched down 0.3 s into the step"), (0.95, "touched down 0.05 s before the step")]
+)
+def test_the_impact_of_a_touch_down_is_no_overshoot_of_the_control(touch: float, words: str) -> None:
+    section = pressed(touch, 11.0)
+    found = {finding.name.partition(": ")[2]: finding for finding in section.findings}
+    (said,) = [sentence for sentence in section.said if "asked on" in sentence]
+    assert f"{words} (up to 11 N)" in said
+    assert "overshot" not in said
+    assert "rose in" not in said
+    for name in ("overshoot", "rise time 10-90 %"):
+        assert math.isnan(found[name].measured)
+        assert words in found[name].note
+    assert found["settling time to 5 %"].measured == pytest.approx(0.04, abs=0.006)
+
+
+def test_a_press_in_a_contact_that_was_there_has_its_overshoot() -> None:
+    section = pressed(0.2, 11.0)
+    assert not any("touched down" in sentence for sentence in section.said)
+    (overshoot,) = [finding for finding in section.findings if finding.name.endswith(": overshoot")]
+    assert overshoot.measured == pytest.approx(100.0 * 6.0 / 4.0, rel=0.05)
+
+
+def test_the_dynamic_range_that_was_shown_is_not_the_one_that_is_predicted(cycling: Recorded) -> None:
+    largest, smallest = cycling.finding("largest controllable force"), cycling.finding("smallest controllable force")
+    truth = cycling.bag.topics["/wam/sim/contact/wrench"]
+    assert isinstance(truth, WrenchColumns)
+    rows = (truth.stamp_ns > 5_700_000_000) & (truth.stamp_ns < 9_300_000_000)  # the last 40 %
+    assert largest.measured == pytest.approx(float(np.mean(truth.force[rows, 1])), rel=0.01)
+    assert largest.predicted > 3.0 * largest.measured
+    found = cycling.finding("dynamic range")
+    assert found.measured == pytest.approx(largest.measured / smallest.measured)
+    assert found.predicted == pytest.approx(largest.predicted / smallest.measured)
+
+
 # theory on the arm
 
 

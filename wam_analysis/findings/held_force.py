@@ -25,6 +25,7 @@ CYCLING = 0.7  # part of it in which a limit cycle is looked for
 BAND = 0.05  # of the step: settled within it
 LOUD = 0.1  # of the force: an error that stays within it has settled
 LEAST_STEP = 0.1  # of the force; less is no step
+FRESH = 0.2  # s; a contact that is younger is still an impact
 FEW = 20  # samples below which a signal is not looked at
 UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
 
@@ -37,6 +38,8 @@ class HeldForce(NamedTuple):
     time, measured : (n,), s from the begin, and the force that the loop measured.
     time_true, applied : (m,), the same of the simulator's truth; empty where it was not recorded.
     response : of the measured force; None where there is no step.
+    touched : when the contact began, s from the begin, FRESH before it at most; NaN where it was there already or is
+        not known.  Rise and overshoot are then those of the impact, and settling counts from there.
     measured_accuracy, applied_accuracy : in the steady part.
     cycle : of the applied force in its last 70 %, else of the measured one.
     stability : of the error.
@@ -51,6 +54,7 @@ class HeldForce(NamedTuple):
     time_true: Numbers
     applied: Numbers
     response: StepResponse | None
+    touched: float
     measured_accuracy: ForceAccuracy
     applied_accuracy: ForceAccuracy
     cycle: Cycle
@@ -79,6 +83,10 @@ def _held(recording: Recording, hold: Hold) -> HeldForce:
     late, late_true = time >= (1.0 - STEADY) * duration, time_true >= (1.0 - STEADY) * duration
     swings, swings_true = time >= (1.0 - CYCLING) * duration, time_true >= (1.0 - CYCLING) * duration
     cover, place = _touched(recording, hold)
+    touched = _touch_down(recording, hold)
+    response = _response(hold, time, measured, STEADY * duration)
+    if response is not None and touched > 0.0:
+        response = response._replace(settling=max(response.settling - touched, 0.0))
     theory = _theory(recording, hold, cover, place)
     return HeldForce(
         hold=hold,
@@ -86,7 +94,8 @@ def _held(recording: Recording, hold: Hold) -> HeldForce:
         measured=measured,
         time_true=time_true,
         applied=applied,
-        response=_response(hold, time, measured, STEADY * duration),
+        response=response,
+        touched=touched,
         measured_accuracy=force_accuracy(np.full(int(np.sum(late)), hold.asked), measured[late]),
         applied_accuracy=force_accuracy(np.full(int(np.sum(late_true)), hold.asked), applied[late_true]),
         cycle=_cycle(time_true[swings_true], applied[swings_true])
@@ -121,6 +130,24 @@ def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> St
         return step_response(time, measured, begin, steady, BAND)
     except ValueError:
         return None
+
+
+def _touch_down(recording: Recording, hold: Hold) -> float:
+    """When the contact of a hold began, by the truth, else by the estimate; see `HeldForce`."""
+    traces = recording.summary.traces
+    if any(stiffness > 0.0 for stiffness in recording.parameters.springs.stiffness):
+        return math.nan  # a spring under the joint is always there
+    first, last = (int(row) for row in np.searchsorted(traces.stamp, [hold.begin, hold.end]))
+    for signal in (traces.true, traces.felt):
+        if first >= last or not np.any(signal.is_known[first:last]):
+            continue
+        acts = signal.acts & ((signal.frame == hold.frame) | (hold.frame not in signal.frame))
+        free = np.flatnonzero(~acts[:first]) if acts[first] else np.array([first + int(np.argmax(acts[first:])) - 1])
+        if not np.any(acts[first:last]) or not len(free) or not signal.is_known[free[-1]]:
+            return math.nan
+        begin = float(traces.stamp[free[-1] + 1] - hold.begin) / 1e9
+        return begin if begin > -FRESH else math.nan
+    return math.nan
 
 
 def _cycle(time: Numbers, value: Numbers) -> Cycle | None:
