@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +18,7 @@ from test_lockstep import configuration, record_composed
 
 from wam_analysis.bag import Bag, JointColumns, WrenchColumns, read
 from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag
-from wam_analysis.findings.finding import Finding, Section
+from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
 from wam_analysis.findings.plots import timing_plots
@@ -162,6 +163,34 @@ def test_the_friction_of_motors_and_joints_is_identified_in_spite_of_noise(movin
         assert found.measured == pytest.approx(arm.joints.dynamic_friction[i], rel=0.02)
         assert found.predicted == arm.joints.dynamic_friction[i]
     assert moving.finding("motor4: viscous friction").measured == pytest.approx(1e-4, rel=0.1)
+
+
+def test_a_friction_that_the_recording_does_not_tell_is_not_given(moving: Recorded) -> None:
+    findings = section_of(moving, "friction").findings
+    said = " ".join(section_of(moving, "friction").said)
+    told = [finding for finding in findings if math.isfinite(finding.measured) and "static" not in finding.name]
+    assert told
+    for finding in told:
+        value, error = finding.measured, float(finding.note.partition("+-")[2].partition(";")[0])
+        assert error < value / 4.0
+        assert abs(value - finding.predicted) < 4.0 * error + 0.02 * finding.predicted
+        assert f"{value:.3g} +- " in said or f"{value:.2e} +- " in said
+    untold = [finding for finding in findings if "not told by this recording" in finding.note]
+    assert untold
+    assert all(math.isnan(finding.measured) for finding in untold)
+    assert said.count("not told by this recording") == len(untold)
+
+
+def test_no_number_of_the_table_runs_into_the_next(moving: Recorded) -> None:
+    lines, seen = text(moving.analysis).splitlines(), 0
+    for section in moving.analysis.sections:
+        for finding in section.findings:
+            measured, predicted = (shown(value, finding.unit) for value in (finding.measured, finding.predicted))
+            words = rf"  {re.escape(finding.name)} {{2,}}{re.escape(measured)} {{2,}}{re.escape(predicted)}"
+            found = [line for line in lines if re.fullmatch(words, line)]
+            assert all(len(line) <= 100 for line in found)
+            seen += len(found) > 0 or len(finding.name) > 40  # a long name is wrapped
+    assert seen == sum(len(section.findings) for section in moving.analysis.sections)
 
 
 def test_a_ripple_is_found_at_its_order(moving: Recorded) -> None:
