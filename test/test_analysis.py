@@ -204,6 +204,8 @@ def test_the_efficiency_is_that_of_the_friction_that_is_configured(moving: Recor
     found = moving.finding("efficiency, motors to links")
     assert 40.0 < found.measured < 95.0
     assert found.measured == pytest.approx(found.predicted, abs=5.0)
+    assert "speeds and loads of this recording" in found.note
+    assert any("at the speeds and loads of this recording" in sentence for sentence in section_of(moving, "power").said)
 
 
 def test_the_push_is_told_with_its_link_and_force(moving: Recorded) -> None:

@@ -279,11 +279,13 @@ def _power_section(
             rows = known & (motor > 0.0) & (joint > 0.0)
             expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
             expected = max(expected, 0.0)
-            note = "friction and cables (6.14), as configured"
+            note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
             findings.append(Finding("efficiency, motors to links", "%", 100.0 * found.forward, 100.0 * expected, note))
             said.append(
                 f"The motors gave {shown(found.forward_put, 'J')} to the transmission while they drove, "
-                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %."
+                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %; the friction and "
+                f"creep that are configured leave {100.0 * expected:.0f} % at the speeds and loads of this recording, "
+                "which the prediction takes from it."
             )
         if found.back_put > LEAST_WORK:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="driven backwards"))

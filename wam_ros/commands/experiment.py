@@ -12,6 +12,7 @@ from wam_analysis.experiments.figure import draw
 from wam_analysis.experiments.page import write
 from wam_analysis.experiments.rows import Result
 from wam_ros.bring_up import Composition
+from wam_ros.commands import writable_directory, writable_file
 from wam_ros.run import Stop
 
 PICTURE = "result.png"
@@ -37,6 +38,10 @@ def run(given: argparse.Namespace) -> int:
         return 0
     if bool(given.experiment) == given.all:
         raise ValueError("name one experiment, or give --all; --list says which there are")
+    if not given.evaluate:
+        writable_directory("--directory", Path(given.directory))
+    if given.write:
+        writable_file("--write", Path(given.write))
     results: dict[str, tuple[Experiment, Result, Path]] = {}
     for experiment in map(load, names() if given.all else [given.experiment]):
         if given.evaluate:
