@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,13 +18,16 @@ from test_lockstep import configuration, record_composed
 
 from wam_analysis.bag import Bag, JointColumns, WrenchColumns, read
 from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag
-from wam_analysis.findings.finding import Finding
+from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.guarded import guarded, sentence
 from wam_analysis.findings.page import page
 from wam_analysis.findings.plots import timing_plots
 from wam_analysis.findings.prediction import largest_force, node_at, predict
 from wam_analysis.findings.text import SCHEMA, document, json_text, text
 from wam_analysis.recorded import recorded_parameters
+from wam_control.force_loop import ForceLoop
 from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_ros.cli import main
 
@@ -105,6 +110,11 @@ def moving(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     return recorded(configuration(script, folder, "bag", **values), folder)
 
 
+def section_of(recorded: Recorded, key: str) -> Section:
+    (found,) = [section for section in recorded.analysis.sections if section.key == key]
+    return found
+
+
 # what was planted
 
 
@@ -155,6 +165,34 @@ def test_the_friction_of_motors_and_joints_is_identified_in_spite_of_noise(movin
     assert moving.finding("motor4: viscous friction").measured == pytest.approx(1e-4, rel=0.1)
 
 
+def test_a_friction_that_the_recording_does_not_tell_is_not_given(moving: Recorded) -> None:
+    findings = section_of(moving, "friction").findings
+    said = " ".join(section_of(moving, "friction").said)
+    told = [finding for finding in findings if math.isfinite(finding.measured) and "static" not in finding.name]
+    assert told
+    for finding in told:
+        value, error = finding.measured, float(finding.note.partition("+-")[2].partition(";")[0])
+        assert error < value / 4.0
+        assert abs(value - finding.predicted) < 4.0 * error + 0.02 * finding.predicted
+        assert f"{value:.3g} +- " in said or f"{value:.2e} +- " in said
+    untold = [finding for finding in findings if "not told by this recording" in finding.note]
+    assert untold
+    assert all(math.isnan(finding.measured) for finding in untold)
+    assert said.count("not told by this recording") == len(untold)
+
+
+def test_no_number_of_the_table_runs_into_the_next(moving: Recorded) -> None:
+    lines, seen = text(moving.analysis).splitlines(), 0
+    for section in moving.analysis.sections:
+        for finding in section.findings:
+            measured, predicted = (shown(value, finding.unit) for value in (finding.measured, finding.predicted))
+            words = rf"  {re.escape(finding.name)} {{2,}}{re.escape(measured)} {{2,}}{re.escape(predicted)}"
+            found = [line for line in lines if re.fullmatch(words, line)]
+            assert all(len(line) <= 100 for line in found)
+            seen += len(found) > 0 or len(finding.name) > 40  # a long name is wrapped
+    assert seen == sum(len(section.findings) for section in moving.analysis.sections)
+
+
 def test_a_ripple_is_found_at_its_order(moving: Recorded) -> None:
     found = moving.finding("motor1: largest ripple")
     assert found.measured == pytest.approx(RIPPLE, rel=0.05)
@@ -166,6 +204,8 @@ def test_the_efficiency_is_that_of_the_friction_that_is_configured(moving: Recor
     found = moving.finding("efficiency, motors to links")
     assert 40.0 < found.measured < 95.0
     assert found.measured == pytest.approx(found.predicted, abs=5.0)
+    assert "speeds and loads of this recording" in found.note
+    assert any("at the speeds and loads of this recording" in sentence for sentence in section_of(moving, "power").said)
 
 
 def test_the_push_is_told_with_its_link_and_force(moving: Recorded) -> None:
@@ -216,6 +256,63 @@ def test_provenance_names_the_parameters_and_the_counts(moving: Recorded) -> Non
     assert len(said["parameters, SHA-256"]) == 64
 
 
+# forces
+
+
+def pressed(touch: float, impact: float) -> Section:
+    """A press of 5 N from 1 s on, in contact from `touch` s on; its force swings to `impact` N for 0.04 s at first."""
+    stamps = np.arange(0, 4_000_000_000, 5_000_000)
+    time = stamps / 1e9
+    asked = np.where(time >= 1.0, -5.0, 0.0)
+    since = time - max(touch, 1.0)
+    pressing = 5.0 * np.clip(since / 0.01, 0.2, 1.0) + (impact - 5.0) * np.sin(np.pi * np.clip(since / 0.04, 0.0, 1.0))
+    force = -np.where(since >= 0.0, pressing, np.where(time >= touch, 1.0, 0.0))
+
+    def wrench(force_y: Any) -> WrenchColumns:
+        forces = np.column_stack([0.0 * time, force_y, 0.0 * time])
+        return WrenchColumns(stamps, stamps, ("outer_link",) * len(time), forces, np.zeros_like(forces))
+
+    columns = {"force_command": asked, "force_measured": force, "sim/contact/wrench": -force}
+    topics: dict[str, Any] = {f"/wam/{name}": wrench(force_y) for name, force_y in columns.items()}
+    analysis = analyse_bag(Bag(Path("made"), topics, {}, {}, {}), lambda doing: None)
+    return next(section for section in analysis.sections if section.key == "force")
+
+
+@pytest.mark.parametrize(
+    ("touch", "words"), [(1.3, "touched down 0.3 s into the step"), (0.95, "touched down 0.05 s before the step")]
+)
+def test_the_impact_of_a_touch_down_is_no_overshoot_of_the_control(touch: float, words: str) -> None:
+    section = pressed(touch, 11.0)
+    found = {finding.name.partition(": ")[2]: finding for finding in section.findings}
+    (said,) = [sentence for sentence in section.said if "asked on" in sentence]
+    assert f"{words} (up to 11 N)" in said
+    assert "overshot" not in said
+    assert "rose in" not in said
+    for name in ("overshoot", "rise time 10-90 %"):
+        assert math.isnan(found[name].measured)
+        assert words in found[name].note
+    assert found["settling time to 5 %"].measured == pytest.approx(0.04, abs=0.006)
+
+
+def test_a_press_in_a_contact_that_was_there_has_its_overshoot() -> None:
+    section = pressed(0.2, 11.0)
+    assert not any("touched down" in sentence for sentence in section.said)
+    (overshoot,) = [finding for finding in section.findings if finding.name.endswith(": overshoot")]
+    assert overshoot.measured == pytest.approx(100.0 * 6.0 / 4.0, rel=0.05)
+
+
+def test_the_dynamic_range_that_was_shown_is_not_the_one_that_is_predicted(cycling: Recorded) -> None:
+    largest, smallest = cycling.finding("largest controllable force"), cycling.finding("smallest controllable force")
+    truth = cycling.bag.topics["/wam/sim/contact/wrench"]
+    assert isinstance(truth, WrenchColumns)
+    rows = (truth.stamp_ns > 5_700_000_000) & (truth.stamp_ns < 9_300_000_000)  # the last 40 %
+    assert largest.measured == pytest.approx(float(np.mean(truth.force[rows, 1])), rel=0.01)
+    assert largest.predicted > 3.0 * largest.measured
+    found = cycling.finding("dynamic range")
+    assert found.measured == pytest.approx(largest.measured / smallest.measured)
+    assert found.predicted == pytest.approx(largest.predicted / smallest.measured)
+
+
 # theory on the arm
 
 
@@ -244,6 +341,40 @@ def test_the_node_of_a_press_has_the_stiffness_and_friction_of_statics(moving: R
     assert plain.routh_gain < plain.sampled_gain
     assert with_g_p.gamma == pytest.approx(1.5e-2 / with_g_p.routh_gain)
     assert with_g_p.routh_gain == pytest.approx(plain.routh_gain + node.damping / node.inertia * 1e-3)
+
+
+def test_the_verdict_on_a_press_is_that_of_the_guard_and_chapter_five_names_its_source(moving: Recorded) -> None:
+    """A gain with which every press settles though an ideal velocity source would be in domain III."""
+    recorded_set = recorded_parameters(moving.bag, "/wam")
+    assert recorded_set.force_loop is not None
+    assert recorded_set.arm is not None
+    assert recorded_set.timing is not None
+    q, place, direction = [0.0, -1.8, 0.0, 1.45], 0.28, np.array([0.0, -1.0, 0.0])
+    node = node_at(recorded_set, recorded_set.arm, q, "outer_link", place, direction)
+    assert node is not None
+    assert predict(node, 0.12, 0.0, 0.005, 1).regime == "unstable for every step (domain III)"
+    for gain, words in ((0.12, "domain I; the gains may be "), (2.0, "NOT stable")):
+        own = replace(recorded_set.force_loop, force_gain=(gain,), contact_cover="outer_link", contact_place=place)
+        found = guarded(recorded_set._replace(force_loop=own), q, "outer_link", place, direction, math.nan)
+        assert found is not None
+        assert words in sentence(found)
+        loop = replace(own, guard=replace(own.guard, mode="refuse"))  # the force loop itself takes it or does not
+        if gain < 1.0:
+            taken = ForceLoop(recorded_set.arm, loop, recorded_set.timing).judgement
+            assert taken is not None
+            assert found.judgement.scale >= taken.scale  # of one axis; the loop takes the worst of two
+        else:
+            with pytest.raises(ParameterError, match=r"times the largest linearly stable"):
+                ForceLoop(recorded_set.arm, loop, recorded_set.timing)
+
+
+def test_a_press_is_told_by_the_loop_as_it_is_before_the_ideal_one(cycling: Recorded) -> None:
+    said = " ".join(section_of(cycling, "stability").said)
+    assert said.index("The sampled loop with its speed loops") < said.index("Chapter 5, for an ideal velocity source:")
+    assert "The theory says" not in said
+    margin = cycling.finding("press: margin of the gains, looked for up to 10 times").predicted
+    gain = cycling.finding("press: largest stable gain, with the speed loops").predicted
+    assert gain == pytest.approx(8e-3 * margin)
 
 
 def test_the_largest_force_of_the_testbed_is_peak_torque_over_the_lever() -> None:

@@ -1,6 +1,7 @@
 """Experiments: what each evaluation says of a signal with a known answer, and two of them run for real."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -217,7 +218,8 @@ def test_actuator_cycle_of_a_motor_that_swings_against_a_stuck_joint(tmp_path: P
         "force_command": forces(time, (0.0, -21.9, 0.0)),
     }
     run = recorded(experiment, 0, topics, (Step("press", 0.0, 8.0, {}),), tmp_path)
-    rows = {row.quantity: row for row in limit_cycles.actuator({"press": run}).rows}
+    result = limit_cycles.actuator({"press": run})
+    rows = {row.quantity: row for row in result.rows}
     assert rows["motor at the joint, peak to peak"].measured == pytest.approx(swing, rel=1e-3)
     assert rows["motor at the joint, peak to peak"].predicted == pytest.approx(12.0 / stiffness, rel=1e-3)
     work = 0.5 * stiffness * (0.5 * swing) ** 2
@@ -225,6 +227,10 @@ def test_actuator_cycle_of_a_motor_that_swings_against_a_stuck_joint(tmp_path: P
     (power,) = (row for name, row in rows.items() if name.startswith("power"))
     assert power.measured == pytest.approx(work / 2.0, rel=5e-3)
     assert "power of a half cycle of 2.00 s" in rows
+    (remark,) = result.remarks  # power times its own time is the work
+    by_law, measured = (float(number) for number in re.findall(r"(\d+\.\d{3}) s", remark))
+    assert power.predicted * by_law == pytest.approx(12.0**2 / 4.0 / (2.0 * stiffness), rel=1e-3)
+    assert power.measured * measured == pytest.approx(rows["work of a half cycle"].measured, rel=1e-3)
 
 
 def test_step_response_of_an_exponential(tmp_path: Path) -> None:
@@ -304,9 +310,10 @@ def test_creep_is_what_the_link_lags_behind_its_motor(tmp_path: Path) -> None:
     time = np.arange(0.0, 4.0, 1e-3)
     theta = 5.6 * (1.0 - np.abs(np.clip(time - 1.0, 0.0, 2.0) - 1.0)) * (time > 1.0)
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(theta)))])
+    swings = np.where(time < 0.5005, 5e-4 * np.cos(2.0 * math.pi * (time - 0.5) / 0.02), 0.0)  # largest as it begins
     topics = {
         "motor_states": joints(time, theta),
-        "joint_sensors": joints(time, theta / 14.0 - 1e-3 * travel),
+        "joint_sensors": joints(time, theta / 14.0 - 1e-3 * travel + swings),
         "sim/disturbance": forces(time, (0.0, -45.0, 0.0), torque=(0.0, 0.0, -40.5)),
     }
     steps = (Step("out", 0.5, 2.0, {}), Step("rest back", 2.0, 4.0, {}))
@@ -435,6 +442,33 @@ def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, domain_id: int, ca
     said = capfd.readouterr().out
     assert "large step, press 10 lb       diverged       diverged" in said
     assert "the driver stopped the arm at" in said
+
+
+class StopAfter:
+    """As `wam_ros.run.Stop`, which a signal sets; here after so many callbacks, whatever the clock says."""
+
+    def __init__(self, callbacks: int) -> None:
+        self._left = callbacks
+
+    @property
+    def is_set(self) -> bool:
+        self._left -= 1
+        return self._left < 0
+
+
+def test_an_interrupted_run_is_stopped_and_is_not_judged(tmp_path: Path, domain_id: int, capfd, monkeypatch) -> None:
+    monkeypatch.setattr("wam_ros.commands.experiment.Stop", lambda: StopAfter(3000))
+    assert run_command("stiction-limit-cycle", "--directory", str(tmp_path), "--name", "mine") == 130
+    said = capfd.readouterr().err
+    assert "without_deadband: stopped" in said
+    assert "done" not in said
+    file = tmp_path / "short.yaml"  # an experiment of this one run
+    whole = yaml.safe_load(packaged("experiments/stiction-limit-cycle").read_text())
+    file.write_text(yaml.safe_dump({**whole, "runs": whole["runs"][:1]}))
+    assert run_command(str(file), "--evaluate", str(tmp_path / "mine")) == 1
+    said = capfd.readouterr().err
+    assert "run 'without_deadband' ended in step 'press', 0 of 1 steps are finished; " in said
+    assert "'wam experiment short' runs it again" in said
 
 
 def test_bags_that_are_missing_are_named(tmp_path: Path, capfd) -> None:

@@ -216,6 +216,19 @@ def test_planted_friction_is_recovered(offset):
         assert abs(value - truth) < 4.0 * error < truth / 2.0
 
 
+def test_what_one_short_motion_cannot_tell_has_an_error_that_says_so():
+    """A spring of cables that settles after each start: alike in every sample of a motion, which is no noise."""
+    time = np.arange(6_000) / 1000.0
+    velocity = np.where((time > 1.0) & (time < 2.0), 1.5 * np.sin(math.pi * (time - 1.0)) ** 2, 0.0)
+    velocity -= np.where((time > 3.0) & (time < 4.0), 1.5 * np.sin(math.pi * (time - 3.0)) ** 2, 0.0)
+    since = np.where(time > 3.0, time - 3.0, time - 1.0)
+    torque = 0.18 * np.sign(velocity) + 0.012 * velocity
+    torque += np.where(velocity != 0.0, np.sign(velocity) * 0.02 * np.exp(-since / 0.3), 0.0)
+    found = identify_friction(time, velocity, torque, rest=0.05, window=0.02)
+    assert abs(found.viscous - 0.012) > 0.002
+    assert abs(found.viscous - 0.012) < 2.0 * found.viscous_error
+
+
 def test_impacts_do_not_spoil_the_friction():
     time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
     torque[np.random.default_rng(9).integers(0, len(time), 60)] += 5.0

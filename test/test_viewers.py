@@ -15,7 +15,7 @@ from test_bag import STORE, joint_state, wrench
 
 from wam_analysis.bag import Bag, JointColumns, read
 from wam_analysis.findings.recording import recording_of
-from wam_analysis.rerun_view import _arrows, _quaternion, _turn, load_rerun, view
+from wam_analysis.rerun_view import NoViewerError, _arrows, _quaternion, _turn, load_rerun, view, viewer
 from wam_description.configuration import Configuration, packaged
 from wam_description.mjcf import rotation_xyz
 from wam_description.rigid_body import RigidBody
@@ -55,6 +55,21 @@ def test_without_rerun_the_command_says_what_to_install(
         main(["view", str(bag)])
     assert ended.value.code == 1
     assert "pip install 'wam_stack[view]'" in capsys.readouterr().err
+
+
+def test_the_viewer_is_found_beside_this_python_though_its_folder_is_not_on_the_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "bin" / "python"))
+    monkeypatch.setenv("PATH", str(tmp_path / "elsewhere"))
+    with pytest.raises(NoViewerError, match=r"neither in .*/bin nor on PATH; pip install .*--save") as refused:
+        viewer()
+    assert "\n" not in str(refused.value)
+    program = tmp_path / "bin" / "rerun"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    assert viewer() == str(program)
 
 
 @pytest.fixture

@@ -4,6 +4,9 @@ Rerun comes with the extra 'view' and is imported only when it is needed.
 """
 
 import math
+import os
+import shutil
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +29,7 @@ Numbers = NDArray[np.float64]
 Times = NDArray[np.int64]
 
 APPLICATION = "wam_stack"
+PROGRAM = "rerun"
 TIMELINE = "time"
 DISTANCE = 1.3  # of the eye, in heights of what it sees
 POSES = 100.0  # poses of the arm in a second at most
@@ -33,7 +37,25 @@ COLOURS = {"asked": ASKED, "applied": TRUE, "measured": MEASURED, "estimated": F
 
 
 class NoViewerError(OSError):
-    """Rerun is not installed."""
+    """Rerun is not installed, or its program is not found."""
+
+
+def viewer() -> str:
+    """Path of Rerun's own program: beside this Python, where its package puts it, else on the search path.
+
+    Raises
+    ------
+    NoViewerError
+        where it is in neither place; the message says what to do.
+    """
+    beside = Path(sys.executable).parent
+    found = shutil.which(PROGRAM, path=str(beside)) or shutil.which(PROGRAM)
+    if found is None:
+        raise NoViewerError(
+            f"Rerun's program '{PROGRAM}' is neither in {beside} nor on PATH; pip install 'wam_stack[view]', or write "
+            "a file with --save and open it where the program is"
+        )
+    return found
 
 
 def load_rerun() -> Any:
@@ -79,7 +101,12 @@ def view(recording: Recording, save: Path | None) -> str:
         raise ValueError(f"{recording.bag.path} has no joint states; there is nothing to view")
     stream = rerun.RecordingStream(APPLICATION, recording_id=recording.bag.path.name)
     if save is None:
-        stream.spawn(default_blueprint=_blueprint(rerun, arm, joints))
+        os.environ["PATH"] = f"{Path(viewer()).parent}{os.pathsep}{os.environ.get('PATH', '')}"  # spawn looks there
+        try:
+            stream.spawn(default_blueprint=_blueprint(rerun, arm, joints))
+        except RuntimeError as error:
+            reason = str(error).strip().partition("\n")[0]
+            raise NoViewerError(f"the viewer does not start ({reason}); --save writes a file for it") from error
     else:
         stream.save(save, default_blueprint=_blueprint(rerun, arm, joints))
     zero = _zero(recording)

@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # whoever read has had enough: `wam ... | head`
         code = 128 + signal.SIGPIPE
     except (ParameterError, ValueError, OSError) as error:
-        parser.exit(1, f"wam {given.command}: {error}\n")
+        parser.exit(1, f"wam {given.command}: {error}{_hint(error, given.command)}\n")
     except KeyboardInterrupt:
         code = 128 + signal.SIGINT
     finally:
@@ -61,6 +61,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _end(number: int, frame: object) -> None:
     sys.exit(128 + number)
+def _hint(error: Exception, command: str) -> str:
+    """What to do about an error of the system that does not say it itself."""
+    if not isinstance(error, PermissionError) or error.filename is None:
+        return ""
+    return (
+        f"; run it in a directory that you may write into, or name another place: 'wam {command} --help' says by which "
+        "option"
+    )
 
 
 def _parser(command: Any) -> argparse.ArgumentParser:

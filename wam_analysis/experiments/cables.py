@@ -11,6 +11,7 @@ from wam_theory import cable
 
 WITHIN = 0.02
 ROUNDING = 1e-6  # s
+REST = 0.1  # s before the motor turns, in which the link swings a little about where it is
 
 
 def efficiency(runs: Mapping[str, Recording]) -> Result:
@@ -70,8 +71,9 @@ def creeping(runs: Mapping[str, Recording]) -> Result:
     first = int(np.searchsorted(motors.time, start))
     theta, angle = motors.position[first:, 0], sensors.position[first:, 0]
     time = motors.time[first:]
+    before = slice(int(np.searchsorted(motors.time, start - REST)), first + 1)
     given = -(angle - theta * arm.joint_from_motor[0])
-    given -= given[0]
+    given += float(np.mean(sensors.position[before, 0] - motors.position[before, 0] * arm.joint_from_motor[0]))
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(theta)))])
     load = load_torque(run, run.step("out"))
     predicted = crept(arm, travel, load)

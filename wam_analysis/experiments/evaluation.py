@@ -10,6 +10,7 @@ from wam_analysis.experiments.definition import Experiment, Run
 from wam_analysis.experiments.recording import Recording, recording
 from wam_analysis.experiments.rows import Result, Row, plain
 
+DONE = "done"  # what the scenario says at its end
 Evaluation = Callable[[Mapping[str, Recording]], Result]
 
 
@@ -24,7 +25,7 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
     Raises
     ------
     BagError
-        where a bag is missing or cannot be read.
+        where a bag is missing or cannot be read, or a run was not played to its end.
     """
     if (directory / "metadata.yaml").is_file() and CUT in (recorded := recording(directory)).bag.metadata:
         return judged_sample(experiment, recorded)
@@ -34,7 +35,27 @@ def evaluate(experiment: Experiment, directory: Path) -> Result:
     missing = [name for name, bag in bags.items() if not bag.is_dir()]
     if missing:
         raise BagError(f"{directory} has no bag of {', '.join(missing)}; run 'wam experiment {experiment.name}'")
-    return _judged(experiment, experiment.evaluation, {name: recording(bag) for name, bag in bags.items()})
+    recordings = {name: recording(bag) for name, bag in bags.items()}
+    for run in experiment.runs:
+        _require_whole(experiment, run, recordings[run.name])
+    return _judged(experiment, experiment.evaluation, recordings)
+
+
+def _require_whole(experiment: Experiment, run: Run, recorded: Recording) -> None:
+    """Refuse a run that was interrupted; one that the driver is expected to stop ends with that."""
+    names = [str(step["name"]) for step in run.steps]
+    if (recorded.outcome == DONE and len(recorded.steps) >= len(names)) or (run.stops and recorded.fault):
+        return
+    begun = [step.name for step in recorded.steps]
+    if recorded.outcome in names:  # what the scenario said last is the step that it was in
+        begun.append(recorded.outcome)
+    step = begun[-1] if begun else names[0]
+    because = f" ({recorded.fault or recorded.outcome})" if recorded.outcome not in (*names, DONE, "") else ""
+    raise BagError(
+        f"{recorded.bag.path}: run '{run.name}' ended in step '{step}', {max(len(begun) - 1, 0)} of {len(names)} steps "
+        f"are finished{because}; there is nothing to judge before all are: 'wam experiment {experiment.name}' runs "
+        "it again"
+    )
 
 
 def judged_sample(experiment: Experiment, recorded: Recording) -> Result:

@@ -7,12 +7,16 @@ import numpy as np
 
 from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED
 from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.guarded import Guarded
+from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import CYCLING, HeldForce
+from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.findings.recording import Recording
-from wam_analysis.measures.force_accuracy import dynamic_range
+from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
 from wam_analysis.measures.runs import runs
 from wam_analysis.measures.stability import Verdict
+from wam_control.stability_guard import LARGEST
 
 SURE = 0.8  # confidence from which a limit cycle is said to be one
 SEEN = 0.02  # of the force: a cycle smaller than that is not worth a sentence
@@ -27,28 +31,47 @@ def force_section(recording: Recording, held: Sequence[HeldForce]) -> Section:
         findings += _press_findings(one)
     if not held:
         said.append("No constant force was asked for.")
-    accuracies = [one.applied_accuracy if len(one.applied) else one.measured_accuracy for one in held]
+    range_said, range_findings = _dynamic_range(held)
+    return Section("force", "Force", (*said, *range_said), (*findings, *range_findings), lacking)
+
+
+def _dynamic_range(held: Sequence[HeldForce]) -> tuple[list[str], list[Finding]]:
+    """Dynamic range (3.2.1): what was shown, and what the arm's limits promise."""
+    known = [(one, accuracy) for one in held if math.isfinite((accuracy := _accuracy(one)).smallest)]
+    if not known:
+        return [], []
     limits = [one.largest for one in held if one.largest is not None and math.isfinite(one.largest.force)]
-    if limits and accuracies:
-        least = min(limits, key=lambda limit: limit.force)
-        found = dynamic_range(least.force, least.limited_by, accuracies)
-        whose = "applied" if any(len(one.applied) for one in held) else "measured"
-        said.append(
-            f"Dynamic range of force control (3.2.1): {shown(found.ratio)}, from {shown(found.smallest, 'N')} that the "
-            f"{whose} force was off at most to {shown(found.largest, 'N')}, where the {found.limited_by} ends it."
+    least = min(limits, key=lambda limit: limit.force, default=LargestForce(math.nan, ""))
+    promised = dynamic_range(least.force, least.limited_by, [accuracy for _, accuracy in known])
+    held_most = max(one.hold.asked + accuracy.bias for one, accuracy in known)
+    ratio = held_most / promised.smallest if promised.smallest > 0.0 else math.nan
+    whose = "applied" if any(len(one.applied) for one, _ in known) else "measured"
+    text = (
+        f"Dynamic range of force control (3.2.1): {shown(ratio)} was shown, from {shown(promised.smallest, 'N')} that "
+        f"the {whose} force was off at most to {shown(held_most, 'N')}, the largest that was held"
+    )
+    if limits:
+        text += (
+            f"; {shown(promised.ratio)} is predicted, to {shown(promised.largest, 'N')}, where the "
+            f"{promised.limited_by} ends it, if the error stays what it is"
         )
-        note = f"largest by {found.limited_by}; smallest is bias and ripple of the worst force"
-        findings += [
-            Finding("smallest controllable force", "N", found.smallest),
-            Finding("largest controllable force", "N", math.nan, found.largest, f"by {found.limited_by}"),
-            Finding("dynamic range", "", found.ratio, note=note),
-        ]
-    return Section("force", "Force", tuple(said), tuple(findings), lacking)
+    note = "the error that was measured below the largest force that was held, or that the limits allow"
+    by = f"largest that was held; predicted by {promised.limited_by}" if limits else "largest that was held"
+    return [f"{text}."], [
+        Finding("smallest controllable force", "N", promised.smallest, note="bias and ripple of the worst force"),
+        Finding("largest controllable force", "N", held_most, promised.largest, by),
+        Finding("dynamic range", "", ratio, promised.ratio, note),
+    ]
+
+
+def _accuracy(one: HeldForce) -> ForceAccuracy:
+    """Of the applied force, of the measured one where that was not recorded."""
+    return one.applied_accuracy if len(one.applied) else one.measured_accuracy
 
 
 def _press_sentence(one: HeldForce) -> str:
     hold, response = one.hold, one.response
-    accuracy = one.applied_accuracy if len(one.applied) else one.measured_accuracy
+    accuracy = _accuracy(one)
     whose = "applied" if len(one.applied) else "measured"
     text = f"{hold.name}: {shown(hold.asked, 'N')} asked on {hold.frame}"
     if math.isnan(accuracy.bias):
@@ -56,14 +79,24 @@ def _press_sentence(one: HeldForce) -> str:
     text += f", {shown(hold.asked + accuracy.bias, 'N')} {whose} in the end"
     text += f" ({100.0 * accuracy.bias / hold.asked:+.1f} %, ripple {shown(accuracy.ripple, 'N')})"
     if response is not None and math.isfinite(response.rise):
-        text += f"; it rose in {shown(response.rise, 's')}"
-        if math.isfinite(response.settling):
-            text += f", settled to 5 % after {shown(response.settling, 's')}"
+        said = [f"settled to 5 % after {shown(response.settling, 's')}"]
+        if not math.isfinite(response.settling):
+            said = ["did not settle to 5 %"]
+        if math.isfinite(one.touched):
+            said[0] += " from there" if one.touched > 0.0 and math.isfinite(response.settling) else ""
+            said.insert(0, f"{_touched(one)}, so that rise and overshoot are those of the impact and are left out")
         else:
-            text += " and did not settle to 5 %"
-        if response.overshoot > 0.01:
-            text += f", overshot by {100.0 * response.overshoot:.0f} %"
+            said.insert(0, f"rose in {shown(response.rise, 's')}")
+            said += [f"overshot by {100.0 * response.overshoot:.0f} %"] if response.overshoot > 0.01 else []
+        text += f"; it {', '.join(said)}"
     return text + ("; it was pushed meanwhile." if hold.disturbed else ".")
+
+
+def _touched(one: HeldForce) -> str:
+    """When a press touched down, and how hard."""
+    peak = float(np.nanmax(one.applied if len(one.applied) else one.measured))
+    text = f"touched down {shown(abs(one.touched), 's')} {'into' if one.touched > 0.0 else 'before'} the step"
+    return f"{text if one.touched else 'touched down as the step began'} (up to {shown(peak, 'N')})"
 
 
 def _press_findings(one: HeldForce) -> list[Finding]:
@@ -75,10 +108,15 @@ def _press_findings(one: HeldForce) -> list[Finding]:
     else:
         rise, note = math.nan, ""
     if response is not None:
+        rose, over, why = response.rise, 100.0 * response.overshoot, ""
+        if math.isfinite(one.touched):
+            rose = over = math.nan
+            why = f"not measured: it {_touched(one)}"
+        since = "from the touch-down" if one.touched > 0.0 else ""
         found += [
-            Finding(f"{name}: rise time 10-90 %", "s", response.rise, rise, note),
-            Finding(f"{name}: settling time to 5 %", "s", response.settling),
-            Finding(f"{name}: overshoot", "%", 100.0 * response.overshoot),
+            Finding(f"{name}: rise time 10-90 %", "s", rose, rise, "; ".join(filter(None, (why, note)))),
+            Finding(f"{name}: settling time to 5 %", "s", response.settling, note=since),
+            Finding(f"{name}: overshoot", "%", over, note=why),
         ]
     for whose, accuracy, there in (
         ("applied", one.applied_accuracy, len(one.applied)),
@@ -124,8 +162,13 @@ def _cycle_sentences(one: HeldForce) -> list[str]:
     else:
         text += ", no limit cycle is seen in it"
     said = [text + "."]
+    if one.guarded is not None:
+        said.append(guard_sentence(one.guarded))
     if predicted is not None and math.isfinite(predicted.gamma):
-        text = f"The theory says: gamma {shown(predicted.gamma)}, zeta {shown(predicted.zeta)}: {predicted.regime}"
+        text = (
+            f"Chapter 5, for an ideal velocity source: gamma {shown(predicted.gamma)}, zeta {shown(predicted.zeta)}: "
+            f"{predicted.regime}"
+        )
         if math.isfinite(predicted.period):
             text += (
                 f"; a stiction cycle would have {shown(predicted.force_peak_to_peak, 'N')} and "
@@ -164,16 +207,44 @@ def _cycle_findings(one: HeldForce) -> list[Finding]:
 def _theory_findings(one: HeldForce, told: set[str]) -> list[Finding]:
     """What the theory says of the loop itself, once where several forces meet the same."""
     name, predicted = one.hold.name, one.predicted
-    if predicted is None or shown(predicted.gamma) in told:
+    margin = one.guarded.judgement.scale if one.guarded is not None else math.nan
+    key = f"{shown(predicted.gamma) if predicted is not None else ''} {shown(margin)}"
+    if key in told:
         return []
-    told.add(shown(predicted.gamma))
+    told.add(key)
+    found = _margin_findings(name, one.guarded)
+    if predicted is None:
+        return found
     actuator = 1e3 * predicted.actuator_peak_to_peak
+    ideal = "for an ideal velocity source, without friction"
     return [
+        *found,
         Finding(f"{name}: actuator cycle at the contact, peak to peak", "mm", math.nan, actuator, "(5.20)"),
-        Finding(f"{name}: gamma", "", math.nan, predicted.gamma, "(5.15)"),
-        Finding(f"{name}: largest stable gain, continuous", "m/s/N", math.nan, predicted.routh_gain, "(5.15)"),
-        Finding(f"{name}: largest stable gain, as sampled", "m/s/N", math.nan, predicted.sampled_gain, "no friction"),
+        Finding(f"{name}: gamma", "", math.nan, predicted.gamma, f"(5.15), {ideal}"),
+        Finding(
+            f"{name}: largest stable gain, continuous", "m/s/N", math.nan, predicted.routh_gain, f"(5.15), {ideal}"
+        ),
+        Finding(
+            f"{name}: largest stable gain, as sampled",
+            "m/s/N",
+            math.nan,
+            predicted.sampled_gain,
+            f"no friction, {ideal}",
+        ),
     ]
+
+
+def _margin_findings(name: str, found: Guarded | None) -> list[Finding]:
+    """Margin of the loop as it is, by the stability guard."""
+    if found is None:
+        return []
+    scale = found.judgement.scale
+    note = f"domain {found.judgement.domain}; stability guard, against {shown(found.surface, 'N/m')}"
+    said = [Finding(f"{name}: margin of the gains, looked for up to {LARGEST:g} times", "", math.nan, scale, note)]
+    if scale < LARGEST:
+        label = f"{name}: largest stable gain, with the speed loops"
+        said.append(Finding(label, "m/s/N", math.nan, scale * found.gain, "sampled; no friction"))
+    return said
 
 
 def contact_section(recording: Recording) -> Section:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.demo_traces import Signal
+from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
 from wam_analysis.findings.recording import Hold, Recording, by_names
 from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
@@ -24,6 +25,7 @@ CYCLING = 0.7  # part of it in which a limit cycle is looked for
 BAND = 0.05  # of the step: settled within it
 LOUD = 0.1  # of the force: an error that stays within it has settled
 LEAST_STEP = 0.1  # of the force; less is no step
+FRESH = 0.2  # s; a contact that is younger is still an impact
 FEW = 20  # samples below which a signal is not looked at
 UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
 
@@ -36,10 +38,13 @@ class HeldForce(NamedTuple):
     time, measured : (n,), s from the begin, and the force that the loop measured.
     time_true, applied : (m,), the same of the simulator's truth; empty where it was not recorded.
     response : of the measured force; None where there is no step.
+    touched : when the contact began, s from the begin, FRESH before it at most; NaN where it was there already or is
+        not known.  Rise and overshoot are then those of the impact, and settling counts from there.
     measured_accuracy, applied_accuracy : in the steady part.
     cycle : of the applied force in its last 70 %, else of the measured one.
     stability : of the error.
     node, predicted, largest : of the theory; None where the bag does not say enough.
+    guarded : the loop as the stability guard judges it; None likewise.
     place : where it pressed, m.
     """
 
@@ -49,6 +54,7 @@ class HeldForce(NamedTuple):
     time_true: Numbers
     applied: Numbers
     response: StepResponse | None
+    touched: float
     measured_accuracy: ForceAccuracy
     applied_accuracy: ForceAccuracy
     cycle: Cycle
@@ -56,6 +62,7 @@ class HeldForce(NamedTuple):
     node: Node | None
     predicted: Predicted | None
     largest: LargestForce | None
+    guarded: Guarded | None
     place: float
 
 
@@ -76,23 +83,29 @@ def _held(recording: Recording, hold: Hold) -> HeldForce:
     late, late_true = time >= (1.0 - STEADY) * duration, time_true >= (1.0 - STEADY) * duration
     swings, swings_true = time >= (1.0 - CYCLING) * duration, time_true >= (1.0 - CYCLING) * duration
     cover, place = _touched(recording, hold)
-    node, predicted, largest = _theory(recording, hold, cover, place)
+    touched = _touch_down(recording, hold)
+    response = _response(hold, time, measured, STEADY * duration)
+    if response is not None and touched > 0.0:
+        response = response._replace(settling=max(response.settling - touched, 0.0))
+    theory = _theory(recording, hold, cover, place)
     return HeldForce(
         hold=hold,
         time=time,
         measured=measured,
         time_true=time_true,
         applied=applied,
-        response=_response(hold, time, measured, STEADY * duration),
+        response=response,
+        touched=touched,
         measured_accuracy=force_accuracy(np.full(int(np.sum(late)), hold.asked), measured[late]),
         applied_accuracy=force_accuracy(np.full(int(np.sum(late_true)), hold.asked), applied[late_true]),
         cycle=_cycle(time_true[swings_true], applied[swings_true])
         or _cycle(time[swings], measured[swings])
         or NO_CYCLE,
         stability=_stability(hold, measured),
-        node=node,
-        predicted=predicted,
-        largest=largest,
+        node=theory.node,
+        predicted=theory.predicted,
+        largest=theory.largest,
+        guarded=theory.guarded,
         place=place,
     )
 
@@ -117,6 +130,24 @@ def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> St
         return step_response(time, measured, begin, steady, BAND)
     except ValueError:
         return None
+
+
+def _touch_down(recording: Recording, hold: Hold) -> float:
+    """When the contact of a hold began, by the truth, else by the estimate; see `HeldForce`."""
+    traces = recording.summary.traces
+    if any(stiffness > 0.0 for stiffness in recording.parameters.springs.stiffness):
+        return math.nan  # a spring under the joint is always there
+    first, last = (int(row) for row in np.searchsorted(traces.stamp, [hold.begin, hold.end]))
+    for signal in (traces.true, traces.felt):
+        if first >= last or not np.any(signal.is_known[first:last]):
+            continue
+        acts = signal.acts & ((signal.frame == hold.frame) | (hold.frame not in signal.frame))
+        free = np.flatnonzero(~acts[:first]) if acts[first] else np.array([first + int(np.argmax(acts[first:])) - 1])
+        if not np.any(acts[first:last]) or not len(free) or not signal.is_known[free[-1]]:
+            return math.nan
+        begin = float(traces.stamp[free[-1] + 1] - hold.begin) / 1e9
+        return begin if begin > -FRESH else math.nan
+    return math.nan
 
 
 def _cycle(time: Numbers, value: Numbers) -> Cycle | None:
@@ -150,26 +181,34 @@ def _median_place(signal: Signal, rows: NDArray[np.bool_]) -> tuple[str, float]:
     return (str(cover), float(np.median(places))) if len(places) else ("", math.nan)
 
 
-def _theory(
-    recording: Recording, hold: Hold, cover: str, place: float
-) -> tuple[Node | None, Predicted | None, LargestForce | None]:
+class _Theory(NamedTuple):
+    node: Node | None
+    predicted: Predicted | None
+    largest: LargestForce | None
+    guarded: Guarded | None
+
+
+NO_THEORY = _Theory(None, None, None, None)
+
+
+def _theory(recording: Recording, hold: Hold, cover: str, place: float) -> _Theory:
     parameters = recording.parameters
     arm = parameters.arm
     if arm is None or cover not in arm.covers.names:
-        return None, None, None
+        return NO_THEORY
     joints = next(
         (columns for name in ("sim/joint_states", "joint_states") if (columns := recording.joints(name)) is not None),
         None,
     )
     positions = None if joints is None else by_names(joints, "position", arm.joints.names)
     if joints is None or positions is None:
-        return None, None, None
+        return NO_THEORY
     middle = (hold.begin + hold.end) // 2
     row = max(int(np.searchsorted(joints.stamp_ns, middle, side="right")) - 1, 0)
     q = positions[row].tolist()
     direction = hold.force
     if hold.frame not in arm.covers.names or not np.all(np.isfinite(q)):
-        return None, None, None
+        return NO_THEORY
     node = node_at(parameters, arm, q, hold.frame, place, direction) if hold.frame == cover else None
     largest = largest_force(arm, q, hold.frame, place, direction)
     loop, timing = parameters.force_loop, parameters.timing
@@ -178,7 +217,8 @@ def _theory(
         delay = math.ceil(timing.outer_delay / timing.outer_divisor)
         gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
         predicted = predict(node, gain, proportional, timing.outer_period_ns / 1e9, delay)
-    return node, predicted, largest
+    found = None if node is None else guarded(parameters, q, cover, place, direction, node.contact_stiffness)
+    return _Theory(node, predicted, largest, found)
 
 
 def _along(gains: Sequence[float], force: Numbers) -> float:

@@ -26,6 +26,8 @@ WINDOW = 0.03  # s over which friction is averaged
 ORDERS = 48  # of the ripple, cycles a turn
 FAINT = 3.0  # ripple below so many times the median order is not named
 SLIGHT = 0.05  # of the dry friction: less ripple is not named either
+UNSURE = 0.25  # of a friction: a standard error that is larger says that the recording does not tell it
+NOT_TOLD = "not told by this recording"
 LEAST_WORK = 1e-3  # J below which no efficiency is given
 
 
@@ -132,8 +134,8 @@ def _friction_section(
         findings += _friction_findings(name, found, truth, "cable torque less strain")
     seen = [name for name, found in {**friction, **joints}.items() if math.isfinite(found.dynamic)]
     said = [
-        f"{name}: dry friction {shown(found.dynamic, 'N m')}, {_breakaway(found)}, "
-        f"viscous {shown(found.viscous, 'N m s/rad')}."
+        f"{name}: dry friction {_known(found.dynamic, found.dynamic_error, 'N m')}, {_breakaway(found)}, "
+        f"viscous {_known(found.viscous, found.viscous_error, 'N m s/rad')}."
         for name, found in {**friction, **joints}.items()
         if name in seen
     ]
@@ -145,7 +147,22 @@ def _friction_section(
 
 
 def _breakaway(found: Friction) -> str:
-    return f"breakaway {shown(found.static, 'N m')}" if math.isfinite(found.static) else "no breakaway seen"
+    if not math.isfinite(found.static):
+        return "no breakaway seen"
+    return f"breakaway {_known(found.static, found.static_error if found.breakaways > 1 else math.nan, 'N m')}"
+
+
+def _known(value: float, error: float, unit: str) -> str:
+    """A value with its standard error, or that the recording does not tell it."""
+    if not math.isfinite(error):
+        return shown(value, unit)
+    if not _is_told(value, error):
+        return f"{NOT_TOLD} ({shown(value)} +- {shown(error, unit)})"
+    return f"{shown(value)} +- {shown(error, unit)}"
+
+
+def _is_told(value: float, error: float) -> bool:
+    return not error > UNSURE * abs(value)
 
 
 def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
@@ -165,14 +182,19 @@ def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
 def _friction_findings(name: str, found: Friction, configured: tuple[float, float, float], note: str) -> list[Finding]:
     static, dynamic, viscous = configured
 
-    def with_error(error: float) -> str:
-        return f"+-{shown(error)}; {note}" if math.isfinite(error) else note
+    def one(kind: str, unit: str, value: float, error: float, predicted: float, first: str = "") -> Finding:
+        told = _is_told(value, error)
+        spread = f"+-{shown(error)}" if math.isfinite(error) and told else ""
+        if not told:
+            spread = f"{NOT_TOLD}: {shown(value)} +-{shown(error)}"
+        text = "; ".join(filter(None, (first, spread, note)))
+        return Finding(f"{name}: {kind} friction", unit, value if told else math.nan, predicted, text)
 
-    breakaways = f"{found.breakaways} breakaways; {note}"
+    several = found.static_error if found.breakaways > 1 else math.nan
     return [
-        Finding(f"{name}: static friction", "N m", found.static, static, breakaways),
-        Finding(f"{name}: dynamic friction", "N m", found.dynamic, dynamic, with_error(found.dynamic_error)),
-        Finding(f"{name}: viscous friction", "N m s/rad", found.viscous, viscous, with_error(found.viscous_error)),
+        one("static", "N m", found.static, several, static, f"{found.breakaways} breakaways"),
+        one("dynamic", "N m", found.dynamic, found.dynamic_error, dynamic),
+        one("viscous", "N m s/rad", found.viscous, found.viscous_error, viscous),
     ]
 
 
@@ -257,11 +279,13 @@ def _power_section(
             rows = known & (motor > 0.0) & (joint > 0.0)
             expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
             expected = max(expected, 0.0)
-            note = "friction and cables (6.14), as configured"
+            note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
             findings.append(Finding("efficiency, motors to links", "%", 100.0 * found.forward, 100.0 * expected, note))
             said.append(
                 f"The motors gave {shown(found.forward_put, 'J')} to the transmission while they drove, "
-                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %."
+                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %; the friction and "
+                f"creep that are configured leave {100.0 * expected:.0f} % at the speeds and loads of this recording, "
+                "which the prediction takes from it."
             )
         if found.back_put > LEAST_WORK:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="driven backwards"))

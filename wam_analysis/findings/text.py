@@ -9,6 +9,7 @@ from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding, Section, shown
 
 WIDTH = 100
+COLUMN = 18  # of the table at least, with two blanks between a number and the next
 SCHEMA = 1  # of the JSON; a number that changes when a key changes its meaning
 
 
@@ -35,12 +36,13 @@ def _table(section: Section) -> list[str]:
     """Numbers in columns; a section without any has no table."""
     if not section.findings:
         return []
-    lines = ["", f"  {'':<60}{'measured':>18}{'predicted':>18}"]
-    for finding in section.findings:
-        name = textwrap.wrap(finding.name, 58) or [""]
-        lines.append(
-            f"  {name[0]:<60}{shown(finding.measured, finding.unit):>18}{shown(finding.predicted, finding.unit):>18}"
-        )
+    numbers = [[shown(value, one.unit) for value in (one.measured, one.predicted)] for one in section.findings]
+    column = max(COLUMN, 2 + max(len(number) for pair in numbers for number in pair))
+    left = WIDTH - 2 - 2 * column
+    lines = ["", f"  {'':<{left}}{'measured':>{column}}{'predicted':>{column}}"]
+    for finding, (measured, predicted) in zip(section.findings, numbers, strict=True):
+        name = textwrap.wrap(finding.name, left - 2) or [""]
+        lines.append(f"  {name[0]:<{left}}{measured:>{column}}{predicted:>{column}}")
         lines += [f"    {more}" for more in name[1:]]
     return lines
 

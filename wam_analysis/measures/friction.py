@@ -115,15 +115,17 @@ def _in_motion(
     acceleration = np.convolve(velocity, slope, "same")[rows] / period
     columns = np.column_stack([np.where(onward[rows], 1.0, -1.0), v, acceleration, np.ones(len(rows))])
     wanted = np.convolve(torque, triangle, "same")[rows]
-    return _robust(columns, wanted, len(triangle))
+    return _robust(columns, wanted, len(triangle), _halves(rows))
 
 
 def _robust(
-    columns: Numbers, wanted: Numbers, width: int
+    columns: Numbers, wanted: Numbers, width: int, half: NDArray[np.int64]
 ) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
     """Least squares without the samples that fit badly; a column that says nothing gives NaN.
 
-    `width` samples overlap in the averaging, so that the errors count one in so many.
+    `width` samples overlap in the averaging, so that the errors count one in so many.  What the law leaves out, as
+    creep of the cables, is alike within a motion and no noise: where the halves of motions, numbered by `half`,
+    disagree by more than that, their disagreement is the error (jackknife).
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     both = bool(np.ptp(columns[:, 0]) > 0.0)  # one direction only: dry friction and offset look the same
@@ -144,11 +146,33 @@ def _robust(
     covariance = np.linalg.pinv(a.T @ a) * float(np.sum(rest[keep] ** 2)) / freedom
     found, errors = np.full(4, math.nan), np.full(4, math.nan)
     found[used] = solution / scale[used]
-    errors[used] = np.sqrt(np.diag(covariance)) / scale[used]
+    errors[used] = np.maximum(np.sqrt(np.diag(covariance)), _disagreement(a, wanted[keep], half[keep])) / scale[used]
     return (
         (float(found[0]), float(found[1]), float(found[2]), float(found[3])),
         (float(errors[0]), float(errors[1]), float(errors[2])),
     )
+
+
+def _halves(rows: NDArray[np.intp]) -> NDArray[np.int64]:
+    """Number the halves of stretches without a gap, (k,): a motion gets faster in one, slower in the other."""
+    begins = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) > 1)
+    lengths = np.diff(begins, append=len(rows))
+    result = np.zeros(len(rows), dtype=np.int64)
+    result[np.concatenate([begins, begins + lengths // 2])[np.tile(lengths > 1, 2)]] = 1
+    return np.cumsum(result)
+
+
+def _disagreement(columns: Numbers, wanted: Numbers, half: NDArray[np.int64]) -> Numbers:
+    """Standard errors of the columns' factors from leaving out one half of a motion at a time."""
+    found = []
+    for number in np.unique(half):
+        solution, _, rank, _ = np.linalg.lstsq(columns[half != number], wanted[half != number], rcond=None)
+        if rank == columns.shape[1]:
+            found.append(solution)
+    if len(found) < 2:
+        return np.zeros(columns.shape[1])
+    result: Numbers = np.sqrt((len(found) - 1) * np.var(found, axis=0))
+    return result
 
 
 def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> Numbers:

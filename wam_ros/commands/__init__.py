@@ -4,8 +4,10 @@ Here is what several of them take.
 """
 
 import argparse
+import math
+import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
@@ -58,7 +60,72 @@ def take_batch(parser: argparse.ArgumentParser) -> None:
 @contextmanager
 def batch_of(given: argparse.Namespace) -> Iterator[Batch]:
     """What the options of `take_batch` name; progress goes to stderr."""
-    if given.workers is not None and given.workers < 1:
-        raise ValueError(f"--workers is {given.workers}; it must be at least 1")
+    if given.workers is not None:
+        at_least("--workers", given.workers, 1)
+    if not given.fresh:
+        writable_directory("--keep", given.keep)
     with executor(given.workers, given.dask) as found:
         yield Batch(found, None if given.fresh else given.keep, Progress(given.command, sys.stderr))
+
+
+def at_least(option: str, value: float, low: float) -> None:
+    """Refuse the value of an option that is too small, or no number.
+
+    Raises
+    ------
+    ValueError
+        which names the option, the value and what is allowed.
+    """
+    if not value >= low:
+        raise ValueError(f"{option} is {value:g}; it must be at least {low:g}")
+
+
+def rising(option: str, ends: Sequence[float]) -> None:
+    """Refuse the ends of a range that do not rise from above zero.
+
+    Raises
+    ------
+    ValueError
+        which names the option, the values and what is allowed.
+    """
+    low, high = ends
+    if not 0.0 < low <= high < math.inf:
+        raise ValueError(f"{option} is {low:g} to {high:g}; LOW must be above 0 and HIGH not below it")
+
+
+def writable_file(option: str, file: Path) -> None:
+    """Refuse, before the work, a file that could not be written after it.
+
+    Raises
+    ------
+    ValueError
+        which says why, and what to do.
+    """
+    folder = file.parent
+    if file.is_dir():
+        why = "it is a directory"
+    elif not folder.is_dir():
+        why = f"{folder} is no directory"
+    elif not os.access(file if file.exists() else folder, os.W_OK):
+        why = f"no permission to write {'it' if file.exists() else f'into {folder}'}"
+    else:
+        return
+    raise ValueError(f"cannot write {file}: {why}; give another file as {option}")
+
+
+def writable_directory(option: str, directory: Path) -> None:
+    """Refuse, before the work, a directory that could not be made or written into.
+
+    Raises
+    ------
+    ValueError
+        which says why, and what to do.
+    """
+    there = next(folder for folder in (directory, *directory.parents) if folder.exists() or folder == folder.parent)
+    if not there.is_dir():
+        why = f"{there} is no directory"
+    elif not os.access(there, os.W_OK | os.X_OK):
+        why = f"no permission to write into {there.absolute()}"
+    else:
+        return
+    raise ValueError(f"cannot write into {directory}: {why}; give another directory as {option}")

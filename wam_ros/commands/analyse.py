@@ -8,6 +8,7 @@ from pathlib import Path
 from wam_analysis.findings.analysis import analyse
 from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
+from wam_ros.commands import writable_file
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +25,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Analyse, print, write."""
+    if given.html:
+        writable_file("--html", given.html)
+    if given.json and given.json != "-":
+        writable_file("--json", Path(given.json))
     begin = time.monotonic()
 
     def progress(doing: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from wam_analysis.demo_report import report
 from wam_ros.bring_up import Composition, Processes
-from wam_ros.commands import configuration_of, take_configuration
+from wam_ros.commands import configuration_of, take_configuration, writable_directory
 from wam_ros.run import Stop
 
 
@@ -31,7 +31,9 @@ def run(given: argparse.Namespace) -> int:
             "recorder:name": name,
         }
     )
-    bag = Path(str(configuration.sections["recorder"]["directory"])) / name
+    directory = Path(str(configuration.sections["recorder"]["directory"]))
+    writable_directory("recorder:directory in the file of --config, or call it elsewhere", directory)
+    bag = directory / name
     if given.lockstep:
         with Composition(configuration) as composition:
             scenario: Any = composition.nodes["scenario"]

@@ -20,7 +20,7 @@ from wam_analysis.contact_battery.score import SceneScore, score
 from wam_analysis.progress import Progress
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
-from wam_ros.commands import batch_of, configuration_of, take_batch, take_configuration
+from wam_ros.commands import at_least, batch_of, configuration_of, take_batch, take_configuration, writable_file
 
 SEEDS = (1, 2, 3)
 PARTS = ("contact",)
@@ -93,6 +93,13 @@ def _write(given: argparse.Namespace, configuration: Configuration, judgement: J
 
 def run(given: argparse.Namespace) -> int:
     """Judge; 1 where a must is missed."""
+    at_least("--contacts", given.contacts, 1)
+    at_least("--resting", given.resting, 0)
+    at_least("--free", given.free, 0.0)
+    for seed in given.seed:
+        at_least("--seed", seed, 0)
+    if given.write:
+        writable_file("--write", given.write)
     configuration = configuration_of(given)
     arm = configuration.shared.arm
     extent = Extent(given.contacts, given.resting, given.free)

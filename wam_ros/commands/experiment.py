@@ -12,6 +12,7 @@ from wam_analysis.experiments.figure import draw
 from wam_analysis.experiments.page import write
 from wam_analysis.experiments.rows import Result
 from wam_ros.bring_up import Composition
+from wam_ros.commands import writable_directory, writable_file
 from wam_ros.run import Stop
 
 PICTURE = "result.png"
@@ -37,6 +38,10 @@ def run(given: argparse.Namespace) -> int:
         return 0
     if bool(given.experiment) == given.all:
         raise ValueError("name one experiment, or give --all; --list says which there are")
+    if not given.evaluate:
+        writable_directory("--directory", Path(given.directory))
+    if given.write:
+        writable_file("--write", Path(given.write))
     results: dict[str, tuple[Experiment, Result, Path]] = {}
     for experiment in map(load, names() if given.all else [given.experiment]):
         if given.evaluate:
@@ -87,8 +92,9 @@ def play(experiment: Experiment, each: Run, directory: Path, label: str, stop: S
             return stop.is_set or bool(scenario.done)
 
         composition.spin(is_over)
-        failure, fault = scenario.failure, driver.driver.safety.fault
-    _say(f"{label}: " + (f"stopped by the driver: {fault}" if fault else "done"), end="\n")
+        failure, fault, is_done = scenario.failure, driver.driver.safety.fault, bool(scenario.done)
+    ended = f"stopped by the driver: {fault}" if fault else "done" if is_done else "stopped"
+    _say(f"{label}: {ended}", end="\n")
     if failure and not fault:
         raise ValueError(f"{label}: {failure}")
 

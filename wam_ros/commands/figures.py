@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from wam_analysis.figures.catalogue import FIGURES, file_of, known, numbers, table
-from wam_ros.commands import batch_of, take_batch
+from wam_ros.commands import batch_of, take_batch, writable_directory
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,6 +17,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Compute, draw, print how far the plant is from the lines."""
     names = known(given.names or list(FIGURES))  # before anything is started
+    writable_directory("--to", given.to)
     with batch_of(given) as batch:
         found = numbers(names, *batch)
     given.to.mkdir(parents=True, exist_ok=True)

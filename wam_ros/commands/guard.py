@@ -4,6 +4,7 @@ import argparse
 import sys
 
 from wam_analysis.guard_study import Trial, exact_trials, table, testbed_trials
+from wam_ros.commands import at_least
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,6 +16,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Print the two tables; 1 where a set was accepted that diverges."""
+    at_least("--sets", given.sets, 1)
+    at_least("--testbed", given.testbed, 1)
+    at_least("--seed", given.seed, 0)
     bad = 0
     for name, trials in (
         ("one friction node, exact integrator", exact_trials(given.seed, given.sets)),

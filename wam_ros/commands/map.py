@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from wam_analysis.stability_study import stability_map, write_csv
-from wam_ros.commands import batch_of, take_batch
+from wam_ros.commands import at_least, batch_of, rising, take_batch, writable_file
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +24,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Compute, write the table."""
+    for name, ends, count in (("gamma", given.gamma, given.gamma_points), ("zeta", given.zeta, given.zeta_points)):
+        at_least(f"--{name}-points", count, 1)
+        rising(f"--{name}", ends)
+    writable_file("FILE", given.file)
     gamma = np.linspace(given.gamma[0], given.gamma[1], given.gamma_points)
     zeta = np.asarray(np.geomspace(given.zeta[0], given.zeta[1], given.zeta_points), dtype=float)
     with batch_of(given) as batch:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from wam_analysis.plant_figure import figure
+from wam_ros.commands import writable_file
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -13,5 +14,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Draw the picture, print the differences."""
+    writable_file("FILE", given.file)
     print(figure(given.file))
     return 0

@@ -1,9 +1,10 @@
 """`wam record`: every topic of a running stack into a bag."""
 
 import argparse
+from pathlib import Path
 
 from wam_ros.bring_up import node_class, parameter_file
-from wam_ros.commands import configuration_of, take_configuration
+from wam_ros.commands import configuration_of, take_configuration, writable_directory
 from wam_ros.run import run as run_node
 
 
@@ -20,6 +21,7 @@ def run(given: argparse.Namespace) -> int:
     if given.directory:
         values["recorder:directory"] = given.directory
     configuration = configuration_of(given).with_values(values)
+    writable_directory("--directory", Path(str(configuration.sections["recorder"]["directory"])))
     with parameter_file(configuration) as file:
         run_node(node_class("recorder"), ["wam", "--ros-args", "--params-file", str(file)])
     return 0

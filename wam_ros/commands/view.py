@@ -5,7 +5,8 @@ from pathlib import Path
 
 from wam_analysis.bag import read
 from wam_analysis.findings.recording import recording_of
-from wam_analysis.rerun_view import load_rerun, view
+from wam_analysis.rerun_view import load_rerun, view, viewer
+from wam_ros.commands import writable_file
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,6 +19,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Log the bag."""
     load_rerun()  # before the work
+    if given.save:
+        writable_file("--save", given.save)
+    else:
+        viewer()
     said = view(recording_of(read(given.bag)), given.save)
     print(f"{given.save or 'viewer'}: {said}")
     return 0

@@ -1,0 +1,94 @@
+"""What the commands refuse before they begin: values that say nothing, and places that cannot be written."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from wam_ros.cli import main
+
+
+def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
+    """The one line that a command ends with, code 1."""
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 1
+    said = capfd.readouterr()
+    assert said.out == ""
+    (line,) = said.err.splitlines()
+    return line
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("map out.csv --gamma-points 0", "wam map: --gamma-points is 0; it must be at least 1"),
+        ("map out.csv --zeta-points -2", "wam map: --zeta-points is -2; it must be at least 1"),
+        ("map out.csv --workers 0", "wam map: --workers is 0; it must be at least 1"),
+        ("map out.csv --zeta 0.9 0.1", "wam map: --zeta is 0.9 to 0.1; LOW must be above 0 and HIGH not below it"),
+        ("map out.csv --gamma 0 2", "wam map: --gamma is 0 to 2; LOW must be above 0 and HIGH not below it"),
+        ("guard --sets -3", "wam guard: --sets is -3; it must be at least 1"),
+        ("guard --testbed 0", "wam guard: --testbed is 0; it must be at least 1"),
+        ("guard --seed -1", "wam guard: --seed is -1; it must be at least 0"),
+        ("evaluate contact --contacts 0", "wam evaluate: --contacts is 0; it must be at least 1"),
+        ("evaluate contact --processes 0", "wam evaluate: --processes is 0; it must be at least 1"),
+        ("evaluate contact --free nan", "wam evaluate: --free is nan; it must be at least 0"),
+        ("evaluate contact --seed 1 -1", "wam evaluate: --seed is -1; it must be at least 0"),
+        ("figures --workers 0", "wam figures: --workers is 0; it must be at least 1"),
+    ],
+)
+def test_a_count_or_a_range_that_says_nothing_is_named(
+    words: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert refused(capfd, *words.split()) == line
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (
+            "analyse bag --html none/x.html",
+            "cannot write none/x.html: none is no directory; give another file as --html",
+        ),
+        (
+            "analyse bag --json none/x.json",
+            "cannot write none/x.json: none is no directory; give another file as --json",
+        ),
+        ("analyse bag --html .", "cannot write .: it is a directory; give another file as --html"),
+        ("map none/x.csv", "cannot write none/x.csv: none is no directory; give another file as FILE"),
+        (
+            "map x.csv --keep file/in",
+            "cannot write into file/in: file is no directory; give another directory as --keep",
+        ),
+        ("figures --to file", "cannot write into file: file is no directory; give another directory as --to"),
+        ("experiment creep --directory file/in", "cannot write into file/in: file is no directory; give another"),
+        ("evaluate contact --write none/x.md", "cannot write none/x.md: none is no directory; give another file as"),
+    ],
+)
+def test_what_cannot_be_written_is_said_before_the_work(
+    words: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("in the way")
+    assert reason in refused(capfd, *words.split())
+    assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_directory_without_permission_is_named_with_the_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "closed").mkdir(mode=0o500)
+    closed = [path for path in (tmp_path / "closed", Path("/proc/self")) if not os.access(path, os.W_OK)]
+    if not closed:
+        pytest.skip("this user may write everywhere")
+    monkeypatch.chdir(tmp_path)
+    for words, option in (
+        (f"experiment creep --directory {closed[0]}/bags", "give another directory as --directory"),
+        (f"record --directory {closed[0]}/bags", "give another directory as --directory"),
+        (f"figures --keep {closed[0]}/.cache", "give another directory as --keep"),
+        (f"analyse bag --html {closed[0]}/x.html", "give another file as --html"),
+    ):
+        said = refused(capfd, *words.split())
+        assert f"no permission to write into {closed[0]}; {option}" in said
