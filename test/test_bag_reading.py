@@ -242,7 +242,7 @@ def test_topics_and_times_that_are_not_asked_for_are_not_read(tmp_path: Path) ->
     assert (
         list(read(path, ["wrenchstamped"]).topics) == list(read(path, ["/wrenchstamped"]).topics) == ["/wrenchstamped"]
     )
-    assert read(path, ["stamped"]).topics == {}
+    assert read(path, ["stamped"], may_lack=True).topics == {}
     with path.open("rb") as stream:
         chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
     assert len(chunks) > 4

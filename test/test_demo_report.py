@@ -382,7 +382,7 @@ def test_report_reads_a_bag_from_disk_and_puts_the_picture_beside_it(tmp_path):
                 writer.write(connection, stamp, store.serialize_cdr(message, kind))
     assert "Demonstration of /wam: 1 steps, 1.0 s, unknown, done" in report(tmp_path / "bag")
     assert (tmp_path / "bag" / "demo.png").is_file()
-    assert list(read(tmp_path / "bag", TOPICS_READ).topics) == ["/wam/status"]
+    assert list(read(tmp_path / "bag", TOPICS_READ, may_lack=True).topics) == ["/wam/status"]
 
 
 def test_arm_is_drawn_with_the_parameters_in_the_bag():
