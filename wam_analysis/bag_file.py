@@ -5,16 +5,16 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 
 from wam_description.parameters import flatten
+from wam_ros.bag_losses import PARAMETERS, RECORDING
 from wam_ros.mcap_file import McapFile, NotClosedError
 from wam_ros.mcap_records import BROKEN, MAGIC, BagError, Channel, Damage
 from wam_ros.message_text import Fields, definitions
 
-PARAMETERS: Final = "parameters.yaml"  # the recorder's attachment
 LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same, in C where it was built
 PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
@@ -164,7 +164,7 @@ def mode_of(metadata: Mapping[str, Mapping[str, str]], parameters: bytes | None)
 
     A recorder that was killed left only the parameters.
     """
-    said = metadata.get("recording", {}).get("mode")
+    said = metadata.get(RECORDING, {}).get("mode")
     if said is not None or parameters is None:
         return said or "unknown"
     try:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.bag import Bag, JointColumns
-from wam_analysis.bag_file import PARAMETERS, mode_of
+from wam_analysis.bag_file import mode_of
 from wam_analysis.demo_traces import (
     NAN,
     RECORDED,
@@ -24,7 +24,7 @@ from wam_analysis.demo_traces import (
     values_of,
 )
 from wam_analysis.measures.runs import runs
-from wam_ros.bag_losses import losses
+from wam_ros.bag_losses import PARAMETERS, losses
 
 NO_LINK = "none"
 NOT_RECORDED = "not recorded"
@@ -151,7 +151,7 @@ def summarize(bag: Bag) -> DemoSummary:
     false = known & ~traces.true.acts & traces.felt.acts
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
     received, dropped = _counts(bag.metadata.get("recording", {}))
-    lost = losses(bag.path, bag.metadata, bag.counts)
+    lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
     first = min(
         (int(columns.log_time_ns.min()) for columns in bag.topics.values() if len(columns.log_time_ns)), default=0
     )

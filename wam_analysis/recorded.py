@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 import yaml
 
 from wam_analysis.bag import Bag
-from wam_analysis.bag_file import LOADER, PARAMETERS
+from wam_analysis.bag_file import LOADER
 from wam_control.force_loop import ForceLoopParameters
 from wam_control.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Arm, Timing
@@ -15,6 +15,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects
 from wam_description.parameters import ParameterError, build, fields, flatten
 from wam_description.world import NO_SPRINGS, Obstacles, Springs
+from wam_ros.bag_losses import PARAMETERS
 
 T = TypeVar("T")
 

@@ -17,7 +17,6 @@ import numpy as np
 import yaml
 
 from wam_analysis.bag import Bag, BagError, Columns, JointColumns, PointColumns, WrenchColumns, read
-from wam_analysis.bag_file import PARAMETERS as RECORDED_PARAMETERS
 from wam_analysis.bag_file import mode_of
 from wam_analysis.direct import Row
 from wam_analysis.replay_wirings import WIRINGS, WITH_STAMP, Step
@@ -25,6 +24,7 @@ from wam_description.arm import Shared, seconds
 from wam_description.configuration import PARAMETERS, Configuration
 from wam_description.parameters import ParameterError, build, fields, flatten
 from wam_description.signals import State
+from wam_ros.bag_losses import PARAMETERS as ATTACHED
 from wam_ros.bag_losses import losses
 from wam_ros.lockstep import Gate
 from wam_ros.topics import BY_NAME
@@ -122,13 +122,13 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
         columns = bag.topics.get(f"{namespace}/{topic}")
         recorded = _rows(columns, names[_side(topic)]) if columns is not None else []
         compared.append(_compare(topic, recorded, said.get(topic, []), names[_side(topic)], _units(topic, columns)))
-    mode = mode_of(bag.metadata, bag.attachments.get(RECORDED_PARAMETERS))
+    mode = mode_of(bag.metadata, bag.attachments.get(ATTACHED))
     mode = shared.timing.mode if mode == "unknown" else mode
     gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
     first = min(
         (int(columns.log_time_ns.min()) for columns in bag.topics.values() if len(columns.log_time_ns)), default=0
     )
-    lost = losses(bag.path, bag.metadata, bag.counts).said(first)
+    lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).said(first)
     return Replay(node, mode, tuple(compared), gaps, tuple(lost))
 
 
@@ -168,7 +168,7 @@ def _parameters(bag: Bag, namespace: str, node: str, configuration: Configuratio
     kind = WIRINGS[node].parameters
     if configuration is not None:
         return configuration.shared, configuration.node(node, kind)
-    attached = bag.attachments.get(RECORDED_PARAMETERS)
+    attached = bag.attachments.get(ATTACHED)
     if attached is None:
         raise BagError(f"{bag.path} has no parameters in it; give a configuration with --config")
     try:

@@ -2,15 +2,17 @@
 
 import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import yaml
 
 REPAIRED: Final = "repaired"  # metadata record that a repair leaves; an entry of JSON for each repair of a file
+PARAMETERS: Final = "parameters.yaml"  # attachment of the recorder
 RECORDING: Final = "recording"  # metadata record of the recorder
 CUT: Final = "cut"  # metadata record of a part of a bag
+_NAMED: Final = 3  # topics in a sentence
 _TIME_OF_DAY: Final = 10**18  # ns; smaller log times are the stamps of lockstep, which begin near 0
 
 Metadata = Mapping[str, Mapping[str, str]]
@@ -57,19 +59,30 @@ class Losses(NamedTuple):
     repaired : by file, None where the entry cannot be read.
     missing : messages by topic that the recorder received and that are not in the bag.
     dropped : messages lost on their way to the recorder, by 'topic from publisher'.
+    uncounted : whether our recorder ended without its counts.
     """
 
     repaired: dict[str, FileLosses | None]
     missing: dict[str, int]
     dropped: dict[str, int]
+    uncounted: bool
+
+    @property
+    def by_topic(self) -> dict[str, int]:
+        """Messages that were recorded and are not there, at least."""
+        return dict(self._told() | Counter(self.missing))
 
     @property
     def gone(self) -> int:
-        """Messages that were recorded and are not there, at least."""
+        """Their number."""
+        return sum(self.by_topic.values())
+
+    def _told(self) -> Counter[str]:
+        """What the repairs know of."""
         told = Counter[str]()
-        for losses in self.repaired.values():
-            told.update(losses.messages if losses else {})
-        return sum((told | Counter(self.missing)).values())
+        for found in self.repaired.values():
+            told.update(found.messages if found else {})
+        return told
 
     def said(self, first: int) -> list[str]:
         """Sentences, none where nothing is known to be lost.
@@ -79,21 +92,26 @@ class Losses(NamedTuple):
         first : first log time in the bag, ns; times of day are told from it.
         """
         lines = [line for name, losses in self.repaired.items() for line in _told(name, losses, first)]
-        if self.missing:
+        if Counter(self.missing) - self._told():
             lines.append(f"The recorder received {_counted(self.missing)} that are not in the bag.")
         if self.dropped:
             listed = ", ".join(f"{count} of {where}" for where, count in self.dropped.items())
             lines.append(f"Lost on the way to the recorder: {listed}.")
+        if self.uncounted:
+            lines.append(
+                "The recorder wrote no counts, for it was killed or its disk was full: what else is lost is not known."
+            )
         return lines
 
 
-def losses(path: Path, metadata: Metadata, counts: Mapping[str, int]) -> Losses:
+def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts: Mapping[str, int]) -> Losses:
     """What a bag lacks, by its own records.
 
     Parameters
     ----------
     path : of the bag, or of one file of it.
     metadata : records by name.
+    attachments : their names; those of our recorder say that it is one of ours.
     counts : messages of every topic in it; empty where they are not known, and then nothing is compared.
     """
     repaired = {key: _parsed(value) for key, value in metadata.get(REPAIRED, {}).items()}
@@ -105,33 +123,37 @@ def losses(path: Path, metadata: Metadata, counts: Mapping[str, int]) -> Losses:
             received[where.split(" ")[0]] += _number(value)
         elif what == "dropped" and _number(value):
             dropped[where.replace(" ", " from ")] = _number(value)
-    if not counts or CUT in metadata or _is_one_of_several(path, metadata):
+    is_part = not counts or CUT in metadata or _is_one_of_several(path, metadata)
+    if is_part:
         received = Counter()
     missing = {topic: count - counts.get(topic, 0) for topic, count in sorted(received.items())}
-    return Losses(repaired, {topic: count for topic, count in missing.items() if count > 0}, dropped)
+    return Losses(
+        repaired,
+        {topic: count for topic, count in missing.items() if count > 0},
+        dropped,
+        bool(counts) and PARAMETERS in attachments and not recording,
+    )
 
 
 def _told(name: str, found: FileLosses | None, first: int) -> list[str]:
     if found is None:
         return [f"{name} was repaired; what was lost cannot be read any more."]
+    lines = []
+    if not found.closed:
+        lines.append(f"{name} had not been closed: what came after its last message is not in it, nobody counted it.")
+    if not (found.holes or found.messages or found.others):
+        return lines
     said = f"{name} was broken and has been repaired: {found.bytes} bytes could not be read"
     if found.messages:
         said += f"; gone are {'' if found.all_known else 'at least '}{_counted(found.messages)}"
-    elif found.holes and not found.all_known:
+    elif found.holes:
         said += "; how many messages these were is not known"
-    else:
-        said += "; no message is known to be gone"
     if found.others:
-        said += f"; {found.others} attachments, metadata records or definitions are gone"
-    lines = [f"{said}."]
+        said += f"; attachments, metadata records or definitions that are gone: {found.others}"
+    lines.insert(0, f"{said}.")
     if found.holes:
-        lines.append(
-            f"{'Holes' if len(found.holes) > 1 else 'A hole'} {'; '.join(_span(h, first) for h in found.holes)}."
-        )
-    if not found.closed:
-        lines.append(
-            f"{name} had not been closed: what came after its last message is not in it, and nobody counted it."
-        )
+        spans = "; ".join(_span(hole, first) for hole in found.holes)
+        lines.insert(1, f"{'Holes' if len(found.holes) > 1 else 'A hole'} {spans}.")
     return lines
 
 
@@ -150,8 +172,11 @@ def _seconds(stamp: int, first: int) -> str:
 
 
 def _counted(messages: Mapping[str, int]) -> str:
-    listed = ", ".join(f"{count} of {topic}" for topic, count in sorted(messages.items()))
-    return f"{sum(messages.values())} messages ({listed})"
+    most = sorted(messages.items(), key=lambda item: (-item[1], item[0]))
+    listed = [f"{count} of {topic}" for topic, count in most[:_NAMED]]
+    if others := most[_NAMED:]:
+        listed.append(f"{sum(count for _, count in others)} of {len(others)} other topics")
+    return f"{sum(messages.values())} messages ({', '.join(listed)})"
 
 
 def _parsed(text: str) -> FileLosses | None:

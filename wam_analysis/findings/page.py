@@ -4,10 +4,10 @@ import base64
 import html
 from collections.abc import Iterable, Sequence
 
-from wam_analysis.bag_file import PARAMETERS
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.plots import Plot, plots
+from wam_ros.bag_losses import PARAMETERS
 
 NARROW = 640  # px, up to which the narrow pictures are shown
 

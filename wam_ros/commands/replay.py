@@ -31,26 +31,24 @@ def reasons(done: Replay) -> list[str]:
     if done.is_same:
         return []
     lines = []
-    alone = [topic.alone for topic in done.topics if topic.alone is not None]
-    if alone and done.gaps:
+    gaps = done.gaps if done.mode != "realtime" or done.lost else ()  # else the driver left periods out itself
+    if gaps:
         lines.append(
-            f"only recorded from {min(alone) / 1e9:.3f} s on: inputs are missing in the bag, and {done.node} works "
-            "only when it has all of a period, as it did while they were recorded"
+            f"the bag lacks inputs of {done.node}: where one is missing nothing comes out, in lockstep perhaps for the "
+            "rest of it, and what comes out behind a gap remembers something else"
         )
-    if done.gaps:
         lines += [
             f"    {gap.topic}: {gap.missing} missing between {gap.begin / 1e9:.3f} s and {gap.end / 1e9:.3f} s"
-            for gap in done.gaps[:_MOST_GAPS]
+            for gap in sorted(gaps, key=lambda gap: -gap.missing)[:_MOST_GAPS]
         ]
-        if len(done.gaps) > _MOST_GAPS:
-            lines.append(f"    and {len(done.gaps) - _MOST_GAPS} more gaps")
+        if len(gaps) > _MOST_GAPS:
+            lines.append(f"    and {len(gaps) - _MOST_GAPS} gaps that are not longer")
     different, compared = (sum(getattr(topic, name) for topic in done.topics) for name in ("different", "compared"))
     if done.mode == "realtime" and different:
         lines.append(
             f"recorded in realtime: {different} of {compared} messages ({100.0 * different / compared:.1f} %) differ: "
-            f"{done.node} took what was newest when it "
-            "worked, and the bag knows the order of arrival only roughly, from when the recorder received it. Only a "
-            "lockstep recording can be the same bit for bit"
+            f"{done.node} took what was newest when it worked, and the bag knows the order of arrival only roughly, "
+            "from when the recorder received it. Only a lockstep recording can be the same bit for bit"
         )
     return lines
 
@@ -65,6 +63,8 @@ def told(topic: Compared) -> str:
         line += "the same bit for bit"
     if topic.only_recorded or topic.only_replayed:
         line += f"; {topic.only_recorded} only recorded, {topic.only_replayed} only replayed"
+    if topic.alone is not None:
+        line += f"\n    first only recorded at {topic.alone / 1e9:.9f} s"
     if topic.first:
         stamp, field, recorded, replayed = topic.first
         line += f"\n    first at {stamp / 1e9:.9f} s: {field} {recorded!r} recorded, {replayed!r} replayed"
