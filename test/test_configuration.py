@@ -86,6 +86,8 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
     ("text", "message"),
     [
         ("a: [1,", "is not YAML"),
+        ("? [a]\n: 1", "is not YAML"),
+        ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; take one of the two away.*\n.*line 3"),
         ("", r"has no section '/\*\*'"),
         ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
         ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),

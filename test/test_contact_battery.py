@@ -12,12 +12,13 @@ from contact_truth import torques as torques_by_hand
 from wam_analysis.batch import processes
 from wam_analysis.contact_battery.judgement import Extent, Judgement, judge, scenes
 from wam_analysis.contact_battery.over_topics import script
-from wam_analysis.contact_battery.page import FEW, MARGINAL, MET, MISSED, STRETCH, mark, missed, page
+from wam_analysis.contact_battery.page import FEW, MARGINAL, MET, MISSED, MISSED_MARGINAL, STRETCH, mark, missed, page
 from wam_analysis.contact_battery.run import Belief, Levers, Played, Record, play
 from wam_analysis.contact_battery.scenes import Draw, Planned, Scene, dither_values
 from wam_analysis.contact_battery.score import ANY, Row, SceneScore, asked, score, stated
 from wam_analysis.contact_battery.statistics import Figure, events, quantile, rms, share
 from wam_analysis.contact_battery.touches import Quiet, Touch, credibility, quiet, residual, spans, touches
+from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.scenario import load as load_script
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import NO_LOAD, Load
@@ -136,6 +137,22 @@ def test_torque_errors_count_in_motion_and_at_rest_apart_and_not_near_the_edges_
     assert 159 - 2 * 25 <= touched.moving_count <= 159 - 2 * 22
 
 
+def test_a_dithered_arm_is_held_against_the_truth_over_a_whole_cycle() -> None:
+    """A hand that rubs to and fro in step with the dither, and an estimate that is its mean."""
+    played = story([5.0] * 200, {}, speed=0.0)
+    swing = [1.0 + 3.0 * math.sin(2.0 * math.pi * i / 8.0) for i in range(200)]
+    rubbing = [
+        one._replace(torques=(torque, 0.0, 0.0, 0.0), external=(1.0, 0.0, 0.0, 0.0))
+        for one, torque in zip(played.records, swing, strict=True)
+    ]
+    errors = {}
+    for group in ("rest", "dither"):
+        found = residual(played._replace(scene=played.scene._replace(group=group), records=rubbing))
+        errors[group] = math.sqrt(found.still[0] / found.still_count)
+    assert errors["rest"] == pytest.approx(3.0 / math.sqrt(2.0), rel=0.02)
+    assert errors["dither"] < 1e-9
+
+
 def test_credibility_of_the_truth_is_uniform_where_the_belief_is_right() -> None:
     random = np.random.default_rng(0)
     levels = []
@@ -162,6 +179,10 @@ def test_intervals_are_those_of_the_textbooks() -> None:
     assert (middle.value, middle.low, middle.high) == (51.0, 41.0, 61.0)
     assert quantile([1.0, 2.0, 3.0, 4.0], 0.5).value == 2.5
     assert quantile([1.0, math.inf, math.inf], 0.5).value == math.inf
+    few = quantile([1.0, 2.0, 3.0], 0.5)
+    assert few.value == 2.0
+    assert math.isnan(few.low)
+    assert math.isnan(few.high), "the interval reaches beyond what was seen"
     assert rms([4.0, 12.0], [1, 3]).value == 2.0
     assert math.isnan(share(0, 0).value)
 
@@ -178,7 +199,9 @@ def test_marks_tell_a_good_number_from_a_marginal_one() -> None:
     assert mark(row, Figure(0.9, 0.8, 1.4, 50)) == STRETCH
     assert mark(row, Figure(1.5, 1.2, 1.9, 50)) == MET
     assert mark(row, Figure(1.5, 1.2, 2.1, 50)) == MARGINAL
-    assert mark(row, Figure(2.5, 1.2, 3.1, 50)) == MISSED
+    assert mark(row, Figure(2.5, 2.2, 3.1, 50)) == MISSED
+    assert mark(row, Figure(2.5, 1.2, 3.1, 50)) == MISSED_MARGINAL
+    assert mark(row, quantile([0.5], 0.5)) == FEW
     assert mark(row, Figure(math.nan, math.nan, math.nan, 0)) == "no data"
     none = row._replace(must=(0.0, 0.0), stretch=(0.0, 0.0))
     assert mark(none, Figure(0.0, 0.0, 3.7, 60)) == FEW
@@ -321,6 +344,9 @@ def test_the_arm_of_every_scene_departs_from_the_configured_one_within_the_decla
     assert 1.07 < max(friction) <= 1.1
     assert all(scene.values["contact_estimator:observer.friction_scale"] == 1.0 for scene in drawn)
     assert 0.0 < max(scene.values.get("driver:departure.payload", 0.0) for scene in drawn) <= 0.05
+    for scene in drawn:  # what is carried is declared, and only that
+        assert ("driver:departure.payload" in scene.values) is ("contact_estimator:observer.payload" in scene.values)
+    assert CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer.payload == (0.0, 0.0)
     assert not any(scene.values["contact_estimator:use_joint_sensors"] for scene in drawn)
 
 
@@ -349,10 +375,20 @@ def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
     assert over.failure == direct.failure == ""
     assert len(over.records) == len(direct.records)
     for one, other in zip(direct.records, over.records, strict=True):
-        exact = (one.stamp, one.q, one.qd, one.thetad, one.external, one.in_contact, one.load.force, one.load.moment)
+        exact = (
+            one.stamp,
+            one.q,
+            one.qd,
+            one.thetad,
+            one.external,
+            one.external_sd,
+            one.in_contact,
+            one.load.force,
+            one.load.moment,
+        )
         assert exact == (
-            other.stamp, other.q, other.qd, other.thetad, other.external, other.in_contact, other.load.force,
-            other.load.moment,
+            other.stamp, other.q, other.qd, other.thetad, other.external, other.external_sd, other.in_contact,
+            other.load.force, other.load.moment,
         )  # fmt: skip
     (mine,), (theirs,) = (score(played, ARM).touches for played in (direct, over))
     for name, value in mine._asdict().items():

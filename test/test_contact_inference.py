@@ -293,3 +293,15 @@ def test_the_links_count_before_anything_is_felt_by_the_area_that_they_sweep() -
             speeds = [start + x * (end - start) for start, end in across]
             swept[i] += length * np.hypot(*speeds).mean()
     assert PARAMETERS.weights[1] / PARAMETERS.weights[0] == pytest.approx(swept[1] / swept[0], rel=0.03)
+
+
+def test_the_set_is_no_wider_for_coarse_places() -> None:
+    """Whole places at its ends would add half of one on average, 8 mm."""
+    pushes = [torques(POSE, "outer_link", (x, 0, 0), (0, 4, 3)).tolist() for x in np.linspace(0.12, 0.28, 20)]
+    lengths = {}
+    for places in (25, 200):
+        inference = ContactInference(ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, places=places))
+        found = [of(inference.infer(POSE, tau, np.linalg.inv(9.0 * COARSE)), "outer_link") for tau in pushes]
+        lengths[places] = np.array([one.high - one.low for one in found])
+    assert lengths[25].min() > 6 * L4 / 25, "many places, none looked at more closely"
+    assert abs(np.mean(lengths[25] - lengths[200])) < 0.002

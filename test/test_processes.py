@@ -276,6 +276,20 @@ def test_help_of_every_command_says_what_it_does(subcommand: str | None, capsys:
         assert all(name in out for name in SUBCOMMANDS)
 
 
+def test_a_battery_that_is_told_to_end_leaves_nothing_behind(tmp_path: Path) -> None:
+    begin = [sys.executable, "-m", "wam_ros.cli", "evaluate", "contact", "--seed", "1"]
+    begin += ["--keep", str(tmp_path / "kept")]
+    with subprocess.Popen(begin, stderr=subprocess.PIPE, text=True, start_new_session=True) as battery:
+        assert battery.stderr is not None
+        assert battery.stderr.readline().startswith("evaluate: 0 of ")
+        wait(lambda: (tmp_path / "kept").exists() and any((tmp_path / "kept").iterdir()), 60.0, "a first scene")
+        battery.terminate()
+        assert battery.wait(10.0) == 128 + signal.SIGTERM
+        assert "leaked" not in battery.stderr.read()
+    with contextlib.suppress(ProcessLookupError):  # the last process of the session is gone
+        wait(lambda: os.killpg(battery.pid, 0), 5.0, "the end of the workers")
+
+
 def test_a_reader_who_has_had_enough_is_no_error() -> None:
     """As in `wam scorecard | head -1`."""
     read, write = os.pipe()

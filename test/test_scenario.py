@@ -246,6 +246,7 @@ def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, tex
     ("tree", "text"),
     [
         ("steps: [", "is not YAML"),
+        ("steps: []\nsteps: []", "'steps' is given twice"),
         ("- 1", "has no list 'steps'"),
         ("", "has no list 'steps'"),
         ({"steps": {"name": "a"}}, "has no list 'steps'"),

@@ -119,13 +119,27 @@ def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_sta
         assert part in text
     assert loop.parameters == OWN
     allowed = float(text.split("force_gain up to [")[1].split(",")[0])
-    loop.tune(replace(OWN, force_gain=(0.99 * allowed,)))
+    loop.tune(replace(OWN, force_gain=(allowed,)))
     with pytest.raises(ParameterError):
         loop.tune(replace(OWN, force_gain=(1.02 * allowed,)))
     Loop(guarded(replace(OWN, force_gain=(0.5,)), mode="off"))
     warned = Loop(guarded(replace(OWN, force_gain=(0.5,)), mode="warn"))
     assert warned.report.is_warning
     assert warned.report.message.startswith("not stable: force_gain [0.5")
+
+
+@pytest.mark.parametrize("gain", [0.3, 0.5, 0.87])
+def test_the_gain_that_a_refusal_allows_is_accepted(gain: float) -> None:
+    for make, own, group in (
+        (Loop, OWN, "force"),
+        (Loop, replace(OWN, mode="joint_torque"), "torque"),
+        (bench_loop, guarded(bench(), mode="refuse"), "force"),
+    ):
+        name = f"{group}_gain"
+        with pytest.raises(ParameterError) as refusal:
+            make(replace(own, **{name: (gain,)}))
+        said = str(refusal.value).split(f"{name} up to [")[1].split("]")[0]
+        assert make(replace(own, **{name: (float(said.split(",")[0]),)})).judgement is not None
 
 
 def test_a_bad_set_stops_the_loop_at_its_start() -> None:
@@ -173,7 +187,7 @@ def test_in_domain_ii_the_saturation_is_held_below_the_stable_error_and_the_test
     with pytest.raises(ParameterError, match=r"domain II; allowed: .* or force_error_limit up to") as refusal:
         bench_loop(bench(force_gain=(gain,)))
     error = float(str(refusal.value).split("force_error_limit up to ")[1].split()[0])
-    accepted = bench_loop(bench(force_gain=(gain,), force_error_limit=(0.99 * error,)))
+    accepted = bench_loop(bench(force_gain=(gain,), force_error_limit=(error,)))
     assert accepted.judgement is not None
     assert accepted.judgement.domain is Domain.II
     limited = bench_loop(guarded(bench(force_gain=(gain,)), mode="limit"))

@@ -23,7 +23,7 @@ Pair = tuple[float, float]
 LEAST_FORCE = 1e-6  # N, keeps the lean of no force from dividing by zero
 REACH = 8.0  # of the log of probability, below which a place does not matter
 FEW = 6  # places of a peak below which it is looked at more closely
-PARTS = 16  # pieces of it then, half a standard deviation each
+PARTS = 12  # pieces of it then, two thirds of a standard deviation each
 ROUNDING = 1e-12  # of a determinant, below which it is lost in rounding
 WEAK_PRIOR = 1e-9  # of the force prior: keeps directions that no joint sees from dividing by zero
 SET = 0.9  # probability of the set that is reported
@@ -143,27 +143,36 @@ class ContactFit:
         A narrow peak is the exponential of a parabola, sought by parabolas through three places, ever nearer.
         """
         row, width, floor = self._row[i], self._widths[i], top - REACH
+        top_value = max(values)
+        if top_value <= floor:
+            return []
         cells = [(value, x, width, i) for value, x in zip(values, row, strict=True) if value > floor]
-        if not 0 < len(cells) < FEW:
+        if len(cells) >= FEW:
             return cells
-        peak = max(range(len(values)), key=values.__getitem__)
-        (start, end), x, near = self._ends[i], row[peak], width
-        offset = values[peak] - link.log_density(x)
-        for _ in range(3):
-            x = min(max(x, start), end)
-            before, at, after = link.log_density(x - near), link.log_density(x), link.log_density(x + near)
+        peak = values.index(top_value)
+        (start, end), x, near, last = self._ends[i], row[peak], width, len(values) - 1
+        inside = 0 < peak < last
+        before, at, after = (values[peak - 1], top_value, values[peak + 1]) if inside else self._three(link, x, near)
+        for again in (True, True, False):
             slope, bend = 0.5 * (after - before) / near, (0.5 * (after + before) - at) / (near * near)
             if bend >= 0.0:
                 return cells
             step = -0.5 * slope / bend
             x, near = x + min(max(step, -width), width), 0.25 * near
-        at, sd = link.log_density(x) + offset, math.sqrt(-0.5 / bend)
+            if again:
+                x = min(max(x, start), end)
+                before, at, after = self._three(link, x, near)
+        at, sd = link.log_density(x) - link.constant - self._spread[i], math.sqrt(-0.5 / bend)
         left, right = max(start, x - 4.0 * sd), min(end, x + 4.0 * sd)
         if left >= right:  # the peak lies beyond the end of the link; all of it is at the end
             left, right = (end - sd, end) if x > end else (start, start + sd)
         part = (right - left) / PARTS
         places = [left + (k + 0.5) * part for k in range(PARTS)]
         return [(at + bend * (place - x) ** 2, place, part, i) for place in places]
+
+    @staticmethod
+    def _three(link: "_Link", x: float, near: float) -> tuple[float, float, float]:
+        return link.log_density(x - near), link.log_density(x), link.log_density(x + near)
 
     def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float]]:
         """Probability, mean and variance of the place, low and high end of the 90 % set, of each link.
@@ -181,19 +190,22 @@ class ContactFit:
             mine[1] += weight * x
             mine[2] += weight * (x * x + width * width / 12.0)
         total, passed = sum(weights), 0.0
+        enough = SET * total
         inside = [[math.inf, -math.inf] for _ in self._ends]
         for weight, (_, x, width, i) in zip(weights, cells, strict=True):
-            if passed >= SET * total:
+            if passed >= enough:
                 break
             # of the last place only the part that fills the set, on the side of the others
-            unused = width * max(0.0, passed + weight - SET * total) / weight
             passed += weight
+            unused = width * (passed - enough) / weight if passed > enough else 0.0
             part, half = inside[i], 0.5 * width
             low, high = x - half, x + half
             if part[0] > part[1]:
                 part[0], part[1] = low + 0.5 * unused, high - 0.5 * unused
-            else:
-                part[0], part[1] = min(part[0], low + unused), max(part[1], high - unused)
+            elif low + unused < part[0]:
+                part[0] = low + unused
+            elif high - unused > part[1]:
+                part[1] = high - unused
         result = []
         for (mass, first, second), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
             if mass == 0.0:
@@ -262,8 +274,12 @@ class _Link:
 
     def log_density(self, x: float) -> float:
         """Log of the probability of the torques for a contact at x, up to a constant of the link; see `ContactFit`."""
-        _, explained, (s11, s12, s22) = self.force(x)
-        return 0.5 * (explained + math.log(max(s11 * s22 - s12 * s12, ROUNDING * s11 * s22)))
+        (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = self.terms
+        n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
+        told1, told2 = c0 + x * c1, e0 + x * e1
+        determinant = max(n11 * n22 - n12 * n12, ROUNDING * n11 * n22)
+        explained = (told1 * (n22 * told1 - 2.0 * n12 * told2) + n11 * told2 * told2) / determinant
+        return 0.5 * (explained - math.log(determinant))
 
     def told_sd(self, x: float, force: Pair) -> float:
         """Standard deviation of the place, m, by the torques alone, the force unknown: a Schur complement.

@@ -340,7 +340,7 @@ class ForceLoop:
             self._touched = contact.cover, contact.place
         if is_doubtful:
             self.fallback = (
-                f"the felt place on {contact.cover} has a standard deviation of {contact.place_sd:.2g} m, a probability"
+                f"the felt place on {contact.cover} has a standard deviation of {contact.place_sd:.3g} m, a probability"
                 f" of {contact.probability:.2f}; allowed: up to place_uncertainty_limit, "
                 f"{parameters.place_uncertainty_limit:g} m, and from link_probability_limit, "
                 f"{parameters.link_probability_limit:g}; "

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from wam_control.force_loop import ForceCommand
+from wam_description import yaml_text
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, flatten, parameter, require
 from wam_description.signals import Contact
@@ -198,7 +199,7 @@ def load(path: Path, arm: Arm) -> list[Step]:
     if not path.is_file():
         raise ParameterError(f"scenario {path} is not a file; give the path of a YAML file with 'steps'")
     try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+        tree = yaml_text.parse(path.read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ParameterError(f"scenario {path} is not YAML: {error}") from error
     if not isinstance(tree, dict) or not isinstance(tree.get("steps"), list):

@@ -29,6 +29,7 @@ SMALLEST_LEVER = 0.05  # relative singular value below which a direction of forc
 ESTIMATE = "contact_estimate"
 LARGEST = 10.0  # scale of the gains above which no margin is looked for
 SCALES: tuple[float, ...] = tuple(np.geomspace(0.01, LARGEST, 19).tolist())
+SLACK = 0.003  # the search for a margin ends within 0.2 %
 REACH = 1e-3  # m; a force whose lever on every joint is shorter cannot be applied
 
 
@@ -240,13 +241,14 @@ class StabilityGuard:
         found = found._replace(domain=domain, stable_error=error)
         if max(law.error_limit) <= error:
             return found
-        allowed = f"{group}_gain up to {_list([share * found.scale * gain for gain in law.gain])}"
+        most = (1.0 - SLACK) * share * found.scale
+        allowed = f"{group}_gain up to {_list([_rounded_down(most * gain) for gain in law.gain])}"
         if error:
-            allowed += f", or {group}_error_limit up to {error:.3g} as it is (guard.mode limit sets it)"
+            allowed += f", or {group}_error_limit up to {_rounded_down(error):g} as it is (guard.mode limit sets it)"
         reason = (
             f"{group}_gain {_list(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
-            f"one (axis {found.where}, contact up to {self.parameters.contact_stiffness:g} N/m): domain {domain}; "
-            f"allowed: {allowed}; lower one of them or guard.contact_stiffness"
+            f"one (axis {found.where}, contact up to {self.parameters.contact_stiffness:g} N/m), of which guard.share, "
+            f"{share:g}, is accepted: domain {domain}; allowed: {allowed}; lower one of them or guard.contact_stiffness"
         )
         if not found.scale:
             reason = (
@@ -307,6 +309,14 @@ class StabilityGuard:
 def _lags(feedback: Feedback) -> list[Feedback]:
     """The feedback with its lag, and without: a lag can also steady a loop, and is not relied on."""
     return [feedback._replace(lag=lag) for lag in sorted({0.0, feedback.lag if feedback.kind == ESTIMATE else 0.0})]
+
+
+def _rounded_down(value: float) -> float:
+    """To three digits, never up: what is said to be allowed has to be accepted."""
+    if not value:
+        return 0.0
+    digit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.floor(value / digit) * digit
 
 
 def _list(values: Sequence[float]) -> str:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import yaml
 
+from wam_description import yaml_text
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError, build, flatten
 
@@ -141,7 +142,7 @@ def _folders() -> Iterator[Path]:
 
 def _sections(path: Path, text: str) -> Mapping[str, Mapping[str, Any]]:
     try:
-        tree = yaml.safe_load(text)
+        tree = yaml_text.parse(text)
     except yaml.YAMLError as error:
         raise ParameterError(f"{path} is not YAML: {error}") from error
     if not isinstance(tree, dict) or SHARED not in tree:

@@ -43,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if rest and not getattr(command, "TAKES_ROS_ARGUMENTS", False):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     given.ros = rest
+    before = signal.signal(signal.SIGTERM, _end)  # what runs gets to clean up; nodes have a way of their own
     try:
         code = command.run(given)
         sys.stdout.flush()
@@ -52,8 +53,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (ParameterError, ValueError, OSError) as error:
         parser.exit(1, f"wam {given.command}: {error}\n")
     except KeyboardInterrupt:
-        code = 130
+        code = 128 + signal.SIGINT
+    finally:
+        signal.signal(signal.SIGTERM, before)
     sys.exit(code or 0)
+
+
+def _end(number: int, frame: object) -> None:
+    sys.exit(128 + number)
 
 
 def _parser(command: Any) -> argparse.ArgumentParser:

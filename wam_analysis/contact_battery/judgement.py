@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from wam_analysis.batch import Report, results
@@ -70,7 +71,11 @@ def judged(task: Task) -> SceneScore:
 
 
 def judge(
-    configuration: Configuration, drawn: Sequence[Scene], executor: Executor, report: Report | None = None
+    configuration: Configuration,
+    drawn: Sequence[Scene],
+    executor: Executor,
+    folder: Path | None = None,
+    report: Report | None = None,
 ) -> list[SceneScore]:
-    """Play scenes without ROS; the score of each, in order, the same by any executor."""
-    return results(judged, [Task(configuration, scene) for scene in drawn], executor, report=report)
+    """Play scenes without ROS; the score of each, in order; the rest is that of `batch.results`."""
+    return results(judged, [Task(configuration, scene) for scene in drawn], executor, folder, report)

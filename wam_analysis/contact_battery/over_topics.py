@@ -19,6 +19,7 @@ TOPICS = (
     "sim/contact/point",
     "motor_states",
     "external_joint_torques",
+    "external_joint_torques_sd",
     "contact/hypotheses",
 )
 
@@ -49,7 +50,7 @@ def _step(step: Step) -> dict[str, Any]:
 def recorded(scene: Scene, bag: Path, arm: Arm, failure: str) -> Played:
     """A scene as a bag has it, every display period an outer one.
 
-    What the hypotheses say is rounded to six digits there, and the spreads of the torques are not in it.
+    What the hypotheses say is rounded to six digits there.
     """
     topics = read(bag, TOPICS).topics
     columns = {name: next(column for topic, column in topics.items() if topic.endswith(f"/{name}")) for name in TOPICS}
@@ -58,11 +59,14 @@ def recorded(scene: Scene, bag: Path, arm: Arm, failure: str) -> Played:
     assert isinstance(joints, JointColumns)
     assert isinstance(motors, JointColumns)
     assert isinstance(external, JointColumns)
+    spread = columns["external_joint_torques_sd"]
+    assert isinstance(spread, JointColumns)
     assert isinstance(wrenches, WrenchColumns)
     assert isinstance(points, PointColumns)
     assert isinstance(felt, Messages)
     levers = Levers(arm)
     torques = dict(zip(external.stamp_ns.tolist(), external.effort.tolist(), strict=True))
+    spreads = dict(zip(spread.stamp_ns.tolist(), spread.effort.tolist(), strict=True))
     speeds = dict(zip(motors.stamp_ns.tolist(), motors.velocity.tolist(), strict=True))
     beliefs = {_stamp(message): tuple(_belief(status) for status in message.status) for message in felt.messages}
     records = []
@@ -87,7 +91,7 @@ def recorded(scene: Scene, bag: Path, arm: Arm, failure: str) -> Played:
                 load=load,
                 torques=levers.torques(q, load),
                 external=tuple(torques[stamp]),
-                external_sd=(),
+                external_sd=tuple(spreads[stamp]),
                 in_contact=bool(beliefs[stamp]),
                 beliefs=beliefs[stamp],
             )

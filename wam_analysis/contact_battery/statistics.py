@@ -11,7 +11,10 @@ RESAMPLED = 400
 
 
 class Figure(NamedTuple):
-    """A measured number, its 95 % interval and how many observations it rests on; NaN where there are none."""
+    """A measured number, its 95 % interval and how many observations it rests on.
+
+    NaN where there are none; an end of the interval is NaN where there are too few to say it.
+    """
 
     value: float
     low: float
@@ -39,11 +42,12 @@ def quantile(values: Sequence[float], level: float) -> Figure:
         return NONE
     ordered = sorted(values)
     half = Z * math.sqrt(n * level * (1.0 - level))
-    low, high = (min(max(math.floor(n * level + side * half), 0), n - 1) for side in (-1.0, 1.0))
+    ranks = (math.floor(n * level + side * half) for side in (-1.0, 1.0))
+    low, high = (ordered[rank] if 0 <= rank < n else math.nan for rank in ranks)
     middle = n * level - 0.5
     lower, upper = (ordered[min(max(k, 0), n - 1)] for k in (math.floor(middle), math.ceil(middle)))
     value = lower if lower == upper else lower + (middle - math.floor(middle)) * (upper - lower)
-    return Figure(value, ordered[low], ordered[high], n)
+    return Figure(value, low, high, n)
 
 
 def rms(sums: Sequence[float], counts: Sequence[int]) -> Figure:

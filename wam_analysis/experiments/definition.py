@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from wam_description import yaml_text
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, require
 
@@ -162,7 +163,7 @@ def _sample(where: str, body: Any, evaluation: str, runs: Sequence[str]) -> Samp
 
 def _mapping(path: Path) -> dict[str, Any]:
     try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+        tree = yaml_text.parse(path.read_text(encoding="utf-8"))
     except yaml.YAMLError as error:
         raise ParameterError(f"{path} is not YAML: {error}") from error
     require(isinstance(tree, dict), f"{path} is not a mapping of names to values")

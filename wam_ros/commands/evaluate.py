@@ -1,7 +1,6 @@
 """`wam evaluate`: judge a part of the stack by a battery of its own."""
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,8 +9,7 @@ from typing import Any
 
 import yaml
 
-from wam_analysis.batch import executor
-from wam_analysis.contact_battery.compute import sentence, times
+from wam_analysis.contact_battery.compute import section, times
 from wam_analysis.contact_battery.figure import figure
 from wam_analysis.contact_battery.judgement import Extent, Judgement, judge, scenes
 from wam_analysis.contact_battery.over_topics import recorded, script
@@ -22,23 +20,13 @@ from wam_analysis.contact_battery.score import SceneScore, score
 from wam_analysis.progress import Progress
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import Composition
-from wam_ros.commands import configuration_of, take_configuration
+from wam_ros.commands import batch_of, configuration_of, take_batch, take_configuration
 
 SEEDS = (1, 2, 3)
 PARTS = ("contact",)
 
 
-def without_ros(
-    configuration: Configuration, drawn: Sequence[Scene], processes: int, report: Progress
-) -> list[SceneScore]:
-    """Play scenes in a loop without ROS, several at a time."""
-    with executor(processes, None) as found:
-        return judge(configuration, drawn, found, report)
-
-
-def over_topics(
-    configuration: Configuration, drawn: Sequence[Scene], _processes: int, report: Progress
-) -> list[SceneScore]:
+def over_topics(configuration: Configuration, drawn: Sequence[Scene], report: Progress) -> list[SceneScore]:
     """Play scenes with the nodes, in lockstep, and score what was recorded."""
     found: list[SceneScore] = []
     for scene in drawn:
@@ -70,23 +58,23 @@ def play_over_topics(configuration: Configuration, scene: Scene, domain_id: int 
         return recorded(scene, Path(folder) / "scene", shared.arm, failure)
 
 
-MODES = {"direct": without_ros, "lockstep": over_topics}
-
-
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("part", choices=PARTS, help="contact: the estimation of contacts on the whole arm")
     parser.add_argument("--seed", type=int, nargs="+", default=list(SEEDS), help="seeds of the battery, default 1 2 3")
     parser.add_argument("--contacts", type=int, default=200, help="contacts in motion for each seed, default 200")
     parser.add_argument("--resting", type=int, default=30, help="contacts at rest for each seed, default 30")
-    parser.add_argument("--free", type=float, default=120.0, help="seconds of motion without contact for each seed")
+    parser.add_argument("--free", type=float, default=200.0, help="seconds of motion without contact for each seed")
     parser.add_argument("--joint-sensors", action="store_true", help="feel with the joint sensors")
     parser.add_argument(
-        "--mode", choices=tuple(MODES), default="direct", help="direct: without ROS; lockstep: over topics, slower"
+        "--mode",
+        choices=("direct", "lockstep"),
+        default="direct",
+        help="direct: without ROS; lockstep: over topics, one scene at a time",
     )
     parser.add_argument("--write", type=Path, help="page to write, for example docs/contact.md")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, help="at a time, default one a core")
     take_configuration(parser)
+    take_batch(parser)
 
 
 def _write(given: argparse.Namespace, configuration: Configuration, judgement: Judgement, scene: Scene) -> None:
@@ -98,7 +86,7 @@ def _write(given: argparse.Namespace, configuration: Configuration, judgement: J
     seeds = " ".join(map(str, given.seed))
     sensors = " --joint-sensors" * given.joint_sensors
     command = f"wam evaluate contact --seed {seeds} {defaults}{sensors} --mode {given.mode} --write {file}"
-    compute = sentence(times(configuration, scene))
+    compute = section(times(configuration, scene))
     text = page(judgement, arm, command, compute, f"{picture.parent.name}/{picture.name}")
     file.write_text(text, encoding="utf-8")
 
@@ -111,8 +99,12 @@ def run(given: argparse.Namespace) -> int:
     dither = dither_values(configuration)
     drawn = {seed: scenes(configuration, seed, extent, given.joint_sensors, dither) for seed in given.seed}
     order = [(seed, scene) for seed, own in drawn.items() for scene in own]
-    play = MODES[given.mode]
-    scored = play(configuration, [scene for _, scene in order], given.processes, Progress("scenes", sys.stderr))
+    scenes_of_all = [scene for _, scene in order]
+    if given.mode == "direct":
+        with batch_of(given) as batch:
+            scored = judge(configuration, scenes_of_all, *batch)
+    else:
+        scored = over_topics(configuration, scenes_of_all, Progress("scenes", sys.stderr))
     judgement = Judgement(tuple(given.seed), {seed: [] for seed in given.seed})
     for (seed, _), scene in zip(order, scored, strict=True):
         judgement.scores[seed].append(scene)
