@@ -313,6 +313,15 @@ def test_the_dynamic_range_that_was_shown_is_not_the_one_that_is_predicted(cycli
     assert found.predicted == pytest.approx(largest.predicted / smallest.measured)
 
 
+def test_provenance_says_that_a_part_was_read(moving: Recorded) -> None:
+    counts = {**moving.bag.counts, "/wam/unread": 1000, "/wam/silent": 0}
+    said = analyse_bag(moving.bag._replace(counts=counts), lambda doing: None).provenance
+    topics, total = len(topics_of(moving.bag)), sum(moving.bag.counts.values())
+    assert said["topics"].startswith(f"{topics} of {topics + 1}; in the others is nothing that is analysed")
+    assert said["messages"].startswith(f"{total} of {total + 1000}; ")
+    assert moving.analysis.provenance["lost"] == "nothing that is known of"
+
+
 # theory on the arm
 
 

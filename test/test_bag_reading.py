@@ -242,7 +242,7 @@ def test_topics_and_times_that_are_not_asked_for_are_not_read(tmp_path: Path) ->
     assert (
         list(read(path, ["wrenchstamped"]).topics) == list(read(path, ["/wrenchstamped"]).topics) == ["/wrenchstamped"]
     )
-    assert read(path, ["stamped"]).topics == {}
+    assert read(path, ["stamped"], may_lack=True).topics == {}
     with path.open("rb") as stream:
         chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
     assert len(chunks) > 4
@@ -255,6 +255,22 @@ def test_topics_and_times_that_are_not_asked_for_are_not_read(tmp_path: Path) ->
         read(path, ["js"])
     assert len(read(path, ["wrenchstamped"]).topics["/wrenchstamped"].log_time_ns) == 40
     assert len(read(path, end_ns=100).topics["/js"].log_time_ns) == 40
+
+
+def test_what_is_not_there_is_no_empty_answer(tmp_path: Path) -> None:
+    path, _ = three_chunks(tmp_path)
+    for look in (read, raw):
+        with pytest.raises(BagError, match=r"no topic 'nosuch'; its topics: /js, /wrenchstamped\. .*may_lack"):
+            look(path, ["js", "nosuch"])
+    assert list(read(path, ["js", "nosuch"], may_lack=True).topics) == ["/js"]
+    with pytest.raises(ValueError, match="from 9 ns to 8 ns; the end must not be before the begin"):
+        read(path, begin_ns=9, end_ns=8)
+
+
+def test_all_topics_are_counted_also_those_that_are_not_read(tmp_path: Path) -> None:
+    for way in ("zstd", "no summary"):
+        path = write(tmp_path / f"{way}.mcap", three_chunks(tmp_path)[1], WAYS[way])
+        assert read(path, ["wrenchstamped"]).counts == {"/js": 80, "/wrenchstamped": 40}
 
 
 def test_one_topic_on_two_channels_is_one_topic(tmp_path: Path) -> None:

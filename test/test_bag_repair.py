@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,11 @@ from rosbags.highlevel import AnyReader
 
 from wam_analysis.bag import BagError, raw, read
 from wam_analysis.bag_file import contents
+from wam_analysis.demo_report import text as report_text
+from wam_analysis.demo_summary import summarize
+from wam_analysis.findings.analysis import analyse_bag
 from wam_ros.bag import RESERVE, WHOLE, BagWriter, RecordingError, Split
+from wam_ros.bag_losses import losses
 from wam_ros.bag_metadata import INFINITE
 from wam_ros.bag_repair import repair
 from wam_ros.commands.bag import described, told
@@ -177,8 +182,129 @@ def test_around_a_damaged_chunk_everything_is_saved(tmp_path: Path) -> None:
     lost = set(written(samples)) - set(serialized(file))
     first, last = chunks[5].message_start_time, chunks[5].message_end_time
     assert lost == {sample.data for sample in samples if first <= sample.time <= last}
-    assert result.lost > 0
+    assert result.losses is not None
+    assert result.losses.bytes > 0
     assert read(file).attachments == {"note.txt": b"written by a test"}
+
+
+def damaged(path: Path, samples: list[Sample], number: int) -> tuple[int, int]:
+    """A recording of ours with one byte of a chunk turned; first and last log time of that chunk."""
+    bag = record(path, samples)
+    counts = Counter(sample.topic for sample in samples)
+    bag.metadata(
+        "recording", {"mode": "lockstep", **{f"{topic} driver received": str(n) for topic, n in counts.items()}}
+    )
+    bag.close()
+    file = path / f"{path.name}_0.mcap"
+    with file.open("rb") as stream:
+        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
+    data = bytearray(file.read_bytes())
+    data[data.index(chunks[number].data) + 30] ^= 255
+    file.write_bytes(data)
+    return chunks[number].message_start_time, chunks[number].message_end_time
+
+
+def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path: Path) -> None:
+    samples = [sample._replace(time=10**7 * k) for k, sample in enumerate(samples_of(100))]
+    first, last = damaged(tmp_path / "bag", samples, 5)
+    gone = Counter(sample.topic for sample in samples if first <= sample.time <= last)
+    lines = told(repair(tmp_path / "bag")[0]).splitlines()
+    assert "gone are 10 messages (5 of /jointstate, 5 of /wrenchstamped)" in lines[1]
+    assert lines[2] == f"A hole from {first / 1e9:.3f} s to {last / 1e9:.3f} s."
+    info = described(contents(tmp_path / "bag"))
+    assert info[:2] == [f"INCOMPLETE: {line}" for line in lines[1:]]
+    assert "recorded in lockstep mode, lost: 10 of those that were recorded" in info
+    assert [line.split()[-3] for line in info if line.endswith("are gone")] == [str(gone[t]) for t in sorted(gone)]
+    bag = read(tmp_path / "bag")
+    assert list(summarize(bag).lost) == lines[1:]
+    assert report_text(summarize(bag)).startswith("INCOMPLETE: bag_0.mcap was broken")
+    found = analyse_bag(bag, lambda doing: None)
+    assert found.sections[0].said[:2] == tuple(info[:2])
+    assert found.provenance["lost"] == " ".join(lines[1:])
+
+
+def test_the_losses_of_two_repairs_stand_side_by_side(tmp_path: Path) -> None:
+    samples = samples_of(100)
+    damaged(tmp_path / "bag", samples, 2)
+    repair(tmp_path / "bag")
+    file = tmp_path / "bag" / "bag_0.mcap"
+    with file.open("rb") as stream:
+        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
+    data = bytearray(file.read_bytes())
+    data[data.index(chunks[7].data) + 30] ^= 255
+    file.write_bytes(data)
+    repair(tmp_path / "bag")
+    found = contents(tmp_path / "bag")
+    counts = {name: topic.messages for name, topic in found.topics.items()}
+    lost = losses(found.path, found.metadata, found.attachments, counts)
+    assert list(lost.repaired) == ["bag_0.mcap", "bag_0.mcap (2)"]
+    assert lost.by_topic == {topic: 50 - count for topic, count in counts.items()}
+    assert lost.gone == 20
+
+
+def test_without_indexes_the_hole_lies_between_its_neighbours(tmp_path: Path) -> None:
+    """Nothing counts what was in the chunk, and that is said."""
+    samples = samples_of(100)
+    file = write(tmp_path / "bag.mcap", samples, Way(chunk_size=2000, indexed=False, summary=False))
+    with file.open("rb") as stream:
+        chunks = [record for record in StreamReader(stream, emit_chunks=True).records if isinstance(record, Chunk)]
+    data = bytearray(file.read_bytes())
+    data[data.index(chunks[3].data) + 30] ^= 255
+    file.write_bytes(data)
+    (result,) = repair(file)
+    assert result.losses is not None
+    (hole,) = result.losses.holes
+    assert (hole.begin, hole.end) == (chunks[2].message_end_time, chunks[4].message_start_time)
+    assert "how many messages these were is not known" in described(contents(file))[0]
+
+
+def test_what_the_recorder_counted_is_compared_with_what_is_there(tmp_path: Path) -> None:
+    bag = record(tmp_path / "bag", samples_of(100))
+    bag.metadata(
+        "recording", {"mode": "lockstep", "/jointstate driver received": "57", "/jointstate driver dropped": "0"}
+    )
+    bag.close()
+    first = described(contents(tmp_path / "bag"))[0]
+    assert first == "INCOMPLETE: The recorder received 7 messages (7 of /jointstate) that are not in the bag."
+    assert summarize(read(tmp_path / "bag", ["wrenchstamped"])).gone == 7
+
+
+def test_one_file_of_several_and_a_cut_are_not_held_against_the_counts_of_the_whole(tmp_path: Path) -> None:
+    bag = record(tmp_path / "bag", samples_of(100), Split(4000, 0.0))
+    bag.metadata(
+        "recording", {"mode": "lockstep", "/jointstate driver received": "50", "/wrenchstamped driver received": "50"}
+    )
+    bag.close()
+    files = sorted((tmp_path / "bag").glob("*.mcap"), key=lambda file: (len(file.name), file.name))
+    assert len(files) > 2
+    for path in (files[-1], tmp_path / "bag"):
+        assert not any("INCOMPLETE" in line for line in described(contents(path)))
+    found = contents(tmp_path / "bag")
+    cut = {**found.metadata, "cut": {"begin_ns": "0"}}
+    assert losses(found.path, cut, found.attachments, {"/jointstate": 1}).gone == 0
+    assert losses(found.path, found.metadata, found.attachments, {"/jointstate": 1}).gone == 99
+
+
+@pytest.mark.parametrize("text", ["", "3", "{}", '{"holes": [1]}', '{"holes": [{"begin": 1}], "messages": {}}'])
+def test_a_damaged_record_of_a_repair_still_says_that_there_was_one(tmp_path: Path, text: str) -> None:
+    lost = losses(tmp_path, {"repaired": {"a.mcap": text}}, (), {})
+    assert lost.said(0) == ["a.mcap was repaired; what was lost cannot be read any more."]
+
+
+def test_after_a_kill_the_mode_is_that_of_the_parameters(tmp_path: Path) -> None:
+    child = os.fork()
+    if child == 0:
+        bag = record(tmp_path / "bag", samples_of(20))
+        values = {"/wam/driver": {"ros__parameters": {"timing": {"mode": "realtime"}}}}
+        bag.attach("parameters.yaml", "application/yaml", yaml.safe_dump(values).encode())
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+    repair(tmp_path / "bag")
+    lines = described(contents(tmp_path / "bag"))
+    assert lines[0].startswith("INCOMPLETE: bag_0.mcap had not been closed")
+    assert lines[1].startswith("INCOMPLETE: The recorder wrote no counts")
+    assert "recorded in realtime mode, lost: unknown, see above" in lines
+    assert summarize(read(tmp_path / "bag")).loop.mode == "realtime"
 
 
 def test_a_bag_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
@@ -198,6 +324,7 @@ def test_info_says_what_is_in_a_bag(tmp_path: Path) -> None:
     lines = described(contents(tmp_path / "bag"))
     assert any(line.startswith(f"{tmp_path}/bag/bag_1.mcap") for line in lines)
     assert "100 messages" in "\n".join(lines)
+    assert lines[0] == "INCOMPLETE: Lost on the way to the recorder: 3 of /jointstate from driver."
     assert "recorded in lockstep mode, lost: 3 of /jointstate from driver" in lines
     joints = next(line for line in lines if line.startswith("/jointstate "))
     assert joints.split()[1] == "50"

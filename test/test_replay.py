@@ -7,13 +7,14 @@ import pytest
 import yaml
 
 from wam_analysis.bag import BagError, raw, read
-from wam_analysis.replay import replay
+from wam_analysis.replay import Compared, Replay, replay
 from wam_analysis.replay_wirings import WIRINGS
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_ros import cli
 from wam_ros.bag import BagWriter
 from wam_ros.bag_metadata import INFINITE
+from wam_ros.commands.replay import reasons, told
 
 STEPS = {
     "steps": [
@@ -68,8 +69,10 @@ def recorded(folder: Path, domain_id: int) -> Path:
     return folder / "bag"
 
 
-def changed(bag: Path, to: Path, topic: str, number: int, change: bytes) -> Path:
-    """The same bag with the last bytes of one message replaced, and without what only the recorder says."""
+def changed(
+    bag: Path, to: Path, topic: str, number: int, change: bytes, without: tuple[str, range] = ("", range(0))
+) -> Path:
+    """The same bag with the last bytes of one message replaced, some messages of a topic left out."""
     contents = read(bag)
     with BagWriter(to) as writer:
         series = raw(bag)
@@ -79,6 +82,8 @@ def changed(bag: Path, to: Path, topic: str, number: int, change: bytes) -> Path
         writer.metadata("recording", contents.metadata["recording"])
         for name, messages in series.items():
             for k, (time, data) in enumerate(zip(messages.log_time_ns.tolist(), messages.data, strict=True)):
+                if name == without[0] and k in without[1]:
+                    continue
                 new = data[: -len(change)] + change if (name, k) == (topic, number) else data
                 writer.write(name, new, time, time, k)
     return to
@@ -131,6 +136,7 @@ def test_the_last_bit_of_one_number_is_found(bag: Path, tmp_path: Path) -> None:
     assert (topic.compared, topic.different) == (101, 1)
     assert topic.first == (int(efforts.stamp_ns[40]), "joint4", float(wrong), float(efforts.effort[40, 3]))
     assert 0.0 < topic.largest < 1e-12
+    assert topic.unit == "N m"
 
 
 def test_a_missing_input_is_named(bag: Path, tmp_path: Path) -> None:
@@ -156,6 +162,29 @@ def test_parameters_that_are_not_in_the_bag_are_asked_for(bag: Path, tmp_path: P
     assert replay(tmp_path / "bare", "gravity", Configuration.load(packaged("wam"))).is_same
     with pytest.raises(BagError, match=r"recorded are joint1, joint2, joint3, joint4; the configuration has joint1$"):
         replay(tmp_path / "bare", "gravity", Configuration.load(packaged("testbed")))
+
+
+def test_a_hole_in_an_input_is_named(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stamps = read(bag, ["joint_states"]).topics["/wam/joint_states"].stamp_ns  # type: ignore[union-attr]
+    hole = changed(bag, tmp_path / "hole", "", 0, b"x", without=("/wam/joint_states", range(40, 50)))
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["replay", str(hole), "gravity"])
+    assert ended.value.code == 1
+    said = capsys.readouterr().out
+    assert "INCOMPLETE: The recorder received 10 messages (10 of /wam/joint_states) that are not in the bag." in said
+    assert f"first only recorded at {stamps[40] / 1e9:.9f} s" in said
+    assert "the bag lacks inputs of gravity: " in said
+    assert f"joint_states: 10 missing between {stamps[39] / 1e9:.3f} s and {stamps[50] / 1e9:.3f} s" in said
+
+
+def test_of_a_realtime_recording_the_share_that_differs_is_told() -> None:
+    """25 of 101 messages differ, the largest by 0.97 N m."""
+    different = Compared("gravity_effort", 101, 0, 0, 25, None, 0.97, "N m", None)
+    done = Replay("gravity", "realtime", (different,), (), ())
+    assert told(different) == "gravity_effort: 101 messages, 25 differ (24.8 %), at most by 0.97 N m"
+    (why,) = reasons(done)
+    assert why.startswith("recorded in realtime: 25 of 101 messages (24.8 %) differ: gravity took what was newest")
+    assert reasons(done._replace(mode="lockstep")) == []
 
 
 def test_the_driver_cannot_be_replayed(bag: Path) -> None:

@@ -8,13 +8,15 @@ checksum over it.  The checksums of chunks, attachments and the summary are chec
 that over all data when all is read.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_analysis.bag_file import files, is_asked, opened, type_of
+from wam_analysis.bag_file import files, is_asked, merge, opened, type_of
 from wam_analysis.cdr import Decoder
 from wam_analysis.columns import (
     BoolColumns,
@@ -38,13 +40,18 @@ __all__ = [
 
 
 class Bag(NamedTuple):
-    """A bag in memory: columns and type by topic, attachments and metadata records by name."""
+    """A bag in memory: columns and type by topic, attachments and metadata records by name.
+
+    `counts` are the messages of every topic in its files, also of those that were not asked for; empty
+    in a bag that did not come from files.
+    """
 
     path: Path
     topics: dict[str, Columns]
     types: dict[str, str]
     attachments: dict[str, bytes]
     metadata: dict[str, dict[str, str]]
+    counts: Mapping[str, int] = MappingProxyType({})
 
 
 class Raw(NamedTuple):
@@ -56,7 +63,14 @@ class Raw(NamedTuple):
     decode: Callable[[bytes], Any]
 
 
-def read(path: str | Path, topics: Collection[str] | None = None, begin_ns: int = 0, end_ns: int = NEVER) -> Bag:
+def read(
+    path: str | Path,
+    topics: Collection[str] | None = None,
+    begin_ns: int = 0,
+    end_ns: int = NEVER,
+    *,
+    may_lack: bool = False,
+) -> Bag:
     """Read a bag, the whole of it or some topics or some time.
 
     Chunks of the file that hold nothing of what is asked for are not read.
@@ -66,12 +80,20 @@ def read(path: str | Path, topics: Collection[str] | None = None, begin_ns: int 
     path : bag directory or .mcap file.
     topics : names of the topics to read, one without a leading '/' in every namespace; None reads all.
     begin_ns, end_ns : log times to read, begin_ns <= t < end_ns.
+    may_lack : whether topics asked for may be missing in the bag.
 
     Raises
     ------
     BagError
-        where it is missing, empty, cut off, damaged or not a ROS 2 bag.
+        where it is missing, empty, cut off, damaged or not a ROS 2 bag, or lacks a topic asked for.
+    ValueError
+        where the time ends before it begins.
     """
+    if begin_ns > end_ns:
+        raise ValueError(
+            f"{path} is to be read from {begin_ns} ns to {end_ns} ns; the end must not be before the begin"
+        )
+    counts: Counter[str] = Counter()
     types: dict[str, str] = {}
     collectors: dict[str, Collector] = {}
     attachments: dict[str, bytes] = {}
@@ -94,14 +116,21 @@ def read(path: str | Path, topics: Collection[str] | None = None, begin_ns: int 
             for channel in mcap.channels.values():
                 if is_asked(channel.topic, topics):
                     collector(channel.topic, *type_of(mcap, channel))
+            said = (mcap.statistics or mcap.count()).counts
+            counts.update({channel.topic: 0 for channel in mcap.channels.values()})
+            for number, count in said.items():
+                counts[mcap.channels[number].topic] += count
             attachments.update(mcap.attachments())
-            metadata.update(mcap.metadata())
+            merge(metadata, mcap.metadata())
+    if not may_lack:
+        _check_has(path, topics, counts)
     columns = {topic: found.columns(f"{path}, topic {topic}") for topic, found in sorted(collectors.items())}
-    return Bag(Path(path), columns, types, attachments, metadata)
+    return Bag(Path(path), columns, types, attachments, metadata, dict(counts))
 
 
 def raw(path: str | Path, topics: Collection[str] | None = None) -> dict[str, Raw]:
     """Serialized messages of a bag by topic; parameters and errors as those of `read`."""
+    present: set[str] = set()
     found: dict[str, Raw] = {}
     times: dict[str, list[Times]] = {}
     for file in files(Path(path)):
@@ -113,13 +142,24 @@ def raw(path: str | Path, topics: Collection[str] | None = None) -> dict[str, Ra
                     raise Damage(f"topic {topic} is of type {entry.type} and of {kind}")
                 times.setdefault(topic, []).append(log_times(buffer, some.offsets))
                 entry.data.extend(messages(buffer, some))
+            present |= {channel.topic for channel in mcap.channels.values()}
             for channel in mcap.channels.values():
                 if is_asked(channel.topic, topics) and channel.topic not in found:
                     kind, definitions = type_of(mcap, channel)
                     found[channel.topic] = Raw(kind, np.empty(0, np.int64), [], Decoder(kind, definitions))
+    _check_has(path, topics, present)
     for topic, parts in times.items():
         found[topic] = found[topic]._replace(log_time_ns=np.concatenate(parts))
     return found
+
+
+def _check_has(path: str | Path, asked: Collection[str] | None, present: Collection[str]) -> None:
+    for name in asked or ():
+        if not any(is_asked(topic, [name]) for topic in present):
+            raise BagError(
+                f"{path} has no topic '{name}'; its topics: {', '.join(sorted(present)) or 'none'}. "
+                "Names may stand without namespace; may_lack=True takes what is there"
+            )
 
 
 def _parts(

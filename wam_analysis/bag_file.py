@@ -2,17 +2,20 @@
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 
+from wam_description.parameters import flatten
+from wam_ros.bag_losses import PARAMETERS, RECORDING
 from wam_ros.mcap_file import McapFile, NotClosedError
 from wam_ros.mcap_records import BROKEN, MAGIC, BagError, Channel, Damage
 from wam_ros.message_text import Fields, definitions
 
+LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same, in C where it was built
 PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
 
@@ -106,19 +109,23 @@ class Contents(NamedTuple):
 
     Attributes
     ----------
+    path : of the bag, as it was given.
     files : the files.
     first, last : log times, ns; 0 in an empty bag.
     topics : by name.
     attachments : bytes by name.
-    recording : what the recorder says about itself, see bags/README.md; empty for other recorders.
+    mode : 'realtime', 'lockstep' or 'unknown', see `mode_of`.
+    metadata : records by name; 'recording' is the recorder's, see docs/bags.md.
     """
 
+    path: Path
     files: list[Path]
     first: int
     last: int
     topics: dict[str, TopicContents]
     attachments: dict[str, int]
-    recording: dict[str, str]
+    mode: str
+    metadata: dict[str, dict[str, str]]
 
 
 def contents(path: str | Path) -> Contents:
@@ -127,8 +134,8 @@ def contents(path: str | Path) -> Contents:
     counts: Counter[str] = Counter()
     types: dict[str, str] = {}
     times: list[int] = []
-    attachments: dict[str, int] = {}
-    recording: dict[str, str] = {}
+    attachments: dict[str, bytes] = {}
+    metadata: dict[str, dict[str, str]] = {}
     for file in found:
         with opened(file) as mcap:
             said = mcap.statistics or mcap.count()
@@ -138,10 +145,35 @@ def contents(path: str | Path) -> Contents:
                 counts[channel.topic] += said.counts.get(number, 0)
                 schema = mcap.schemas.get(channel.schema)
                 types.setdefault(channel.topic, schema.name if schema else "?")
-            attachments.update({name: len(data) for name, data in mcap.attachments().items()})
-            recording.update(mcap.metadata().get("recording", {}))
+            attachments.update(mcap.attachments())
+            merge(metadata, mcap.metadata())
     topics = {topic: TopicContents(types[topic], counts[topic]) for topic in sorted(types)}
-    return Contents(found, min(times, default=0), max(times, default=0), topics, attachments, recording)
+    sizes = {name: len(data) for name, data in attachments.items()}
+    mode = mode_of(metadata, attachments.get(PARAMETERS))
+    return Contents(Path(path), found, min(times, default=0), max(times, default=0), topics, sizes, mode, metadata)
+
+
+def merge(metadata: dict[str, dict[str, str]], more: Mapping[str, Mapping[str, str]]) -> None:
+    """Take the metadata records of another file of a bag: entries of the same record stand side by side."""
+    for name, values in more.items():
+        metadata.setdefault(name, {}).update(values)
+
+
+def mode_of(metadata: Mapping[str, Mapping[str, str]], parameters: bytes | None) -> str:
+    """'realtime', 'lockstep' or 'unknown': what the recorder says, else what its nodes' parameters say.
+
+    A recorder that was killed left only the parameters.
+    """
+    said = metadata.get(RECORDING, {}).get("mode")
+    if said is not None or parameters is None:
+        return said or "unknown"
+    try:
+        tree = yaml.load(parameters.decode(), LOADER)
+        modes = {flatten(node["ros__parameters"]).get("timing.mode") for node in tree.values()}
+    except (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return "unknown"
+    known = sorted(str(mode) for mode in modes - {None})
+    return known[0] if len(known) == 1 else "unknown"
 
 
 def is_asked(topic: str, topics: Collection[str] | None) -> bool:

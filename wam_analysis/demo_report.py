@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from wam_analysis.bag import read
+from wam_analysis.bag import BagError, read
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import (
     NO_LINK,
@@ -39,11 +39,16 @@ def report(bag: Path) -> str:
     Raises
     ------
     BagError
-        where the bag cannot be read.
+        where the bag cannot be read, or has no demonstration in it; then nothing is written.
     """
     bag = Path(bag)
-    recording = read(bag, TOPICS_READ)
+    recording = read(bag, TOPICS_READ, may_lack=True)
     summary = summarize(recording)
+    if not summary.steps:
+        raise BagError(
+            f"{bag} is no recording of a demonstration: no step of a scenario is in it; its topics: "
+            f"{', '.join(recording.counts) or 'none'}. 'wam analyse {bag}' says what any recording shows"
+        )
     picture = (bag if bag.is_dir() else bag.parent) / "demo.png"
     try:
         notes = save(picture, summary, recording)
@@ -61,12 +66,14 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     summary : of the bag.
     notes : what else has to be said.
     """
-    lines = _wrapped(f"Demonstration of {summary.namespace or '/'}: {_played(summary)}")
+    lines = [line for lost in summary.lost for line in _wrapped(f"INCOMPLETE: {lost}")]
+    lines += _wrapped(f"Demonstration of {summary.namespace or '/'}: {_played(summary)}")
     lines += ["", *_presses(summary.presses), "", *_touches(summary.touches, summary.period)]
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
     lines += [line for note in (*summary.notes, *notes) for line in _wrapped(f"Note     {note}")]
-    return "\n".join([*lines, "", "Verdict, the worst in brackets", f"  {verdict(summary)}"])
+    worst = "Verdict, the worst in brackets" + (", of what is left of the recording" if summary.lost else "")
+    return "\n".join([*lines, "", worst, f"  {verdict(summary)}"])
 
 
 def verdict(summary: DemoSummary) -> str:
@@ -190,7 +197,8 @@ def _loop(loop: Loop) -> str:
 def _messages(summary: DemoSummary) -> str:
     if summary.received < 0:
         return "the recorder did not say how many it received"
-    return f"{summary.received} recorded, {summary.dropped} dropped"
+    gone = f", {summary.gone} of them no longer in the bag" if summary.gone else ""
+    return f"{summary.received} recorded{gone}, {summary.dropped} dropped"
 
 
 def _number(value: float, digits: int) -> str:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.bag import Bag, JointColumns
+from wam_analysis.bag_file import mode_of
 from wam_analysis.demo_traces import (
     NAN,
     RECORDED,
@@ -23,6 +24,7 @@ from wam_analysis.demo_traces import (
     values_of,
 )
 from wam_analysis.measures.runs import runs
+from wam_ros.bag_losses import PARAMETERS, losses
 
 NO_LINK = "none"
 NOT_RECORDED = "not recorded"
@@ -110,6 +112,8 @@ class DemoSummary(NamedTuple):
     outcome : 'done', why the scenario failed, or that the recording ended before it.
     false_contact, longest_false_contact, free : s felt without contact, the longest such time, s without contact.
     received, dropped : messages according to the recorder, -1 where it did not say.
+    gone : messages that were recorded and are not in the bag, as far as is known.
+    lost : sentences about what the bag lacks, none where nothing is known to be lost.
     notes : what is missing or not as it should be.
     """
 
@@ -126,6 +130,8 @@ class DemoSummary(NamedTuple):
     loop: Loop
     received: int
     dropped: int
+    gone: int
+    lost: tuple[str, ...]
     moment: Moment | None
     notes: tuple[str, ...]
 
@@ -145,6 +151,10 @@ def summarize(bag: Bag) -> DemoSummary:
     false = known & ~traces.true.acts & traces.felt.acts
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
     received, dropped = _counts(bag.metadata.get("recording", {}))
+    lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
+    first = min(
+        (int(columns.log_time_ns.min()) for columns in bag.topics.values() if len(columns.log_time_ns)), default=0
+    )
     return DemoSummary(
         namespace=namespace,
         period=period,
@@ -159,6 +169,8 @@ def summarize(bag: Bag) -> DemoSummary:
         loop=_loop(bag),
         received=received,
         dropped=dropped,
+        gone=lost.gone,
+        lost=tuple(lost.said(first)),
         moment=_moment(bag, namespace, traces, presses),
         notes=(*notes, *_faults(bag, namespace)),
     )
@@ -286,7 +298,8 @@ def _loop(bag: Bag) -> Loop:
         if node_of(status) == "driver"
     ]
     timed = [facts for facts in reports if "rate [Hz]" in facts]
-    mode = bag.metadata.get("recording", {}).get("mode", "realtime" if timed else "unknown")
+    mode = mode_of(bag.metadata, bag.attachments.get(PARAMETERS))
+    mode = "realtime" if mode == "unknown" and timed else mode
     if not timed:
         return Loop(mode, NAN, NAN, NAN, NAN, -1, -1)
     p50, p99 = (np.array([float(facts.get(f"latency {p} [us]", NAN)) for facts in timed]) for p in ("p50", "p99"))

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 import yaml
 
 from wam_analysis.bag import Bag
+from wam_analysis.bag_file import LOADER
 from wam_control.force_loop import ForceLoopParameters
 from wam_control.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Arm, Timing
@@ -14,11 +15,9 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects
 from wam_description.parameters import ParameterError, build, fields, flatten
 from wam_description.world import NO_SPRINGS, Obstacles, Springs
+from wam_ros.bag_losses import PARAMETERS
 
 T = TypeVar("T")
-
-PARAMETERS = "parameters.yaml"  # the recorder's attachment
-_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same, in C where it was built
 
 
 class RecordedArm(NamedTuple):
@@ -123,7 +122,7 @@ def _nodes(bag: Bag) -> Mapping[str, Any] | ParameterError:
     if attached is None:
         return ParameterError("it has no attachment parameters.yaml")
     try:
-        tree = yaml.load(attached.decode(), _LOADER)
+        tree = yaml.load(attached.decode(), LOADER)
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         return ParameterError(f"its parameters.yaml cannot be read: {error}")
     return tree if isinstance(tree, dict) else {}

@@ -13,15 +13,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import yaml
 
 from wam_analysis.bag import Bag, BagError, Columns, JointColumns, PointColumns, WrenchColumns, read
+from wam_analysis.bag_file import mode_of
 from wam_analysis.direct import Row
 from wam_analysis.replay_wirings import WIRINGS, WITH_STAMP, Step
 from wam_description.arm import Shared, seconds
 from wam_description.configuration import PARAMETERS, Configuration
 from wam_description.parameters import ParameterError, build, fields, flatten
 from wam_description.signals import State
+from wam_ros.bag_losses import PARAMETERS as ATTACHED
+from wam_ros.bag_losses import losses
 from wam_ros.lockstep import Gate
 from wam_ros.topics import BY_NAME
 
@@ -38,7 +42,11 @@ class Difference(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """One topic: messages on both sides, those that differ, the first of them and the largest difference."""
+    """One topic: messages on both sides, those that differ, the first of them and the largest difference.
+
+    `unit` is that of the largest difference; `alone` the stamp (ns) of the first message that was only recorded,
+    None where there is none.
+    """
 
     topic: str
     compared: int
@@ -47,6 +55,8 @@ class Compared(NamedTuple):
     different: int
     first: Difference | None
     largest: float
+    unit: str
+    alone: int | None
 
     @property
     def is_same(self) -> bool:
@@ -54,12 +64,23 @@ class Compared(NamedTuple):
         return not (self.only_recorded or self.only_replayed or self.different)
 
 
+class Gap(NamedTuple):
+    """Stamps of an input between which messages are missing, ns, and how many periods that are."""
+
+    topic: str
+    begin: int
+    end: int
+    missing: int
+
+
 class Replay(NamedTuple):
-    """A replay: mode of the recording, and how each topic of the node came out."""
+    """A replay: mode of the recording, how each topic of the node came out, gaps in its inputs, what the bag lacks."""
 
     node: str
     mode: str
     topics: tuple[Compared, ...]
+    gaps: tuple[Gap, ...]
+    lost: tuple[str, ...]
 
     @property
     def is_same(self) -> bool:
@@ -87,7 +108,7 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
         raise ParameterError(f"no node '{node}' can be replayed; nodes: {', '.join(WIRINGS)}")
     outputs = tuple(topic.name for topic in BY_NAME.values() if node in topic.publisher and topic.name in _COMPARED)
     inputs = [topic.name for topic in BY_NAME.values() if node in topic.subscribers and _is_numbers(topic.type)]
-    bag = read(path, [*inputs, *outputs])
+    bag = read(path, [*inputs, *outputs], may_lack=True)
     namespace = _namespace(bag, node, [*inputs, *outputs])
     shared, own = _parameters(bag, namespace, node, configuration)
     steps = WIRINGS[node].steps(shared, own)
@@ -100,9 +121,28 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
     for topic in outputs:
         columns = bag.topics.get(f"{namespace}/{topic}")
         recorded = _rows(columns, names[_side(topic)]) if columns is not None else []
-        compared.append(_compare(topic, recorded, said.get(topic, []), names[_side(topic)]))
-    mode = bag.metadata.get("recording", {}).get("mode", shared.timing.mode)
-    return Replay(node, mode, tuple(compared))
+        compared.append(_compare(topic, recorded, said.get(topic, []), names[_side(topic)], _units(topic, columns)))
+    mode = mode_of(bag.metadata, bag.attachments.get(ATTACHED))
+    mode = shared.timing.mode if mode == "unknown" else mode
+    gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
+    first = min(
+        (int(columns.log_time_ns.min()) for columns in bag.topics.values() if len(columns.log_time_ns)), default=0
+    )
+    lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).said(first)
+    return Replay(node, mode, tuple(compared), gaps, tuple(lost))
+
+
+def _gaps(topic: str, columns: Columns | None) -> list[Gap]:
+    """Where stamps are further apart than a period, which is their median distance."""
+    if not isinstance(columns, JointColumns | WrenchColumns | PointColumns) or len(columns.stamp_ns) < 3:
+        return []
+    steps = np.diff(columns.stamp_ns)
+    period = max(int(np.median(steps)), 1)
+    missing = np.rint(steps / period).astype(int) - 1
+    return [
+        Gap(topic, int(columns.stamp_ns[i]), int(columns.stamp_ns[i + 1]), int(missing[i]))
+        for i in np.flatnonzero(missing > 0)
+    ]
 
 
 def _is_numbers(kind: str) -> bool:
@@ -128,7 +168,7 @@ def _parameters(bag: Bag, namespace: str, node: str, configuration: Configuratio
     kind = WIRINGS[node].parameters
     if configuration is not None:
         return configuration.shared, configuration.node(node, kind)
-    attached = bag.attachments.get("parameters.yaml")
+    attached = bag.attachments.get(ATTACHED)
     if attached is None:
         raise BagError(f"{bag.path} has no parameters in it; give a configuration with --config")
     try:
@@ -220,10 +260,12 @@ def _rows(columns: Columns, names: Sequence[str]) -> list[Row]:
     return [Row(stamp, tuple(point), frame) for stamp, point, frame in points]
 
 
-def _compare(topic: str, recorded: Sequence[Row], replayed: Sequence[Row], names: Sequence[str]) -> Compared:
+def _compare(
+    topic: str, recorded: Sequence[Row], replayed: Sequence[Row], names: Sequence[str], units: Sequence[str]
+) -> Compared:
     known = {row.stamp: row for row in replayed}
     both = [(row, known[row.stamp]) for row in recorded if row.stamp in known]
-    first, different, largest = None, 0, 0.0
+    first, different, largest, unit = None, 0, 0.0, ""
     for old, new in both:
         difference = _difference(topic, old, new, names)
         if difference is None:
@@ -232,9 +274,24 @@ def _compare(topic: str, recorded: Sequence[Row], replayed: Sequence[Row], names
         first = first or difference
         if len(old.values) == len(new.values):
             gaps = [abs(a - b) for a, b in zip(old.values, new.values, strict=True)]
-            largest = max([largest, *[gap for gap in gaps if math.isfinite(gap)]])
+            for i, gap in enumerate(gaps):
+                if math.isfinite(gap) and gap > largest:
+                    largest, unit = gap, units[i] if len(units) == len(gaps) else ""
     missing = len(recorded) - len(both)
-    return Compared(topic, len(both), missing, len(replayed) - len(both), different, first, largest)
+    alone = next((row.stamp for row in recorded if row.stamp not in known), None)
+    return Compared(topic, len(both), missing, len(replayed) - len(both), different, first, largest, unit, alone)
+
+
+def _units(topic: str, columns: Columns | None) -> list[str]:
+    """Unit of each number of a message."""
+    if isinstance(columns, WrenchColumns):
+        return ["N"] * 3 + ["N m"] * 3
+    if isinstance(columns, PointColumns):
+        return ["m"] * 3
+    if not isinstance(columns, JointColumns):
+        return []
+    units = dict(zip(State._fields, ("rad", "rad/s", "A" if "current" in topic else "N m"), strict=True))
+    return [unit for field, unit in units.items() for _ in range(getattr(columns, field).shape[1])]
 
 
 def _difference(topic: str, old: Row, new: Row, names: Sequence[str]) -> Difference | None:

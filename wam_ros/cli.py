@@ -61,6 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _end(number: int, frame: object) -> None:
     sys.exit(128 + number)
+
+
 def _hint(error: Exception, command: str) -> str:
     """What to do about an error of the system that does not say it itself."""
     if not isinstance(error, PermissionError) or error.filename is None:

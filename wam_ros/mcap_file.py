@@ -107,7 +107,7 @@ class McapFile:
             where it was not finished: its writer was killed, or the copy is not whole.
         """
         begin = self._read_header()
-        if self._read(max(0, self._size - len(records.MAGIC)), len(records.MAGIC)) != records.MAGIC:
+        if not self.has_end():
             raise NotClosedError("it was not closed")
         parts = self._read_summary()
         position = begin
@@ -145,7 +145,7 @@ class McapFile:
         known = {records.SCHEMA, records.CHANNEL, records.MESSAGE, records.CHUNK, records.MESSAGE_INDEX,
                  records.ATTACHMENT, records.METADATA}  # fmt: skip
         while position + HEAD.size <= self._size:
-            kind, length = HEAD.unpack(self._read(position, HEAD.size))
+            kind, length = self.head(position)
             end = position + HEAD.size + length
             if kind not in known or end > self._size:
                 break
@@ -157,11 +157,30 @@ class McapFile:
             return
         for start, end, part in sorted(parts, key=lambda item: item[0]):
             if start >= position and end <= self._size:
-                yield (records.CHUNK, start, part.end) if isinstance(part, Chunk) else (part, start, end)
+                if not isinstance(part, Chunk):
+                    yield part, start, end
+                    continue
+                yield records.CHUNK, start, part.end
+                if part.index_end > part.end:
+                    yield records.MESSAGE_INDEX, part.end, part.index_end  # all of them
 
     def data_size(self) -> int:
         """Bytes of the file without its end, as far as it has one."""
         return self._data_end or self._size
+
+    def has_end(self) -> bool:
+        """Whether it was finished once: it ends as such a file does."""
+        size = len(records.MAGIC)
+        return self._size >= size and self._read(self._size - size, size) == records.MAGIC
+
+    def ends_at(self, position: int) -> bool:
+        """Whether the record that ends the data stands at a place, so that behind it are no messages."""
+        return position + HEAD.size <= self._size and self.head(position) == (records.DATA_END, 4)
+
+    def head(self, position: int) -> tuple[int, int]:
+        """Kind of the record at a place, and bytes of its content."""
+        kind, length = HEAD.unpack(self._read(position, HEAD.size))
+        return int(kind), int(length)
 
     def content(self, start: int, end: int) -> bytes:
         """Content of the record between two places."""

@@ -56,7 +56,7 @@ def analyse(path: str | Path, progress: Progress) -> Analysis:
         where the bag cannot be read.
     """
     progress(f"reading {path}")
-    bag = read(path, TOPICS_READ)
+    bag = read(path, TOPICS_READ, may_lack=True)
     if not any(len(columns.log_time_ns) for columns in bag.topics.values()):
         progress("none of the stack's topics is in it; reading all")
         bag = read(path)
@@ -81,7 +81,8 @@ def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
 def _happened(recording: Recording, duration: float) -> Section:
     """What happened, in a few sentences."""
     summary, bag = recording.summary, recording.bag
-    said = [f"{shown(duration, 's')} of {summary.namespace or '/'}, {recording.mode}."]
+    said = [f"INCOMPLETE: {line}" for line in summary.lost]
+    said.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {recording.mode}.")
     if summary.steps:
         ended = "to its end" if summary.outcome == "done" else f"and ended so: {summary.outcome}"
         said.append(f"A scenario of {len(summary.steps)} steps was played {ended}.")
@@ -96,8 +97,6 @@ def _happened(recording: Recording, duration: float) -> Section:
     foreign = _foreign(bag)
     if foreign:
         said += foreign
-    if summary.dropped > 0:
-        said.append(f"{summary.dropped} of {summary.received + summary.dropped} messages were lost at the recorder.")
     if recording.parameters.note:
         said.append(f"Predictions are missing in part: {recording.parameters.note}.")
     lacking = recording.lacking("motor_states", "joint_states", "force_command", "contact/wrench", "status")

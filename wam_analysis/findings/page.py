@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.plots import Plot, plots
-from wam_analysis.recorded import PARAMETERS
+from wam_ros.bag_losses import PARAMETERS
 
 NARROW = 640  # px, up to which the narrow pictures are shown
 

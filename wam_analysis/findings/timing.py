@@ -77,6 +77,7 @@ def provenance(recording: Recording) -> dict[str, str]:
     bag, summary = recording.bag, recording.summary
     said = dict(bag.metadata.get("recording", {}))
     counts = {name: len(columns.log_time_ns) for name, columns in bag.topics.items()}
+    whole = bag.counts or counts
     try:
         here = version("wam_stack")
     except PackageNotFoundError:
@@ -85,15 +86,22 @@ def provenance(recording: Recording) -> dict[str, str]:
         "bag": str(bag.path),
         "arm": recording.namespace or "/",
         "mode": recording.mode,
-        "topics": str(sum(count > 0 for count in counts.values())),
-        "messages": str(sum(counts.values())),
+        "topics": _part_of(sum(count > 0 for count in counts.values()), sum(count > 0 for count in whole.values())),
+        "messages": _part_of(sum(counts.values()), sum(whole.values())),
         "received": "not said" if summary.received < 0 else str(summary.received),
         "dropped": "not said" if summary.dropped < 0 else str(summary.dropped),
+        "lost": " ".join(summary.lost) or "nothing that is known of",
         "parameters, SHA-256": recording.parameters.hash or "not in the bag",
         "analysed with": f"wam_stack {here}",
     }
     told = {key: value for key, value in said.items() if not key.startswith("/") and key != "mode"}
     return {**facts, **{f"recorded: {key}": value for key, value in told.items()}}
+
+
+def _part_of(read: int, all_of_them: int) -> str:
+    if read == all_of_them:
+        return str(read)
+    return f"{read} of {all_of_them}; in the others is nothing that is analysed, so they are not read"
 
 
 def extent(columns: Mapping[str, Columns]) -> float:

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from wam_analysis.bag_file import Contents, contents
+from wam_ros.bag_losses import PARAMETERS, RECORDING, Losses, losses
 from wam_ros.bag_repair import Repaired, repair
 
 
@@ -27,19 +28,32 @@ def described(found: Contents) -> list[str]:
     """Lines about a bag: files, time, what the recorder says, topics."""
     seconds = (found.last - found.first) / 1e9
     count = sum(topic.messages for topic in found.topics.values())
-    lines = [f"{file}  {file.stat().st_size / 1e6:.1f} MB" for file in found.files]
+    counts = {name: topic.messages for name, topic in found.topics.items()}
+    lost = losses(found.path, found.metadata, found.attachments, counts)
+    lines = [f"INCOMPLETE: {line}" for line in lost.said(found.first)]
+    lines += [f"{file}  {file.stat().st_size / 1e6:.1f} MB" for file in found.files]
     lines.append(f"from {_time(found.first)}, {seconds:.3f} s, {count} messages")
-    if found.recording:
-        dropped = {key.removesuffix(" dropped"): int(value) for key, value in found.recording.items()
-                   if key.endswith(" dropped")}  # fmt: skip
-        lost = ", ".join(f"{value} of {key.replace(' ', ' from ')}" for key, value in dropped.items() if value)
-        lines.append(f"recorded in {found.recording.get('mode', 'unknown')} mode, lost: {lost or 'nothing'}")
+    if RECORDING in found.metadata or PARAMETERS in found.attachments:
+        lines.append(f"recorded in {found.mode} mode, lost: {_lost(found, lost)}")
     lines += [f"attachment {name}, {size} bytes" for name, size in found.attachments.items()]
     width = max(map(len, found.topics), default=0)
     for name, topic in found.topics.items():
         rate = f"{(topic.messages - 1) / seconds:9.1f} Hz" if topic.messages > 1 and seconds else " " * 12
-        lines.append(f"{name:{width}}  {topic.messages:8d} {rate}  {topic.type}")
+        gone = f"  {lost.by_topic[name]} are gone" if name in lost.by_topic else ""
+        lines.append(f"{name:{width}}  {topic.messages:8d} {rate}  {topic.type}{gone}")
     return lines
+
+
+def _lost(found: Contents, lost: Losses) -> str:
+    said = [f"{count} of {where}" for where, count in lost.dropped.items()]
+    said += [f"{lost.gone} of those that were recorded"] if lost.gone else []
+    if lost.uncounted:
+        said.append("unknown, see above")
+    if said:
+        return ", ".join(said)
+    return (
+        "see above" if lost.said(found.first) else f"nothing{', though it had to be repaired' if lost.repaired else ''}"
+    )
 
 
 def _time(stamp: int) -> str:
@@ -49,7 +63,8 @@ def _time(stamp: int) -> str:
 
 
 def told(result: Repaired) -> str:
-    """A line about a file."""
-    if result.was_whole:
+    """What became of a file; where something was lost, a line about that."""
+    if result.losses is None:
         return f"{result.name} is whole, {result.messages} messages"
-    return f"{result.name} was repaired: {result.messages} messages, {result.lost} bytes could not be read"
+    lost = Losses({result.name: result.losses}, {}, {}, False).said(result.first)
+    return "\n".join([f"{result.name} was repaired: {result.messages} messages are in it", *lost])

@@ -2,34 +2,69 @@
 
 import argparse
 
-from wam_analysis.replay import Compared, replay
+from wam_analysis.replay import Compared, Replay, replay
 from wam_analysis.replay_wirings import WIRINGS
 from wam_ros.commands import configuration_of
+
+EXIT_CODES = "Ends with 0 where every topic is the same bit for bit, with 1 where one is not or the bag cannot be used."
+_MOST_GAPS = 5  # named one by one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
+    parser.epilog = EXIT_CODES
     parser.add_argument("bag", help="directory of the bag, or an .mcap file")
     parser.add_argument("node", choices=tuple(WIRINGS))
     parser.add_argument("--config", help="values to use instead of those in the bag: a YAML file, or an installed name")
 
 
 def run(given: argparse.Namespace) -> int:
-    """Replay, print how each topic came out; 0 where all are the same bit for bit."""
+    """Replay, print how each topic came out; 0 where all are the same bit for bit, else 1."""
     done = replay(given.bag, given.node, configuration_of(given) if given.config else None)
-    for topic in done.topics:
-        print(told(topic))
-    if not done.is_same and done.mode == "realtime":
-        print("recorded in realtime: which input was the newest is known only roughly, so small differences are normal")
+    for line in (*(f"INCOMPLETE: {line}" for line in done.lost), *map(told, done.topics), *reasons(done)):
+        print(line)
     return 0 if done.is_same else 1
+
+
+def reasons(done: Replay) -> list[str]:
+    """Why topics are not the same, as far as the recording tells."""
+    if done.is_same:
+        return []
+    lines = []
+    gaps = done.gaps if done.mode != "realtime" or done.lost else ()  # else the driver left periods out itself
+    if gaps:
+        lines.append(
+            f"the bag lacks inputs of {done.node}: where one is missing nothing comes out, in lockstep perhaps for the "
+            "rest of it, and what comes out behind a gap remembers something else"
+        )
+        lines += [
+            f"    {gap.topic}: {gap.missing} missing between {gap.begin / 1e9:.3f} s and {gap.end / 1e9:.3f} s"
+            for gap in sorted(gaps, key=lambda gap: -gap.missing)[:_MOST_GAPS]
+        ]
+        if len(gaps) > _MOST_GAPS:
+            lines.append(f"    and {len(gaps) - _MOST_GAPS} gaps that are not longer")
+    different, compared = (sum(getattr(topic, name) for topic in done.topics) for name in ("different", "compared"))
+    if done.mode == "realtime" and different:
+        lines.append(
+            f"recorded in realtime: {different} of {compared} messages ({100.0 * different / compared:.1f} %) differ: "
+            f"{done.node} took what was newest when it worked, and the bag knows the order of arrival only roughly, "
+            "from when the recorder received it. Only a lockstep recording can be the same bit for bit"
+        )
+    return lines
 
 
 def told(topic: Compared) -> str:
     """A line about a topic, a second one about its first difference."""
     line = f"{topic.topic}: {topic.compared} messages, "
-    line += f"{topic.different} differ, at most by {topic.largest:.6g}" if topic.different else "the same bit for bit"
+    if topic.different:
+        share = 100.0 * topic.different / topic.compared
+        line += f"{topic.different} differ ({share:.1f} %), at most by {topic.largest:.6g} {topic.unit}".rstrip()
+    else:
+        line += "the same bit for bit"
     if topic.only_recorded or topic.only_replayed:
         line += f"; {topic.only_recorded} only recorded, {topic.only_replayed} only replayed"
+    if topic.alone is not None:
+        line += f"\n    first only recorded at {topic.alone / 1e9:.9f} s"
     if topic.first:
         stamp, field, recorded, replayed = topic.first
         line += f"\n    first at {stamp / 1e9:.9f} s: {field} {recorded!r} recorded, {replayed!r} replayed"

@@ -12,6 +12,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the report."""
+    """Print the report; a bag without a demonstration is an error, and nothing is written beside it."""
     print(report(given.bag))
     return 0
