@@ -31,7 +31,7 @@ def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
         ("guard --testbed 0", "wam guard: --testbed is 0; it must be at least 1"),
         ("guard --seed -1", "wam guard: --seed is -1; it must be at least 0"),
         ("evaluate contact --contacts 0", "wam evaluate: --contacts is 0; it must be at least 1"),
-        ("evaluate contact --processes 0", "wam evaluate: --processes is 0; it must be at least 1"),
+        ("evaluate contact --workers 0", "wam evaluate: --workers is 0; it must be at least 1"),
         ("evaluate contact --free nan", "wam evaluate: --free is nan; it must be at least 0"),
         ("evaluate contact --seed 1 -1", "wam evaluate: --seed is -1; it must be at least 0"),
         ("figures --workers 0", "wam figures: --workers is 0; it must be at least 1"),
