@@ -111,7 +111,7 @@ def main() -> None:
         said = contents(Path(folder) / "bag")
         found = {name: topic.messages for name, topic in said.topics.items()}
         early = Counter[str]()  # published before the recorder was there
-        for key, value in said.recording.items():
+        for key, value in said.metadata.get("recording", {}).items():
             if key.endswith(" missed"):
                 early[key.split(" ")[0]] += int(value)
         states = raw(Path(folder) / "bag", ["motor_states"])["/wam/motor_states"]

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from mcap_ros2.reader import read_ros2_messages
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from wam_analysis.bag import read
@@ -89,8 +90,10 @@ def test_other_readers_see_the_same(name: str) -> None:
             if hasattr(message, "header"):
                 sums[connection.topic] += message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
     theirs = dict.fromkeys(bag.topics, 0)
-    for message in read_ros2_messages(BAGS / "sample" / name / f"{name}_0.mcap"):
-        theirs[message.channel.topic] += 1
+    with (BAGS / "sample" / name / f"{name}_0.mcap").open("rb") as file:
+        for _, channel, _, message in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            assert message is not None
+            theirs[channel.topic] += 1
     ours = {topic: len(columns.log_time_ns) for topic, columns in bag.topics.items()}
     assert ours == counts == theirs
     for topic, columns in bag.topics.items():
