@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
+Triple = tuple[float, float, float]
 
 LEAST_FORCE = 1e-6  # N, keeps the lean of no force from dividing by zero
 REACH = 8.0  # of the log of probability, below which a place does not matter
@@ -59,6 +60,8 @@ class Fit(NamedTuple):
     high: float
 
 
+Terms = tuple[Triple, Triple, Triple, Triple, Triple]
+Triangle = tuple[float, ...]  # 15: the rows of the upper triangle of a matrix 5 by 5, one after the other
 # a piece of a link: log of the probability of a contact just there, per metre; place and width, m; link
 Cell = tuple[float, float, float, int]
 
@@ -110,9 +113,7 @@ class ContactFit:
         """
         full = gram.tolist()
         links = [
-            _Link([row[i:5] for i, row in enumerate(one[:5])], self._precision).leaning(
-                one, 0.5 * (start + end), miss, self._friction, radius
-            )
+            _Link(*_leaning(one, self._precision, 0.5 * (start + end), miss, self._friction, radius))
             for one, (start, end), miss, radius in zip(full, self._ends, self._miss, self._radius, strict=True)
         ]
         log_density = self._log_density(links)
@@ -243,34 +244,18 @@ class ContactFit:
 
 
 class _Link:
-    """The weighted least squares problem of one link, by the upper triangle of its Gram matrix, without lean."""
+    """The weighted least squares problem of one link, by the Gram matrix of r, A_1, A_2, B_1, B_2."""
 
-    def __init__(self, gram: Sequence[Sequence[float]], precision: float, log_widening: float = 0.0) -> None:
-        self.rr, ra1, ra2, rb1, rb2 = gram[0]
-        a11, a12, a1b1, a1b2 = gram[1]
-        a22, a2b1, a2b2 = gram[2]
-        b11, b12 = gram[3]
-        (b22,) = gram[4]
+    def __init__(self, triangle: Triangle, precision: float, log_widening: float) -> None:
+        self.rr, *_ = triangle
+        self._slopes = triangle[7:9] + triangle[10:]
         self.precision = precision
         self.constant = 0.5 * (self.rr + log_widening)  # what the log of the probability lacks at every place
-        self._slopes = (a1b1, a1b2, a2b1, a2b2, b11, b12, b22)
-        # coefficients of 1, x, x^2 in G^T W G, 11, 12, 22, and in G^T W r, 1, 2
-        self.terms = (
-            (a11 + precision, 2.0 * a1b1, b11),
-            (a12, a1b2 + a2b1, b12),
-            (a22 + precision, 2.0 * a2b2, b22),
-            (ra1, rb1, 0.0),
-            (ra2, rb2, 0.0),
-        )
+        self.terms = _terms(triangle, precision)
 
-    def force(self, x: float) -> tuple[Pair, float, tuple[float, float, float]]:
-        """Most likely force at place x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
-        (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = self.terms
-        n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
-        told1, told2 = c0 + x * c1, e0 + x * e1
-        determinant = n11 * n22 - n12 * n12
-        f1, f2 = (n22 * told1 - n12 * told2) / determinant, (n11 * told2 - n12 * told1) / determinant
-        return (f1, f2), f1 * told1 + f2 * told2, (n22 / determinant, -n12 / determinant, n11 / determinant)
+    def force(self, x: float) -> tuple[Pair, float, Triple]:
+        """See `_force`."""
+        return _force(self.terms, x)
 
     def log_density(self, x: float) -> float:
         """Log of the probability of the torques for a contact at x, up to a constant of the link; see `ContactFit`."""
@@ -297,30 +282,76 @@ class _Link:
         information = f1 * f1 * b11 + 2.0 * f1 * f2 * b12 + f2 * f2 * b22 - known
         return 1.0 / math.sqrt(information) if information > 0.0 else math.inf
 
-    def leaning(self, gram: list[list[float]], middle: float, miss: float, friction: float, radius: float) -> "_Link":
-        """The same with the lean of the force, as large as at the middle of the link, in the covariance.
 
-        Twist: the line of the force misses the axis by some part of the radius.  Axial: a force along
-        the surface, which is where the force comes from, one radius off the axis.  With z the two in
-        torques of one standard deviation, S + z z^T has the Gram matrix G - u (1 + v)^-1 u^T,
-        u = Z^T W z, v = z^T W z (Woodbury).
-        """
-        (f1, f2), _, _ = self.force(middle)
-        size = math.hypot(f1, f2) + LEAST_FORCE
-        sd, arm, turn = friction * size, miss * size, friction * radius
-        turn1, turn2 = turn * f1, turn * f2
-        twist, axial = gram[5], gram[6]
-        u = [arm * value for value in twist]
-        v = [sd * a + turn1 * b1 + turn2 * b2 for b1, b2, a in zip(gram[3], gram[4], axial, strict=True)]
-        w11, w12 = 1.0 + arm * u[5], arm * v[5]
-        w22 = 1.0 + sd * v[6] + turn1 * v[3] + turn2 * v[4]
-        determinant = w11 * w22 - w12 * w12
-        pairs = [
-            ((w22 * a - w12 * b) / determinant, (w11 * b - w12 * a) / determinant)
-            for a, b in zip(u[:5], v[:5], strict=True)
-        ]
-        wide = [
-            [value - u[i] * p - v[i] * q for value, (p, q) in zip(gram[i][i:5], pairs[i:], strict=True)]
-            for i in range(5)
-        ]
-        return _Link(wide, self.precision, math.log(determinant))
+def _terms(triangle: Triangle, precision: float) -> Terms:
+    """Coefficients of 1, x, x^2 in G^T W G, 11, 12, 22, and in G^T W r, 1, 2."""
+    _, ra1, ra2, rb1, rb2, a11, a12, a1b1, a1b2, a22, a2b1, a2b2, b11, b12, b22 = triangle
+    return (
+        (a11 + precision, 2.0 * a1b1, b11),
+        (a12, a1b2 + a2b1, b12),
+        (a22 + precision, 2.0 * a2b2, b22),
+        (ra1, rb1, 0.0),
+        (ra2, rb2, 0.0),
+    )
+
+
+def _force(terms: Terms, x: float) -> tuple[Pair, float, Triple]:
+    """Most likely force at place x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
+    (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = terms
+    n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
+    told1, told2 = c0 + x * c1, e0 + x * e1
+    determinant = n11 * n22 - n12 * n12
+    f1, f2 = (n22 * told1 - n12 * told2) / determinant, (n11 * told2 - n12 * told1) / determinant
+    return (f1, f2), f1 * told1 + f2 * told2, (n22 / determinant, -n12 / determinant, n11 / determinant)
+
+
+def _leaning(
+    gram: list[list[float]], precision: float, middle: float, miss: float, friction: float, radius: float
+) -> tuple[Triangle, float, float]:
+    """What makes a `_Link` with the lean of the force, as large as at the middle of the link, in the covariance.
+
+    Twist: the line of the force misses the axis by some part of the radius.  Axial: a force along
+    the surface, which is where the force comes from, one radius off the axis.  With z the two in
+    torques of one standard deviation, S + z z^T has the Gram matrix G - u (1 + v)^-1 u^T,
+    u = Z^T W z, v = z^T W z (Woodbury).  Written out: this is most of the work, and loops double it.
+    """
+    (r, g1, g2, g3, g4, t, a) = gram
+    triangle = (*r[:5], *g1[1:5], *g2[2:5], *g3[3:5], g4[4])
+    (f1, f2), _, _ = _force(_terms(triangle, precision), middle)
+    size = math.hypot(f1, f2) + LEAST_FORCE
+    sd, arm, turn = friction * size, miss * size, friction * radius
+    b1, b2 = turn * f1, turn * f2
+    u0, u1, u2, u3, u4 = arm * t[0], arm * t[1], arm * t[2], arm * t[3], arm * t[4]
+    v0, v1, v2 = (
+        sd * a[0] + b1 * g3[0] + b2 * g4[0],
+        sd * a[1] + b1 * g3[1] + b2 * g4[1],
+        sd * a[2] + b1 * g3[2] + b2 * g4[2],
+    )
+    v3, v4 = sd * a[3] + b1 * g3[3] + b2 * g4[3], sd * a[4] + b1 * g3[4] + b2 * g4[4]
+    w11, w12 = 1.0 + arm * (arm * t[5]), arm * (sd * a[5] + b1 * g3[5] + b2 * g4[5])
+    w22 = 1.0 + sd * (sd * a[6] + b1 * g3[6] + b2 * g4[6]) + b1 * v3 + b2 * v4
+    determinant = w11 * w22 - w12 * w12
+    p0, q0 = (w22 * u0 - w12 * v0) / determinant, (w11 * v0 - w12 * u0) / determinant
+    p1, q1 = (w22 * u1 - w12 * v1) / determinant, (w11 * v1 - w12 * u1) / determinant
+    p2, q2 = (w22 * u2 - w12 * v2) / determinant, (w11 * v2 - w12 * u2) / determinant
+    p3, q3 = (w22 * u3 - w12 * v3) / determinant, (w11 * v3 - w12 * u3) / determinant
+    p4, q4 = (w22 * u4 - w12 * v4) / determinant, (w11 * v4 - w12 * u4) / determinant
+    rr, ra1, ra2, rb1, rb2, a11, a12, a1b1, a1b2, a22, a2b1, a2b2, b11, b12, b22 = triangle
+    wide = (
+        rr - u0 * p0 - v0 * q0,
+        ra1 - u0 * p1 - v0 * q1,
+        ra2 - u0 * p2 - v0 * q2,
+        rb1 - u0 * p3 - v0 * q3,
+        rb2 - u0 * p4 - v0 * q4,
+        a11 - u1 * p1 - v1 * q1,
+        a12 - u1 * p2 - v1 * q2,
+        a1b1 - u1 * p3 - v1 * q3,
+        a1b2 - u1 * p4 - v1 * q4,
+        a22 - u2 * p2 - v2 * q2,
+        a2b1 - u2 * p3 - v2 * q3,
+        a2b2 - u2 * p4 - v2 * q4,
+        b11 - u3 * p3 - v3 * q3,
+        b12 - u3 * p4 - v3 * q4,
+        b22 - u4 * p4 - v4 * q4,
+    )
+    return wide, precision, math.log(determinant)
