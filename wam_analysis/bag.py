@@ -53,6 +53,12 @@ class Bag(NamedTuple):
     metadata: dict[str, dict[str, str]]
     counts: Mapping[str, int] = MappingProxyType({})
 
+    @property
+    def first_ns(self) -> int:
+        """Log time of the first message that was read, 0 where none was."""
+        found = (columns.log_time_ns for columns in self.topics.values())
+        return min((int(times.min()) for times in found if len(times)), default=0)
+
 
 class Raw(NamedTuple):
     """Messages of a topic as they were serialized, in the order in which they stand in the files."""

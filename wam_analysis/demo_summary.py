@@ -152,9 +152,6 @@ def summarize(bag: Bag) -> DemoSummary:
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
     received, dropped = _counts(bag.metadata.get("recording", {}))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
-    first = min(
-        (int(columns.log_time_ns.min()) for columns in bag.topics.values() if len(columns.log_time_ns)), default=0
-    )
     return DemoSummary(
         namespace=namespace,
         period=period,
@@ -170,7 +167,7 @@ def summarize(bag: Bag) -> DemoSummary:
         received=received,
         dropped=dropped,
         gone=lost.gone,
-        lost=tuple(lost.said(first)),
+        lost=tuple(lost.said(bag.first_ns)),
         moment=_moment(bag, namespace, traces, presses),
         notes=(*notes, *_faults(bag, namespace)),
     )

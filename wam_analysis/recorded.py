@@ -13,7 +13,7 @@ from wam_control.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Arm, Timing
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects
-from wam_description.parameters import ParameterError, build, fields, flatten
+from wam_description.parameters import ParameterError, build_part, flatten
 from wam_description.world import NO_SPRINGS, Obstacles, Springs
 from wam_ros.bag_losses import PARAMETERS
 
@@ -92,11 +92,11 @@ def recorded_arm(bag: Bag, namespace: str) -> RecordedArm:
     """
     try:
         flat = node_parameters(bag, namespace, "driver")
-        return RecordedArm(_group(Arm, flat, "arm."), _group(Obstacles, flat, "world.obstacles."), "")
+        return RecordedArm(build_part(Arm, flat, "arm."), build_part(Obstacles, flat, "world.obstacles."), "")
     except ParameterError as error:
         reason = str(error).partition("\n")[0]
     configuration = Configuration.load(packaged("wam"))
-    obstacles = _group(Obstacles, configuration.sections["driver"], "world.obstacles.")
+    obstacles = build_part(Obstacles, configuration.sections["driver"], "world.obstacles.")
     note = f"the arm is drawn from configuration 'wam' of the package, not from the bag: {reason}"
     return RecordedArm(configuration.shared.arm, obstacles, note)
 
@@ -145,14 +145,7 @@ def _part(cls: type[T], flat: Mapping[str, Any], prefix: str, notes: list[str]) 
     if not flat:
         return None
     try:
-        return _group(cls, flat, prefix)
+        return build_part(cls, flat, prefix)
     except ParameterError as error:
         notes.append(str(error).partition("\n")[0])
         return None
-
-
-def _group(cls: type[T], flat: Mapping[str, Any], prefix: str) -> T:
-    """The class from its part of a node's parameters; those of ROS itself, as use_sim_time, stand beside them."""
-    known = {field.name for field in fields(cls)}
-    names = {key.removeprefix(prefix): value for key, value in flat.items() if key.startswith(prefix)}
-    return build(cls, names if prefix else {key: value for key, value in names.items() if key in known})

@@ -22,7 +22,7 @@ from wam_analysis.direct import Row
 from wam_analysis.replay_wirings import WIRINGS, WITH_STAMP, Step
 from wam_description.arm import Shared, seconds
 from wam_description.configuration import PARAMETERS, Configuration
-from wam_description.parameters import ParameterError, build, fields, flatten
+from wam_description.parameters import ParameterError, build_part, flatten
 from wam_description.signals import State
 from wam_ros.bag_losses import PARAMETERS as ATTACHED
 from wam_ros.bag_losses import losses
@@ -125,10 +125,7 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
     mode = mode_of(bag.metadata, bag.attachments.get(ATTACHED))
     mode = shared.timing.mode if mode == "unknown" else mode
     gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
-    first = min(
-        (int(columns.log_time_ns.min()) for columns in bag.topics.values() if len(columns.log_time_ns)), default=0
-    )
-    lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).said(first)
+    lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).said(bag.first_ns)
     return Replay(node, mode, tuple(compared), gaps, tuple(lost))
 
 
@@ -178,14 +175,9 @@ def _parameters(bag: Bag, namespace: str, node: str, configuration: Configuratio
             f"{bag.path} has no parameters of {namespace}/{node} ({error}); give a configuration with --config"
         ) from None
     try:
-        return _built(Shared, flat), _built(kind, flat)
+        return build_part(Shared, flat), build_part(kind, flat)
     except ParameterError as error:
         raise ParameterError(f"{bag.path}, parameters of {node}: {error}; give a configuration with --config") from None
-
-
-def _built(kind: type, flat: Mapping[str, Any]) -> Any:
-    known = {field.name for field in fields(kind)}
-    return build(kind, {name: value for name, value in flat.items() if name in known})
 
 
 def _run(

@@ -125,6 +125,26 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
     return _assemble(cls, checked, "")
 
 
+def build_part(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:
+    """Make a parameter object from its part of flat names and values, among which others stand.
+
+    Parameters
+    ----------
+    cls : parameter class.
+    flat : values by name, as those of a node.
+    prefix : what its names begin with there, as 'world.'; without one, names that it does not know belong to others.
+
+    Raises
+    ------
+    ParameterError
+        as `build`.
+    """
+    if prefix:
+        return build(cls, {key.removeprefix(prefix): value for key, value in flat.items() if key.startswith(prefix)})
+    known = {field.name for field in fields(cls)}
+    return build(cls, {key: value for key, value in flat.items() if key in known})
+
+
 def _assemble(cls: type[T], flat: Mapping[str, Value], prefix: str) -> T:
     hints = get_type_hints(cls)
     arguments: dict[str, Any] = {}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wam_analysis.bag import Bag, BagError, JointColumns, Messages, WrenchColumns, read
 from wam_analysis.bag_cut import CUT
 from wam_description.arm import Shared
-from wam_description.parameters import build, fields, flatten
+from wam_description.parameters import build_part, flatten
 
 T = TypeVar("T")
 Numbers = NDArray[np.float64]
@@ -67,22 +67,17 @@ class Recording(NamedTuple):
     @property
     def shared(self) -> Shared:
         """What every node read."""
-        known = {field.name for field in fields(Shared)}
-        any_node = next(iter(self.parameters.values()))
-        return build(Shared, {name: value for name, value in any_node.items() if name in known})
+        return build_part(Shared, next(iter(self.parameters.values())))
 
     def node(self, name: str, cls: type[T]) -> T:
         """The parameters of one node, at the start."""
         if name not in self.parameters:
             raise BagError(f"{self.bag.path} has no parameters of node '{name}'; it has: {', '.join(self.parameters)}")
-        own = {field.name for field in fields(cls)}
-        return build(cls, {key: value for key, value in self.parameters[name].items() if key in own})
+        return build_part(cls, self.parameters[name])
 
     def part(self, name: str, prefix: str, cls: type[T]) -> T:
         """A part of a node's parameters, as ``part('driver', 'world.springs', Springs)``, whatever else it has."""
-        begin = f"{prefix}."
-        flat = self.parameters[name]
-        return build(cls, {key.removeprefix(begin): value for key, value in flat.items() if key.startswith(begin)})
+        return build_part(cls, self.parameters[name], f"{prefix}.")
 
     def joints(self, topic: str) -> Joints:
         """A JointState topic."""

@@ -1,11 +1,10 @@
 """`wam model`: the arm's model as a file for other programs."""
 
 import argparse
-from typing import Any
 
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
-from wam_description.parameters import build
+from wam_description.parameters import build_part
 from wam_description.urdf import urdf
 from wam_description.world import World
 from wam_ros.commands import configuration_of, take_configuration
@@ -25,10 +24,7 @@ def run(given: argparse.Namespace) -> int:
         print(urdf(shared.arm))
         return 0
 
-    def part(prefix: str) -> dict[str, Any]:
-        section = configuration.sections["driver"]
-        return {key.removeprefix(prefix): value for key, value in section.items() if key.startswith(prefix)}
-
-    world, effects = build(World, part("world.")), build(Effects, part("effects."))
+    section = configuration.sections["driver"]
+    world, effects = build_part(World, section, "world."), build_part(Effects, section, "effects.")
     print(mjcf(shared.arm, shared.timing.substep, world, effects))
     return 0
