@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from wam_theory.linear_loop import damping_ratio, routh_gain, sampled_margin
 from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess
-from wam_theory.stiction import stiction_cycle_force, stiction_cycle_period
+from wam_theory.stiction import deadband_against_stiction, stiction_cycle_force, stiction_cycle_period
 
 SOFTER = (1.0, 0.6, 0.35, 0.2, 0.1, 0.03)  # parts of the worst contact stiffness that are looked at as well
 STEPS = (0.3, 0.8, 1.0, 1.5, 3.0, 10.0, 50.0)  # of F_des, in saturations, that have to come to rest
@@ -89,7 +89,8 @@ def stiction_cycle(node: FrictionNode, gain: float) -> Cycle:
         return Cycle(0.0, 0.0, 0.0)
     zeta = damping_ratio(node.inertia, node.damping, *stiffness)
     size = float(stiction_cycle_force(*stiffness, *friction, zeta))
-    return Cycle(size, float(stiction_cycle_period(gain, *stiffness, *friction, zeta)), size / 2.0)
+    period = float(stiction_cycle_period(gain, *stiffness, *friction, zeta))
+    return Cycle(size, period, float(deadband_against_stiction(size)))
 
 
 def stable_error(node: FrictionNode, loop: ForceLoop) -> float:

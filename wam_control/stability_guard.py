@@ -22,6 +22,7 @@ from wam_control.friction_verdict import SOFTER, Cycle, Domain, stiction_cycle
 from wam_control.sampled_loop import Axes, Feedback, SampledLoop, Servo
 from wam_description.arm import Arm, Timing
 from wam_description.parameters import lengths, parameter
+from wam_theory.linear_loop import series_stiffness
 from wam_theory.stick_slip import FrictionNode
 
 Array = NDArray[np.float64]
@@ -193,7 +194,7 @@ class StabilityGuard:
         ktr, kc = node.transmission_stiffness, node.contact_stiffness
         where = f"{name} at {touch.place:g} m of {touch.cover}"
         domain = Domain.I if scale * self.parameters.share >= 1.0 else Domain.BEYOND
-        found = Judgement(domain, scale, math.inf, ktr * kc / (ktr + kc), cycles[name], where, "")
+        found = Judgement(domain, scale, math.inf, float(series_stiffness(ktr, kc)), cycles[name], where, "")
         return found if domain is Domain.I else self._beyond(task, touch, found)
 
     def node(self, task: Task, touch: Touch, axis: int) -> FrictionNode:

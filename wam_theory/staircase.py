@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_theory.friction_model import FrictionNode, require
+from wam_theory.linear_loop import damping_ratio
+from wam_theory.stiction import slip_overshoot
 
 
 class Staircase(NamedTuple):
@@ -44,8 +46,8 @@ def inertialess_staircase(node: FrictionNode, gain: float, force: float, jumps: 
             "the response is (5.2) after the delay (5.3)"
         )
     ks = node.transmission_stiffness + node.contact_stiffness
-    zeta = node.damping / (2.0 * math.sqrt(node.inertia * ks))
-    omega = 1.0 + (math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta * zeta)) if zeta < 1.0 else 0.0)
+    zeta = damping_ratio(node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness)
+    omega = float(slip_overshoot(zeta))
     t, contact, spring = 0.0, 0.0, 0.0
     rows = []
     for _ in range(jumps):
