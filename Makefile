@@ -1,5 +1,5 @@
 # Needs python3 (3.11 or newer) with venv, and make; everything else goes into .venv.
-# Nothing outside this directory is written, and nothing here needs ROS to be installed.
+# Apart from temporary files, nothing is written outside this directory. ROS need not be installed.
 
 PYTHON ?= python3
 ARGS ?=
@@ -7,15 +7,15 @@ ARGS ?=
 VENV := .venv
 PY := $(VENV)/bin/python3
 PIP := $(PY) -m pip --disable-pip-version-check
-# scripts in .venv name its path: a tree that was moved or copied gets a new one
+# scripts in .venv contain its path, so a tree that was moved or copied gets a new one
 STAMPS := $(VENV)/stamps-$(shell pwd | cksum | cut -d ' ' -f 1)
 
-# The installed copy is that of these very files: a change in any of them reinstalls it.
+# A change in any of these files reinstalls the package.
 SOURCE := setup.py setup.cfg pyproject.toml package.xml config launch resource scripts wam_*
 SOURCE_ID := $(shell find $(SOURCE) -type f ! -name '*.pyc' | LC_ALL=C sort | xargs sha256sum | sha256sum | cut -c 1-16)
 INSTALLED := $(STAMPS)/installed-$(SOURCE_ID)
 
-# A sourced ROS or another environment must not leak into .venv: its libraries would be mixed with the wheels'.
+# A sourced ROS or another environment must not reach .venv: its libraries would mix with those of the wheels.
 unexport PYTHONPATH PYTHONHOME RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 ifdef ROS_DISTRO
 unexport LD_LIBRARY_PATH ROS_DISTRO
@@ -26,37 +26,45 @@ export ROS_LOG_DIR ?= $(CURDIR)/.cache/ros
 export MPLCONFIGDIR ?= $(CURDIR)/.cache/matplotlib
 
 .DEFAULT_GOAL := help
-.PHONY: help demo install test bench docs constraints clean
+.PHONY: help demo install check test bench docs constraints clean
 .DELETE_ON_ERROR:
 # pip must not run twice at once in one .venv
 .NOTPARALLEL:
 
-# What a build leaves here; build/lib would bring back modules that have been deleted
+# Remove what a build leaves here: build/lib would bring back deleted modules
 TIDY := rm -rf build/lib build/bdist.* *.egg-info; rmdir build 2>/dev/null || true
 
-help:  ## this list
+help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-12s %s\n", $$1, $$2}' Makefile
 
-demo: $(INSTALLED)  ## start every node, press on a foam box, record, judge; ARGS="--lockstep" for options
+demo: $(INSTALLED)  ## run the demonstration: start all nodes, press on a foam box, record, report; ARGS="--lockstep"
 	@$(VENV)/bin/wam demo $(ARGS)
 
-install: $(INSTALLED)  ## .venv with the stack and ROS from wheels; then .venv/bin/wam --help
+install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .venv/bin/wam --help
 
-test: export ROS_PYTHON_CHECK_FIELDS = 1
+check: PYTEST_ARGS = -m "not ros and not slow"
+check: $(STAMPS)/test  ## lint, types and fast tests without ROS nodes, in under a minute; ARGS="-k plant" goes to pytest
+	@$(RUN_CHECKS)
+
 test: $(STAMPS)/test $(INSTALLED)  ## lint, types and all tests; ARGS="-k plant -x" goes to pytest
-	@failed=; \
-	echo '== ruff'; $(PY) -P -m ruff check . || failed="$$failed ruff"; \
-	echo '== mypy'; $(PY) -P -m mypy || failed="$$failed mypy"; \
-	echo '== pytest'; $(PY) -P -m pytest $(ARGS) || failed="$$failed pytest"; \
-	if [ -n "$$failed" ]; then echo "make test: failed:$$failed" >&2; exit 1; fi
+	@$(RUN_CHECKS)
 
-bench: $(STAMPS)/test $(INSTALLED)  ## benchmarks, as ratios of one run
+check test: export ROS_PYTHON_CHECK_FIELDS = 1
+define RUN_CHECKS
+failed=; \
+echo '== ruff'; { $(PY) -P -m ruff check . && $(PY) -P -m ruff format --check -q .; } || failed="$$failed ruff"; \
+echo '== mypy'; $(PY) -P -m mypy || failed="$$failed mypy"; \
+echo '== pytest'; $(PY) -P -m pytest -n 2 --dist loadgroup $(PYTEST_ARGS) $(ARGS) || failed="$$failed pytest"; \
+if [ -n "$$failed" ]; then echo "make $@: failed:$$failed" >&2; exit 1; fi
+endef
+
+bench: $(STAMPS)/test $(INSTALLED)  ## run the benchmarks; they print ratios of one run
 	@for script in benchmarks/*.py; do echo "== $$script"; $(PY) "$$script" $(ARGS) || exit 1; done
 
-docs: $(STAMPS)/test $(INSTALLED)  ## write the generated pages of docs/ again
+docs: $(STAMPS)/test $(INSTALLED)  ## regenerate the generated pages of docs/
 	@$(PY) docs/generate.py $(ARGS)
 
-constraints: $(STAMPS)/venv  ## pin the newest versions that go together; then make clean test
+constraints: $(STAMPS)/venv  ## pin the newest compatible versions in constraints.txt; then make clean test
 	@mkdir -p .cache
 	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[ros,test,view]'
 	@$(TIDY)
@@ -67,7 +75,7 @@ constraints: $(STAMPS)/venv  ## pin the newest versions that go together; then m
 	pins.pop("wam-stack"); \
 	file.write_text("\n".join(head + sorted(f"{n}=={v}" for n, v in pins.items())) + "\n")'
 
-clean:  ## remove .venv, caches and build leftovers; recordings stay
+clean:  ## remove .venv, caches and build files; recordings stay
 	@rm -rf $(VENV) .cache build *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -87,7 +95,7 @@ $(STAMPS)/ros: $(STAMPS)/venv constraints.txt setup.py
 	@touch $@
 
 $(STAMPS)/test: $(STAMPS)/ros
-	@echo "Installing what the tests need"
+	@echo "Installing the tools of the tests"
 	@$(TIDY)
 	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[ros,test]'
 	@$(TIDY)

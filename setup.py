@@ -1,34 +1,32 @@
 """One tree, two builds: `pip install .` where there is no ROS, `colcon build` where there is."""
 
+import shutil
 import sys
 from glob import glob
 from pathlib import Path
+from runpy import run_path
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
-NODES = {
-    "driver": "wam_driver.driver_node",
-    "transform": "wam_control.transform_node",
-    "velocity_loop": "wam_control.velocity_loop_node",
-    "gravity": "wam_control.gravity_node",
-    "force_loop": "wam_control.force_loop_node",
-    "contact_estimator": "wam_control.contact_estimator_node",
-    "scenario": "wam_control.scenario_node",
-    "recorder": "wam_ros.recorder_node",
-}
+HERE = Path(__file__).resolve().parent
+NODES = run_path(str(HERE / "wam_description" / "nodes.py"))["NODES"]
+PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 
 CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets")
 
-package = ElementTree.parse(Path(__file__).resolve().parent / "package.xml").getroot()
+package = ElementTree.parse(HERE / "package.xml").getroot()
 name = package.findtext("name")
 
 # colcon and bloom run `setup.py install` or `setup.py develop`: each node becomes a console script, which
 # setup.cfg sends to lib/wam_stack.  pip builds a wheel, whose console scripts all land on PATH: there only
-# `wam` is one, and the launchers in scripts/ stand in lib/wam_stack instead.
+# `wam` is one, and scripts/node is installed in lib/wam_stack under the name of each node.
 ros_build = not {"install", "develop"}.isdisjoint(sys.argv)
-console_scripts = [f"{node} = {module}:main" for node, module in NODES.items()] if ros_build else []
-launchers = [] if ros_build else [f"scripts/{node}" for node in NODES]
+console_scripts = [f"{program} = wam_ros.program:main" for program in PROGRAMS] if ros_build else []
+launchers = [] if ros_build else [f"build/launchers/{program}" for program in PROGRAMS]
+for launcher in launchers:
+    Path(launcher).parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy("scripts/node", launcher)
 
 setup(
     name=name,
@@ -38,10 +36,12 @@ setup(
     maintainer=package.findtext("maintainer"),
     maintainer_email=package.find("maintainer").get("email"),
     packages=find_packages(include=["wam_*"]),
+    package_data={"": ["py.typed"]},
     python_requires=">=3.11",
     install_requires=[
         "lz4",
         "matplotlib",
+        "mcap",
         "mujoco",
         "numpy",
         "pin",
@@ -49,17 +49,17 @@ setup(
         "zstandard",
     ],
     extras_require={
-        # maps and batteries on many machines: `wam map --dask ADDRESS`
+        # maps and benchmarks on many machines: `wam map --dask ADDRESS`
         "dask": ["distributed"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "colcon-common-extensions",
-            "mcap",
             "mcap-ros2-support",
             "distributed",
             "mypy",
             "pytest<9",
+            "pytest-xdist",
             "rosbags",
             "ruff",
             "scipy",
@@ -76,6 +76,6 @@ setup(
         (f"share/{name}/launch", sorted(glob("launch/*.launch.py"))),
         (f"lib/{name}", launchers),
     ],
-    entry_points={"console_scripts": ["wam = wam_ros.cli:main", *console_scripts]},
+    entry_points={"console_scripts": ["wam = wam_cli.main:program", *console_scripts]},
     zip_safe=False,
 )

@@ -1,7 +1,7 @@
 """The reader of bags against rosbags and mcap-ros2-support, on the same bag, each message decoded.
 
-Theirs make an object of every message and nothing of it; ours makes columns, and objects of what has none.
-Measured is processor time, which other programs disturb less.
+The other readers make an object of every message; ours makes columns, and objects of the types that have none.
+Processor time is measured, because other programs disturb it less.
 """
 
 import tempfile
@@ -16,7 +16,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from speed import lockstep, scenario
 
-from wam_analysis.bag import Messages, read
+from wam_bag.bag import Messages, read
 from wam_description.configuration import Configuration, packaged
 
 SECONDS = 20.0  # of the arm in the bag

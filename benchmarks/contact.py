@@ -1,4 +1,4 @@
-"""The contact estimator in contact against a fixed workload of pinocchio, numpy and Python, in the same run."""
+"""Computing time of the contact estimator in contact, relative to a fixed workload in the same run."""
 
 import time
 from collections.abc import Callable
@@ -18,12 +18,12 @@ from wam_description.transmission_map import TransmissionMap
 
 POSE = (0.1, -1.05, 0.3, 0.5)  # rad
 SPEED = (1.0, -1.2, 2.0, 1.5)  # rad/s of the motors
-PLACE, FORCE = 0.28, (0.0, 8.0, 6.0)  # m, N, of a push on the outer link, in the base frame
+POSITION, FORCE = 0.28, (0.0, 8.0, 6.0)  # m, N, of a push on the outer link, in the base frame
 PERIOD = 1e-3
 
 
 def reference(body: RigidBody) -> Callable[[], object]:
-    """A fixed piece of work of the same kind: rigid-body algorithms, small matrices, scalar Python."""
+    """A fixed workload of the same kind: rigid-body algorithms, small matrices, scalar Python."""
     matrix = np.diag((1.0, 2.0, 3.0, 4.0))
 
     def work() -> object:
@@ -35,12 +35,12 @@ def reference(body: RigidBody) -> Callable[[], object]:
     return work
 
 
-def felt(arm: Arm, parameters: ContactEstimatorParameters) -> tuple[MomentumObserver, State]:
-    """An observer in motion that feels a push, and the sample that it sees."""
+def pushed_observer(arm: Arm, parameters: ContactEstimatorParameters) -> tuple[MomentumObserver, State]:
+    """An observer of the moving arm under a push, and its input."""
     transmission = TransmissionMap.of(arm)
     observer = MomentumObserver(arm, parameters.observer, use_joint_sensors=False)
     body = RigidBody(arm, parameters.observer.mass_scale)
-    levers = body.point_jacobian(POSE, arm.covers.names[-1], (PLACE, 0.0, 0.0))
+    levers = body.point_jacobian(POSE, arm.covers.names[-1], (POSITION, 0.0, 0.0))
     torque = body.gravity_torque(POSE) - levers.T @ np.array(FORCE)
     state = State(transmission.motor_positions(POSE), list(SPEED), transmission.motor_torques(torque.tolist()))
     for _ in range(200):
@@ -49,7 +49,7 @@ def felt(arm: Arm, parameters: ContactEstimatorParameters) -> tuple[MomentumObse
 
 
 def best(work: Callable[[], object], count: int) -> float:
-    """Seconds of one call, the best of some tries: what others take of the machine is not counted."""
+    """Seconds of one call, the shortest of some tries, to exclude other load."""
     tries = []
     for _ in range(5):
         begin = time.perf_counter()
@@ -65,12 +65,12 @@ def main() -> None:
     configuration = Configuration.load(packaged("wam")).with_values({"contact_estimator:use_joint_sensors": False})
     arm, timing = configuration.shared.arm, configuration.shared.timing
     parameters = configuration.node("contact_estimator", ContactEstimatorParameters)
-    observer, state = felt(arm, parameters)
+    observer, state = pushed_observer(arm, parameters)
     estimator = ContactEstimator(arm, timing, parameters)
     for _ in range(200):
         estimator.observe(state, None, PERIOD)
     if not estimator.estimate().in_contact:
-        raise SystemExit("the push is not felt: the benchmark would measure free motion")
+        raise SystemExit("the push is not detected: the benchmark would measure free motion")
     torques, covariance = observer.torques()
     precision = np.linalg.inv(covariance)
     inference = ContactInference(arm, RigidBody(arm), parameters.inference)
@@ -93,7 +93,7 @@ def main() -> None:
         rows.append([name, f"{microseconds:.1f}", f"{ratio:.2f}"])
         measured[name] = {"microseconds": microseconds, "reference_ratio": ratio}
     print(machine())
-    print(table(["contact estimator", "us (middle half)", "times the reference"], rows))
+    print(table(["contact estimator", "us (middle half)", "ratio to the reference"], rows))
     save("contact", given, measured)
 
 

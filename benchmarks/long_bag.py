@@ -1,7 +1,7 @@
 """`wam analyse` on a recording of ten minutes: seconds of the recording in a second of the wall.
 
-A short lockstep recording is written again and again through the recorder's own writer, each time
-with stamps one length later, so that ten minutes cost no ten minutes.
+A short lockstep recording is written many times through the recorder's own writer, each time with stamps one
+length later, which is faster than recording ten minutes.
 """
 
 import struct
@@ -13,14 +13,14 @@ import yaml
 from comparing import arguments, machine, save, spread, table
 from speed import lockstep, scenario
 
-from wam_analysis.bag import raw, read
 from wam_analysis.findings.analysis import TOPICS_READ, analyse_bag
 from wam_analysis.findings.page import page
+from wam_bag.bag import raw, read
+from wam_bag.bag_writer import BagWriter
+from wam_bag.message_layout import stamp_reader
 from wam_description.configuration import Configuration, packaged
-from wam_ros.bag import BagWriter
-from wam_ros.message_layout import stamp_reader
+from wam_description.topics import TOPICS
 from wam_ros.qos import qos
-from wam_ros.topics import TOPICS
 
 MINUTES, QUICK_MINUTES = 10.0, 0.2
 ROWS = ("reading", "analysis", "page")
@@ -47,7 +47,7 @@ def repeated(source: Path, target: Path, seconds: float) -> None:
                 data = topics[name].data[i]
                 stamp = stamped[name](data)
                 if stamp is None and turn:
-                    continue  # latched: said once
+                    continue  # latched: published once
                 if stamp is not None and turn and topics[name].type != "visualization_msgs/msg/MarkerArray":
                     later = divmod(stamp + turn * length, 1_000_000_000)
                     data = data[:4] + struct.pack("<iI", *later) + data[12:]

@@ -1,4 +1,4 @@
-"""A substep of the plant against a bare mj_step of the same model in the same state."""
+"""Time of a substep of the plant relative to a bare mj_step of the same model in the same state."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -24,15 +24,15 @@ PUSH = (np.array([0.0, 12.0, 0.0]), np.array([0.0, 0.0, 12.0 * 0.28]))  # N, N m
 
 
 class Case:
-    """The plant, and the bare model that it consists of, in one state.
+    """The plant and its bare MuJoCo model in one state.
 
     Parameters
     ----------
     q : pose at the start, rad.
-    extra : torque of each motor on top of what carries the links, N m.
+    extra : torque of each motor in addition to gravity compensation, N m.
     pushed : whether a disturbance pushes on the last link.
     name : of the configuration.
-    values : changes of it.
+    values : overrides of it.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ def every_effect(motors: int) -> dict[str, Any]:
     """Everything that the plant can do at once, beside what is on anyway."""
     return {
         "driver:effects.tension_friction": (1e-5,) * motors,
-        "driver:effects.rubbing_friction": (0.1,) * motors,
+        "driver:effects.added_coulomb_friction": (0.1,) * motors,
         "driver:effects.ripples.amplitude": (0.01,) * motors,
     }
 

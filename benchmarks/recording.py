@@ -1,4 +1,4 @@
-"""Is every published message in the bag, in a minute of the arm in real time; and what a message costs to write.
+"""Whether every published message is in the bag, in a minute of the arm in real time; and the cost of writing one.
 
 The whole stack and the recorder share one process and one executor, and every call of publish is counted.
 With --quick two seconds in lockstep.
@@ -17,13 +17,13 @@ from comparing import arguments, machine, ratios, save, spread, table
 from mcap.writer import Writer
 from rclpy.publisher import Publisher
 
-from wam_analysis.bag import raw
-from wam_analysis.bag_file import contents
+from wam_bag.bag import raw
+from wam_bag.contents import contents
+from wam_bag.mcap_writer import McapWriter
 from wam_description.configuration import Configuration, packaged
+from wam_description.topics import TOPICS
 from wam_ros.bring_up import Composition
-from wam_ros.mcap_writer import McapWriter
 from wam_ros.run import NAMESPACE
-from wam_ros.topics import TOPICS
 
 SECONDS, QUICK_SECONDS = 60.0, 2.0
 MESSAGES = 20_000  # written in one measurement
@@ -95,7 +95,7 @@ def main() -> None:
         step = {
             "name": "speak",
             "seconds": QUICK_SECONDS if given.quick else SECONDS,
-        }  # braked: a slow machine is no fault
+        }  # braked, so that a slow computer causes no fault
         script.write_text(yaml.safe_dump({"steps": [step]}), encoding="utf-8")
         base = Configuration.load(packaged("wam"))
         configuration = base.with_values(

@@ -1,7 +1,7 @@
-"""From a state out to its current in, driver to velocity_loop and back, against a bare relay of two hops.
+"""Latency from motor state to motor current, driver to velocity_loop and back, relative to a bare relay of two hops.
 
-Both send a JointState of four motors every millisecond, on the same executor, and measure the
-time until the answer with the same stamp is there.
+Both send a JointState of four motors every millisecond, on the same executor, and measure the time until the
+response with the same stamp arrives.
 """
 
 import subprocess
@@ -20,22 +20,23 @@ from sensor_msgs.msg import JointState
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import State
+from wam_description.topics import BY_NAME
 from wam_ros.bring_up import Composition, Processes
-from wam_ros.messages import joint_state, stamp_of
+from wam_ros.header import stamp_of
+from wam_ros.messages import joint_state
 from wam_ros.qos import qos
 from wam_ros.run import Connection, spin
-from wam_ros.topics import BY_NAME
 
 PERIOD = 0.001  # s
 NAMES = ["motor1", "motor2", "motor3", "motor4"]
 NUMBERS = [0.1, 0.2, 0.3, 0.4]
 QOS = qos(BY_NAME["motor_states"])
-SETTLE = 1.0  # s at the start that do not count
+SETTLE = 1.0  # s at the start that are ignored
 WAYS = ("one process", "two processes")
 
 
 class Sender(Node):
-    """Sends a state every period and measures how long its answer takes."""
+    """Sends a state every period and measures the latency of the response."""
 
     def __init__(self, context: Context) -> None:
         super().__init__("sender", context=context)

@@ -1,6 +1,6 @@
-"""A second of the arm against a second of the wall: lockstep over topics, and the loop without ROS.
+"""Real-time factor of the simulation: lockstep over topics, and the loop without ROS.
 
-The scenario is the demonstration's beginning, shortened: enable, move, a push on the outer link, brake.
+The scenario is a short form of the demonstration: enable, move, a push on the outer link, brake.
 """
 
 import tempfile
@@ -13,18 +13,18 @@ from comparing import arguments, machine, ratios, save, spread, table
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from wam_analysis.direct import DirectRun
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_ros.bring_up import Composition
+from wam_sim.simulation import Simulation
 
 STEADY = ClockType.STEADY_TIME
-LOOK = 0.02  # s between two looks at the arm's time
+POLL = 0.02  # s between two readings of the arm's time
 ROWS = ("direct run", "lockstep", "lockstep, recorded")
 
 
 def scenario(seconds: float) -> dict[str, Any]:
-    """Steps that take `seconds` in all."""
+    """Steps of `seconds` in total."""
     push = {"cover": "outer_link", "place": 0.28, "newtons": [0.0, 12.0, 0.0], "begin": 0.1, "end": 0.3 * seconds}
     return {
         "steps": [
@@ -37,8 +37,8 @@ def scenario(seconds: float) -> dict[str, Any]:
 
 
 def direct(configuration: Configuration, script: Path) -> float:
-    """Seconds of the arm per second of the wall, without ROS."""
-    run = DirectRun(configuration, load(script, configuration.shared.arm))
+    """Simulated seconds per second of wall-clock time, without ROS."""
+    run = Simulation(configuration, load(script, configuration.shared.arm))
     begin = time.perf_counter()
     if failure := run.play():
         raise SystemExit(failure)
@@ -46,7 +46,7 @@ def direct(configuration: Configuration, script: Path) -> float:
 
 
 def lockstep(configuration: Configuration, *recorder: str) -> float:
-    """The same over topics in one process; starting and matching the nodes is not counted."""
+    """The same over topics in one process, without the start of the nodes."""
     nodes = {"nodes": [*configuration.shared.nodes, "scenario", *recorder]}
     seen: list[tuple[float, int]] = []
     with Composition(configuration.with_values(nodes)) as composition:
@@ -54,7 +54,7 @@ def lockstep(configuration: Configuration, *recorder: str) -> float:
         player: Any = composition.nodes["scenario"]
         watch = Node("stopwatch", context=composition.context)
         watch.create_timer(
-            LOOK, lambda: seen.append((time.perf_counter(), driver.driver.stamp)), clock=Clock(clock_type=STEADY)
+            POLL, lambda: seen.append((time.perf_counter(), driver.driver.stamp)), clock=Clock(clock_type=STEADY)
         )
         composition.executor.add_node(watch)
         composition.spin(lambda: player.done)

@@ -1,4 +1,4 @@
-"""The stability map of figure 5.8 against scipy's solve_ivp with events, and against our own scalar bisection."""
+"""Time of the stability map of figure 5.8 relative to scipy's solve_ivp with events, and to the scalar bisection."""
 
 import time
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from comparing.solve_ivp import BEST, Node
 from comparing.solve_ivp import largest_stable_step as by_solve_ivp
 
 from wam_theory.stability_map import largest_stable_steps
-from wam_theory.stick_slip import ForceLoop, FrictionNode, largest_stable_step
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, largest_stable_step
 
 GAMMA, ZETA = np.meshgrid(np.linspace(1.02, 3.0, 100), np.geomspace(0.05, 1.0, 100))
 CLOSE = 5e-3
@@ -19,11 +19,11 @@ CLOSE = 5e-3
 def scalar(node: Node) -> float:
     """Our exact integrator, one response after the other."""
     friction = FrictionNode(1.0, node.b, node.ktr, node.kc, 1.0, node.static)
-    return largest_stable_step(friction, ForceLoop(node.gain), rtol=1e-4)
+    return largest_stable_step(friction, IntegralLoop(node.gain), rtol=1e-4)
 
 
 def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
-    """How long it took, and what came out."""
+    """Duration and result."""
     begin = time.perf_counter()
     result = work()
     return time.perf_counter() - begin, result
@@ -57,7 +57,7 @@ def main() -> None:
     rows, measured = [], dict[str, Any]()
     for title, fast, slow in (
         ("map, against solve_ivp", "map", "solve_ivp"),
-        ("its points alone, against solve_ivp", "sample", "solve_ivp"),
+        ("the same points only, against solve_ivp", "sample", "solve_ivp"),
         ("map, against the scalar bisection", "map", "scalar"),
     ):
         ratio = ratios(times[slow], times[fast])

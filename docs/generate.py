@@ -1,12 +1,11 @@
-"""Writes what the documentation takes from the code: tables, listings, the demonstration's picture.
+"""Write the generated parts of the documentation: tables, listings, pictures.
 
-A page is written by hand, but for its blocks between `<!-- generated: NAME -->` and
-`<!-- end -->`; this program fills those.  `make docs` runs it; a test fails where a block is stale.
+Pages are written by hand, apart from the blocks between `<!-- generated: NAME -->` and `<!-- end -->`, which this
+program fills.  `make docs` runs it; a test fails if a block is stale.
 """
 
 import argparse
 import ast
-import importlib
 import math
 import re
 import shutil
@@ -18,21 +17,24 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from wam_analysis import contact_picture
-from wam_analysis.batch import processes
-from wam_analysis.figures.catalogue import FIGURES, file_of, numbers
-from wam_analysis.figures.catalogue import table as figures_table
-from wam_analysis.plant_figure import figure
-from wam_analysis.scorecard import report as scorecard
+from wam_analysis.table import markdown
 from wam_control.dither import Dither
 from wam_control.force_loop import ForceLoop, ForceLoopParameters
 from wam_control.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
+from wam_description.interface import Interface, declared
+from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, fields
-from wam_ros.bring_up import MODULES
-from wam_ros.topics import TOPICS
+from wam_description.topics import TOPICS
+from wam_experiments.contact_benchmark import resting_push
+from wam_experiments.figures.catalogue import FIGURES, file_of, numbers
+from wam_experiments.figures.catalogue import table as figures_table
+from wam_experiments.plant.figure import figure
+from wam_experiments.scorecard import report as scorecard
+from wam_sim.batch import processes
+from wam_sim.pieces import default_folder
 from wam_theory.equations import EQUATIONS, Equation
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -42,19 +44,8 @@ CITED = re.compile(r"\((\d\.\d+)(?:\.[ab])?\)")
 BLOCK = re.compile(r"(<!-- generated: (?P<name>[^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
-def cell(text: str) -> str:
-    """A text that stands in a table."""
-    return text.replace("|", "\\|").replace("\n", " ")
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table of Markdown."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(cell(text) for text in line) + " |" for line in lines) + "\n"
-
-
 def number(value: Any) -> str:
-    """A value as it is read best; seven digits are more than any of them has."""
+    """A value as text, with at most seven digits."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (tuple, list)):
@@ -66,7 +57,7 @@ def number(value: Any) -> str:
 
 
 def rate(name: str, timing: Timing) -> str:
-    """How often a topic comes, with the periods of config/wam.yaml."""
+    """Rate of a topic with the periods of config/wam.yaml."""
     periods = {"inner": 1, "outer": timing.outer_divisor, "display": timing.outer_divisor * timing.display_divisor}
     if name not in periods:
         return name
@@ -74,8 +65,9 @@ def rate(name: str, timing: Timing) -> str:
 
 
 def topics(configuration: Configuration) -> str:
-    """The interface table."""
-    every = set(MODULES)
+    """The table of topics, with the nodes that publish and take each."""
+    every = set(NODES)
+    interface = Interface(configuration.with_values({"nodes": list(NODES)}).shared)
 
     def nodes(names: Sequence[str]) -> str:
         return "every node" if set(names) == every else ", ".join(names) or "–"
@@ -85,14 +77,14 @@ def topics(configuration: Configuration) -> str:
         [
             f"`{topic.name}`",
             topic.type.replace("/msg/", "/"),
-            nodes(topic.publisher),
-            nodes(topic.subscribers),
+            nodes(interface.publishers(topic.name)),
+            nodes([name for name in interface.subscribers(topic.name) if name != "recorder"]),
             rate(topic.rate, timing),
             topic.doc,
         ]
         for topic in TOPICS
     ]
-    return table(["topic", "type", "from", "to", "rate", "content"], rows)
+    return markdown(["topic", "type", "from", "to", "rate", "content"], rows)
 
 
 # parameters
@@ -109,7 +101,7 @@ def parameter_rows(cls: type, given: Mapping[str, Any]) -> Iterator[list[str]]:
 
 def parameters_of(node: str) -> type:
     """The parameter class of a node."""
-    found: type = importlib.import_module(MODULES[node]).PARAMETERS
+    found: type = declared(node).parameter_class
     return found
 
 
@@ -117,10 +109,10 @@ def parameters(configuration: Configuration) -> str:
     """Every parameter of every node."""
     head = ["parameter", "type", "unit", "allowed", "live", "meaning", "in config/wam.yaml"]
     shared = list(parameter_rows(Shared, configuration.sections["/**"]))
-    parts = ["## Shared by all nodes, section `/**`\n", table(head, shared)]
-    for node in MODULES:
+    parts = ["## Shared by all nodes, section `/**`\n", markdown(head, shared)]
+    for node in NODES:
         rows = list(parameter_rows(parameters_of(node), configuration.sections[node]))
-        parts += [f"## `{node}`\n", table(head, rows) if rows else "None of its own.\n"]
+        parts += [f"## `{node}`\n", markdown(head, rows) if rows else "None of its own.\n"]
     return "\n".join(parts)
 
 
@@ -130,7 +122,7 @@ def parameters(configuration: Configuration) -> str:
 def constants(rows: Sequence[Constant]) -> str:
     """A part of the table of constants."""
     head = ["", "meaning", "value", "unit", "SI", "from", "parameter", "remark"]
-    return table(head, [constant_row(row) for row in rows])
+    return markdown(head, [constant_row(row) for row in rows])
 
 
 def constant_row(row: Constant) -> list[str]:
@@ -172,7 +164,7 @@ def citing() -> dict[str, list[str]]:
 
 
 def tests_by_function() -> dict[str, list[str]]:
-    """Name of a function to the tests, file.name, that use it; those of shapes and refusals do not count."""
+    """Name of a function to the tests, file.name, that use it, apart from tests of shapes and refusals."""
     found: dict[str, list[str]] = {}
     paths = [*sorted(ROOT.glob("test/test_equations_*.py")), ROOT / "test" / "test_stick_slip.py"]
     for path in paths:
@@ -191,10 +183,10 @@ def names_in(function: ast.FunctionDef) -> set[str]:
 
 
 def equations() -> str:
-    """Every numbered equation: what it says, what is wrong in its print, its functions and their tests."""
+    """Every numbered equation: content, correction, functions and their tests."""
     citing_, using = citing(), tests_by_function()
-    head = ["", "section", "what", "in print", "function", "test"]
-    return table(head, [equation_row(row, citing_.get(row.number, []), using) for row in EQUATIONS])
+    head = ["", "section", "content", "correction of the print", "function", "test"]
+    return markdown(head, [equation_row(row, citing_.get(row.number, []), using) for row in EQUATIONS])
 
 
 def equation_row(row: Equation, names: Sequence[str], using: Mapping[str, Sequence[str]]) -> list[str]:
@@ -203,7 +195,7 @@ def equation_row(row: Equation, names: Sequence[str], using: Mapping[str, Sequen
     return [
         f"({row.number})",
         row.section,
-        row.says,
+        row.content,
         row.correction,
         row.reason or ", ".join(f"`{name}`" for name in names),
         ", ".join(f"`{test}`" for test in list(tests)[:3]),
@@ -220,7 +212,7 @@ def listing(name: str) -> str:
 
 @cache
 def plant_study() -> str:
-    """Differences between plant and theory; draws docs/plant.png on the way."""
+    """Differences between plant and theory; also draws docs/plant.png."""
     with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
         picture = Path(folder) / "plant.png"
         text = figure(picture)
@@ -231,9 +223,9 @@ def plant_study() -> str:
 
 @cache
 def figures() -> str:
-    """How far the plant is from the lines of the thesis's figures; draws them on the way."""
+    """Distances of the plant from the lines of the thesis's figures; also draws the figures."""
     with processes() as executor:
-        found = numbers(list(FIGURES), executor, ROOT / ".cache" / "pieces")
+        found = numbers(list(FIGURES), executor, default_folder())
     if WRITES_PICTURES:
         for name, values in found.items():
             FIGURES[name].draw(values, file_of(name, ROOT / "docs" / "figures"))
@@ -241,7 +233,7 @@ def figures() -> str:
 
 
 def blocks() -> dict[str, Callable[[], str]]:
-    """What can stand in a page, by name."""
+    """Blocks of the pages, by name."""
     configuration = Configuration.load(CONFIGURATION)
     return {
         "topics": lambda: topics(configuration),
@@ -250,7 +242,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
         "plant": plant_study,
-        "felt": felt,
+        "resting pushes": resting_pushes,
         "dither": lambda: dither(configuration),
         "refusals": refusals,
         "guard": lambda: f"```\n{(ROOT / 'docs' / 'guard.txt').read_text(encoding='utf-8')}```\n",
@@ -262,51 +254,53 @@ def blocks() -> dict[str, Callable[[], str]]:
 
 
 @cache
-def pushes() -> tuple[contact_picture.Felt, ...]:
-    """What is felt of pushes at rest with config/wam.yaml."""
-    return tuple(contact_picture.study(Configuration.load(CONFIGURATION)))
+def pushes() -> tuple[resting_push.RestingPush, ...]:
+    """Estimates of pushes at rest with config/wam.yaml."""
+    return tuple(resting_push.study(Configuration.load(CONFIGURATION)))
 
 
-def felt() -> str:
-    """What is felt of a push at rest, in each way."""
+def resting_pushes() -> str:
+    """The estimate of each push at rest with each kind of sensing."""
     rows = []
     for row in pushes():
         estimate = row.estimate
-        place = estimate.place - contact_picture.PLACE if estimate.in_contact else math.nan
+        error = estimate.place - resting_push.POSITION if estimate.in_contact else math.nan
         sd = max(estimate.torque_sd)
-        known = not math.isnan(place)
+        known = not math.isnan(error)
         rows.append(
             [
-                row.way,
+                row.sensing,
                 f"{row.newtons:g} N",
-                estimate.link.replace("_", " ") or "nothing",
-                f"{100.0 * place:.1f} cm" if known else "–",
-                f"{100.0 * estimate.place_sd:.1f} cm" if known else "–",
+                estimate.link.replace("_", " ") or "missed",
+                f"{100.0 * error:.1f} cm" if known else "–",
+                f"{100.0 * estimate.position_sd:.1f} cm" if known else "–",
                 f"{row.force_error:.1f} N" if estimate.in_contact else "–",
                 f"{sd:.2g} N m",
             ]
         )
-    return table(["felt by", "push", "felt", "place, error", "place, sd", "force, error", "largest torque sd"], rows)
+    return markdown(
+        ["sensing", "push", "estimated link", "position error", "position sd", "force error", "largest torque sd"], rows
+    )
 
 
 def dither(configuration: Configuration) -> str:
-    """What the dither costs."""
-    shared = configuration.with_values({"timing.dither_cycle": contact_picture.CYCLE}).shared
+    """Cost of the dither."""
+    shared = configuration.with_values({"timing.dither_cycle": resting_push.CYCLE}).shared
     own = configuration.node("velocity_loop", VelocityLoopParameters).dither
-    cost = Dither(shared.arm, shared.timing, own).cost(contact_picture.POSE)
-    moved = next(row.tip_motion for row in pushes() if row.way == "motors, dither")
+    cost = Dither(shared.arm, shared.timing, own).cost(resting_push.POSE)
+    moved = next(row.tip_motion for row in pushes() if row.sensing == "motors, dither")
     rows = [
         ["frequency", f"{1.0 / (shared.timing.dither_cycle * shared.timing.period):g} Hz"],
-        ["amplitude, per static friction of motor and joints", f"{own.level:g}"],
-        ["motion of the tool, peak to peak, on the plant", f"{1e3 * moved:.2g} mm"],
-        ["the same if there were no friction", f"{1e3 * cost.tip_motion:.2g} mm"],
-        ["heat, of what the hottest winding stands for ever", f"{100.0 * max(cost.heat):.2g} %"],
+        ["amplitude over static friction of motor and joints", f"{own.level:g}"],
+        ["motion of the tool on the plant, peak to peak", f"{1e3 * moved:.2g} mm"],
+        ["the same without friction", f"{1e3 * cost.tip_motion:.2g} mm"],
+        ["heat of the hottest winding, over its rated continuous value", f"{100.0 * max(cost.heat):.2g} %"],
     ]
-    return table(["the dither", ""], rows)
+    return markdown(["the dither", ""], rows)
 
 
 def refusals() -> str:
-    """What the force loop says to some sets that are not stable."""
+    """Messages of the force loop for some unstable parameter sets."""
     lines = []
     for name, change in (
         ("wam", {"force_loop:force_gain": [0.5]}),
@@ -318,54 +312,56 @@ def refusals() -> str:
         shared = configuration.shared
         given = ", ".join(f"{key.removeprefix('force_loop:')} {value}" for key, value in change.items())
         try:
-            ForceLoop(shared.arm, configuration.node("force_loop", ForceLoopParameters), shared.timing)
+            ForceLoop(shared.arm, shared.servo, configuration.node("force_loop", ForceLoopParameters), shared.timing)
         except ParameterError as error:
             lines.append(f"{name}, {given}:\n  {error}")
         else:
-            raise SystemExit(f"the guard accepts {given} on {name}; the page wants a refusal")
+            raise SystemExit(f"the guard accepts {given} on {name}; the page needs a refusal")
     return "```\n" + "\n".join(lines) + "\n```\n"
 
 
 def measure_guard() -> None:
-    """Hold the guard against simulation and keep the two tables."""
-    command = [sys.executable, "-m", "wam_ros.cli", "guard"]
+    """Validate the guard by Monte Carlo simulation and keep the two tables."""
+    command = [sys.executable, "-m", "wam_cli.main", "guard"]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode:
-        raise SystemExit(f"the guard accepted what diverges, docs/guard.txt stays as it was:\n{done.stdout}")
+        raise SystemExit(f"the guard accepted a diverging set; docs/guard.txt is unchanged:\n{done.stdout}")
     (ROOT / "docs" / "guard.txt").write_text(done.stdout.rstrip() + "\n", encoding="utf-8")
 
 
 def filled(text: str) -> str:
-    """A page with its generated blocks as they should be."""
+    """A page with its generated blocks up to date."""
     known = blocks()
     return BLOCK.sub(lambda found: f"{found[1]}\n{known[found['name']]()}\n{found[3]}", text)
 
 
 def pages() -> dict[Path, str]:
-    """Every page that has generated blocks, as it should be."""
+    """Every page with generated blocks, up to date."""
     texts = {path: path.read_text(encoding="utf-8") for path in [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]}
     return {path: filled(text) for path, text in texts.items() if BLOCK.search(text)}
 
 
 def draw_demonstration() -> None:
-    """Play the demonstration in lockstep and keep its picture and its report."""
+    """Run the demonstration in lockstep and keep its picture and its report."""
     with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
         configuration = Configuration.load(CONFIGURATION).with_values({"recorder:directory": folder})
         file = Path(folder) / "wam.yaml"
         file.write_text(configuration.text, encoding="utf-8")
-        command = [sys.executable, "-m", "wam_ros.cli", "demo", "--lockstep", "--name", "demo", "--config", str(file)]
+        command = [sys.executable, "-m", "wam_cli.main", "demo", "--lockstep", "--name", "demo", "--config", str(file)]
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
         if done.returncode:
-            raise SystemExit("the demonstration failed, docs/demo.* stay as they were; what it said stands above")
+            raise SystemExit("the demonstration failed, see above; docs/demo.* are unchanged")
         report = done.stdout.partition("\nbag ")[0].rstrip()
         (ROOT / "docs" / "demo.txt").write_text(report + "\n", encoding="utf-8")
         shutil.copyfile(Path(folder) / "demo" / "demo.png", ROOT / "docs" / "demo.png")
 
 
 def main() -> None:
-    """Measure the guard, write the pages, then the picture."""
+    """Validate the guard, write the pages, then the pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--pages", action="store_true", help="pages only, without demonstration and guard's trials")
+    parser.add_argument(
+        "--pages", action="store_true", help="pages only, without demonstration and validation of the guard"
+    )
     given = parser.parse_args()
     if not given.pages:
         measure_guard()
@@ -373,7 +369,7 @@ def main() -> None:
         path.write_text(text, encoding="utf-8")
         print(path.relative_to(ROOT))
     if not given.pages:
-        contact_picture.save(ROOT / "docs" / "estimator.png", Configuration.load(CONFIGURATION))
+        resting_push.save(ROOT / "docs" / "estimator.png", Configuration.load(CONFIGURATION))
         draw_demonstration()
         print("docs/estimator.png\ndocs/demo.png\ndocs/demo.txt")
 

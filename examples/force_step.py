@@ -1,6 +1,6 @@
-"""A node of your own: touch the foam box, press 5 N, then 10 N, say what was measured, brake.
+"""A node of your own: touch the foam box, press 5 N, then 10 N, print what was measured, brake.
 
-Start the stack in one shell, `wam up`, and this in another, `python3 examples/force_step.py`.
+Start the stack in one terminal, `wam up`, and this in another, `python3 examples/force_step.py`.
 It needs nothing of this package: topics and one service are the whole contract (docs/topics.md).
 """
 
@@ -9,44 +9,53 @@ import time
 from collections.abc import Iterator
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
 ABOVE = [0.0, -1.8, 0.0, 1.45]  # rad, joint1..joint4, as in config/demo_scenario.yaml
 BELOW = [0.0, -2.1, 0.0, 1.45]
-FELT = 1.5  # N
+DETECTED = 1.5  # N
 PERIOD = 0.005  # s, of joint_states
 
 
 class ForceStep(Node):
-    """Answers each joint state with a posture and a force; the task is a generator, a yield a period."""
+    """Answers each joint state with a posture and a force; the task is a generator, one yield per period."""
 
     def __init__(self) -> None:
         super().__init__("force_step", namespace="wam")
         self.q: list[float] = []
-        self.felt = self.measured = 0.0
+        self.touch = self.measured = 0.0
         self.posture = self.create_publisher(JointState, "joint_posture_command", 10)
         self.force = self.create_publisher(WrenchStamped, "force_command", 10)
         self.enable = self.create_client(SetBool, "driver/enable")
         self.create_subscription(WrenchStamped, "contact/wrench", self.take_contact, 10)
         self.create_subscription(WrenchStamped, "force_measured", self.take_measured, 10)
         self.create_subscription(JointState, "joint_states", self.take_joints, 10)
+        latched = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.create_subscription(DiagnosticStatus, "status", self.take_status, latched)
         self.wanted, self.newtons = [0.0] * 4, 0.0
         self.task = self.play()
         self.is_done = False
 
     def take_contact(self, message: WrenchStamped) -> None:
         force = message.wrench.force  # of the world on the link
-        self.felt = (force.x**2 + force.y**2 + force.z**2) ** 0.5
+        self.touch = (force.x**2 + force.y**2 + force.z**2) ** 0.5
+
+    def take_status(self, message: DiagnosticStatus) -> None:
+        facts = {item.key: item.value for item in message.values}
+        if message.name == "driver" and facts.get("fault") and self.q:
+            sys.exit(f"the driver stopped: {facts['fault']}; call reset_fault, then start again")
 
     def take_measured(self, message: WrenchStamped) -> None:
         self.measured = -message.wrench.force.y  # of the arm on the world
 
     def take_joints(self, message: JointState) -> None:
-        place = dict(zip(message.name, message.position, strict=True))
-        self.q = [place[f"joint{i}"] for i in (1, 2, 3, 4)]  # by name, never by index
+        position = dict(zip(message.name, message.position, strict=True))
+        self.q = [position[f"joint{i}"] for i in (1, 2, 3, 4)]  # by name, never by index
         if next(self.task, "done") == "done":
             self.is_done = True
             return
@@ -63,8 +72,8 @@ class ForceStep(Node):
         yield from self.ask(True)
         yield from self.move(ABOVE, 2.0)
         yield from self.move(BELOW, 4.0)
-        if self.felt < FELT:
-            sys.exit("no contact was felt; is the box where config/wam.yaml has it?")
+        if self.touch < DETECTED:
+            sys.exit("no contact was detected; is the box at its position of config/wam.yaml?")
         for newtons in (5.0, 10.0):
             self.newtons, sum_of_all = newtons, 0.0
             for _ in range(300):
@@ -72,7 +81,7 @@ class ForceStep(Node):
             for _ in range(200):
                 sum_of_all += self.measured / 200
                 yield
-            print(f"asked {newtons:5.2f} N, measured {sum_of_all:5.2f} N", flush=True)
+            print(f"commanded {newtons:5.2f} N, measured {sum_of_all:5.2f} N", flush=True)
         self.newtons, self.wanted = 0.0, list(self.q)
         yield from self.move(ABOVE, 2.0)
         yield from self.ask(False)
@@ -87,12 +96,12 @@ class ForceStep(Node):
             sys.exit(answer.result().message)
 
     def move(self, goal: list[float], seconds: float) -> Iterator[None]:
-        """Along a straight line; ends early where a contact is felt on the way down."""
+        """Along a straight line; ends early if a contact is detected on the way down."""
         start, count = list(self.wanted), int(seconds / PERIOD)
         for i in range(1, count + 1):
             self.wanted = [a + (b - a) * i / count for a, b in zip(start, goal, strict=True)]
             yield
-            if goal is BELOW and self.felt >= FELT:
+            if goal is BELOW and self.touch >= DETECTED:
                 return
 
 

@@ -30,13 +30,13 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     return [
         Node(
             package="wam_stack",
-            executable=name,
-            name=name,
+            executable="node" if ":" in entry else entry,
+            arguments=[entry] if ":" in entry else [],
             namespace=namespace,
             parameters=[str(parameters), {"timing.mode": mode}],
             output="screen",
         )
-        for name in [*nodes, *(["recorder"] if record == "true" else [])]
+        for entry in [*nodes, *(["recorder"] if record == "true" else [])]
     ]
 
 

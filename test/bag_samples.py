@@ -9,13 +9,14 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from wam_ros.topics import TOPICS
+from wam_description.topics import TOPICS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 OURS = sorted({topic.type for topic in TOPICS})
+CLOUD = "sensor_msgs/msg/PointCloud2"
 FOREIGN = [
     "geometry_msgs/msg/TwistStamped", "nav_msgs/msg/Odometry", "sensor_msgs/msg/BatteryState", "sensor_msgs/msg/Imu",
-    "sensor_msgs/msg/MultiDOFJointState", "sensor_msgs/msg/PointCloud2", "std_msgs/msg/Empty", "std_msgs/msg/Int8",
+    "sensor_msgs/msg/MultiDOFJointState", CLOUD, "std_msgs/msg/Empty", "std_msgs/msg/Int8",
     "std_msgs/msg/UInt64MultiArray", "trajectory_msgs/msg/JointTrajectory",
 ]  # fmt: skip
 PRIMITIVE, NAMED, FIXED = 1, 2, 3  # kinds of field in rosbags
@@ -58,6 +59,8 @@ WAYS = {
 
 def random_message(kind: str, chance: random.Random, lengths: Sequence[int] = (0, 1, 3)) -> Any:
     """A message of a type with random values; strings and sequences have one of these lengths."""
+    if kind == CLOUD:
+        return random_cloud(chance, chance.choice(lengths))
     values = []
     for _, (field, inner) in STORE.fielddefs[kind][1]:
         if field == PRIMITIVE:
@@ -68,6 +71,20 @@ def random_message(kind: str, chance: random.Random, lengths: Sequence[int] = (0
             count = inner[1] if field == FIXED else chance.choice(lengths)
             values.append(_values(inner[0], count, chance, lengths))
     return STORE.types[kind](*values)
+
+
+def random_cloud(chance: random.Random, points: int, height: int = 1) -> Any:
+    """A point cloud whose sizes fit; with fields of several types, gaps and padding."""
+    numbers = {"x": (4, 8, 1), "n": (17, 3, 1), "ab": (20, 7, 3)}  # offset, datatype, count
+    step, padding = 40, chance.choice([0, 6])
+    header = STORE.types["std_msgs/msg/Header"]
+    time = STORE.types["builtin_interfaces/msg/Time"](chance.randint(0, 9), chance.randint(0, 10**9 - 1))
+    fields = [STORE.types["sensor_msgs/msg/PointField"](name, *each) for name, each in numbers.items()]
+    data = np.frombuffer(chance.randbytes(height * (points * step + padding)), np.uint8)
+    return STORE.types[CLOUD](
+        header(time, chance.choice("ab")), height, points, fields, chance.random() < 0.5, step, points * step + padding,
+        data, True,
+    )  # fmt: skip
 
 
 def _value(kind: str, chance: random.Random, lengths: Sequence[int]) -> Any:

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import LONG
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 VARIABLE = "WAM_TEST_BROWSER"
-TIMEOUT = 120.0  # s
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
@@ -58,7 +58,7 @@ def looked_at(page: str, width: int, folder: Path) -> dict[str, Any]:
     file.write_text(LOOK.replace("WIDTH", str(width)).replace("PAGE", html.escape(page)), encoding="utf-8")
     command = [program, *FLAGS, f"--user-data-dir={folder / 'profile'}", "--window-size=1400,1000"]
     command += ["--virtual-time-budget=20000", "--dump-dom", file.as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False, cwd=folder)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONG, check=False, cwd=folder)
     seen = re.search(r'<pre id="seen">(.+?)</pre>', done.stdout)
     assert seen, f"{program} ended with {done.returncode} and showed nothing: {done.stderr[-2000:]}"
     found: dict[str, Any] = json.loads(html.unescape(seen[1]))

@@ -3,6 +3,8 @@
 import fcntl
 import itertools
 import os
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -13,8 +15,37 @@ from typing import Any
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-_DOMAINS = 101  # above, the ports of a domain lie among those that Linux gives to any program
+ROOT = Path(__file__).resolve().parents[1]
+# programs that a test starts run this tree too, whatever is installed
+os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+# a test without the fixture domain_id cannot reach anybody: rclpy.init refuses this
+os.environ["ROS_DOMAIN_ID"] = "tests take the fixture domain_id"
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+for elsewhere in ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOCALHOST_ONLY"):
+    os.environ.pop(elsewhere, None)
+
+# The tests' own: nobody uses them by default, and their ports lie above those that Linux gives to any program.
+DOMAINS = range(215, 233)
+PORTS = 250  # of each domain, from 7400 on
+LONG = 300.0  # s, for what must happen at all, on a machine as busy as may be
 _COUNTER = itertools.count()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the tests that start ROS nodes; one worker runs them all, so that they do not slow each other."""
+    for item in items:
+        if {"domain_id", "domain_of_module"} & set(getattr(item, "fixturenames", ())):
+            item.add_marker("ros")
+        if item.get_closest_marker("ros") and config.pluginmanager.hasplugin("xdist"):
+            item.add_marker(pytest.mark.xdist_group("ros"))
+
+
+def soon() -> float:
+    """Seconds that count as prompt: 2, or on a busy machine as long as a few starts of Python with numpy."""
+    begin = time.monotonic()
+    subprocess.run([sys.executable, "-c", "import numpy"], check=True)
+    return max(2.0, 20.0 * (time.monotonic() - begin))
 
 
 class RosWorld:
@@ -59,7 +90,7 @@ class RosWorld:
 
         return self.add(Node(name, namespace=namespace, context=self.context))
 
-    def wait(self, until: Callable[[], Any], timeout: float = 10.0, what: str = "") -> None:
+    def wait(self, until: Callable[[], Any], timeout: float = LONG, what: str = "") -> None:
         """Spin until something is true; the test fails where that takes longer than `timeout` seconds."""
         end = time.monotonic() + timeout
         while not until():
@@ -75,12 +106,25 @@ class RosWorld:
         rclpy.try_shutdown(context=self.context)
 
 
+def is_inhabited(number: int, table: str | None = None) -> bool:
+    """Whether a program of this machine takes part in a ROS domain: it has bound UDP ports of the domain.
+
+    Parameters
+    ----------
+    number : the domain.
+    table : sockets as in /proc/net/udp, which is read where None.
+    """
+    first = 7400 + PORTS * number
+    lines = (Path("/proc/net/udp").read_text() if table is None else table).splitlines()[1:]
+    return any(first <= int(line.split()[1].rpartition(":")[2], 16) < first + PORTS for line in lines)
+
+
 @contextmanager
 def locked_domain() -> Iterator[int]:
-    """A free ROS domain, locked against other test processes."""
-    start = os.getpid() + next(_COUNTER)
-    for offset in range(_DOMAINS):
-        number = 1 + (start + offset) % _DOMAINS
+    """A ROS domain that nobody is in, locked against other test processes."""
+    end = time.monotonic() + 10.0 * LONG
+    for attempt in itertools.count(os.getpid() + next(_COUNTER)):
+        number = DOMAINS[attempt % len(DOMAINS)]
         lock = os.open(
             Path(tempfile.gettempdir()) / f"wam_stack_test_domain_{number}",
             os.O_CREAT | os.O_RDWR | os.O_CLOEXEC,
@@ -88,12 +132,13 @@ def locked_domain() -> Iterator[int]:
         )
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not is_inhabited(number):
+                break
         except OSError:
-            os.close(lock)
-            continue
-        break
-    else:
-        pytest.fail(f"all {_DOMAINS} ROS domains are in use by other tests; end them")
+            pass  # another test has it
+        os.close(lock)
+        assert time.monotonic() < end, f"ROS domains {DOMAINS[0]} to {DOMAINS[-1]} are all in use; end what is there"
+        time.sleep(0.05)
     try:
         yield number
     finally:
@@ -103,7 +148,6 @@ def locked_domain() -> Iterator[int]:
 def isolate(monkeypatch: pytest.MonkeyPatch, number: int, folder: Path) -> None:
     """Environment of this process and its children for a ROS domain of its own."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.setenv("ROS_LOG_DIR", str(folder / "ros_log"))
     monkeypatch.setenv("ROS_PYTHON_CHECK_FIELDS", "1")
 
@@ -113,6 +157,14 @@ def domain_id(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """A free ROS domain in the environment of this process."""
     with locked_domain() as number:
         isolate(monkeypatch, number, tmp_path)
+        yield number
+
+
+@pytest.fixture(scope="module")
+def domain_of_module(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """The same, for fixtures of a module."""
+    with pytest.MonkeyPatch.context() as patch, locked_domain() as number:
+        isolate(patch, number, tmp_path_factory.mktemp("ros"))
         yield number
 
 

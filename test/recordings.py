@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from wam_analysis.bag import Bag, JointColumns, Messages, WrenchColumns
-from wam_analysis.experiments.definition import Experiment, configured
-from wam_analysis.experiments.recording import Recording, Step
+from wam_bag.bag import Bag, JointColumns, Messages, WrenchColumns
 from wam_description.configuration import SHARED
+from wam_experiments.thesis.definition import Experiment, configured
+from wam_experiments.thesis.recording import Recording, Step
+from wam_sim.recorded_parameters import RecordedParameters
 
 NAMESPACE = "/wam"
 
@@ -45,13 +46,17 @@ def recorded(
     sections = configured(experiment, experiment.runs[number], folder).sections
     parameters = {name: {**sections[SHARED], **own} for name, own in sections.items() if name != SHARED}
     bag = Bag(Path("made"), {f"{NAMESPACE}/{name}": columns for name, columns in topics.items()}, {}, {}, {})
-    return Recording(bag, NAMESPACE, parameters, steps, "", float("nan"), "done")
+    of_nodes = RecordedParameters("made", parameters, "", "", ())
+    return Recording(bag, NAMESPACE, of_nodes, steps, "", float("nan"), "done")
 
 
-def status(name: str, message: str, **facts: str) -> SimpleNamespace:
+def status(name: str, message: str, level: int = 0, **facts: str) -> SimpleNamespace:
     """A message of the topic status, as it is decoded."""
     return SimpleNamespace(
-        name=name, message=message, values=[SimpleNamespace(key=key, value=value) for key, value in facts.items()]
+        name=name,
+        message=message,
+        level=level,
+        values=[SimpleNamespace(key=key, value=value) for key, value in facts.items()],
     )
 
 

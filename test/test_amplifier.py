@@ -1,4 +1,4 @@
-"""The amplifier against the closed form of I2t, and its imperfections against what was asked for."""
+"""The amplifier against the closed form of I2t, and its imperfections against their parameters."""
 
 import dataclasses
 import math
@@ -34,10 +34,10 @@ def heat_up(amp: Amplifier) -> None:
     raise AssertionError("the peak current was never limited")
 
 
-def seconds_to_limit(asked: float) -> float:
+def seconds_to_limit(commanded: float) -> float:
     """Time until motor 1 gets less than it asks for."""
     amp, ticks = amplifier(), 0
-    while amp.step([asked, *REST], DT)[0] == asked:
+    while amp.step([commanded, *REST], DT)[0] == commanded:
         ticks += 1
         assert ticks * DT < 10 * THERMAL_TIME
     return ticks * DT
@@ -130,7 +130,7 @@ def test_torque_ripples_by_its_share_with_its_cycles_while_the_report_does_not()
     expected[0] = 2 * np.abs([1.0, -0.5, 0.75, 1.0])
     expected[24, 0], expected[6, 1], expected[2, 3] = 0.02 * 1.0, 0.02 * 0.5, 0.05 * 1.0
     np.testing.assert_allclose(harmonics, expected, atol=1e-12)
-    assert torque[:, 0].max() == pytest.approx(1.02, abs=1e-3)  # a sample beside the crest
+    assert torque[:, 0].max() == pytest.approx(1.02, abs=1e-3)  # a sample next to the crest
     assert amp.nominal_torque(currents) == [1.0, -0.5, 0.75, 1.0]
     assert amp.torque([0.0] * 4, [0.3] * 4) == [0.0] * 4
 
@@ -138,9 +138,9 @@ def test_torque_ripples_by_its_share_with_its_cycles_while_the_report_does_not()
 DRAWS = 20_000
 
 
-def noisy(seed: int, asked: list[float], **parameters: tuple[float, ...]) -> np.ndarray:
+def noisy(seed: int, commanded: list[float], **parameters: tuple[float, ...]) -> np.ndarray:
     amp = amplifier(seed, current_noise=(0.02, 0.05, 0.0, 0.02), **parameters)
-    return np.array([amp.step(asked, DT) for _ in range(DRAWS)])
+    return np.array([amp.step(commanded, DT) for _ in range(DRAWS)])
 
 
 def test_current_noise_has_its_standard_deviation_and_no_offset() -> None:
@@ -154,9 +154,9 @@ def test_current_noise_has_its_standard_deviation_and_no_offset() -> None:
 
 
 def test_current_noise_is_that_of_the_seed() -> None:
-    asked = [1.0, -2.0, 1.0, 3.0]
-    np.testing.assert_array_equal(noisy(5, asked), noisy(5, asked))
-    assert np.all((noisy(5, asked) != noisy(6, asked))[:, [0, 1, 3]])
+    commanded = [1.0, -2.0, 1.0, 3.0]
+    np.testing.assert_array_equal(noisy(5, commanded), noisy(5, commanded))
+    assert np.all((noisy(5, commanded) != noisy(6, commanded))[:, [0, 1, 3]])
 
 
 def test_no_noise_flows_where_nothing_is_asked_for() -> None:

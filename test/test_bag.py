@@ -1,30 +1,40 @@
 """Bags written without ROS and read by readers that are not ours, and the other way round."""
 
+import contextlib
 import itertools
 import os
+import shutil
 import struct
+import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
+import mcap.writer
 import numpy as np
 import pytest
 import yaml
+from bag_comparison import compare
 from mcap.reader import make_reader
+from mcap.records import Attachment, Message
+from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosHistory, QosReliability, QosTime
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from wam_analysis.bag import BagError, BoolColumns, JointColumns, Messages, PointColumns, WrenchColumns, read
-from wam_analysis.comparison import compare
-from wam_ros.bag import BagWriter, RecordingError, exact_cdr, policies
-from wam_ros.bag_metadata import INFINITE
-from wam_ros.definitions import DefinitionError, definition, schema, type_hash
-from wam_ros.message_layout import ExactLength, stamp_reader
-from wam_ros.topics import TOPICS
+import wam_bag
+from wam_bag.bag import BagError, BoolColumns, JointColumns, Messages, PointColumns, WrenchColumns, read
+from wam_bag.bag_writer import BagWriter, RecordingError, exact_cdr, policies
+from wam_bag.definitions import DefinitionError, definition, schema, type_hash
+from wam_bag.mcap_writer import McapWriter
+from wam_bag.message_layout import ExactLength, stamp_reader
+from wam_bag.metadata import INFINITE
+from wam_description.topics import TOPICS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 QOS = {
@@ -233,7 +243,7 @@ def read_only() -> Iterator[Path]:
 
 
 def test_a_read_only_directory_is_refused(read_only: Path) -> None:
-    with pytest.raises(RecordingError, match="cannot be made: Permission denied; give a directory"):
+    with pytest.raises(RecordingError, match="cannot be created: Permission denied; give a directory"):
         BagWriter(read_only / "bag")
 
 
@@ -366,3 +376,81 @@ def test_a_disk_that_is_full_is_an_error_and_not_a_crash(tmp_path: Path) -> None
         os.dup2(full.fileno(), bag._stream.fileno())
     with pytest.raises(OSError, match="No space"):
         bag.write("/t", b"\0\1\0\0\1", 0, 0, 1)
+
+
+def test_a_file_of_ours_is_byte_for_byte_that_of_the_library(tmp_path: Path) -> None:
+    messages = [(1 + k % 3, k, 1000 - k, 900 - k, os.urandom(k % 40)) for k in range(200)]
+    with (tmp_path / "theirs.mcap").open("wb") as stream:
+        theirs = mcap.writer.Writer(stream, chunk_size=1000, enable_data_crcs=True)
+        theirs.start("ros2", "test")
+        number = theirs.register_schema("a_msgs/msg/A", "ros2msg", b"int32 x")
+        for topic in "abc":
+            theirs.register_channel(topic, "cdr", number, {"by": "a test"})
+        for channel, sequence, log_time, publish_time, data in messages:
+            theirs.add_message(channel, log_time, data, publish_time, sequence)
+        theirs.flush()
+        theirs.add_attachment(5, 6, "note.txt", "text/plain", b"a note")
+        theirs.add_metadata("note", {"by": "a test"})
+        theirs.finish()
+    with FileIO(tmp_path / "ours.mcap", "w") as stream:
+        ours = McapWriter(stream, "test", 1000)
+        number = ours.schema("a_msgs/msg/A", "ros2msg", b"int32 x")
+        for topic in "abc":
+            ours.channel(topic, "cdr", number, {"by": "a test"})
+        for channel, sequence, log_time, publish_time, data in messages:
+            ours.add(channel, log_time, publish_time, sequence, data)
+        ours.flush()
+        ours.attach(Attachment(5, 6, "note.txt", "text/plain", b"a note"))
+        ours.metadata("note", {"by": "a test"})
+        ours.finish()
+    assert (tmp_path / "ours.mcap").read_bytes() == (tmp_path / "theirs.mcap").read_bytes()
+
+
+def test_after_a_failed_write_the_file_is_still_whole(tmp_path: Path) -> None:
+    """The reason for a writer of our own: the library's counts and checksum would include what is not on disk."""
+
+    class FullDisk(FileIO):
+        room = 10**6
+
+        def write(self, data: Any) -> int:
+            taken = data[: max(self.room, 0)]
+            self.room -= len(data)
+            if not taken:
+                raise OSError(28, "No space left on device")
+            return super().write(taken)
+
+    with FullDisk(tmp_path / "bag.mcap", "w") as stream:
+        writer = McapWriter(stream, "test", 10**6)
+        bools = writer.channel(
+            "/a", "cdr", writer.schema("std_msgs/msg/Bool", "ros2msg", schema("std_msgs/msg/Bool")), {}
+        )
+        for k in range(3):
+            writer.add(bools, k, k, k, b"\0\1\0\0\1")
+            stream.room = (10**6, 60, 10**6)[k]
+            with contextlib.nullcontext() if k != 1 else pytest.raises(OSError, match="No space"):
+                writer.flush()
+            assert (tmp_path / "bag.mcap").stat().st_size == writer.position
+        writer.finish()
+    assert writer.counts == {bools: 2}
+    assert read(tmp_path / "bag.mcap").topics["/a"].log_time_ns.tolist() == [0, 2]
+    with (tmp_path / "bag.mcap").open("rb") as stream:
+        assert sum(isinstance(record, Message) for record in StreamReader(stream, validate_crcs=True).records) == 2
+
+
+def test_bags_are_read_without_the_rest_of_the_project(tmp_path: Path) -> None:
+    write_sample(tmp_path / "sample")
+    shutil.copytree(Path(wam_bag.__file__).parent, tmp_path / "alone" / "wam_bag")
+    program = (
+        "import sys; from wam_bag import bag, bag_writer, contents, cut, losses, repair; "
+        "assert len(bag.read(sys.argv[1]).topics) == 6; repair.repair(contents.Path(sys.argv[1])); "
+        "print(*sorted({name.split('.')[0] for name in sys.modules if name.startswith(('wam_', 'rclpy'))}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program, str(tmp_path / "sample")],
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "alone")},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stderr, done.stdout.split()) == ("", ["wam_bag"])

@@ -8,10 +8,10 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
-from wam_analysis.bag import BagError, read
-from wam_analysis.bag_cut import CUT, Cut, cut
-from wam_ros.bag import WHOLE, BagWriter, Split
-from wam_ros.bag_metadata import INFINITE
+from wam_bag.bag import BagError, read
+from wam_bag.bag_writer import WHOLE, BagWriter, Split
+from wam_bag.cut import CUT, Cut, cut
+from wam_bag.metadata import INFINITE
 
 PART = Cut(20_000_000, 60_000_000)
 QOS = {
@@ -57,6 +57,7 @@ def messages(file: Path) -> list[tuple[str, int, int, int, bytes]]:
         return [(c.topic, m.log_time, m.publish_time, m.sequence, bytes(m.data)) for _, c, m in found]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_the_part_has_the_messages_of_its_time_and_topics_and_no_other(tmp_path: Path, way: str) -> None:
     samples = random_samples(OURS, 30, seed=3)

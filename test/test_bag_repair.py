@@ -19,16 +19,16 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 
-from wam_analysis.bag import BagError, raw, read
-from wam_analysis.bag_file import contents
 from wam_analysis.demo_report import text as report_text
 from wam_analysis.demo_summary import summarize
 from wam_analysis.findings.analysis import analyse_bag
-from wam_ros.bag import RESERVE, WHOLE, BagWriter, RecordingError, Split
-from wam_ros.bag_losses import losses
-from wam_ros.bag_metadata import INFINITE
-from wam_ros.bag_repair import repair
-from wam_ros.commands.bag import described, told
+from wam_bag.bag import BagError, raw, read
+from wam_bag.bag_writer import RESERVE, WHOLE, BagWriter, RecordingError, Split
+from wam_bag.contents import contents
+from wam_bag.losses import losses
+from wam_bag.metadata import INFINITE
+from wam_bag.repair import repair
+from wam_cli.commands.bag import described, told
 
 ROOT = Path(__file__).parents[1]
 JOINTS = "sensor_msgs/msg/JointState"
@@ -112,6 +112,7 @@ def test_repairing_twice_changes_nothing(tmp_path: Path) -> None:
     assert {path: path.read_bytes() for path in (tmp_path / "bag").iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_repair_that_is_killed_can_be_done_again(tmp_path: Path) -> None:
     samples = samples_of(4000)
     killed(tmp_path / "broken", samples)
@@ -155,6 +156,7 @@ def test_a_repair_that_fails_leaves_the_bag_as_it_was(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [file]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_what_stands_before_a_cut_is_saved_however_it_was_written(tmp_path: Path, way: str) -> None:
     samples = random_samples(OURS, 20, seed=8)
@@ -209,17 +211,17 @@ def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path:
     first, last = damaged(tmp_path / "bag", samples, 5)
     gone = Counter(sample.topic for sample in samples if first <= sample.time <= last)
     lines = told(repair(tmp_path / "bag")[0]).splitlines()
-    assert "gone are 10 messages (5 of /jointstate, 5 of /wrenchstamped)" in lines[1]
-    assert lines[2] == f"A hole from {first / 1e9:.3f} s to {last / 1e9:.3f} s."
+    assert "lost are 10 messages (5 of /jointstate, 5 of /wrenchstamped)" in lines[1]
+    assert lines[2] == f"A gap from {first / 1e9:.3f} s to {last / 1e9:.3f} s."
     info = described(contents(tmp_path / "bag"))
     assert info[:2] == [f"INCOMPLETE: {line}" for line in lines[1:]]
     assert "recorded in lockstep mode, lost: 10 of those that were recorded" in info
     assert [line.split()[-3] for line in info if line.endswith("are gone")] == [str(gone[t]) for t in sorted(gone)]
     bag = read(tmp_path / "bag")
     assert list(summarize(bag).lost) == lines[1:]
-    assert report_text(summarize(bag)).startswith("INCOMPLETE: bag_0.mcap was broken")
+    assert report_text(summarize(bag)).startswith("INCOMPLETE: bag_0.mcap was damaged")
     found = analyse_bag(bag, lambda doing: None)
-    assert found.sections[0].said[:2] == tuple(info[:2])
+    assert found.sections[0].sentences[:2] == tuple(info[:2])
     assert found.provenance["lost"] == " ".join(lines[1:])
 
 
@@ -255,7 +257,7 @@ def test_without_indexes_the_hole_lies_between_its_neighbours(tmp_path: Path) ->
     assert result.losses is not None
     (hole,) = result.losses.holes
     assert (hole.begin, hole.end) == (chunks[2].message_end_time, chunks[4].message_start_time)
-    assert "how many messages these were is not known" in described(contents(file))[0]
+    assert "it is not known how many messages were lost" in described(contents(file))[0]
 
 
 def test_what_the_recorder_counted_is_compared_with_what_is_there(tmp_path: Path) -> None:
@@ -288,7 +290,7 @@ def test_one_file_of_several_and_a_cut_are_not_held_against_the_counts_of_the_wh
 @pytest.mark.parametrize("text", ["", "3", "{}", '{"holes": [1]}', '{"holes": [{"begin": 1}], "messages": {}}'])
 def test_a_damaged_record_of_a_repair_still_says_that_there_was_one(tmp_path: Path, text: str) -> None:
     lost = losses(tmp_path, {"repaired": {"a.mcap": text}}, (), {})
-    assert lost.said(0) == ["a.mcap was repaired; what was lost cannot be read any more."]
+    assert lost.sentences(0) == ["a.mcap was repaired; the record of its losses cannot be read."]
 
 
 def test_after_a_kill_the_mode_is_that_of_the_parameters(tmp_path: Path) -> None:
@@ -346,7 +348,7 @@ FILL = """
 import os, sys
 from pathlib import Path
 from test_bag_repair import QOS
-from wam_ros.bag import BagWriter, RecordingError, Split
+from wam_bag.bag_writer import BagWriter, RecordingError, Split
 path = Path(sys.argv[1])
 bag = BagWriter(path / "bag", Split(int(sys.argv[2]), 0.0))
 bag.add_topic("/t", "std_msgs/msg/String", QOS)
@@ -357,7 +359,7 @@ try:
 except RecordingError as error:
     print(error)
 assert bag.closed
-from wam_analysis.bag import read
+from wam_bag.bag import read
 from test_bag_repair import assert_others_read_it
 count = len(read(path / "bag").topics["/t"].log_time_ns)
 assert_others_read_it(path / "bag", count)
@@ -371,6 +373,7 @@ assert not (path / "third").exists()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("split_size", [0, 1_000_000])
 def test_a_disk_that_fills_up_leaves_a_bag_that_is_closed(tmp_path: Path, split_size: int) -> None:
     inside = f'mount -t tmpfs -o size=12m none {tmp_path} && exec "$@"'
@@ -386,5 +389,5 @@ def test_a_disk_that_fills_up_leaves_a_bag_that_is_closed(tmp_path: Path, split_
     )
     assert done.returncode == 0, done.stderr
     first, second = done.stdout.splitlines()
-    assert first == "No space left on device; it was closed with what came before"
-    assert "third cannot be made: No space left on device; free 8 MiB or more" in second
+    assert first == "No space left on device; it was closed with what was recorded before"
+    assert "third cannot be created: No space left on device; free 8 MiB or more" in second

@@ -1,4 +1,4 @@
-"""Each benchmark runs and prints its ratios; how fast is for people to judge."""
+"""Each benchmark runs and prints its ratios; how fast is for people to assess."""
 
 import os
 import re
@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import LONG
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = sorted(path.name for path in ROOT.glob("benchmarks/*.py"))
@@ -25,7 +26,7 @@ ROWS = {
     "speed.py": ["direct run", "lockstep", "lockstep, recorded"],
     "stability_map.py": [
         "map, against solve_ivp",
-        "its points alone, against solve_ivp",
+        "the same points only, against solve_ivp",
         "map, against the scalar bisection",
     ],
 }
@@ -45,7 +46,7 @@ def test_benchmark_prints_a_ratio_in_every_row(script: str, domain_id: int) -> N
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=LONG,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -87,7 +87,7 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
     [
         ("a: [1,", "is not YAML"),
         ("? [a]\n: 1", "is not YAML"),
-        ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; take one of the two away.*\n.*line 3"),
+        ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; remove one of the two.*\n.*line 3"),
         ("", r"has no section '/\*\*'"),
         ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),
         ("/**: {parameters: {}}", r"section '/\*\*' needs 'ros__parameters:'"),
@@ -134,10 +134,11 @@ def test_unknown_packaged_configuration_is_refused_with_those_that_exist() -> No
 def test_a_file_that_would_win_over_the_command_line_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(packaged("wam").read_text() + LOOP)
-    with pytest.raises(ParameterError, match=r"section '/\*\*/loop' stands after '/\*\*'"):
+    with pytest.raises(ParameterError, match=r"section '/\*\*/loop' comes after '/\*\*'"):
         Configuration.load(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["own prefix", "ament prefix"])
 def test_packaged_configuration_is_found_when_installed(tmp_path: Path, way: str) -> None:
     source = Path(__file__).resolve().parents[1]
@@ -166,3 +167,38 @@ def test_every_packaged_configuration_is_plain_yaml_with_a_shared_part() -> None
     for path in packaged("wam").parent.glob("*.yaml"):
         if "/**" in (yaml.safe_load(path.read_text()) or {}):
             assert Configuration.load(path).shared.arm.motors.names
+
+
+def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
+    overlay = tmp_path / "mine.yaml"
+    overlay.write_text(
+        "base: wam\n/**/mine: {ros__parameters: {gain: 2.0}}\n/**/driver: {ros__parameters: {watchdog: 0.03}}\n"
+        "/**: {ros__parameters: {timing: {mode: lockstep}, nodes: [driver, 'my_package.mine:Mine']}}\n"
+    )
+    found, base = Configuration.load(overlay), Configuration.load(packaged("wam"))
+    assert found.sections["mine"] == {"gain": 2.0}
+    assert found.sections["driver"] == {**base.sections["driver"], "watchdog": 0.03}
+    assert found.shared.timing.mode == "lockstep"
+    assert yaml.safe_load(found.text)["/**/driver"]["ros__parameters"]["watchdog"] == 0.03
+    assert list(found.sections)[-1] == "/**", "the shared section is the last one, else it would win over -p"
+    other = tmp_path / "other.yaml"
+    other.write_text("base: mine.yaml\n/**/mine: {ros__parameters: {gain: 3.0}}\n")
+    assert Configuration.load(other).sections["mine"] == {"gain": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("base: wam\n/**/driver: {ros__parameters: {watchdgo: 1}}\n", "node 'driver' has no parameter 'watchdgo'"),
+        ("base: nothing\n", "no configuration 'nothing' comes with wam_stack"),
+        ("base: odd.yaml\n", "base is the file itself"),
+        ("base: wam\n/**/drivr: {ros__parameters: {seed: 2}}\n", r"section '/\*\*/drivr' is of no node in 'nodes'"),
+        ("base: [wam]\n", r"base is \['wam'\]; give the name of a configuration"),
+        ("base: wam\ndriver: {ros__parameters: {}}\n", "section 'driver' is not allowed"),
+    ],
+)
+def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "odd.yaml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=message):
+        Configuration.load(path)

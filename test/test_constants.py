@@ -28,6 +28,7 @@ def elements(row: Constant, length: int) -> list[tuple[int, float]]:
     return list(zip(places, numbers, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "row"), CARRIED, ids=lambda x: x if isinstance(x, str) else f"{x.parameter}{list(x.index) or ''}"
 )
@@ -47,8 +48,8 @@ def test_every_number_of_the_arm_has_exactly_one_row(name: str) -> None:
         if carrier == name
         for place, _ in elements(row, len(numbers[row.parameter]))
     ]
-    asked = [(name, place) for name, array in numbers.items() for place in range(len(array))]
-    assert sorted(covered) == sorted(asked)
+    expected = [(name, place) for name, array in numbers.items() for place in range(len(array))]
+    assert sorted(covered) == sorted(expected)
 
 
 def test_cable_stages_come_to_the_stiffness_that_was_measured_with() -> None:
@@ -114,7 +115,7 @@ def test_assumed_pretension_leaves_no_strand_slack_at_peak_torque() -> None:
     assert 2 * pretension.si[0] == pytest.approx(si(43, "in-lb") / si(0.375, "in"), rel=0.01)
 
 
-def test_corrections_are_noted_beside_wrong_prints() -> None:
+def test_corrections_are_noted_with_wrong_prints() -> None:
     assert math.sqrt(64 / 0.0057) == pytest.approx(105.96, abs=0.005)
     (matching,) = (row for row in CONSTANTS if row.symbol == "N_m")
     assert matching.value == 104.0

@@ -70,6 +70,7 @@ def at_rest(cover: str, x: float, force: tuple[float, float, float]) -> ContactE
     return estimator.estimate()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [5.0, 10.0])
 @pytest.mark.parametrize("phi", [0.0, 60.0, 90.0, 180.0, -90.0])
 def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> None:
@@ -78,7 +79,7 @@ def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> Non
     assert felt.in_contact
     assert felt.link == "outer_link"
     assert felt.place == pytest.approx(0.28, abs=0.03)
-    assert abs(felt.place - 0.28) < 2 * felt.place_sd
+    assert abs(felt.place - 0.28) < 2 * felt.position_sd
     assert np.linalg.norm(np.subtract(felt.force, force)) < 0.1 * size
     assert felt.reason == ""
 
@@ -87,7 +88,7 @@ def test_joint_sensors_feel_the_moment_of_a_push_on_the_inner_link() -> None:
     felt = at_rest("inner_link", 0.3, (0.0, 0.0, 8.0))
     assert felt.link == "inner_link"
     assert math.isnan(felt.place)
-    assert "the shoulder sees only the moment" in felt.reason
+    assert "the shoulder measures only the moment" in felt.reason
     assert felt.moment[1] == pytest.approx(-2.4, rel=0.05)
     assert np.linalg.norm(felt.force) <= 8.0
 
@@ -143,6 +144,7 @@ def moving(
     return felt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.8, 1.05])
 @pytest.mark.parametrize("fastest", [1.0, 2.5])
 def test_no_false_alarm_in_motion_at_reversals_and_at_stops(friction: float, fastest: float) -> None:
@@ -152,6 +154,7 @@ def test_no_false_alarm_in_motion_at_reversals_and_at_stops(friction: float, fas
         assert all(felt.estimate.reason for felt in results)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_motors_alone_feel_5_newton_within_60_milliseconds_in_motion(seed: int) -> None:
     (results,) = moving([ContactEstimator(ARM, TIMING, MOTORS)], Move(seed, 1.0), 1.5, 1.0, push_at=600)
@@ -161,7 +164,7 @@ def test_motors_alone_feel_5_newton_within_60_milliseconds_in_motion(seed: int) 
     settled = next(felt.estimate for felt in results if felt.tick >= 680)
     assert settled.link == "outer_link"
     assert np.linalg.norm(np.subtract(settled.force, (0, 4, 3))) < 2.0
-    assert abs(settled.place - 0.28) < max(0.04, 2.5 * settled.place_sd)
+    assert abs(settled.place - 0.28) < max(0.04, 2.5 * settled.position_sd)
 
 
 def test_contact_is_released_below_the_lower_threshold_only() -> None:
@@ -207,7 +210,7 @@ def test_nothing_is_felt_before_anything_is_observed_or_after_reset() -> None:
         assert not found.in_contact
         assert found.link == ""
         assert math.isnan(found.place)
-        assert found.reason == "not enough has been observed"
+        assert found.reason == "too few samples yet"
         estimator.observe(State(ZERO, ZERO, ZERO), State(ZERO, ZERO, [9.0] * 4), DT)
         estimator.reset()
 

@@ -19,7 +19,9 @@ CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.y
 ARM = CONFIGURATION.shared.arm
 PARAMETERS = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).inference
 INFERENCE = ContactInference(ARM, RigidBody(ARM), PARAMETERS)
-EXACT = ContactInference(ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, force_scale=1e4, miss=0.0, friction=0.0))
+EXACT = ContactInference(
+    ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, force_scale=1e4, moment_arm_offset=0.0, friction=0.0)
+)
 POSE = (0.0, -1.05, 0.0, 0.5)
 SD = 0.02
 S = SD**2 * np.eye(4)
@@ -81,7 +83,7 @@ def test_any_direction_and_pose_on_the_outer_link() -> None:
         wrong += found[0].cover != "outer_link"
         outer = of(found, "outer_link")
         if not math.isnan(outer.place):
-            errors.append((abs(outer.place - x), outer.place_sd))
+            errors.append((abs(outer.place - x), outer.position_sd))
             forces.append(np.linalg.norm(np.subtract(outer.force, force)) / size)
             assert outer.direction == pytest.approx(phi, abs=0.1)
     assert len(errors) > 195
@@ -101,7 +103,7 @@ def test_reported_spread_is_the_spread_of_the_errors() -> None:
         tau = torques(q, "outer_link", (x, 0, 0), (0.0, size * math.cos(phi), size * math.sin(phi)))
         outer = of(EXACT.infer(q, (tau + SD * rng.standard_normal(4)).tolist(), W), "outer_link")
         if not math.isnan(outer.place):
-            scores.append(abs(outer.place - x) / outer.place_sd)
+            scores.append(abs(outer.place - x) / outer.position_sd)
     assert 0.5 < np.median(scores) < 0.85
     assert np.quantile(scores, 0.9) < 2.0
 
@@ -112,8 +114,8 @@ def test_inner_link_shows_moment_and_bound_but_no_place(x: float, phi: float) ->
     force = (0.0, 8 * math.cos(math.radians(phi)), 8 * math.sin(math.radians(phi)))
     found = of(infer(POSE, "inner_link", (x, 0, 0), force), "inner_link")
     assert math.isnan(found.place)
-    assert math.isnan(found.place_sd)
-    assert "the shoulder sees only the moment" in found.reason
+    assert math.isnan(found.position_sd)
+    assert "the shoulder measures only the moment" in found.reason
     assert found.is_lower_bound
     bound = x * 8 / L3
     assert np.linalg.norm(found.force) == pytest.approx(bound, rel=0.03)
@@ -165,7 +167,7 @@ def test_unknown_places_always_have_a_reason_and_the_least_force() -> None:
                 assert found.is_lower_bound
             else:
                 assert 0.0 <= found.place <= L4
-                assert 0.0 < found.place_sd < L4 / 2
+                assert 0.0 < found.position_sd < L4 / 2
     assert seen >= 300
 
 
@@ -181,7 +183,7 @@ def evidence(q: tuple[float, ...], tau: np.ndarray, cover: str) -> float:
     """Log probability of torques by brute force: every place alike, normal force, twist that goes with it."""
     length, slope = (L3, 0.04064 / L3) if cover == "inner_link" else (L4, 0.0)
     radius = ARM.covers.radius[ARM.covers.names.index(cover)]
-    twist_arm = PARAMETERS.miss * ARM.covers.radius[ARM.covers.names.index(cover)]
+    twist_arm = PARAMETERS.moment_arm_offset * ARM.covers.radius[ARM.covers.names.index(cover)]
     across = (0.0, 1.0, 0.0), (-slope, 0.0, 1.0)
 
     def levers(x: float) -> np.ndarray:
@@ -202,6 +204,7 @@ def evidence(q: tuple[float, ...], tau: np.ndarray, cover: str) -> float:
     return float(np.logaddexp.reduce(logs) - math.log(len(logs)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cover", "x", "force"),
     [
@@ -269,18 +272,19 @@ def one_joint(arm: Arm) -> Arm:
     )
 
 
-def test_a_single_joint_reports_what_it_sees() -> None:
+def test_a_single_joint_reports_what_it_measures() -> None:
     arm = one_joint(ARM)
     inference = ContactInference(arm, RigidBody(arm), dataclasses.replace(PARAMETERS, weights=(1.0,)))
     (found,) = inference.infer([0.4], [1.2], np.array([[SD**-2]]))
     assert found.cover == "outer_link"
     assert found.probability == 1.0
     assert math.isnan(found.place)
-    assert "the only joint sees only the moment" in found.reason
+    assert "the only joint measures only the moment" in found.reason
     assert found.moment == pytest.approx((0.0, 0.0, 1.2), rel=0.01)
     assert found.force == pytest.approx((0.0, 1.2 / L4, 0.0), rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_links_count_before_anything_is_felt_by_the_area_that_they_sweep() -> None:
     """Any pose within the limits, each joint at any speed up to its own; by geometry done by hand, not by the arm's."""
     rng, swept = np.random.default_rng(3), np.zeros(2)
@@ -300,7 +304,7 @@ def test_the_set_is_no_wider_for_coarse_places() -> None:
     pushes = [torques(POSE, "outer_link", (x, 0, 0), (0, 4, 3)).tolist() for x in np.linspace(0.12, 0.28, 20)]
     lengths = {}
     for places in (25, 200):
-        inference = ContactInference(ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, places=places))
+        inference = ContactInference(ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, positions=places))
         found = [of(inference.infer(POSE, tau, np.linalg.inv(9.0 * COARSE)), "outer_link") for tau in pushes]
         lengths[places] = np.array([one.high - one.low for one in found])
     assert lengths[25].min() > 6 * L4 / 25, "many places, none looked at more closely"

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
-from wam_analysis.contact_battery.scenes import Draw
-from wam_analysis.direct import DirectRun
 from wam_control.contact_estimator import ContactEstimate, ContactEstimatorParameters
 from wam_control.contact_inference import ContactInference
 from wam_control.momentum_observer import MomentumObserver
-from wam_control.scenario import Push, Step
+from wam_control.scenario import Push, ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
+from wam_experiments.contact_benchmark.scenarios import ScenarioGenerator
+from wam_sim.simulation import Simulation
 
 CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
 ARM = CONFIGURATION.shared.arm
@@ -47,8 +47,8 @@ def test_truth_does_not_share_masses_and_friction_with_the_estimator() -> None:
     nominal = dataclasses.replace(PARAMETERS.observer, payload=(0.0, 0.0))
     departed = felt_while_sliding(ARM, MomentumObserver(ARM, nominal, False), 200)
     assert np.abs(departed[180:]).max() > 5.0 * np.abs(shared[180:]).max()
-    for scene in Draw(CONFIGURATION, 1).contacts(4):
-        assert len({*scene.values["driver:departure.mass"], *scene.values["driver:departure.motor_friction"]}) == 8
+    for scenario in ScenarioGenerator(CONFIGURATION, 1).contacts(4):
+        assert len({*scenario.values["driver:mismatch.mass"], *scenario.values["driver:mismatch.motor_friction"]}) == 8
 
 
 def test_a_textbook_differential_mistakes_gravity_for_a_push() -> None:
@@ -78,22 +78,27 @@ def test_more_samples_of_the_same_friction_do_not_make_it_better_known() -> None
     assert np.all(spreads[1] > least)
 
 
-def resting(newtons: float, seconds: float = 0.5, **values: object) -> tuple[ContactEstimate, DirectRun]:
+def resting(newtons: float, seconds: float = 0.5, **values: object) -> tuple[ContactEstimate, Simulation]:
     """What the motors alone feel of a push on the outer link of the arm that holds its posture."""
     own = {
         "contact_estimator:use_joint_sensors": False,
         "arm.joints.start": [0.1, -0.9, 0.2, 0.7],
-        "driver:departure.motor_friction": [1.05, 0.95, 1.02, 0.97],
+        "driver:mismatch.motor_friction": [1.05, 0.95, 1.02, 0.97],
         "driver:world.obstacles.positions": [5.0] * 3,
         **values,
     }
     push = Push("outer_link", 0.28, (0.0, 0.8 * newtons, 0.6 * newtons), 0.0, 2.0)
-    steps = [Step("release", 0.05, request="enable"), Step("settle", 0.45), Step("rest", seconds, push=push)]
-    run = DirectRun(CONFIGURATION.with_values(own), steps)
+    steps = [
+        ScenarioStep("release", 0.05, request="enable"),
+        ScenarioStep("settle", 0.45),
+        ScenarioStep("rest", seconds, push=push),
+    ]
+    run = Simulation(CONFIGURATION.with_values(own), steps)
     assert run.play() == ""
     return run.estimate, run
 
 
+@pytest.mark.slow
 def test_stiction_hides_5_newton_at_rest_and_the_estimate_says_so() -> None:
     """A test that pushes with 20 N only would not notice."""
     light, _ = resting(5.0)
@@ -103,17 +108,19 @@ def test_stiction_hides_5_newton_at_rest_and_the_estimate_says_so() -> None:
     assert heavy.in_contact
 
 
+@pytest.mark.slow
 def test_dither_feels_5_newton_at_rest() -> None:
     found, run = resting(5.0, **{"timing.dither_cycle": 40})
     assert found.in_contact
     assert found.link == "outer_link"
-    assert abs(found.place - 0.28) < max(0.03, 2.0 * found.place_sd)
+    assert abs(found.place - 0.28) < max(0.03, 2.0 * found.position_sd)
     assert np.linalg.norm(np.subtract(found.force, (0.0, 4.0, 3.0))) < 1.0
     tip = [row.values[:4] for row in run.rows["sim/joint_states"][60:100]]
     moved = np.ptp([RigidBody(ARM).tool_pose(q).position for q in tip], axis=0)
     assert 0.0 < np.linalg.norm(moved) < 0.5e-3
 
 
+@pytest.mark.slow
 def test_dither_averaged_over_less_than_a_cycle_is_felt_as_a_push() -> None:
     swings = {}
     for cycle in (40, 27):

@@ -16,13 +16,17 @@ from typing import Any, NamedTuple
 
 import pytest
 import yaml
+from conftest import LONG
 
 from wam_description.configuration import Configuration, packaged
-from wam_ros.topics import BY_NAME
+from wam_description.topics import BY_NAME
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-HANDBOOK = {path.name: path.read_text(encoding="utf-8") for path in [ROOT / "README.md", *ROOT.glob("docs/*.md")]}
+HANDBOOK = {
+    path.name: path.read_text(encoding="utf-8")
+    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]
+}
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 MARKED = re.compile(r"<!-- ([^\n]*?) -->\n+```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 MARKS = ("run", "start: ", "run with the stack", "not run here: ", "generated: ")
@@ -60,6 +64,7 @@ def generate() -> Any:
     return load(ROOT / "docs" / "generate.py")
 
 
+@pytest.mark.slow
 def test_generated_pages_are_current(generate: Any) -> None:
     stale = [path.name for path, text in generate.pages().items() if path.read_text(encoding="utf-8") != text]
     assert stale == [], "these pages are not what the code says; run 'make docs' and commit them"
@@ -83,7 +88,7 @@ class Shell:
         self.directory = directory
         programs = directory / "bin"
         programs.mkdir()
-        for name, command in (("wam", "-m wam_ros.cli"), ("python3", "")):
+        for name, command in (("wam", "-m wam_cli.main"), ("python3", "")):
             program = programs / name
             program.write_text(f'#!/bin/sh\nexec "{sys.executable}" {command} "$@"\n')
             program.chmod(0o755)
@@ -103,7 +108,7 @@ class Shell:
 
     def run(self, *command: str) -> str:
         done = subprocess.run(
-            command, cwd=self.directory, env=self.environment, capture_output=True, text=True, timeout=110, check=False
+            command, cwd=self.directory, env=self.environment, capture_output=True, text=True, timeout=LONG, check=False
         )
         assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
         return done.stdout
@@ -123,7 +128,7 @@ def started(ros: Any, shell: Shell) -> Iterator[Any]:
     def start(commands: list[str], nodes: list[str]) -> None:
         processes.extend(shell.start(command) for command in commands)
         for node in nodes:
-            assert onlooker.wait_for_node(f"/wam/{node}", timeout=60.0), f"{commands}: no node /wam/{node}"
+            assert onlooker.wait_for_node(f"/wam/{node}", timeout=LONG), f"{commands}: no node /wam/{node}"
 
     def kill() -> None:
         for process in processes:
@@ -137,7 +142,7 @@ def started(ros: Any, shell: Shell) -> Iterator[Any]:
             assert process.poll() is None, f"{process.args!r} ended by itself:\n{process.communicate()[0]}"
             process.send_signal(signal.SIGINT)
         for process in processes:
-            said, _ = process.communicate(timeout=30)
+            said, _ = process.communicate(timeout=LONG)
             assert process.returncode == 0, said
             assert "Traceback" not in said, said
 
@@ -187,36 +192,37 @@ def test_python_of_the_readme_reads_a_bag(shell: Shell, domain_id: int) -> None:
         assert shell.run("python3", "-c", block.code) != ""
 
 
-def test_example_of_a_node_presses_what_it_asks(shell: Shell, started: Any) -> None:
+def test_example_of_a_client_presses_with_the_commanded_force(shell: Shell, started: Any) -> None:
     (block,) = marked("run with the stack")
     # in lockstep, because no watchdog minds a busy machine there
     started(["wam up --mode lockstep"], ["driver", "contact_estimator"])
     said = shell.run("sh", "-e", "-c", block.code)
-    pressed = [tuple(map(float, found)) for found in re.findall(r"asked +(\S+) N, measured +(\S+) N", said)]
-    assert [asked for asked, _ in pressed] == [5.0, 10.0]
-    for asked, measured in pressed:
-        assert measured == pytest.approx(asked, rel=0.2)
+    pressed = [tuple(map(float, found)) for found in re.findall(r"commanded +(\S+) N, measured +(\S+) N", said)]
+    assert [commanded for commanded, _ in pressed] == [5.0, 10.0]
+    for commanded, measured in pressed:
+        assert measured == pytest.approx(commanded, rel=0.2)
 
 
 def test_example_without_ros_says_how_the_force_was_held(shell: Shell) -> None:
     said = shell.run("python3", "examples/direct_run.py")
-    assert len(re.findall(r"asked .* N  measured .* N", said)) >= 6
+    assert len(re.findall(r"commanded .* N  measured .* N", said)) >= 6
 
 
 # names
 
 
 def test_topics_and_services_named_in_the_handbook_exist(domain_id: int) -> None:
-    from wam_ros.bring_up import MODULES, Composition
+    from wam_description.nodes import NODES
+    from wam_ros.bring_up import Composition
 
-    nodes = [name for name in MODULES if name != "recorder"]
+    nodes = [name for name in NODES if name != "recorder"]
     configuration = Configuration.load(packaged("wam")).with_values({"nodes": nodes, "timing.mode": "lockstep"})
     with Composition(configuration, domain_id=domain_id) as composition:
         services = {service.service_name for node in composition.nodes.values() for service in node.services}
     topics = {name if name.startswith("/") else f"/wam/{name}" for name in BY_NAME}
     for page, text in HANDBOOK.items():
         named = set(re.findall(r"/wam/[a-z_/]*[a-z]", text))
-        assert named <= topics | services | {f"/wam/{node}" for node in MODULES}, page
+        assert named <= topics | services | {f"/wam/{node}" for node in NODES}, page
 
 
 def test_topics_in_backticks_exist() -> None:
@@ -232,7 +238,7 @@ def test_topics_in_backticks_exist() -> None:
 
 def test_files_that_the_handbook_links_to_exist() -> None:
     for page, text in HANDBOOK.items():
-        folder = ROOT if page == "README.md" else ROOT / "docs"
+        folder = ROOT if page in ("README.md", "CONTRIBUTING.md") else ROOT / "docs"
         for target in re.findall(r"\]\(([^)#:]+)\)", text):
             assert (folder / target).is_file(), f"{page}: {target}"
 
@@ -246,6 +252,7 @@ def spoken(path: Path) -> Iterator[str]:
             yield node.value
 
 
+@pytest.mark.slow
 def test_refusals_in_the_handbook_are_those_of_the_code() -> None:
     table = HANDBOOK["safety.md"].partition("<!-- messages:")[2]
     messages = re.findall(r"^\|[^|]+\| `(.+)` \|$", table, re.MULTILINE)

@@ -95,10 +95,12 @@ def test_reducer_at_the_joint_gives_root_n_at_constant_stress_and_n_for_equal_li
     ratio, length = 14.0, 0.9
     for place, gain in ((0.0, 1.0), (length, math.sqrt(ratio))):
         stiffer = stiffness_with_reducer(1e4, length, ratio, place) / stiffness_with_reducer(1e4, length, ratio, 0.0)
-        assert resonance.bandwidth_by_place(ratio, length, place) == pytest.approx(math.sqrt(stiffer), rel=1e-12)
+        assert resonance.bandwidth_by_reducer_position(ratio, length, place) == pytest.approx(
+            math.sqrt(stiffer), rel=1e-12
+        )
         assert math.sqrt(stiffer) == pytest.approx(gain, rel=1e-12)
     halfway = stiffness_with_reducer(1e4, length, ratio, 0.5) / stiffness_with_reducer(1e4, length, ratio, 0.0)
-    assert resonance.bandwidth_by_place(ratio, length, 0.5) == pytest.approx(math.sqrt(halfway), rel=1e-12)
+    assert resonance.bandwidth_by_reducer_position(ratio, length, 0.5) == pytest.approx(math.sqrt(halfway), rel=1e-12)
     equal = resonance.position_bandwidth(JL, KTR, ratio) / resonance.position_bandwidth(JL, KTR, 1.0)
     assert equal == pytest.approx(ratio)
 
@@ -181,7 +183,7 @@ def test_share_at_the_crossover_falls_from_one_to_0_62_at_the_matched_ratio() ->
     [
         (lambda: resonance.position_transfer(1j, 0.0, 1.0, 1.0), "link_inertia is 0"),
         (lambda: resonance.position_bandwidth(1.0, 1.0, -1.0), "ratio is -1"),
-        (lambda: resonance.bandwidth_by_place(2.0, 1.0, 1.1), "distance is 1.1 m"),
+        (lambda: resonance.bandwidth_by_reducer_position(2.0, 1.0, 1.1), "distance is 1.1 m"),
         (lambda: resonance.force_transfer(1j, 1.0, 1.0, 1.0, 0.0, 1.0), "contact_stiffness is 0"),
         (lambda: resonance.soft_contact_bandwidth(1.0, 1.0, 1.0, 0.0), "ratio is 0"),
         (lambda: resonance.hard_contact_bandwidth(0.0, 1.0), "motor_inertia is 0"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wam_theory import describing_function, regimes
-from wam_theory.stick_slip import ForceLoop, FrictionNode, Kind, Verdict, assess, simulate
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Kind, Verdict, assess, simulate
 
 QUARTER = (1.0, 1.0, 2.0, 2.0)  # J, b, k_tr, k_c: zeta = 0.25 and gamma = G_I
 
@@ -40,7 +40,7 @@ def test_predicted_cycle_solves_5_16() -> None:
 @pytest.mark.parametrize(("gamma", "excess", "from_rest"), [(1.1, 0.007, 2.0), (1.5, 0.05, 1.42), (2.0, 0.18, 1.09)])
 def test_exact_cycle_is_where_responses_linger_before_they_part(gamma: float, excess: float, from_rest: float) -> None:
     """Start as near the edge between settling and diverging as numbers allow: the peaks stay at the cycle."""
-    node, loop = FrictionNode(*QUARTER, 1.0, 1.0), ForceLoop(gamma)
+    node, loop = FrictionNode(*QUARTER, 1.0, 1.0), IntegralLoop(gamma)
     low, high = 0.1, 100.0
     for _ in range(60):
         middle = (low + high) / 2.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wam_theory import linear_loop
-from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess, simulate
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
 
 
 def state_matrices(
@@ -34,7 +34,7 @@ def test_integral_time_constant_is_that_of_a_fast_node() -> None:
     node, gain = FrictionNode(1e-8, 1e-4, 3.0, 6.0, 0.0, 0.0), 0.25
     tau = float(linear_loop.integral_time_constant(gain, linear_loop.series_stiffness(3.0, 6.0)))
     assert tau == pytest.approx(2.0)
-    force = simulate(node, ForceLoop(gain), 5.0, 10.0).at([tau]).contact_force[0]
+    force = simulate(node, IntegralLoop(gain), 5.0, 10.0).at([tau]).contact_force[0]
     assert force == pytest.approx(5.0 * (1.0 - math.exp(-1.0)), rel=1e-3)
 
 
@@ -72,6 +72,7 @@ def test_testbed_gains_of_section_5_6() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0, 1, 2, 5])
 @pytest.mark.parametrize("period", [0.02, 0.3, 2.0])
 def test_sampled_margin_is_where_the_exact_response_begins_to_grow(delay: int, period: float) -> None:
@@ -80,7 +81,7 @@ def test_sampled_margin_is_where_the_exact_response_begins_to_grow(delay: int, p
     node = FrictionNode(*values, 0.0, 0.0)
     sizes = []
     for factor in (0.97, 1.03):
-        loop = ForceLoop(factor * margin.gain, sample_period=period, delay_samples=delay)
+        loop = IntegralLoop(factor * margin.gain, sample_period=period, delay_samples=delay)
         times = np.arange(0.0, 300.0 * math.pi / margin.frequency, 0.1 / margin.frequency)
         error = np.abs(1.0 - simulate(node, loop, 1.0, times[-1] + 1.0).at(times).contact_force)
         third = len(times) // 3
@@ -105,7 +106,7 @@ TESTBED = (4.0, 33.10755, 14443.0, 12960.0)  # J, b, k_tr, k_c in pounds and inc
 
 def verdict(gain: float, step: float, delay: int) -> Verdict:
     """Of the testbed with 8.4 lb-in of friction at 50 Hz."""
-    loop = ForceLoop(gain, sample_period=0.02, delay_samples=delay)
+    loop = IntegralLoop(gain, sample_period=0.02, delay_samples=delay)
     return assess(FrictionNode(*TESTBED, 8.4, 8.4), loop, step).verdict
 
 

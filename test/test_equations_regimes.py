@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wam_theory import linear_loop, regimes
-from wam_theory.stick_slip import ForceLoop, FrictionNode, Kind, half_cycle, simulate
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Kind, half_cycle, simulate
 
 
 def slip_by_matrix(gamma: float, zeta: float, samples: int = 400) -> tuple[float, float] | None:
@@ -63,7 +63,7 @@ def test_half_cycle_ends_where_matrix_steps_of_5_14_do(gamma: float, zeta: float
 def test_psi_is_the_ratio_of_errors_at_successive_standstills() -> None:
     zeta, gamma = 0.25, 0.9
     node = FrictionNode(1.0, 1.0, 2.0, 2.0, 1.0, 1.0)
-    sticks = [e for e in simulate(node, ForceLoop(gamma), 1.0, 1e4).events if e.kind is Kind.STICK]
+    sticks = [e for e in simulate(node, IntegralLoop(gamma), 1.0, 1e4).events if e.kind is Kind.STICK]
     errors = [1.0 - e.contact_force for e in sticks[:6]]
     ratios = [-late / early for early, late in pairwise(errors)]
     assert ratios == pytest.approx([float(regimes.psi(gamma, zeta))] * len(ratios), rel=1e-6)
@@ -76,7 +76,9 @@ def test_slips_never_stop_below_gamma_a_and_do_above(zeta: float) -> None:
     assert slip_by_matrix(0.97 * bound, zeta) is None
     node = FrictionNode(1.0, 4.0 * zeta, 2.0, 2.0, 1.0, 1.0)
     for factor, stops in ((0.999, False), (1.02, True)):
-        kinds = [e.kind for e in simulate(node, ForceLoop(factor * bound * 4.0 * zeta), 1.0, 1e6, max_events=5).events]
+        kinds = [
+            e.kind for e in simulate(node, IntegralLoop(factor * bound * 4.0 * zeta), 1.0, 1e6, max_events=5).events
+        ]
         assert (Kind.STICK in kinds) is stops
 
 
@@ -139,7 +141,7 @@ def test_point_b_parts_first_slips_that_stick_from_those_that_reverse(ktr: float
     ratio = float(regimes.point_b(zeta, ktr, kc))
     for factor, kind in ((1.001, Kind.STICK), (0.999, Kind.REVERSE)):
         node = FrictionNode(j, b, ktr, kc, factor * ratio, factor * ratio)
-        assert simulate(node, ForceLoop(gain), 1.0, 1e3).events[2].kind is kind
+        assert simulate(node, IntegralLoop(gain), 1.0, 1e3).events[2].kind is kind
 
 
 @pytest.mark.parametrize("gamma", [0.45, 0.9])
@@ -147,7 +149,7 @@ def test_spin_up_is_the_time_stuck_of_the_exact_response(gamma: float) -> None:
     """Zeta = 0.25, friction 5: stairs of equal times below gamma_b = 0.597, times without bound above."""
     node = FrictionNode(1.0, 1.25, 2.0, 4.25, 5.0, 5.0)
     gain = gamma * float(linear_loop.routh_gain(1.0, 1.25, 2.0, 4.25))
-    events = simulate(node, ForceLoop(gain), 1.0, 1e300, max_events=24).events[1:]
+    events = simulate(node, IntegralLoop(gain), 1.0, 1e300, max_events=24).events[1:]
     stuck = []
     for slip, stick, after in zip(events[::2], events[1::2], events[2::2], strict=False):
         assert (slip.kind, stick.kind) == (Kind.SLIP, Kind.STICK)
@@ -169,7 +171,7 @@ def test_no_time_is_stuck_where_the_slip_is_too_hard_and_all_where_it_creeps() -
 def actuator_range(gamma: float, step: float) -> float:
     """Peak to peak of x_m between the last breakaways of a response of zeta = 0.25, F_friction = 1.5."""
     node = FrictionNode(1.0, 1.0, 2.0, 2.0, 1.5, 1.5)
-    events = simulate(node, ForceLoop(gamma), step, 1e300, max_events=40).events
+    events = simulate(node, IntegralLoop(gamma), step, 1e300, max_events=40).events
     motor = [e.x_m for e in events if e.kind is Kind.SLIP][-4:]
     return max(motor) - min(motor)
 
@@ -189,7 +191,7 @@ def test_actuator_cycle_exists_only_from_gamma_b_to_gamma_3() -> None:
 def test_actuator_power_is_its_work_over_the_time_of_the_exact_half_cycle() -> None:
     gamma, friction = 0.9, 1.5
     node = FrictionNode(1.0, 1.0, 2.0, 2.0, friction, friction)
-    events = simulate(node, ForceLoop(gamma), 1.0, 1e300, max_events=60).events
+    events = simulate(node, IntegralLoop(gamma), 1.0, 1e300, max_events=60).events
     breaks = [e for e in events if e.kind is Kind.SLIP][-2:]
     error = abs(1.0 - breaks[1].contact_force)
     time = breaks[1].time - breaks[0].time

@@ -24,7 +24,7 @@ def test_contact_is_found_in_every_pose_but_the_right_angle() -> None:
         tau_1, tau_2 = torques_of(-7.0, 0.3, 0.56, inner, elbow)
         found = planar_contact(tau_1, tau_2, 0.56, elbow)
         assert found.force == pytest.approx(-7.0)
-        assert found.place == pytest.approx(0.3)
+        assert found.position == pytest.approx(0.3)
     tau_1, tau_2 = torques_of(7.0, 0.3, 0.56, 0.4, math.pi / 2)
     assert tau_1 == pytest.approx(tau_2)  # the inner joint feels nothing of its own
     assert np.isnan(planar_contact(tau_1, tau_2, 0.56, math.pi / 2)).all()
@@ -35,16 +35,16 @@ def test_printed_contact_is_that_of_the_straight_arm_alone() -> None:
         tau_1, tau_2 = torques_of(7.0, 0.3, 0.56, 0.2, elbow)
         printed = (tau_1 - tau_2) / 0.56, tau_2 * 0.56 / (tau_1 - tau_2)
         found = planar_contact(tau_1, tau_2, 0.56, elbow)
-        assert (printed == pytest.approx((float(found.force), float(found.place)))) is right
+        assert (printed == pytest.approx((float(found.force), float(found.position)))) is right
     assert printed[0] == pytest.approx(7.0 * math.cos(1.0))
 
 
-def test_contact_without_force_has_no_place_and_arguments_broadcast() -> None:
+def test_contact_without_force_has_no_position_and_arguments_broadcast() -> None:
     found = planar_contact([[0.0], [1.0]], [0.0, 0.2, 0.5], 0.5, 0.0)
-    assert found.force.shape == found.place.shape == (2, 3)
+    assert found.force.shape == found.position.shape == (2, 3)
     assert found.force[0, 0] == 0.0
-    assert math.isnan(found.place[0, 0])
-    assert found.place[1, 2] == pytest.approx(0.5)
+    assert math.isnan(found.position[0, 0])
+    assert found.position[1, 2] == pytest.approx(0.5)
 
 
 def test_impact_force_is_the_greatest_of_a_mass_that_runs_into_a_spring() -> None:

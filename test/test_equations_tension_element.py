@@ -68,7 +68,7 @@ def test_places_of_no_slip_are_what_the_control_volume_gives(at_entry: bool) -> 
     v2 = v1 * (1.0 + (tight - loose) / EA)
     speed = v1 if at_entry else v2
     heat = te.control_volume_loss((tight - loose) * speed, loose, tight, v1, v2, EA, 0.0, 0.0, 0.0)
-    found = te.loss_by_place(speed, loose, tight, EA, at_entry)
+    found = te.loss_by_sticking_point(speed, loose, tight, EA, at_entry)
     assert found == pytest.approx(float(heat), rel=1e-9 if at_entry else 0.05)
     assert bool(found > 0.0) is at_entry
 
@@ -77,8 +77,8 @@ def test_cable_sticks_at_the_entry_because_the_exit_would_take_heat_in() -> None
     rng = np.random.default_rng(4)
     loose = rng.uniform(0.0, 100.0, 200)
     tight = loose + rng.uniform(1.0, 100.0, 200)
-    assert np.all(te.loss_by_place(1.0, loose, tight, 9500.0, True) > 0.0)
-    assert np.all(te.loss_by_place(1.0, loose, tight, 9500.0, False) < 0.0)
+    assert np.all(te.loss_by_sticking_point(1.0, loose, tight, 9500.0, True) > 0.0)
+    assert np.all(te.loss_by_sticking_point(1.0, loose, tight, 9500.0, False) < 0.0)
     assert te.driven_pulley_speed(3.0, 0.5) == pytest.approx(6.0)
     stage = Stage(10.0 * LB, 170.0 * LB)
     work = (160.0 * LB * 0.1) * te.driven_pulley_speed([stage.v1, stage.v2], 0.1)
@@ -90,7 +90,7 @@ def test_cable_sticks_at_the_entry_because_the_exit_would_take_heat_in() -> None
 def test_last_term_of_6_10_takes_the_loss_away_from_the_exact_one() -> None:
     loose, tight = 0.0, 170.0 * LB
     stage = Stage(loose, tight)
-    with_term = float(te.loss_by_place(stage.v1, loose, tight, EA, True))
+    with_term = float(te.loss_by_sticking_point(stage.v1, loose, tight, EA, True))
     without = float(te.pulley_loss(stage.shaft_out, tight - loose, EA))
     assert without == pytest.approx(stage.driven_loss, rel=1e-10)
     assert with_term == pytest.approx(stage.driven_loss * (1.0 - tight / EA), rel=1e-10)
@@ -189,7 +189,7 @@ def test_coulomb_like_torque_of_both_pulleys_is_the_power_that_creep_takes() -> 
 def test_arguments_broadcast() -> None:
     column, row = np.array([[1.0], [2.0]]), np.array([10.0, 20.0, 30.0])
     assert te.speed_ratio(column, row, 9500.0).shape == (2, 3)
-    assert te.loss_by_place(1.0, column, row, 9500.0, True).shape == (2, 3)
+    assert te.loss_by_sticking_point(1.0, column, row, 9500.0, True).shape == (2, 3)
     assert te.equal_stages_efficiency(row, 9500.0, column).shape == (2, 3)
     assert te.slip_arc(column, row, 0.2).shape == (2, 3)
     assert te.gravity_number(column, 9.8, 1e4, 0.1, row).shape == (2, 3)
@@ -204,7 +204,7 @@ def test_arguments_broadcast() -> None:
         (lambda: te.kinetic_number(1.0, 1.0, 0.0), "difference is 0"),
         (lambda: te.gravity_number(1.0, 9.8, 1.0, 0.0, 1.0), "radius is 0"),
         (lambda: te.driven_pulley_speed(math.nan, 1.0), "loose_speed is nan"),
-        (lambda: te.loss_by_place(-1.0, 1.0, 2.0, 9.0, True), "speed is -1"),
+        (lambda: te.loss_by_sticking_point(-1.0, 1.0, 2.0, 9.0, True), "speed is -1"),
         (lambda: te.pulley_loss(1.0, -1.0, 9.0), "difference is -1"),
         (lambda: te.output_power(1.0, 9.0, 9.0), "difference is 9.0 N; it must be below ea"),
         (lambda: te.equal_stages_efficiency(1.0, 9.0, -1.0), "stages is -1"),

@@ -9,19 +9,19 @@ import pytest
 import yaml
 from recordings import forces, joints, recorded
 
-from wam_analysis.bag import BagError, PointColumns
-from wam_analysis.experiments import arm_forces, cables, limit_cycles, step_response, testbed, transmission
-from wam_analysis.experiments.definition import configured, load, names
-from wam_analysis.experiments.evaluation import evaluation_of
-from wam_analysis.experiments.one_link import growth, last_cycle, one_link
-from wam_analysis.experiments.page import write
-from wam_analysis.experiments.recording import Step
-from wam_analysis.experiments.rows import Result, Row, markdown, plain
+from wam_bag.bag import BagError, PointColumns
+from wam_cli.main import main
 from wam_control import scenario
 from wam_description.configuration import packaged
 from wam_description.parameters import ParameterError
 from wam_description.units import si
-from wam_ros.cli import main
+from wam_experiments.thesis import arm_forces, cables, limit_cycles, step_response, testbed, transmission
+from wam_experiments.thesis.definition import configured, load, names
+from wam_experiments.thesis.evaluation import evaluation_of
+from wam_experiments.thesis.one_link import growth, one_link
+from wam_experiments.thesis.page import write
+from wam_experiments.thesis.recording import Step
+from wam_experiments.thesis.rows import Comparison, Result, markdown, plain
 
 LEVER = 0.9144  # m
 STIFFNESS = 1464.28  # k_c of the testbed at its joint, N m/rad
@@ -35,6 +35,7 @@ def pressed(time, force):  # the sensors of a testbed that presses with this for
 # definition
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", names())
 def test_every_experiment_has_parameters_that_exist_and_steps_that_can_be_played(name: str, tmp_path: Path) -> None:
     experiment = load(name)
@@ -53,7 +54,7 @@ def test_the_experiments_of_chapters_four_to_six_are_there() -> None:
 
 
 def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
-    with pytest.raises(ParameterError, match=r"no experiment is named 'creeep'; there are: .*creep"):
+    with pytest.raises(ParameterError, match=r"no experiment is named 'creeep'; choose from .*creep"):
         load("creeep")
 
 
@@ -62,7 +63,7 @@ def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
     [
         ({"rums": []}, "unknown key 'rums'"),
         ({"runs": []}, "'runs' must be a list with at least one"),
-        ({"runs": [{"name": "../x", "steps": [{}]}]}, "it must be one for a directory"),
+        ({"runs": [{"name": "../x", "steps": [{}]}]}, "it must be valid for a directory"),
         ({"runs": [{"name": "a", "steps": [{}]}] * 2}, "several runs are named a"),
         ({"runs": [{"name": "a"}]}, "'steps' is missing"),
     ],
@@ -79,19 +80,19 @@ def test_a_file_that_is_not_an_experiment_is_refused(change: dict, message: str,
 
 
 def test_a_row_agrees_within_its_bound_and_never_with_what_could_not_be_measured() -> None:
-    assert Row("x", 2.0, 2.03, bound=0.02).agrees
-    assert not Row("x", 2.0, 2.05, bound=0.02).agrees
-    assert Row("x", -2.0, -1.97, bound=0.02).deviation == pytest.approx(0.015)
-    assert not Row("x", 2.0, math.nan, bound=0.02).agrees
-    assert not Row("x", 0.0, 0.001, bound=0.02).agrees, "nothing is near zero in parts of it"
-    assert Row("x", 0.0, 0.001, bound=0.02, absolute=True).agrees
-    assert not Row("x", "settled", "diverged").agrees
-    assert Row("x", 1.0, 9.0, bound=math.nan).agrees
-    assert not Result([Row("x", 1.0, 1.0), Row("x", 1.0, 2.0, bound=0.1)], []).agrees
+    assert Comparison("x", 2.0, 2.03, bound=0.02).agrees
+    assert not Comparison("x", 2.0, 2.05, bound=0.02).agrees
+    assert Comparison("x", -2.0, -1.97, bound=0.02).deviation == pytest.approx(0.015)
+    assert not Comparison("x", 2.0, math.nan, bound=0.02).agrees
+    assert not Comparison("x", 0.0, 0.001, bound=0.02).agrees, "nothing is near zero in parts of it"
+    assert Comparison("x", 0.0, 0.001, bound=0.02, absolute=True).agrees
+    assert not Comparison("x", "settled", "diverged").agrees
+    assert Comparison("x", 1.0, 9.0, bound=math.nan).agrees
+    assert not Result([Comparison("x", 1.0, 1.0), Comparison("x", 1.0, 2.0, bound=0.1)], []).agrees
 
 
 def test_tables_say_what_was_missed() -> None:
-    rows = [Row("period", 2.0, 2.5, "s", 0.02, "(5.9)"), Row("a|b", "settled", "settled")]
+    rows = [Comparison("period", 2.0, 2.5, "s", 0.02, "(5.9)"), Comparison("a|b", "settled", "settled")]
     assert "+25.00 %  2.00 %  (5.9)     MISSED" in plain(rows)
     assert "| a\\|b | settled | settled |" in markdown(rows)
 
@@ -109,15 +110,6 @@ def test_growth_of_a_growing_and_of_a_decaying_oscillation() -> None:
         growth(time, np.ones_like(time))
 
 
-def test_last_cycle_of_a_cycle_that_converges() -> None:
-    time = np.arange(0.0, 12.0, 1e-3)
-    sawtooth = 2.0 * ((time / 1.5) % 1.0 - 0.5) * (1.0 + np.exp(-2.0 * time)) + 9.0
-    found = last_cycle(time, sawtooth)
-    assert found.peak_to_peak == pytest.approx(2.0, rel=0.01)
-    assert found.period == pytest.approx(1.5, rel=0.01)
-    assert math.isnan(last_cycle(time, time).period)
-
-
 # evaluations
 
 
@@ -126,7 +118,7 @@ def test_marginal_gain_lies_where_growth_changes_its_sign(tmp_path: Path) -> Non
     time = np.arange(0.0, 2.5, 5e-4)
     runs = {}
     for number, name, gain, rate in ((0, "below", 0.010, -0.6), (1, "above", 0.014, 0.2)):
-        steps = (Step("more gain", 0.0, 2.5, {"force_loop:force_gain": [gain]}),)
+        steps = (Step("raise the gain", 0.0, 2.5, {"force_loop:force_gain": [gain]}),)
         force = 44.0 + 0.5 * np.exp(rate * time) * np.sin(75.0 * time)
         topics = {"joint_sensors": pressed(time, force), "motor_states": joints(time, 0.0)}
         runs[name] = recorded(experiment, number, topics, steps, tmp_path)
@@ -141,14 +133,14 @@ def test_marginal_gain_lies_where_growth_changes_its_sign(tmp_path: Path) -> Non
 def test_margin_with_the_velocity_loop_tends_to_that_of_a_velocity_source_as_it_gets_stiffer(tmp_path: Path) -> None:
     run = recorded(load("testbed-own-servo"), 0, {}, PRESS, tmp_path)
     own = testbed.margin_with_servo(run)
-    stiff = {"proportional_gain": (0.03,), "integral_gain": (9.0,)}
-    stiffer = {**run.parameters, "velocity_loop": {**run.parameters["velocity_loop"], **stiff}}
+    stiff = {"velocity_loop:servo.proportional_gain": (0.03,), "velocity_loop:servo.integral_gain": (9.0,)}
+    stiffer = run.parameters.with_values(stiff)
     closer = testbed.margin_with_servo(run._replace(parameters=stiffer))
     ideal = one_link(run).margin.gain * LEVER**2
     assert own > closer > ideal
 
 
-def test_fate_of_a_step_is_read_from_its_last_windows(tmp_path: Path) -> None:
+def test_verdict_on_a_step_follows_from_its_last_windows(tmp_path: Path) -> None:
     experiment = load("testbed-5.6")
     time = np.arange(0.0, 3.0, 5e-4)
     step = Step("press", 0.0, 3.0, {})
@@ -162,15 +154,15 @@ def test_fate_of_a_step_is_read_from_its_last_windows(tmp_path: Path) -> None:
         topics = {"joint_sensors": pressed(time, force), "motor_states": joints(time, 0.0)}
         run = recorded(experiment, 2, topics, (step,), tmp_path)
         shown = testbed.response(run, one_link(run), step)
-        assert testbed.fate(run, step, shown) == verdict
-        assert testbed.fate(run._replace(fault="cable", fault_time=2.0), step, shown) == "diverged"
+        assert testbed.measured_verdict(run, step, shown) == verdict
+        assert testbed.measured_verdict(run._replace(fault="cable", fault_time=2.0), step, shown) == "diverged"
 
 
 def test_saturation_rod_and_delay_come_from_the_recorded_parameters(tmp_path: Path) -> None:
     experiment = load("testbed-5.6")
     number = [run.name for run in experiment.runs].index("large_step_saturated")
     run = recorded(experiment, number, {}, PRESS, tmp_path)
-    link = one_link(run, {"driver:effects.rubbing_friction": [0.949]})
+    link = one_link(run, {"driver:effects.added_coulomb_friction": [0.949]})
     assert link.loop.error_limit == pytest.approx(22.24 * LEVER)
     assert link.loop.gain == pytest.approx(0.01921 / LEVER**2)
     assert link.node.static_friction == pytest.approx(0.949)
@@ -198,8 +190,8 @@ def test_stiction_cycle_of_a_square_wave(tmp_path: Path) -> None:
     rows = {row.quantity: row for row in limit_cycles.stiction(runs).rows}
     assert rows["F_c peak to peak"].measured == pytest.approx(2.4, rel=1e-4)
     assert rows["period"].measured == pytest.approx(1.9, rel=1e-3)
-    assert rows["what is left of the cycle with it"].measured == pytest.approx(0.0, abs=1e-9)
-    assert rows["error that is left with it"].measured == pytest.approx(0.936, abs=1e-4)
+    assert rows["remaining peak to peak with it"].measured == pytest.approx(0.0, abs=1e-9)
+    assert rows["remaining error with it"].measured == pytest.approx(0.936, abs=1e-4)
     # (5.8), (5.9) corrected, by hand: zeta 0.1604, Omega 1.6, dF 3 N m
     assert rows["F_c peak to peak"].predicted == pytest.approx(1.6 * 3.0 * 1464.28 / 3096.9 / LEVER, rel=2e-3)
     assert rows["period"].predicted == pytest.approx(1.943, rel=2e-3)
@@ -243,19 +235,19 @@ def test_step_response_of_an_exponential(tmp_path: Path) -> None:
         "force_command": forces(time, (0.0, -21.87, 0.0)),
     }
     run = recorded(experiment, 0, topics, (Step("press", 0.0, 2.5, {}),), tmp_path)
-    constant, farthest = step_response.responses({"no_friction": run}).rows
+    constant, largest = step_response.responses({"no_friction": run}).rows
     assert constant.measured == pytest.approx(0.5, rel=1e-4)
     assert constant.predicted == pytest.approx(1.0 / (0.002 * 772.0), rel=2e-3)  # (5.2), G_I 0.002, K 772 N m/rad
-    # farthest between two exponentials of 0.5 and 0.648 s: 0.095 of the step
-    assert farthest.measured == pytest.approx(0.095, abs=0.01)
-    assert not farthest.agrees
+    # largest between two exponentials of 0.5 and 0.648 s: 0.095 of the step
+    assert largest.measured == pytest.approx(0.095, abs=0.01)
+    assert not largest.agrees
 
 
 def test_errors_at_rest_are_those_of_the_standstills() -> None:
     time = np.arange(0.0, 1.0, 1e-3)
     speed = np.where((time % 0.25) < 0.1, 0.0, 0.3)
     force = np.select([time < 0.25, time < 0.5, time < 0.75], [0.0, 8.0, 9.5], 9.9)
-    shown = step_response.Response(time, force, force, speed)
+    shown = step_response.MeasuredResponse(time, force, force, speed)
     assert step_response.errors_at_rest(shown, 10.0) == pytest.approx([2.0, 0.5, 0.1])
 
 
@@ -322,7 +314,7 @@ def test_creep_is_what_the_link_lags_behind_its_motor(tmp_path: Path) -> None:
     assert row.predicted == pytest.approx(11.5, rel=0.01)
 
 
-def test_forces_of_the_arm_are_compared_along_the_one_asked_for(tmp_path: Path) -> None:
+def test_forces_of_the_arm_are_compared_along_the_commanded_one(tmp_path: Path) -> None:
     experiment = load("wam-press")
     time = np.arange(0.0, 4.0, 5e-3)
     topics = {
@@ -333,8 +325,8 @@ def test_forces_of_the_arm_are_compared_along_the_one_asked_for(tmp_path: Path) 
     }
     run = recorded(experiment, 0, topics, (Step("press 10 N", 0.0, 4.0, {}),), tmp_path)
     found = arm_forces.along(run)
-    assert found.asked == pytest.approx(10.0)
-    assert found.applied == pytest.approx(9.5)
+    assert found.commanded == pytest.approx(10.0)
+    assert found.true == pytest.approx(9.5)
     assert found.estimated == pytest.approx(9.6)
     elsewhere = {**topics, "contact/wrench": forces(time, (0.0, 9.6, 0.0), "inner_link")}
     run = recorded(experiment, 0, elsewhere, run.steps, tmp_path)
@@ -350,15 +342,42 @@ def test_page_gets_the_table_and_the_picture_of_each_experiment(tmp_path: Path) 
     picture = tmp_path / "result.png"
     picture.write_bytes(b"picture")
     experiment = load("creep")
-    write(page, [(experiment, Result([Row("q", 1.0, 1.01, "N", 0.02)], [], ("a \\d remark",)), picture)])
+    write(page, [(experiment, Result([Comparison("q", 1.0, 1.01, "N", 0.02)], [], ("a \\d remark",)), picture)])
     text = page.read_text()
     assert "| q | 1 | 1.01 | N | +1.00 % | 2.00 % |  | ok |" in text
     assert "- a \\d remark" in text
     assert "old" not in text
     assert text.endswith("<!-- end -->\nafter\n")
     assert (tmp_path / "page" / "creep.png").read_bytes() == b"picture"
-    with pytest.raises(ValueError, match="no block '<!-- experiment: efficiency -->'"):
-        write(page, [(load("efficiency"), Result([], []), picture)])
+
+
+def test_a_new_experiment_gets_a_section_at_the_end_of_the_page(tmp_path: Path) -> None:
+    page, picture = tmp_path / "page.md", tmp_path / "result.png"
+    page.write_text("# Title\n")
+    picture.write_bytes(b"picture")
+    result = Result([Comparison("q", 1.0, 1.01, "N", 0.02)], [])
+    for _ in range(2):
+        write(page, [(load("creep"), result, picture)])
+    text = page.read_text()
+    assert text.startswith("# Title\n\n## Creep of cables")
+    assert text.count("<!-- experiment: creep -->") == text.count("| q | 1 | 1.01 |") == 1
+
+
+def test_an_experiment_outside_of_the_package_has_an_evaluation_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A YAML and a module, nothing else."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "my_laboratory.py").write_text("def names(runs):\n    return sorted(runs)\n")
+    (tmp_path / "mine.yaml").write_text(
+        "{title: Mine, section: none, configuration: testbed, evaluation: 'my_laboratory:names', "
+        "runs: [{name: a, steps: [{name: rest, seconds: 1.0}]}]}"
+    )
+    experiment = load(str(tmp_path / "mine.yaml"))
+    assert evaluation_of(experiment)({"b": None, "a": None}) == ["a", "b"]  # type: ignore[dict-item, comparison-overlap]
+    for wrong in ("my_laboratory:missing", "nowhere:names", "cables", "cables.missing"):
+        with pytest.raises(ParameterError, match=f"evaluation is '{wrong}'.*it must be MODULE.FUNCTION"):
+            evaluation_of(experiment._replace(evaluation=wrong))
 
 
 def test_documentation_shows_every_experiment() -> None:
@@ -374,7 +393,7 @@ def test_documentation_shows_every_experiment() -> None:
 def test_a_touch_is_judged_by_its_time_link_force_and_place(tmp_path: Path) -> None:
     time = np.arange(0.0, 3.0, 5e-3)
     there = (time >= 1.0) & (time < 2.0)
-    felt = (time >= 1.06) & (time < 2.04)
+    detected = (time >= 1.06) & (time < 2.04)
     elsewhere = (time >= 1.5) & (time < 1.6)
 
     def wrench(where, newtons):
@@ -387,12 +406,12 @@ def test_a_touch_is_judged_by_its_time_link_force_and_place(tmp_path: Path) -> N
 
     topics = {
         "sim/contact/wrench": wrench(there, 12.0),
-        "contact/wrench": wrench(felt & ~elsewhere, 11.4),
+        "contact/wrench": wrench(detected & ~elsewhere, 11.4),
         "sim/contact/point": place(there, 0.28),
-        "contact/point": place(felt & ~elsewhere, 0.31),
+        "contact/point": place(detected & ~elsewhere, 0.31),
     }
     run = recorded(load("wam-touch"), 0, topics, (Step("push", 0.0, 3.0, {}),), tmp_path)
-    before, after, right, force, x = arm_forces.touching({"push": run}).rows
+    before, after, right, force, x = arm_forces.pushed({"push": run}).rows
     assert before.measured == 0.0
     assert after.measured == pytest.approx(0.06, abs=1e-6)
     assert right.measured == pytest.approx(1.0 - 0.1 / 0.9, abs=0.01)
@@ -400,7 +419,7 @@ def test_a_touch_is_judged_by_its_time_link_force_and_place(tmp_path: Path) -> N
     assert (force.predicted, force.measured) == pytest.approx((12.0, 11.4))
     assert x.deviation == pytest.approx(0.03)
     early = {**topics, "contact/wrench": wrench(time > 0.5, 11.4)}
-    before, after, *_ = arm_forces.touching({"push": recorded(load("wam-touch"), 0, early, (), tmp_path)}).rows
+    before, after, *_ = arm_forces.pushed({"push": recorded(load("wam-touch"), 0, early, (), tmp_path)}).rows
     assert (before.measured, after.measured) == pytest.approx((0.5, 0.0), abs=0.01)
     assert not before.agrees
 
@@ -417,7 +436,7 @@ def run_command(*words: str) -> int:
 def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path, domain_id: int, capfd) -> None:
     assert run_command("creep", "--directory", str(tmp_path), "--name", "mine") == 0
     said = capfd.readouterr()
-    assert "every bound is kept" in said.out
+    assert "all quantities are within their bounds" in said.out
     assert "creep 1/1 out_and_back: done" in said.err
     assert (tmp_path / "mine" / "result.png").is_file()
     assert run_command("creep", "--evaluate", str(tmp_path / "mine")) == 0
@@ -429,7 +448,7 @@ def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path,
     text = packaged("experiments/creep").read_text()
     other.write_text(text.replace("  - name: out_and_back\n", "  - name: out_and_back\n    stops: true\n"))
     assert run_command(str(other), "--evaluate", str(tmp_path / "mine")) == 1
-    assert "stops the arm  lets it run" in capfd.readouterr().out
+    assert "stops the arm  does not stop" in capfd.readouterr().out
 
 
 def test_a_protection_that_ends_a_run_is_said(tmp_path: Path, domain_id: int, capfd) -> None:
@@ -457,7 +476,7 @@ class StopAfter:
 
 
 def test_an_interrupted_run_is_stopped_and_is_not_judged(tmp_path: Path, domain_id: int, capfd, monkeypatch) -> None:
-    monkeypatch.setattr("wam_ros.commands.experiment.Stop", lambda: StopAfter(3000))
+    monkeypatch.setattr("wam_cli.commands.experiment.Stop", lambda: StopAfter(3000))
     assert run_command("stiction-limit-cycle", "--directory", str(tmp_path), "--name", "mine") == 130
     said = capfd.readouterr().err
     assert "without_deadband: stopped" in said
@@ -467,8 +486,8 @@ def test_an_interrupted_run_is_stopped_and_is_not_judged(tmp_path: Path, domain_
     file.write_text(yaml.safe_dump({**whole, "runs": whole["runs"][:1]}))
     assert run_command(str(file), "--evaluate", str(tmp_path / "mine")) == 1
     said = capfd.readouterr().err
-    assert "run 'without_deadband' ended in step 'press', 0 of 1 steps are finished; " in said
-    assert "'wam experiment short' runs it again" in said
+    assert "run 'without_deadband' ended in step 'press', 0 of 1 steps finished; " in said
+    assert "repeat 'wam experiment short'" in said
 
 
 def test_bags_that_are_missing_are_named(tmp_path: Path, capfd) -> None:

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wam_analysis.batch import processes
-from wam_analysis.figures.catalogue import FIGURES, file_of, numbers, table
-from wam_analysis.figures.series import Series
-from wam_ros.cli import main
+from wam_cli.main import main
+from wam_experiments.figures.catalogue import FIGURES, file_of, numbers, table
+from wam_experiments.figures.series import Series
+from wam_sim.batch import processes
+from wam_sim.pieces import default_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 # the testbed at its joint, SI: 64 oz-in-s^2 of link; 8.33 N m/rad at the motor, N = 14
@@ -23,24 +24,25 @@ INERTIA, K_TR, K_C = 64.0 / 16.0 * 0.1129848, 14.0**2 * 8.33, 1464.28
 @pytest.fixture(scope="module")
 def found() -> dict[str, Any]:
     with processes() as executor:
-        return numbers(list(FIGURES), executor, ROOT / ".cache" / "pieces")
+        return numbers(list(FIGURES), executor, default_folder())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 def test_points_of_the_plant_lie_on_the_lines(found: dict[str, Any], name: str) -> None:
-    off = FIGURES[name].off(found[name])
-    assert all(value < 0.02 for value in off.values()), off
-    assert off or name == "3.1"
+    distance = FIGURES[name].distance(found[name])
+    assert all(value < 0.02 for value in distance.values()), distance
+    assert distance or name == "3.1"
 
 
 def test_a_point_beside_the_line_is_noticed() -> None:
     x = np.linspace(1.0, 11.0, 50)
     series = Series(x, 4.0 * x, x[::7], 4.0 * x[::7])
-    assert series.off == pytest.approx(0.0, abs=1e-12)
-    assert series.off_by_factor == pytest.approx(0.0, abs=1e-12)
+    assert series.distance == pytest.approx(0.0, abs=1e-12)
+    assert series.relative_distance == pytest.approx(0.0, abs=1e-12)
     moved = series._replace(plant_y=series.plant_y + np.eye(1, len(series.plant_x), 3)[0] * 4.0)
-    assert moved.off == pytest.approx(0.1 / math.sqrt(2.0), rel=1e-6)  # across a line at 45 degrees
-    assert moved.off_by_factor == pytest.approx(1.0 / x[21])
+    assert moved.distance == pytest.approx(0.1 / math.sqrt(2.0), rel=1e-6)  # across a line at 45 degrees
+    assert moved.relative_distance == pytest.approx(1.0 / x[21])
 
 
 def test_grasp_by_hand(found: dict[str, Any]) -> None:
@@ -128,9 +130,10 @@ def test_cables_by_hand(found: dict[str, Any]) -> None:
     # section 6.4.5: 60 in-lb, two stages
     assert np.interp(60.0 * 0.1129848, efficiency.testbed.x, efficiency.testbed.y) == pytest.approx(0.966, abs=1e-3)
     assert efficiency.equal_stages[2, -1] == pytest.approx(0.97**3)
-    assert np.interp(creep.turn, creep.way.x, creep.way.y) == pytest.approx(0.5 * creep.way.y[-1], rel=1e-6)
+    assert np.interp(creep.reversal, creep.creep.x, creep.creep.y) == pytest.approx(0.5 * creep.creep.y[-1], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_every_picture_is_in_the_docs_and_can_be_drawn(found: dict[str, Any], tmp_path: Path) -> None:
     page = (ROOT / "docs" / "figures.md").read_text(encoding="utf-8")
     for name, values in found.items():
@@ -142,6 +145,7 @@ def test_every_picture_is_in_the_docs_and_can_be_drawn(found: dict[str, Any], tm
     assert table(found).count("\n") > len(FIGURES)
 
 
+@pytest.mark.slow
 def test_command_draws_what_is_named_and_refuses_what_is_not(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -154,7 +158,7 @@ def test_command_draws_what_is_named_and_refuses_what_is_not(
     with pytest.raises(SystemExit) as ended:
         main(["figures", *options, "5.4"])
     assert ended.value.code == 1
-    assert "there is no figure 5.4; there are 3.1, 4.9" in capsys.readouterr().err
+    assert "no figure 5.4; choose from 3.1, 4.9" in capsys.readouterr().err
 
 
 def test_command_writes_the_map_as_a_table(tmp_path: Path) -> None:

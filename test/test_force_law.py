@@ -1,17 +1,19 @@
 """The law of an axis beside the exact integrator's, and what protects a user of the force loop."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from test_force_loop import ARM, DRIVEN, DT, GAIN, OWN, POSE, STILL, Loop, World, ask, down, lever
+from test_force_loop import ARM, BODY, DRIVEN, DT, GAIN, OWN, POSE, STILL, World, ask, down, force_loop, lever
 
+from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.force_law import ForceLaw
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceOutput
 from wam_description.parameters import ParameterError
 from wam_description.signals import NO_CONTACT, State
-from wam_theory.stick_slip import ForceLoop as ExactLoop
+from wam_theory.stick_slip import IntegralLoop
 
 
 def law(**values: tuple[float, ...]) -> ForceLaw:
@@ -24,29 +26,27 @@ def test_the_law_is_that_of_the_exact_integrator_bit_for_bit() -> None:
     for error, *sizes in random.uniform(-1.0, 1.0, (500, 4)).tolist():
         limit, share, gain = map(abs, sizes)
         deadband = limit * share
-        exact = ExactLoop(gain, limit, deadband)
-        machine = law(gain=(gain,), error_limit=(limit,), deadband=(deadband,))
-        assert machine.velocity(1, error, error, DT) == gain * exact.effective_error(error)
+        exact = IntegralLoop(gain, limit, deadband)
+        controller = law(gain=(gain,), error_limit=(limit,), deadband=(deadband,))
+        assert controller.velocity(1, error, error, DT) == gain * exact.effective_error(error)
 
 
 @pytest.mark.parametrize(
     ("error", "velocity"), [(0.5, 0.0), (-0.9, 0.0), (1.5, 1.0), (-3.0, -4.0), (5.0, 8.0), (9.0, 8.0), (-9.0, -8.0)]
 )
-def test_saturation_comes_first_and_the_dead_zone_takes_its_width_from_what_is_left(
-    error: float, velocity: float
-) -> None:
+def test_saturation_comes_first_and_the_deadband_is_subtracted_from_the_rest(error: float, velocity: float) -> None:
     assert law(gain=(2.0,), deadband=(1.0,)).velocity(0, error, error, DT) == pytest.approx(velocity)
 
 
 def test_each_axis_has_a_law_of_its_own() -> None:
-    machine = law(gain=(1.0, 2.0, 3.0), error_limit=(1.0, 2.0, 4.0), deadband=(0.0, 1.0, 3.0))
-    assert [machine.velocity(i, 9.0, 9.0, DT) for i in range(3)] == [1.0, 2.0, 3.0]
+    each = law(gain=(1.0, 2.0, 3.0), error_limit=(1.0, 2.0, 4.0), deadband=(0.0, 1.0, 3.0))
+    assert [each.velocity(i, 9.0, 9.0, DT) for i in range(3)] == [1.0, 2.0, 3.0]
     for n, expected in (((1, 0, 0), 1.0), ((0, 1, 0), 2.0), ((0, 0, -1), 3.0)):
         own = replace(
-            OWN, force_gain=machine.gain, force_error_limit=machine.error_limit, force_deadband=machine.deadband,
+            OWN, force_gain=each.gain, force_error_limit=each.error_limit, force_deadband=each.deadband,
             joint_speed_limit=1e9,
         )  # fmt: skip
-        out = ask(Loop(ARM, own), World(400.0), [9.0 * c for c in n])
+        out = ask(force_loop(ARM, own), World(400.0), [9.0 * c for c in n])
         assert lever(POSE, n) @ out.velocity == pytest.approx(expected, rel=1e-6)
 
 
@@ -55,31 +55,31 @@ def test_each_joint_has_a_law_of_its_own() -> None:
         OWN, mode="joint_torque", torque_gain=(1.0, 2.0, 3.0, 4.0), torque_error_limit=(9.0,),
         torque_deadband=(0.0, 0.5, 0.0, 1.0),
     )  # fmt: skip
-    out = ask(Loop(ARM, own), World(1e-9), None, torque=[1.0, 1.0, -1.0, 3.0])
+    out = ask(force_loop(ARM, own), World(1e-9), None, torque=[1.0, 1.0, -1.0, 3.0])
     assert out.velocity == pytest.approx([1.0, 1.0, -3.0, 8.0], abs=1e-6)
 
 
 def test_proportional_action_moves_by_its_gain_times_the_change_of_force_and_not_of_the_set_point() -> None:
     own, gp = replace(OWN, force_gain=(0.0,), force_proportional_gain=(2e-4,)), 2e-4
-    loop = Loop(ARM, own)
+    loop = force_loop(ARM, own)
     along = lever(POSE)
     assert along @ ask(loop, World(400.0, force=1.0), down(4.0)).velocity == pytest.approx(0.0, abs=1e-12)
     more = ask(loop, World(400.0, force=3.0), down(4.0)).velocity
     assert along @ more * DT == pytest.approx(-gp * 2.0, rel=1e-5)
     stepped = ask(loop, World(400.0, force=3.0), down(9.0)).velocity
     assert along @ stepped == pytest.approx(0.0, abs=1e-9), "a new set point is no change of the force"
-    blunt = Loop(ARM, replace(own, force_error_limit=(0.5,)))
+    blunt = force_loop(ARM, replace(own, force_error_limit=(0.5,)))
     ask(blunt, World(400.0, force=1.0), down(4.0))
     assert along @ ask(blunt, World(400.0, force=3.0), down(4.0)).velocity == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("samples", [1, 3])
-def test_an_answer_that_is_held_back_comes_so_many_periods_later(samples: int) -> None:
-    loop = Loop(ARM, replace(OWN, delay_samples=samples))
+def test_a_delayed_velocity_comes_so_many_periods_later(samples: int) -> None:
+    loop = force_loop(ARM, replace(OWN, delay_samples=samples))
     along = lever(POSE)
-    said = [float(along @ ask(loop, World(400.0, force=f), down(9.0)).velocity) for f in (1.0, 2.0, 3.0, 4.0, 5.0)]
+    reported = [float(along @ ask(loop, World(400.0, force=f), down(9.0)).velocity) for f in (1.0, 2.0, 3.0, 4.0, 5.0)]
     expected = [0.0] * samples + [GAIN * (9.0 - f) for f in (1.0, 2.0, 3.0, 4.0, 5.0)]
-    assert said == pytest.approx(expected[:5], rel=1e-6, abs=1e-9)
+    assert reported == pytest.approx(expected[:5], rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_an_answer_that_is_held_back_comes_so_many_periods_later(samples: int) -
     ],
 )
 def test_laws_that_do_not_fit_are_refused_whole(change: dict[str, Any], text: str) -> None:
-    loop = Loop(ARM, OWN)
+    loop = force_loop(ARM, OWN)
     with pytest.raises(ParameterError, match=text):
         loop.tune(replace(OWN, **change, posture_gain=1.0))
     assert loop.parameters == OWN
@@ -121,22 +121,69 @@ def largest_jump(loop: ForceLoop, changes: list[Any]) -> float:
     ],
 )
 def test_velocity_does_not_jump_when_a_command_begins_or_ends_or_mode_or_gain_changes(changes: list[Any]) -> None:
-    smooth = largest_jump(Loop(ARM, replace(OWN, blend_time=0.05)), changes)
-    hard = largest_jump(Loop(ARM, OWN), changes)
+    smooth = largest_jump(force_loop(ARM, replace(OWN, blend_time=0.05)), changes)
+    hard = largest_jump(force_loop(ARM, OWN), changes)
     assert smooth < 0.2 * hard
     assert hard > 0.05
 
 
-def test_blending_ends_at_what_the_law_asks_for() -> None:
-    loop = Loop(ARM, replace(OWN, blend_time=0.05))
+def test_bumpless_transfer_ends_at_the_velocity_of_the_law() -> None:
+    loop = force_loop(ARM, replace(OWN, blend_time=0.05))
     for _ in range(200):
         out = ask(loop, World(400.0, force=2.0), down(12.0))
     assert lever(POSE) @ out.velocity == pytest.approx(GAIN * 10.0, rel=1e-6)
 
 
-def felt_across(torque: list[float]) -> ForceOutput:
-    """What is felt of 3 N after 9 N, at the moment when the motors give this torque."""
-    loop = Loop(ARM, replace(OWN, force_filter=1.0, delay_samples=5))
+def test_the_jump_that_is_bridged_decays_with_the_time_constant() -> None:
+    transfer, time_constant = BumplessTransfer(2), 0.05
+    assert transfer.step([], [1.0, 1.0], time_constant, DT) == []
+    transfer.restart()
+    outs = [transfer.step([0.0, 3.0], [1.0, 1.0], time_constant, DT) for _ in range(41)]
+    for k in (0, 1, 10, 40):
+        left = math.exp(-k * DT / time_constant)
+        assert outs[k] == pytest.approx([left, 3.0 - 2.0 * left], rel=1e-12)
+    transfer.restart()
+    assert transfer.step([-1.0, 0.0], [1.0, 1.0], time_constant, DT) == pytest.approx(outs[-1]), "from the last command"
+    transfer.reset()
+    assert transfer.step([-1.0, 0.0], [1.0, 1.0], time_constant, DT) == [0.0, 0.0], "from rest"
+
+
+def test_the_limited_error_has_the_limit_of_each_axis() -> None:
+    own = replace(OWN, force_error_limit=(1.0, 2.0, 3.0))
+    out = ask(force_loop(ARM, own), World(400.0), (30.0, -30.0, 2.5))
+    assert out.limited == pytest.approx((1.0, -2.0, 2.5))
+
+
+def test_another_frame_begins_without_the_memory_of_the_one_before() -> None:
+    """A low pass and a delay line that remembered would mix forces along different axes."""
+    outs = {}
+    for frame in ("base", "inner_link"):
+        loop = force_loop(ARM, replace(OWN, force_filter=1.0, delay_samples=5))
+        for _ in range(400):
+            ask(loop, World(400.0, force=9.0), down(9.5))
+        rotation = np.eye(3) if frame == "base" else BODY.cover_pose(POSE, frame).rotation
+        command = ForceCommand(frame, tuple((rotation.T @ down(9.5)).tolist()))
+        out = ask(loop, World(400.0, force=3.0), None, command=command)
+        outs[frame] = (rotation @ out.measured)[2], lever(POSE) @ out.velocity
+    assert outs["base"] == (pytest.approx(-9.0, abs=0.1), pytest.approx(GAIN * 0.5, rel=0.1))
+    assert outs["inner_link"] == (pytest.approx(-3.0, abs=1e-6), pytest.approx(0.0, abs=1e-9))
+
+
+def test_joint_torques_begin_without_the_rate_of_an_earlier_measurement() -> None:
+    own = replace(OWN, mode="joint_torque", torque_gain=(0.0,), torque_proportional_gain=(1e-4,))
+    speeds = []
+    for pause in ([1.0] * 4, None):
+        loop = force_loop(ARM, own)
+        ask(loop, World(400.0, force=2.0), None, torque=[1.0] * 4)
+        ask(loop, World(400.0, force=2.0), None, torque=pause)
+        speeds.append(max(map(abs, ask(loop, World(400.0, force=4.0), None, torque=[1.0] * 4).velocity)))
+    assert speeds[0] > 1e-3, "G_P answers a change of the measured torque"
+    assert speeds[1] == 0.0, "but not one that came while nothing was commanded"
+
+
+def measured_across(torque: list[float]) -> ForceOutput:
+    """Output for 3 N after 9 N, in the period in which the motors give this torque."""
+    loop = force_loop(ARM, replace(OWN, force_filter=1.0, delay_samples=5))
     for _ in range(400):
         ask(loop, World(400.0, force=9.0), down(9.5))
     world = World(400.0, force=3.0)
@@ -145,15 +192,15 @@ def felt_across(torque: list[float]) -> ForceOutput:
 
 
 def test_brakes_and_faults_make_the_loop_forget_filter_and_delayed_answers() -> None:
-    braked, driven = felt_across(STILL), felt_across(DRIVEN)
+    braked, driven = measured_across(STILL), measured_across(DRIVEN)
     assert braked.measured == pytest.approx(down(3.0), abs=1e-6)
     assert driven.measured == pytest.approx(down(9.0), abs=0.1), "the filter remembers"
     assert lever(POSE) @ braked.velocity == pytest.approx(0.0, abs=1e-9)
-    assert lever(POSE) @ driven.velocity == pytest.approx(GAIN * 0.5, rel=0.1), "and so does what is held back"
+    assert lever(POSE) @ driven.velocity == pytest.approx(GAIN * 0.5, rel=0.1), "and so does the delay line"
 
 
 def test_the_posture_to_hold_is_that_of_the_enabling() -> None:
-    loop = Loop(ARM, OWN)
+    loop = force_loop(ARM, OWN)
     moved = [0.3, -1.0, 0.4, 0.9]
 
     def hold(q: list[float], effort: list[float]) -> list[float]:
@@ -165,25 +212,25 @@ def test_the_posture_to_hold_is_that_of_the_enabling() -> None:
     assert hold(moved, DRIVEN) == STILL, "after the brakes it holds where it is"
 
 
-def test_a_force_above_the_limit_is_refused_and_the_last_good_one_stands() -> None:
-    loop = Loop(ARM, replace(OWN, force_limit=30.0))
-    free = Loop(ARM, OWN)
-    for machine, effort in ((loop, 10.0), (free, 31.0)):
+def test_a_force_above_the_limit_is_refused_and_the_last_good_one_remains_in_force() -> None:
+    loop = force_loop(ARM, replace(OWN, force_limit=30.0))
+    free = force_loop(ARM, OWN)
+    for controller, effort in ((loop, 10.0), (free, 31.0)):
         for newtons in (10.0, 31.0):
-            out = ask(machine, World(400.0), down(newtons))
+            out = ask(controller, World(400.0), down(newtons))
         assert out.effort == pytest.approx(effort * lever(POSE), abs=1e-6)
-    reason = "31 N is asked for; allowed: up to force_limit, 30 N; the last good command stands"
+    reason = "31 N is commanded; allowed: up to force_limit, 30 N; the last good command remains in force"
     assert loop.refusals == {"force_command": reason}
     assert (loop.refused, free.refused, free.refusals) == (1, 0, {})
     ask(loop, World(400.0), down(29.0))
     assert loop.refusals == {}
 
 
-def test_a_torque_above_the_limit_is_refused_and_the_last_good_one_stands() -> None:
-    loop = Loop(ARM, replace(OWN, mode="joint_torque", torque_limit=4.0))
+def test_a_torque_above_the_limit_is_refused_and_the_last_good_one_remains_in_force() -> None:
+    loop = force_loop(ARM, replace(OWN, mode="joint_torque", torque_limit=4.0))
     for torque in ([1.0, 2.0, 0.0, 0.0], [1.0, -4.5, 0.0, 0.0]):
         out = ask(loop, World(1e-9), None, torque=torque)
     assert out.effort == [1.0, 2.0, 0.0, 0.0]
-    assert "4.5 N m is asked for; allowed: up to torque_limit, 4 N m" in loop.refusals["joint_torque_command"]
+    assert "4.5 N m is commanded; allowed: up to torque_limit, 4 N m" in loop.refusals["joint_torque_command"]
     loop.tune(replace(loop.parameters, torque_limit=5.0))
     assert ask(loop, World(1e-9), None, torque=torque).effort == torque

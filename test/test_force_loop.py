@@ -1,14 +1,14 @@
-"""The outer loop on a world that is computed here: the arm goes where it is told, springs push back."""
+"""The outer loop on a world that is computed here: the arm follows its velocity command, springs push back."""
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
+from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, build, values
 from wam_description.rigid_body import RigidBody
@@ -17,7 +17,6 @@ from wam_description.signals import NO_CONTACT, Contact, State
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm
 BODY = RigidBody(ARM)
-Loop = partial(ForceLoop, timing=CONFIGURATION.shared.timing)
 GAIN, LIMIT = 0.015, 20.0
 GIVEN = CONFIGURATION.node("force_loop", ForceLoopParameters)
 OWN = replace(
@@ -31,12 +30,16 @@ OWN = replace(
     force_filter=0.0,
     blend_time=0.0,
 )
-COVER, PLACE = OWN.contact_cover, OWN.contact_place
+COVER, PLACE = OWN.contact_cover, OWN.contact_position
 POSE = [0.3, -1.2, 0.2, 1.0]
 DOWN = (0.0, 0.0, -1.0)
 DT = 5e-3
 STILL = [0.0] * 4
 DRIVEN = [1.0] * 4  # N m: the motors give torque
+
+
+def force_loop(arm: Arm, own: ForceLoopParameters) -> ForceLoop:
+    return ForceLoop(arm, CONFIGURATION.shared.servo, own, CONFIGURATION.shared.timing)
 
 
 def lever(q: list[float], n: Any = DOWN, cover: str = COVER, place: float = PLACE) -> np.ndarray:
@@ -98,7 +101,7 @@ def down(newtons: float) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize("stiffness", [200.0, 800.0])
 def test_force_comes_with_the_time_constant_of_equation_5_2(stiffness: float) -> None:
-    loop, world, dt = Loop(ARM, OWN), World(stiffness, force=1.0), 2e-4
+    loop, world, dt = force_loop(ARM, OWN), World(stiffness, force=1.0), 2e-4
     time_constant = 1.0 / (GAIN * stiffness)
     worst = 0.0
     for k in range(round(3.0 * time_constant / dt)):
@@ -109,8 +112,8 @@ def test_force_comes_with_the_time_constant_of_equation_5_2(stiffness: float) ->
     assert world.force == pytest.approx(8.0 - 7.0 * math.exp(-3.0), rel=0.005)
 
 
-def test_force_converges_to_the_one_that_is_asked_for() -> None:
-    loop, world = Loop(ARM, replace(OWN, force_filter=0.02)), World(400.0)
+def test_force_converges_to_the_commanded_one() -> None:
+    loop, world = force_loop(ARM, replace(OWN, force_filter=0.02)), World(400.0)
     for newtons in (5.0, 10.0, 5.0):
         for _ in range(600):
             out = ask(loop, world, down(newtons))
@@ -120,28 +123,28 @@ def test_force_converges_to_the_one_that_is_asked_for() -> None:
         assert out.error == pytest.approx((0.0, 0.0, 0.0), abs=1e-4)
 
 
-@pytest.mark.parametrize(("asked", "limited"), [(100.0, LIMIT), (-90.0, -LIMIT), (7.0, 7.0), (20.0, 20.0)])
-def test_saturation_limits_the_commanded_speed_exactly(asked: float, limited: float) -> None:
-    out = ask(Loop(ARM, OWN), World(400.0), down(asked))
+@pytest.mark.parametrize(("commanded", "limited"), [(100.0, LIMIT), (-90.0, -LIMIT), (7.0, 7.0), (20.0, 20.0)])
+def test_saturation_limits_the_commanded_speed_exactly(commanded: float, limited: float) -> None:
+    out = ask(force_loop(ARM, OWN), World(400.0), down(commanded))
     along = lever(POSE)
     assert along @ out.velocity == pytest.approx(GAIN * limited, rel=1e-7)
-    assert out.error == pytest.approx(down(asked), rel=1e-7)
+    assert out.error == pytest.approx(down(commanded), rel=1e-7)
     assert out.limited == pytest.approx(down(limited), rel=1e-7)
     free = replace(OWN, force_error_limit=(1e9,), joint_speed_limit=1e9)
-    unlimited = ask(Loop(ARM, free), World(400.0), down(asked))
-    assert along @ unlimited.velocity == pytest.approx(GAIN * asked, rel=1e-7)
+    unlimited = ask(force_loop(ARM, free), World(400.0), down(commanded))
+    assert along @ unlimited.velocity == pytest.approx(GAIN * commanded, rel=1e-7)
 
 
 def test_a_short_lever_does_not_make_a_joint_race() -> None:
     """Straight up, a force along the arm has hardly a lever on any joint."""
     upright = [0.0, -2e-3, 0.0, math.pi / 2 - 2e-3]
-    loop = Loop(ARM, replace(OWN, contact_place=0.4))
-    fast = Loop(ARM, replace(OWN, contact_place=0.4, joint_speed_limit=1e9))
-    for machine, most in ((loop, OWN.joint_speed_limit), (fast, math.inf)):
+    loop = force_loop(ARM, replace(OWN, contact_position=0.4))
+    fast = force_loop(ARM, replace(OWN, contact_position=0.4, joint_speed_limit=1e9))
+    for controller, most in ((loop, OWN.joint_speed_limit), (fast, math.inf)):
         state = State(upright, [0.0] * 4, [0.0] * 4)
         sensed = State(upright, [0.0] * 4, BODY.gravity_torque(upright).tolist())
         press = ForceCommand("base", (0.0, 0.0, -20.0))
-        out = machine.step(state, sensed, NO_CONTACT, None, press, 0.0, upright, None, 0.005)
+        out = controller.step(state, sensed, NO_CONTACT, None, press, 0.0, upright, None, 0.005)
         assert max(map(abs, out.velocity)) <= most * (1.0 + 1e-12)
     assert max(map(abs, out.velocity)) > 10.0 * OWN.joint_speed_limit
 
@@ -149,13 +152,13 @@ def test_a_short_lever_does_not_make_a_joint_race() -> None:
 def test_posture_moves_nothing_along_the_force() -> None:
     along = lever(POSE)
     for posture in (POSE, [0.5, -1.0, 0.0, 1.2], [-2.0, 1.0, 1.0, -1.0]):
-        out = ask(Loop(ARM, OWN), World(400.0), down(6.0), posture=posture)
+        out = ask(force_loop(ARM, OWN), World(400.0), down(6.0), posture=posture)
         assert along @ out.velocity == pytest.approx(GAIN * 6.0, rel=1e-7)
 
 
 def test_posture_is_reached_in_the_complement_of_the_force() -> None:
     posture = [0.35, -1.15, 0.25, 1.1]
-    loop, world = Loop(ARM, OWN), World(400.0)
+    loop, world = force_loop(ARM, OWN), World(400.0)
     for _ in range(1500):
         world.move(ask(loop, world, down(6.0), posture=posture).velocity)
     assert world.force == pytest.approx(6.0, abs=1e-3)
@@ -167,7 +170,7 @@ def test_posture_is_reached_in_the_complement_of_the_force() -> None:
 
 
 def test_posture_alone_is_reached_no_faster_than_allowed() -> None:
-    loop, world = Loop(ARM, OWN), World(1e-9)
+    loop, world = force_loop(ARM, OWN), World(1e-9)
     posture = [0.3, -0.2, 0.2, 1.3]
     speeds = []
     for _ in range(600):
@@ -181,7 +184,7 @@ def test_posture_alone_is_reached_no_faster_than_allowed() -> None:
 def test_zero_force_releases_the_axis() -> None:
     posture = [0.3, -1.1, 0.2, 1.0]
     outs = [
-        ask(Loop(ARM, OWN), World(400.0, force=3.0), force, posture=posture)
+        ask(force_loop(ARM, OWN), World(400.0, force=3.0), force, posture=posture)
         for force in ((0.0, 0.0, 0.0), None, down(3.0))
     ]
     released, none, pressing = outs
@@ -191,16 +194,16 @@ def test_zero_force_releases_the_axis() -> None:
     assert pressing.velocity != pytest.approx(released.velocity)
 
 
-def test_no_motion_is_asked_for_at_the_start() -> None:
-    assert ask(Loop(ARM, OWN), World(400.0), None).velocity == [0.0] * 4
-    out = ask(Loop(ARM, OWN), World(400.0, force=4.0), down(4.0))
+def test_no_motion_is_commanded_at_the_start() -> None:
+    assert ask(force_loop(ARM, OWN), World(400.0), None).velocity == [0.0] * 4
+    out = ask(force_loop(ARM, OWN), World(400.0, force=4.0), down(4.0))
     assert out.velocity == pytest.approx([0.0] * 4, abs=1e-9), "the filter starts at what is measured"
-    slow = Loop(ARM, replace(OWN, force_filter=10.0))
+    slow = force_loop(ARM, replace(OWN, force_filter=10.0))
     assert ask(slow, World(400.0, force=4.0), down(4.0)).measured == pytest.approx(down(4.0), rel=1e-6)
 
 
 def test_the_filter_is_a_first_order_lag() -> None:
-    loop = Loop(ARM, replace(OWN, force_filter=0.1))
+    loop = force_loop(ARM, replace(OWN, force_filter=0.1))
     ask(loop, World(400.0, force=0.0), down(1.0), dt=1e-3)
     for _ in range(100):
         out = ask(loop, World(400.0, force=4.0), down(1.0), dt=1e-3)
@@ -208,7 +211,7 @@ def test_the_filter_is_a_first_order_lag() -> None:
 
 
 def test_open_loop_feeds_the_torque_of_the_force_forward_and_no_velocity() -> None:
-    loop, force = Loop(ARM, replace(OWN, mode="open_loop")), np.array([2.0, -3.0, 6.0])
+    loop, force = force_loop(ARM, replace(OWN, mode="open_loop")), np.array([2.0, -3.0, 6.0])
     for feeling in (0.0, 5.0):
         out = ask(loop, World(400.0, force=feeling), force)
         assert out.velocity == []
@@ -219,50 +222,60 @@ def test_open_loop_feeds_the_torque_of_the_force_forward_and_no_velocity() -> No
 
 def test_the_feedback_loop_feeds_the_same_torque_forward() -> None:
     outs = [
-        ask(Loop(ARM, replace(OWN, mode=mode)), World(400.0, force=2.0), (1.0, 2.0, 3.0))
+        ask(force_loop(ARM, replace(OWN, mode=mode)), World(400.0, force=2.0), (1.0, 2.0, 3.0))
         for mode in ("hybrid", "open_loop")
     ]
     assert outs[0].effort == outs[1].effort
 
 
 def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
-    loop = Loop(ARM, replace(OWN, mode="joint_torque"))
-    stiffness, asked = np.array([40.0, 60.0, 30.0, 20.0]), [1.0, -2.0, 0.5, 0.8]
+    loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
+    stiffness, commanded = np.array([40.0, 60.0, 30.0, 20.0]), [1.0, -2.0, 0.5, 0.8]
     world = World(1e-9)
     for _ in range(4000):
         external = -stiffness * np.subtract(world.q, POSE)
         sensors = State(world.q, STILL, (BODY.gravity_torque(world.q) - external).tolist())
-        out = loop.step(world.joints, sensors, NO_CONTACT, None, None, 0.0, None, asked, DT)
-        assert out.effort == asked
+        out = loop.step(world.joints, sensors, NO_CONTACT, None, None, 0.0, None, commanded, DT)
+        assert out.effort == commanded
         world.move(out.velocity)
-    assert stiffness * np.subtract(world.q, POSE) == pytest.approx(asked, rel=1e-3)
+    assert stiffness * np.subtract(world.q, POSE) == pytest.approx(commanded, rel=1e-3)
 
 
 def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -> None:
-    loop = Loop(ARM, replace(OWN, mode="joint_torque"))
+    loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
     assert ask(loop, World(1e-9), None).velocity == [0.0] * 4
     out = ask(loop, World(1e-9), None, torque=[100.0, -100.0, 1.0, 0.0])
     (limit,), (gain,) = OWN.torque_error_limit, OWN.torque_gain
     assert out.velocity == pytest.approx([gain * limit, -gain * limit, gain, 0.0], abs=1e-9)
 
 
-def test_a_force_whose_commander_is_gone_is_let_go_where_the_arm_is() -> None:
-    loop, world = Loop(ARM, OWN), World(400.0)
+def test_a_stale_force_command_is_dropped_and_the_arm_holds_its_position() -> None:
+    loop, world = force_loop(ARM, OWN), World(400.0)
     for _ in range(1500):
         world.move(ask(loop, world, down(6.0), posture=POSE).velocity)
     pressed = list(world.q)
     assert world.force == pytest.approx(6.0, abs=1e-3)
-    for age, asked in ((0.9 * OWN.command_timeout, 6.0), (1.1 * OWN.command_timeout, 0.0)):
+    for age, commanded in ((0.9 * OWN.command_timeout, 6.0), (1.1 * OWN.command_timeout, 0.0)):
         out = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0], age=age)
-        assert any(out.effort) == bool(asked)
+        assert any(out.effort) == bool(commanded)
     assert out.velocity == pytest.approx([0.0] * 4, abs=1e-9)  # holds here, not at the posture of old
     assert world.q == pressed
     again = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0], age=0.0)
     assert max(map(abs, again.velocity)) > 0.1
 
 
-def test_joint_torque_without_a_command_stands_still_wherever_the_posture_is() -> None:
-    loop = Loop(ARM, OWN)
+def test_after_a_stale_command_the_arm_is_pulled_back_to_where_the_command_ended() -> None:
+    loop, world = force_loop(ARM, OWN), World(400.0)
+    ask(loop, world, down(6.0))
+    ask(loop, world, down(6.0), age=2.0 * OWN.command_timeout)
+    world.q = [angle + 0.01 for angle in POSE]  # pushed away
+    for _ in range(3):
+        out = ask(loop, world, down(6.0), age=2.0 * OWN.command_timeout)
+    assert out.velocity == pytest.approx([-0.01 * OWN.posture_gain] * 4)
+
+
+def test_joint_torque_without_a_command_holds_still_whatever_the_posture() -> None:
+    loop = force_loop(ARM, OWN)
     ask(loop, World(400.0), None, posture=[0.3, 0.3, 0.3, 0.3])
     loop.tune(replace(OWN, mode="joint_torque"))
     assert ask(loop, World(400.0), None, posture=[0.3, 0.3, 0.3, 0.3]).velocity == [0.0] * 4
@@ -272,24 +285,24 @@ def rotation(cover: str, q: list[float] = POSE) -> np.ndarray:
     return BODY.cover_pose(q, cover).rotation
 
 
-def test_the_estimate_is_fed_back_where_it_is_asked_for() -> None:
-    loop, world = Loop(ARM, replace(OWN, feedback="contact_estimate")), World(400.0, force=9.0)
+def test_the_estimate_is_fed_back_if_it_is_chosen() -> None:
+    loop, world = force_loop(ARM, replace(OWN, feedback="contact_estimate")), World(400.0, force=9.0)
     felt = rotation(COVER).T @ np.array([0.0, 0.0, 4.0])  # of the world on the arm: upwards
     out = ask(loop, world, down(6.0), contact=Contact(COVER, PLACE, tuple(felt)))
     assert out.measured == pytest.approx(down(4.0), abs=1e-9)
     assert out.error == pytest.approx(down(2.0), abs=1e-9)
-    assert ask(loop, world, down(6.0)).error == pytest.approx(down(6.0)), "nothing felt is no force"
+    assert ask(loop, world, down(6.0)).error == pytest.approx(down(6.0)), "no contact is no force"
 
 
-def test_an_estimate_without_a_place_is_still_a_force_in_its_own_frame() -> None:
-    loop = Loop(ARM, replace(OWN, feedback="contact_estimate"))
+def test_an_estimate_without_a_position_is_still_a_force_in_its_own_frame() -> None:
+    loop = force_loop(ARM, replace(OWN, feedback="contact_estimate"))
     felt = rotation("inner_link").T @ np.array([0.0, 0.0, 4.0])
     out = ask(loop, World(400.0), down(6.0), contact=Contact("inner_link", math.nan, tuple(felt)))
     assert out.measured == pytest.approx(down(4.0), abs=1e-9)
 
 
-def test_the_force_acts_where_contact_is_felt() -> None:
-    loop = Loop(ARM, OWN)
+def test_the_force_acts_where_contact_is_detected() -> None:
+    loop = force_loop(ARM, OWN)
     out = ask(loop, World(400.0), down(2.0), contact=Contact("inner_link", 0.4, (0.0, 0.0, 1.0)))
     assert out.effort == pytest.approx(2.0 * lever(POSE, DOWN, "inner_link", 0.4), abs=1e-6)
     elsewhere = ask(loop, World(400.0), down(2.0))
@@ -298,49 +311,51 @@ def test_the_force_acts_where_contact_is_felt() -> None:
 
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
 @pytest.mark.parametrize(
-    ("place_sd", "probability", "is_used"), [(0.01, 0.99, True), (0.05, 0.99, False), (0.01, 0.5, False)]
+    ("position_sd", "probability", "is_used"), [(0.01, 0.99, True), (0.05, 0.99, False), (0.01, 0.5, False)]
 )
-def test_a_place_that_is_too_unsure_gives_way_to_the_configured_one(
-    place_sd: float, probability: float, is_used: bool, feedback: str
+def test_an_uncertain_contact_position_is_replaced_by_the_configured_one(
+    position_sd: float, probability: float, is_used: bool, feedback: str
 ) -> None:
-    """A refusal where the estimate is what the loop lives on; with joint sensors the place is only wished for."""
-    loop = Loop(ARM, replace(OWN, feedback=feedback))
-    contact = Contact("inner_link", 0.4, (0.0, 0.0, 1.0), place_sd, probability)
+    """A refusal where the estimate is what the loop lives on; with joint sensors the estimate is not required."""
+    loop = force_loop(ARM, replace(OWN, feedback=feedback))
+    contact = Contact("inner_link", 0.4, (0.0, 0.0, 1.0), position_sd, probability)
     for _ in range(2):
         out = ask(loop, World(400.0), down(2.0), contact=contact)
     there = lever(POSE, DOWN, "inner_link", 0.4) if is_used else lever(POSE)
     assert out.effort == pytest.approx(2.0 * there, abs=1e-6)
-    assert ("contact_cover and contact_place are used" in loop.fallback) is not is_used
+    assert ("contact_cover and contact_position are used" in loop.fallback) is not is_used
     is_refused = not is_used and feedback == "contact_estimate"
-    assert ("contact/spread" in loop.refusals) is is_refused
+    assert ("contact/hypotheses" in loop.refusals) is is_refused
     assert loop.refused == is_refused
     ask(loop, World(400.0), down(2.0))
     assert (loop.fallback, loop.refusals) == ("", {})
 
 
-def test_a_place_once_sure_stands_as_long_as_the_touch() -> None:
+def test_a_certain_contact_position_is_kept_as_long_as_the_contact_lasts() -> None:
     """Going back and forth between it and the configured one would make a step of the measured force each time."""
-    loop = Loop(ARM, OWN)
-    sure, doubtful = (Contact("inner_link", 0.4, (0.0, 0.0, 1.0), place_sd, 0.99) for place_sd in (0.01, 0.05))
+    loop = force_loop(ARM, OWN)
+    certain, uncertain = (
+        Contact("inner_link", 0.4, (0.0, 0.0, 1.0), position_sd, 0.99) for position_sd in (0.01, 0.05)
+    )
     there, configured = lever(POSE, DOWN, "inner_link", 0.4), lever(POSE)
     for contact, expected in (
-        (doubtful, configured),
-        (sure, there),
-        (doubtful, there),
+        (uncertain, configured),
+        (certain, there),
+        (uncertain, there),
         (NO_CONTACT, configured),
-        (doubtful, configured),
+        (uncertain, configured),
     ):
         out = ask(loop, World(400.0), down(2.0), contact=contact)
         assert out.effort == pytest.approx(2.0 * expected, abs=1e-6)
 
 
-def test_the_force_of_a_doubtful_estimate_is_not_believed_but_its_torques_are() -> None:
+def test_of_a_rejected_estimate_the_torques_are_used_and_not_the_force() -> None:
     world, felt = World(400.0), (0.0, 9.0, 0.0)
     torques = (-3.0 * lever(POSE)).tolist()  # of a push of 3 N where the parameters say
-    for place_sd, expected in ((0.01, float(rotation("outer_link")[2] @ felt)), (0.05, 3.0)):
+    for position_sd, expected in ((0.01, float(rotation("outer_link")[2] @ felt)), (0.05, 3.0)):
         loop, contact = (
-            Loop(ARM, replace(OWN, feedback="contact_estimate")),
-            Contact(COVER, PLACE, felt, place_sd, 0.99),
+            force_loop(ARM, replace(OWN, feedback="contact_estimate")),
+            Contact(COVER, PLACE, felt, position_sd, 0.99),
         )
         out = ask(loop, world, down(5.0), contact=contact, external=torques)
         assert out.measured == pytest.approx(down(expected), abs=1e-5)
@@ -354,15 +369,17 @@ def test_a_force_in_a_cover_frame_is_the_same_force_in_the_base_frame(feedback: 
     in_base = rotation("outer_link") @ in_cover
     touch = Contact("outer_link", 0.2, (0.3, 1.0, -0.2))
     commands = [ForceCommand(frame, tuple(force)) for frame, force in (("outer_link", in_cover), ("base", in_base))]
-    outs = [ask(Loop(ARM, own), World(400.0, force=2.0), None, contact=touch, command=command) for command in commands]
+    outs = [
+        ask(force_loop(ARM, own), World(400.0, force=2.0), None, contact=touch, command=command) for command in commands
+    ]
     assert outs[0].velocity == pytest.approx(outs[1].velocity, abs=1e-12)
     assert outs[0].effort == pytest.approx(outs[1].effort, abs=1e-12)
     for here, there in ((outs[0].measured, outs[1].measured), (outs[0].limited, outs[1].limited)):
         assert rotation("outer_link") @ here == pytest.approx(there, abs=1e-12)
 
 
-def test_tare_takes_what_is_felt_as_zero() -> None:
-    loop = Loop(ARM, OWN)
+def test_tare_takes_the_present_torques_as_zero() -> None:
+    loop = force_loop(ARM, OWN)
     assert ask(loop, World(400.0, force=3.0), down(5.0)).measured == pytest.approx(down(3.0), abs=1e-6)
     loop.tare()
     assert ask(loop, World(400.0, force=3.0), down(5.0)).measured == pytest.approx(down(0.0), abs=1e-9)
@@ -370,15 +387,15 @@ def test_tare_takes_what_is_felt_as_zero() -> None:
     assert ask(loop, World(400.0, force=7.0), down(5.0)).measured == pytest.approx(down(4.0), abs=1e-6)
 
 
-def test_a_force_without_a_lever_asks_for_no_motion_along_it() -> None:
+def test_a_force_without_a_lever_commands_no_motion_along_it() -> None:
     stretched = [0.0, 0.0, 0.0, math.pi / 2]  # arm straight up
-    out = ask(Loop(ARM, OWN), World(400.0, q=stretched), down(5.0))
+    out = ask(force_loop(ARM, OWN), World(400.0, q=stretched), down(5.0))
     assert out.velocity == pytest.approx([0.0] * 4, abs=1e-12)
     assert np.all(np.isfinite(out.effort))
 
 
-def test_sensors_that_have_not_come_yet_count_as_nothing_felt() -> None:
-    loop = Loop(ARM, OWN)
+def test_missing_sensors_count_as_no_force() -> None:
+    loop = force_loop(ARM, OWN)
     command = ForceCommand("base", (0.0, 0.0, -5.0))
     out = loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, command, 0.0, None, None, DT)
     assert out.measured == pytest.approx((0.0, 0.0, 0.0))
@@ -393,11 +410,11 @@ def test_sensors_that_have_not_come_yet_count_as_nothing_felt() -> None:
         ({"feedback": "eyes"}, "'feedback' is 'eyes'; allowed: one of joint_sensors, contact_estimate"),
         ({"force_gain": [-0.1]}, "'force_gain' is -0.1 m/s/N; allowed: at least 0"),
         ({"force_filter": math.nan}, "'force_filter' is nan s"),
-        ({"contact_place": "tip"}, "'contact_place' is 'tip' m; allowed: a number"),
+        ({"contact_position": "tip"}, "'contact_position' is 'tip' m; allowed: a number"),
     ],
 )
 def test_a_parameter_set_that_does_not_fit_is_refused_by_name(change: dict[str, Any], text: str) -> None:
-    loop = Loop(ARM, OWN)
+    loop = force_loop(ARM, OWN)
     with pytest.raises(ParameterError, match=text):
         loop.tune(build(ForceLoopParameters, {**values(OWN), **change}))
     assert loop.parameters == OWN
@@ -406,5 +423,5 @@ def test_a_parameter_set_that_does_not_fit_is_refused_by_name(change: dict[str, 
 def test_feedback_of_sensors_that_are_not_mounted_is_refused() -> None:
     bare = CONFIGURATION.with_values({"arm.joint_sensors": False}).shared.arm
     with pytest.raises(ParameterError, match=r"arm\.joint_sensors is false; use 'contact_estimate'"):
-        Loop(bare, OWN)
-    Loop(bare, replace(OWN, feedback="contact_estimate"))
+        force_loop(bare, OWN)
+    force_loop(bare, replace(OWN, feedback="contact_estimate"))

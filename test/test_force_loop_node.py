@@ -7,13 +7,12 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
-from test_nodes import ARM, Listener, start
+from test_nodes import ARM, WAM, Listener, start
 
-from wam_description.signals import State
-from wam_ros.messages import Wrench, joint_state, wrench_stamped
-from wam_ros.ports import message_type
+from wam_description.signals import State, Wrench
+from wam_description.topics import BY_NAME
+from wam_ros.messages import joint_state, message_type, wrench_stamped
 from wam_ros.qos import qos
-from wam_ros.topics import BY_NAME
 
 MS = 1_000_000
 
@@ -33,7 +32,7 @@ class Feeder:
         ros.wait(lambda: all(p.get_subscription_count() for p in self._publishers.values()))
 
     def feed(self, newtons: float = 0.0) -> None:
-        """One state, with a force asked for."""
+        """One state, with a force commanded."""
         self.stamp += 5 * MS
         force = wrench_stamped(self.stamp, Wrench("base", (0.0, 0.0, -newtons), (0.0, 0.0, 0.0)))
         self._publishers["force_command"].publish(force)
@@ -60,33 +59,55 @@ class Feeder:
         raise AssertionError([m.message for m in self.heard.seen["status"]])
 
     def facts(self) -> tuple[DiagnosticStatus, dict[str, str]]:
-        said = self.heard.seen["status"][-1]
-        return said, {pair.key: pair.value for pair in said.values}
+        reported = self.heard.seen["status"][-1]
+        return reported, {pair.key: pair.value for pair in reported.values}
 
 
 def test_status_says_domain_margin_stiffness_and_cycle_and_changes_with_the_set(ros: Any, tmp_path: Path) -> None:
     feeder = Feeder(ros, tmp_path)
     feeder.feed_until(lambda: any("domain" in m.message for m in feeder.heard.seen["status"]))
-    said, facts = feeder.facts()
-    assert (said.level, said.message, facts["peers"]) == (DiagnosticStatus.OK, "domain I", "connected")
+    reported, facts = feeder.facts()
+    assert (reported.level, reported.message, facts["peers"]) == (DiagnosticStatus.OK, "domain I", "connected")
     assert facts["verdict"] == "accepted"
     assert float(facts["effective stiffness [N/m]"]) > 1000.0
     assert float(facts["deadband that removes it [N]"]) > 0.0
     refused = feeder.set(force_gain=[0.5])
     assert not refused.successful
     assert "times the largest linearly stable one" in refused.reason
-    assert feeder.loop._loop.parameters.force_gain == (0.015,)
+    assert feeder.loop.node._loop.parameters.force_gain == (0.015,)
     assert feeder.set(force_gain=[0.5], guard__mode="warn").successful
-    feeder.feed_until(lambda: feeder.facts()[0].message != said.message)
+    feeder.feed_until(lambda: feeder.facts()[0].message != reported.message)
     assert feeder.facts()[0].level == DiagnosticStatus.WARN
     assert feeder.facts()[0].message.startswith("not stable: force_gain [0.5, 0.5, 0.5]")
 
 
-def test_a_force_above_the_limit_is_counted_and_the_last_good_one_stands(ros: Any, tmp_path: Path) -> None:
+def test_a_force_above_the_limit_is_counted_and_the_last_good_one_remains_in_force(ros: Any, tmp_path: Path) -> None:
     feeder = Feeder(ros, tmp_path)
     for newtons in (8.0, 61.0):
         for _ in range(2):
             feeder.feed(newtons)
     assert feeder.heard.seen["force_error"][-1].wrench.force.z < -7.0
     assert feeder.heard.seen["force_error"][-1].wrench.force.z > -9.0
-    assert feeder.loop._ports.refusals["force_command"] >= 1
+    assert feeder.loop._ports.refusals["force_command"] == 2
+
+
+def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: Any, tmp_path: Path) -> None:
+    feeder = Feeder(ros, tmp_path)
+    feeder.feed_until(lambda: any("domain" in m.message for m in feeder.heard.seen["status"]))
+    start(ros, tmp_path, ["velocity_loop"])
+    client = feeder.node.create_client(SetParametersAtomically, "velocity_loop/set_parameters_atomically")
+    ros.wait(client.service_is_ready, what="the parameter service")
+
+    def set_gain(factor: float) -> None:
+        gains = [factor * gain for gain in WAM.shared.servo.proportional_gain]
+        parameter = Parameter("servo.proportional_gain", value=gains).to_parameter_msg()
+        future = client.call_async(SetParametersAtomically.Request(parameters=[parameter]))
+        ros.wait(future.done, what="an answer to the set")
+        assert future.result().result.successful
+
+    set_gain(0.05)
+    ros.wait(lambda: "velocity_loop uses servo.* that are not accepted here" in feeder.facts()[0].message)
+    assert feeder.facts()[0].level == DiagnosticStatus.WARN
+    set_gain(1.05)
+    feeder.feed_until(lambda: "domain I" in feeder.facts()[0].message)
+    assert feeder.loop.node._loop._servo.proportional_gain[0] == 1.05 * WAM.shared.servo.proportional_gain[0]

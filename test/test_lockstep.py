@@ -1,7 +1,7 @@
 """Lockstep: the same scenario gives the same numbers, bit for bit, wherever and however it runs."""
 
+import dataclasses
 import json
-import math
 import os
 import subprocess
 import sys
@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from bag_comparison import compare
 
-from wam_analysis.bag import Bag, JointColumns, PointColumns, WrenchColumns, read
-from wam_analysis.comparison import compare
-from wam_analysis.direct import DirectRun, Rows
+from wam_bag.bag import Bag, JointColumns, PointColumns, TableColumns, WrenchColumns, read
 from wam_control.scenario import load
 from wam_description.arm import Timing
 from wam_description.configuration import Configuration, packaged
-from wam_ros.lockstep import Gate, Need
+from wam_description.synchroniser import InputSpec, Synchroniser
+from wam_sim.replay import tables
+from wam_sim.simulation import Rows, Simulation
 
 STEPS = [
     {"name": "release", "seconds": 0.1, "request": "enable"},
@@ -70,8 +71,8 @@ def record_in_processes(configured: Configuration) -> None:
         assert processes.wait(bool) == {"scenario": 0}
 
 
-def play_directly(configured: Configuration, script: Path) -> DirectRun:
-    run = DirectRun(configured, load(script, configured.shared.arm))
+def play_directly(configured: Configuration, script: Path) -> Simulation:
+    run = Simulation(configured, load(script, configured.shared.arm))
     assert run.play() == ""
     return run
 
@@ -79,21 +80,26 @@ def play_directly(configured: Configuration, script: Path) -> DirectRun:
 def differences(rows: Rows, bag: Bag) -> list[str]:
     """Topics of a direct run whose numbers are not those of the bag, bit for bit."""
     found = []
-    for topic, said in rows.items():
+    for topic, published in rows.items():
         columns = bag.topics[f"/wam/{topic}"]
         if isinstance(columns, JointColumns):
             numbers = np.hstack([columns.position, columns.velocity, columns.effort])
         elif isinstance(columns, WrenchColumns):
             numbers = np.hstack([columns.force, columns.torque])
+        elif isinstance(columns, TableColumns):
+            rows = [[number for row in table.rows for number in row] for table in tables(columns)]
+            if repr([list(row.values) for row in published]) != repr(rows):
+                found.append(topic)
+            continue
         else:
             assert isinstance(columns, PointColumns)
             numbers = columns.point
-        here = np.array([row.values for row in said])
+        here = np.array([row.values for row in published])
         if here.shape != numbers.shape or here.tobytes() != np.ascontiguousarray(numbers).tobytes():
             found.append(f"{topic}: {here.shape} and {numbers.shape}")
-        if [row.stamp for row in said] != columns.stamp_ns.tolist():
+        if [row.stamp for row in published] != columns.stamp_ns.tolist():
             found.append(f"{topic}: stamps")
-        if said[0].frame and [row.frame for row in said] != list(columns.frames):
+        if published[0].frame and [row.frame for row in published] != list(columns.frames):
             found.append(f"{topic}: frames")
     return found
 
@@ -138,15 +144,16 @@ def test_processes_under_load_say_what_one_process_says(script: Path, tmp_path: 
     assert len(bag.topics["/wam/motor_states"].log_time_ns) == 801
 
 
+@pytest.mark.slow
 def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_path: Path) -> None:
     code = (
         "import sys, json, hashlib\n"
         "from pathlib import Path\n"
-        "from wam_analysis.direct import DirectRun\n"
+        "from wam_sim.simulation import Simulation\n"
         "from wam_control.scenario import load\n"
         "from wam_description.configuration import Configuration, packaged\n"
         "c = Configuration.load(packaged('wam'))\n"
-        "run = DirectRun(c, load(Path(sys.argv[1]), c.shared.arm))\n"
+        "run = Simulation(c, load(Path(sys.argv[1]), c.shared.arm))\n"
         "run.play()\n"
         "print(json.dumps({t: hashlib.sha256(repr(r).encode()).hexdigest() for t, r in run.rows.items()}))\n"
     )
@@ -164,34 +171,50 @@ def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_p
 TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0)
 
 
-def test_gate_waits_for_the_command_that_belongs_to_the_state() -> None:
-    gate = Gate(TIMING, "state", {"command": Need(outer=True, delay=1)})
+def puts(synchroniser: Synchroniser, topic: str, stamp: int, value: str) -> list[tuple[int, float, str, str | None]]:
+    """Stamp, dt, state and command of each step that an input completes."""
+    steps = synchroniser.put(topic, stamp, value)
+    return [(inputs.stamp, inputs.dt, inputs["state"], inputs["command"]) for inputs in steps]
+
+
+def test_a_step_waits_for_the_command_that_belongs_to_the_state() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=1)})
     ms = 1_000_000
-    assert list(gate.put("state", 1 * ms, "s1")) == [(1 * ms, {"state": "s1", "command": None})]
-    assert list(gate.put("state", 2 * ms, "s2")) == []
-    assert gate.missing(2 * ms) == ["command"]
-    assert list(gate.put("command", 1 * ms, "c1")) == [(2 * ms, {"state": "s2", "command": "c1"})]
-    assert list(gate.put("command", 6 * ms, "c6")) == []
-    assert list(gate.put("state", 6 * ms, "s6")) == [(6 * ms, {"state": "s6", "command": "c1"})]
-    assert list(gate.put("state", 7 * ms, "s7")) == [(7 * ms, {"state": "s7", "command": "c6"})]
+    assert puts(synchroniser, "state", 1 * ms, "s1") == [(1 * ms, 0.001, "s1", None)]
+    assert puts(synchroniser, "state", 2 * ms, "s2") == []
+    assert synchroniser.missing(2 * ms) == ["command"]
+    assert puts(synchroniser, "command", 1 * ms, "c1") == [(2 * ms, 0.001, "s2", "c1")]
+    assert puts(synchroniser, "command", 6 * ms, "c6") == []
+    assert puts(synchroniser, "state", 6 * ms, "s6") == [(6 * ms, 0.004, "s6", "c1")]
+    assert puts(synchroniser, "state", 7 * ms, "s7") == [(7 * ms, 0.001, "s7", "c6")]
 
 
-def test_gate_in_realtime_takes_the_newest_and_never_waits() -> None:
-    gate = Gate(TIMING.__class__(**{**vars(TIMING), "mode": "realtime"}), "state", {"command": Need(outer=True)})
-    assert list(gate.put("state", 1_000_000, "s1")) == [(1_000_000, {"state": "s1", "command": None})]
-    list(gate.put("command", 1_000_000, "old"))
-    list(gate.put("command", 6_000_000, "new"))
-    assert list(gate.put("state", 9_000_000, "s9")) == [(9_000_000, {"state": "s9", "command": "new"})]
+def test_in_realtime_a_step_takes_the_newest_and_never_waits() -> None:
+    realtime = dataclasses.replace(TIMING, mode="realtime")
+    synchroniser = Synchroniser(realtime, "state", {"command": InputSpec(outer=True)})
+    assert puts(synchroniser, "state", 1_000_000, "s1") == [(1_000_000, 0.001, "s1", None)]
+    assert puts(synchroniser, "command", 1_000_000, "old") == []
+    assert puts(synchroniser, "command", 6_000_000, "new") == []
+    assert puts(synchroniser, "state", 9_000_000, "s9") == [(9_000_000, 0.008, "s9", "new")]
 
 
-def test_gate_ignores_a_state_that_comes_twice() -> None:
-    gate = Gate(TIMING, "state", {})
-    assert len(list(gate.put("state", 1_000_000, "a"))) == 1
-    assert list(gate.put("state", 1_000_000, "b")) == []
+def test_the_age_of_an_input_counts_from_the_state_that_caused_it() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=1)})
+    assert list(synchroniser.put("command", 1_000_000, "c1")) == []
+    (inputs,) = synchroniser.put("state", 4_000_000, "s4")
+    assert (inputs.age("command"), inputs.stamp_of("command")) == (0.003, 1_000_000)
+    assert (inputs.age("nothing"), inputs["nothing"]) == (0.0, None)
 
 
-def test_stamps_of_outer_periods() -> None:
-    ms = 1_000_000
-    assert [TIMING.outer_stamp(k * ms) // ms for k in (1, 2, 5, 6, 10, 11)] == [1, 1, 1, 6, 6, 11]
-    assert [k for k in range(1, 12) if TIMING.is_outer(k * ms)] == [1, 6, 11]
-    assert math.isclose(TIMING.outer_period_ns, 5e6)
+def test_a_state_that_comes_twice_starts_one_step() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {})
+    assert len(list(synchroniser.put("state", 1_000_000, "a"))) == 1
+    assert list(synchroniser.put("state", 1_000_000, "b")) == []
+
+
+def test_an_outer_step_takes_states_of_outer_periods_only() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"sensors": InputSpec(outer=False)}, outer=True, thinned=True)
+    for tick in range(1, 12):
+        synchroniser.put("sensors", tick * 1_000_000, tick)
+        steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.put("state", tick * 1_000_000, tick)]
+        assert steps == ([(tick * 1_000_000, tick)] if tick in (1, 6, 11) else [])

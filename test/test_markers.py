@@ -1,24 +1,30 @@
 """The contact as markers: what a viewer is told to draw."""
 
 import math
+from typing import Any
 
 import pytest
 
-from wam_ros.markers import METRES_PER_NEWTON, Likely, contact_markers
+from wam_description.signals import Contact, ContactView, LikelyRange
+from wam_ros.markers import METRES_PER_NEWTON, contact_markers
 
 Marker = pytest.importorskip("visualization_msgs.msg").Marker
-PARTS = [Likely("outer_link", 0.2, 0.3), Likely("inner_link", 0.4, 0.5588)]
+PARTS = (LikelyRange("outer_link", 0.2, 0.3), LikelyRange("inner_link", 0.4, 0.5588))
+
+
+def drawn(cover: str, place: float, force: tuple[float, float, float]) -> list[Any]:
+    return contact_markers(1, ContactView(Contact(cover, place, force), PARTS)).markers
 
 
 def test_every_message_begins_by_deleting_what_was_drawn_before() -> None:
     for cover in ("", "outer_link"):
-        markers = contact_markers(1, cover, 0.25, (0.0, 5.0, 0.0), PARTS).markers
+        markers = drawn(cover, 0.25, (0.0, 5.0, 0.0))
         assert markers[0].action == Marker.DELETEALL
         assert (len(markers) == 1) == (not cover)
 
 
 def test_the_arrow_ends_at_the_place_and_is_as_long_as_the_force() -> None:
-    _, arrow, sphere, *_ = contact_markers(1, "outer_link", 0.25, (0.0, 3.0, 4.0), PARTS).markers
+    _, arrow, sphere, *_ = drawn("outer_link", 0.25, (0.0, 3.0, 4.0))
     tail, tip = arrow.points
     assert (tip.x, tip.y, tip.z) == (0.25, 0.0, 0.0)
     assert math.dist((tail.x, tail.y, tail.z), (tip.x, tip.y, tip.z)) == pytest.approx(5.0 * METRES_PER_NEWTON)
@@ -27,7 +33,7 @@ def test_the_arrow_ends_at_the_place_and_is_as_long_as_the_force() -> None:
 
 
 def test_bands_lie_along_the_links_where_the_contact_is_likely() -> None:
-    bands = contact_markers(1, "outer_link", 0.25, (0.0, 5.0, 0.0), PARTS).markers[3:]
+    bands = drawn("outer_link", 0.25, (0.0, 5.0, 0.0))[3:]
     assert [band.header.frame_id for band in bands] == ["outer_link", "inner_link"]
     for band, part in zip(bands, PARTS, strict=True):
         assert band.scale.z == pytest.approx(part.high - part.low)
@@ -37,6 +43,6 @@ def test_bands_lie_along_the_links_where_the_contact_is_likely() -> None:
 
 
 def test_an_unknown_place_is_grey_and_stands_in_the_middle_of_what_is_likely() -> None:
-    _, arrow, sphere, *_ = contact_markers(1, "inner_link", math.nan, (0.0, 5.0, 0.0), PARTS).markers
+    _, arrow, sphere, *_ = drawn("inner_link", math.nan, (0.0, 5.0, 0.0))
     assert sphere.pose.position.x == pytest.approx(0.4794)
     assert arrow.color.r == arrow.color.g == arrow.color.b

@@ -1,29 +1,31 @@
 """Messages in and out: matched by name, refused whole, the same after a round trip."""
 
 import math
+import struct
 import sys
 from array import array
 from typing import Any
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped, WrenchStamped
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, PointCloud2
 
-from wam_description.signals import NO_CONTACT, Contact, State
+from wam_description.signals import Level, NodeStatus, Point, State, Table, Wrench
+from wam_ros.header import header, stamp_of
 from wam_ros.messages import (
     Refused,
-    Wrench,
-    contact_of,
-    header,
+    diagnostic_status,
     joint_state,
     point_stamped,
-    read_contact,
     read_joint_state,
+    read_point,
+    read_status,
+    read_table,
     read_wrench,
-    stamp_of,
+    table,
     wrench_stamped,
 )
 
@@ -97,8 +99,8 @@ def spoilt(**fields: Any) -> JointState:
         (spoilt(effort=[0.0] * 5), "effort has 5 values; send 4"),
         (spoilt(effort=[]), "effort has 0 values; send 4"),
         (spoilt(name=["motor1", "motor2", "motor3", "elbow"]), "unknown name 'elbow'; allowed are motor1, motor2"),
-        (spoilt(name=["motor1", "motor2", "motor3", "motor3"]), "name 'motor3' stands there twice; send each of"),
-        (spoilt(name=[*NAMES, "motor1"]), "name 'motor1' stands there twice"),
+        (spoilt(name=["motor1", "motor2", "motor3", "motor3"]), "name 'motor3' is there twice; send each of"),
+        (spoilt(name=[*NAMES, "motor1"]), "name 'motor1' is there twice"),
         (spoilt(name=NAMES[:3]), "name 'motor4' is missing; send all of motor1, motor2, motor3, motor4"),
         (spoilt(name=[]), "name 'motor1' is missing"),
         (spoilt(name=["motor4", "motor3", "motor2", "motor1"], effort=[math.nan, 0, 0, 0]), "effort of motor4 is nan"),
@@ -126,7 +128,7 @@ def test_numbers_of_other_types_become_floats() -> None:
     force = np.array([1, 2, 3])
     message = wrench_stamped(STAMP, Wrench("base", tuple(force), tuple(np.float32([0.5, 0.25, 0.0]))))
     assert read_wrench(message, FRAMES) == Wrench("base", (1.0, 2.0, 3.0), (0.5, 0.25, 0.0))
-    assert type(point_stamped(STAMP, "base", np.array([2, 0, 0])).point.x) is float
+    assert type(point_stamped(STAMP, Point("base", (np.int64(2), 0, 0))).point.x) is float
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
@@ -145,18 +147,61 @@ def test_an_unknown_frame_is_refused(frame: str) -> None:
     with pytest.raises(Refused, match=text):
         read_wrench(wrench_stamped(STAMP, WRENCH._replace(frame=frame)), FRAMES)
     with pytest.raises(Refused, match=text):
-        read_contact(point_stamped(STAMP, frame, (0.1, 0.0, 0.0)), FRAMES)
+        read_point(point_stamped(STAMP, Point(frame, (0.1, 0.0, 0.0))), FRAMES)
 
 
-def test_a_place_may_be_unknown_but_not_infinite() -> None:
-    wire = serialize_message(point_stamped(STAMP, "outer_link", (0.28, 0.0, 0.0)))
-    assert read_contact(deserialize_message(wire, PointStamped), FRAMES) == 0.28
-    assert math.isnan(read_contact(point_stamped(STAMP, "outer_link", (math.nan, 0.0, 0.0)), FRAMES))
-    with pytest.raises(Refused, match="place is inf m; send a finite number, or NaN where it is not known"):
-        read_contact(point_stamped(STAMP, "outer_link", (math.inf, 0.0, 0.0)), FRAMES)
+def test_a_position_may_be_unknown_but_not_infinite() -> None:
+    point = Point("outer_link", (0.28, 0.0, 0.0))
+    assert (
+        read_point(deserialize_message(serialize_message(point_stamped(STAMP, point)), PointStamped), FRAMES) == point
+    )
+    unknown = point_stamped(STAMP, Point("outer_link", (math.nan, 0.0, 0.0)))
+    assert math.isnan(read_point(unknown, FRAMES).position[0])
+    with pytest.raises(Refused, match=r"position is .*inf.* m; send finite numbers, or NaN where it is not known"):
+        read_point(point_stamped(STAMP, Point("outer_link", (math.inf, 0.0, 0.0))), FRAMES)
 
 
-def test_a_contact_needs_both_a_wrench_and_a_place() -> None:
-    assert contact_of(WRENCH, 0.28) == Contact("outer_link", 0.28, (1.0, -2.0, 3.0))
-    for wrench, place in ((None, 0.28), (WRENCH, None), (WRENCH._replace(frame="base"), 0.28)):
-        assert contact_of(wrench, place) is NO_CONTACT
+COLUMNS = ("link", "probability", "place")
+ROWS = Table("outer_link", ((1.0, 0.75, 0.1 + 0.2), (0.0, 0.25, math.inf - math.inf)))
+
+
+def test_a_table_is_the_same_to_the_bit_after_a_round_trip() -> None:
+    for rows in (ROWS, Table("base", ())):
+        message = deserialize_message(serialize_message(table(STAMP, COLUMNS, rows)), PointCloud2)
+        assert repr(read_table(message, COLUMNS, FRAMES)) == repr(rows)
+        assert stamp_of(message) == STAMP
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"fields": []}, "fields are none; send little-endian float64 fields link, probability, place"),
+        ({"is_bigendian": True}, "send little-endian float64 fields"),
+        ({"width": 3}, "48 bytes of data; 3 rows need 24 bytes each"),
+        ({"point_step": 8}, "48 bytes of data"),
+        ({"data": array("B", struct.pack("<6d", 1, 1, math.inf, 0, 0, 0))}, "a number is infinite"),
+        ({"header": header(STAMP, "hand")}, "frame_id is 'hand'; allowed are base"),
+    ],
+)
+def test_a_table_that_is_not_whole_is_refused(change: dict[str, Any], text: str) -> None:
+    message = table(STAMP, COLUMNS, ROWS)
+    for name, value in change.items():
+        setattr(message, name, value)
+    with pytest.raises(Refused, match=text):
+        read_table(message, COLUMNS, FRAMES)
+
+
+def test_a_status_is_the_same_after_a_round_trip() -> None:
+    facts = {"gain factor": "1", "worst": ""}
+    for status in (
+        NodeStatus(Level.WARN, "domain I", "force_loop", connected=True, facts=facts),
+        NodeStatus(Level.ERROR, "fault: x", "driver", mode="fault", fault="x", stamp=5_000_000),
+        NodeStatus(Level.OK, "press", "scenario", step="press", stamp=1),
+    ):
+        wire = serialize_message(diagnostic_status(status, "wam"))
+        assert read_status(deserialize_message(wire, DiagnosticStatus)) == status
+
+
+def test_a_foreign_status_is_read_without_an_error() -> None:
+    message = DiagnosticStatus(name="x", level=bytes([77]), message="y", values=[KeyValue(key="stamp", value="-3e9")])
+    assert read_status(message) == NodeStatus(Level.ERROR, "y", "x")

@@ -123,7 +123,7 @@ def _product(model: mujoco.MjModel, data: mujoco.MjData, vector: np.ndarray) -> 
     return result
 
 
-def test_mass_matrix_is_that_of_pinocchio_with_pulleys_and_rotors_beside_it() -> None:
+def test_mass_matrix_is_that_of_pinocchio_plus_pulleys_and_rotors() -> None:
     model = compiled()
     for q in poses(200):
         mass = full_mass(model, placed(model, q))
@@ -204,11 +204,11 @@ def test_bad_obstacle_is_refused_with_the_name_of_the_parameter(change: dict[str
 
 def test_obstacles_need_names_of_their_own() -> None:
     twice = {f.name: getattr(FOAM, f.name) * 2 for f in dataclasses.fields(FOAM)}
-    with pytest.raises(ParameterError, match="name twice: block, block"):
+    with pytest.raises(ParameterError, match="duplicate name: block, block"):
         Obstacles(**twice)
     with pytest.raises(ParameterError, match="empty name"):
         dataclasses.replace(FOAM, names=("",))
-    with pytest.raises(ParameterError, match="'outer_link' is named like a cover"):
+    with pytest.raises(ParameterError, match="'outer_link' has the name of a cover"):
         ideal_mjcf(WAM, 5e-4, dataclasses.replace(FOAM, names=("outer_link",)))
 
 

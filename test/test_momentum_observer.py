@@ -28,7 +28,7 @@ POSE = (0.2, -1.05, 0.3, 0.5)
 
 
 def wave(time: float) -> np.ndarray:
-    """Joint torques on top of gravity that swing the arm fast, every joint to and fro."""
+    """Joint torques on top of gravity that swing the arm fast, every joint back and forth."""
     return np.array([6.0, 8.0, 3.0, 2.0]) * np.sin(2 * math.pi * np.array([1.1, 1.3, 1.7, 2.1]) * time)
 
 
@@ -64,6 +64,7 @@ def test_residual_reaches_63_percent_of_a_step_after_the_time_constant() -> None
         np.testing.assert_allclose(rows[99 + ticks], expected, atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensors", [False, True])
 def test_motion_alone_gives_no_external_torque(sensors: bool) -> None:
     observer = MomentumObserver(ARM, FREE, use_joint_sensors=sensors)
@@ -73,6 +74,7 @@ def test_motion_alone_gives_no_external_torque(sensors: bool) -> None:
     assert np.abs(rows).max() < 0.05
 
 
+@pytest.mark.slow
 def test_rotor_inertia_is_part_of_the_momentum() -> None:
     without = dataclasses.replace(ARM, motors=dataclasses.replace(ARM.motors, inertia=(1e-9,) * 4))
     worst = {}
@@ -118,6 +120,7 @@ def test_joint_sensors_see_neither_friction_nor_rotors() -> None:
     np.testing.assert_allclose(still[-1], push, atol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensors", [False, True])
 @pytest.mark.parametrize("friction", [0.84, 1.02])
 def test_declared_uncertainty_covers_a_nominal_model_that_is_wrong(sensors: bool, friction: float) -> None:
@@ -157,6 +160,7 @@ def test_one_motor_that_rests_couples_the_errors_of_joints_2_and_3() -> None:
     assert observer.torques()[1][1, 2] == pytest.approx(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid value")  # 1e308 is seen by what comes out
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e308])
 @pytest.mark.parametrize("sensors", [False, True])
@@ -190,7 +194,64 @@ def test_lost_samples_are_bridged() -> None:
     assert np.abs(observer.torques()[0]).max() < 0.1
 
 
-def test_motors_without_current_at_rest_tell_nothing() -> None:
+def test_nothing_is_taken_from_a_gap_longer_than_the_time_constant() -> None:
+    """Nobody knows what acted in it; it would look like a push."""
+    plant, observer = RigidArm(ARM, POSE, friction=0.0), MomentumObserver(ARM, FREE, use_joint_sensors=False)
+    swing(observer, plant, 0.3)
+    before = list(observer.torques()[0])
+    theta, thetad, tau = plant.motors(np.full(4, 0.1))
+    assert observer.observe(State(theta, [speed + 20.0 for speed in thetad], tau), 2.0 * FREE.time_constant)
+    assert observer.torques()[0] == before
+    assert observer.observe(State(theta, thetad, tau), 0.5 * FREE.time_constant)
+    assert np.abs(np.subtract(observer.torques()[0], before)).max() > 1.0, "a short one is bridged"
+
+
+def test_torques_are_averaged_over_each_period_so_that_slow_sampling_costs_little() -> None:
+    """Trapezoidal rule: with the newest sample alone the error is of first order in the period."""
+    slow, every = 5, MomentumObserver(ARM, FREE, use_joint_sensors=False)
+    plant = RigidArm(ARM, POSE, friction=0.0)
+    residuals = []
+    for k in range(120):
+        torque = wave(k * slow * DT) + plant.gravity()
+        motor = np.linalg.solve(DRIVE, torque)
+        for _ in range(slow):
+            plant.step(motor, NONE)
+        assert every.observe(State(*plant.motors(motor)), slow * DT)
+        residuals.append(np.abs(every.torques()[0]).max())
+    assert max(residuals) < 0.06
+
+
+def test_a_shaft_that_has_just_stopped_is_held_as_it_was_slowed_down_and_that_fades() -> None:
+    own = dataclasses.replace(EXACT, time_constant=2e-3, friction_memory=0.1)
+    joints = dataclasses.replace(ARM.joints, static_friction=(0.0,) * 4, dynamic_friction=(0.0,) * 4)
+    observer = MomentumObserver(dataclasses.replace(ARM, joints=joints), own, use_joint_sensors=False)
+    theta = motor_from_joint(np.array(POSE)).tolist()
+    slow = 1.01 * own.motor_rest_velocity  # hardly any momentum
+    friction = np.array(ARM.motors.dynamic_friction)
+    carry = np.linalg.solve(DRIVE, RigidArm(ARM, POSE, friction=0.0).gravity())
+
+    def errors(speed: float, torque: np.ndarray, samples: int) -> np.ndarray:
+        for _ in range(samples):
+            assert observer.observe(State(theta, [speed] * 4, (carry + torque).tolist()), DT)
+        return np.linalg.solve(DRIVE, observer.torques()[0]) / friction  # at the motors, per friction
+
+    errors(slow, friction, 100)
+    faded = math.exp(-0.02 / own.friction_memory)
+    assert errors(0.0, friction, 20) == pytest.approx([-(1.0 - faded)] * 4, abs=0.05)
+    assert errors(0.0, friction, 500) == pytest.approx([-1.0] * 4, abs=0.05), "long at rest, friction is unknown"
+
+
+def test_nothing_counts_before_two_time_constants_have_passed() -> None:
+    observer = MomentumObserver(ARM, EXACT, use_joint_sensors=False)
+    state = State(motor_from_joint(np.array(POSE)).tolist(), [0.0] * 4, [0.1] * 4)
+    samples = 0
+    while not observer.is_ready:
+        observer.observe(state, DT)
+        samples += 1
+    assert samples * DT == pytest.approx(2.0 * EXACT.time_constant, abs=1.5 * DT)
+
+
+def test_motors_without_current_at_rest_give_no_estimate() -> None:
     """Brakes hold: without this the arm's own weight would look like a contact."""
     observer = MomentumObserver(ARM, EXACT, use_joint_sensors=False)
     theta = motor_from_joint(np.array(POSE)).tolist()

@@ -17,14 +17,18 @@ from std_srvs.srv import SetBool, Trigger
 
 from wam_control.transform import Transform
 from wam_description.configuration import Configuration, packaged
+from wam_description.interface import Interface
+from wam_description.nodes import NODES
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import State
+from wam_description.signals import State, Wrench
+from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
-from wam_ros.bring_up import MODULES, Composition, node_class
-from wam_ros.messages import Wrench, joint_state, stamp_of, wrench_stamped
-from wam_ros.ports import READY, message_type
+from wam_ros.bring_up import Composition
+from wam_ros.header import stamp_of
+from wam_ros.messages import diagnostic_status, joint_state, message_type, wrench_stamped
+from wam_ros.node import make_node
+from wam_ros.ports import READY
 from wam_ros.qos import DEPTH, qos
-from wam_ros.topics import BY_NAME, TOPICS
 
 WAM = Configuration.load(packaged("wam"))
 ARM = WAM.shared.arm
@@ -56,7 +60,7 @@ def make(ros: Any, folder: Path, name: str, namespace: str, configured: Configur
     file.write_text(configured.text)
     arguments = ["--ros-args", "--params-file", str(file)]
     return ros.add(
-        node_class(name)(context=ros.context, namespace=namespace, cli_args=arguments, use_global_arguments=False)
+        make_node(name, context=ros.context, namespace=namespace, cli_args=arguments, use_global_arguments=False)
     )
 
 
@@ -107,7 +111,7 @@ class Hand:
         self.node = make(ros, folder, "driver", "/wam", changed(nodes, timing__mode=mode, **values))
         self.driver = self.node.driver
         ros.wait(lambda: self.publisher.get_subscription_count() and node.count_publishers("motor_states"))
-        status.publish(DiagnosticStatus(name="velocity_loop", message=READY))
+        status.publish(diagnostic_status(READY._replace(node="velocity_loop"), "wam"))
         ros.wait(lambda: self.last > 10 * MS, what="the driver's states")
 
     def answer(self, state: Any) -> None:
@@ -221,7 +225,7 @@ def test_a_bad_command_is_refused_counted_and_never_reaches_the_motors(message: 
     hand.ros.wait(lambda: refusals["motor_current_command"] == 5, what="refusals")
     hand.wait_periods(5)
     assert hand.driver.safety.mode is Mode.ENABLED
-    flowing = [sample.flowing for sample in hand.driver.recent]
+    flowing = [sample.actual for sample in hand.driver.recent]
     assert all(currents in (HOLDING, [0.0] * 4) for currents in flowing)
     reports, key = heard.seen["/diagnostics"], "refused on motor_current_command"
     hand.ros.wait(lambda: any(counted(report, key) == "5" for report in reports))
@@ -239,7 +243,7 @@ def test_a_command_that_answers_no_state_is_refused_in_realtime(stamp: int, live
         live.wait_periods(1)
     live.wait_periods(60)
     assert "command stale" in live.driver.safety.fault, "it does not feed the watchdog"
-    assert all(sample.flowing in (HOLDING, [0.0] * 4) for sample in live.driver.recent)
+    assert all(sample.actual in (HOLDING, [0.0] * 4) for sample in live.driver.recent)
 
 
 def counted(message: Any, key: str) -> str | None:
@@ -273,7 +277,7 @@ def test_a_command_of_the_second_publisher_never_reaches_the_motors(live: Hand) 
     for _ in range(20):
         second.publish(joint_state(live.driver.stamp, MOTORS, State([], [], [3.0] * 4)))
     live.wait_periods(20)
-    assert all(max(map(abs, sample.flowing)) < 2.0 for sample in live.driver.recent)
+    assert all(max(map(abs, sample.actual)) < 2.0 for sample in live.driver.recent)
     assert live.driver.currents == [0.0] * 4
 
 
@@ -294,7 +298,7 @@ def test_enable_with_a_latched_fault_is_refused_until_it_is_reset(hand: Hand) ->
 
 def last_flow_after(hand: Hand, stamp: int) -> int:
     """Arm time for which currents still flowed after the state of a stamp, ns."""
-    flowing = [sample.stamp for sample in hand.driver.recent if any(sample.flowing)]
+    flowing = [sample.stamp for sample in hand.driver.recent if any(sample.actual)]
     return max(flowing) - stamp
 
 
@@ -324,7 +328,7 @@ def test_what_was_commanded_before_enable_is_discarded(live: Hand) -> None:
     live.is_answering = False
     assert live.ask("enable", True).success
     live.ros.wait(lambda: live.driver.safety.mode is Mode.FAULT, what="the watchdog")
-    assert not any(any(sample.flowing) for sample in live.driver.recent)
+    assert not any(any(sample.actual) for sample in live.driver.recent)
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
@@ -360,7 +364,7 @@ def test_a_late_subscriber_gets_the_description_and_the_status(hand: Hand) -> No
     late = Listener(hand.ros, "robot_description", "status")
     hand.ros.wait(lambda: late.seen["robot_description"] and len(late.seen["status"]) == 2)
     assert ElementTree.fromstring(late.seen["robot_description"][0].data).get("name") == ARM.name
-    assert {m.name: m.message for m in late.seen["status"]} == {"driver": "enabled", "velocity_loop": READY}
+    assert {m.name: m.message for m in late.seen["status"]} == {"driver": "enabled", "velocity_loop": READY.message}
 
 
 def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
@@ -455,7 +459,7 @@ def test_two_arms_in_two_namespaces_do_not_mix(ros: Any, tmp_path: Path) -> None
         assert heard[namespace].stamps("joint_states") == sorted(set(heard[namespace].stamps("joint_states")))
         assert {m.hardware_id for m in heard[namespace].seen["status"]} == {namespace[1:]}
         for topic in TOPICS:
-            if not topic.name.startswith("/") and topic.publisher != ("recorder",):
+            if not topic.name.startswith("/"):
                 publishers = heard[namespace].node.get_publishers_info_by_topic(f"{namespace}/{topic.name}")
                 assert {info.node_namespace for info in publishers} <= {namespace}
 
@@ -467,7 +471,7 @@ def whole(domain_id: int, tmp_path: Path) -> Iterator[Composition]:
     script.write_text(yaml.safe_dump({"steps": [{"name": "wait", "seconds": 1000.0}]}))
     configured = WAM.with_values(
         {
-            "nodes": list(MODULES),
+            "nodes": list(NODES),
             "timing.mode": "lockstep",
             "scenario:script": str(script),
             "recorder:directory": str(tmp_path),
@@ -483,16 +487,17 @@ def test_the_live_graph_is_the_interface_table(whole: Composition) -> None:
     whole.spin(lambda: driver.driver.stamp > 20 * MS)  # type: ignore[attr-defined]
     node = whole.nodes["scenario"]
     names = {driver.resolve_topic_name(topic.name): topic for topic in TOPICS}
+    interface = Interface(WAM.with_values({"nodes": list(NODES)}).shared)
     for full_name, topic in names.items():
         publishers = node.get_publishers_info_by_topic(full_name)
-        assert sorted(info.node_name for info in publishers) == sorted(topic.publisher), topic.name
+        assert sorted(info.node_name for info in publishers) == sorted(interface.publishers(topic.name)), topic.name
         durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE
         for info in publishers:
             assert info.topic_type == topic.type, topic.name
             assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE, topic.name
             assert info.qos_profile.durability == durability, topic.name
         subscriptions = node.get_subscriptions_info_by_topic(full_name)
-        assert sorted(info.node_name for info in subscriptions) == sorted([*topic.subscribers, "recorder"]), topic.name
+        assert sorted(info.node_name for info in subscriptions) == sorted(interface.subscribers(topic.name)), topic.name
         for info in subscriptions:
             assert info.topic_type == topic.type
             assert info.qos_profile.durability == durability, f"{info.node_name} of {topic.name}"
@@ -510,5 +515,5 @@ def test_every_node_says_that_it_is_ready_and_reports_every_second(whole: Compos
     node.create_subscription(message_type(status), status.name, lambda m: ready.add(m.name), profile)
     node.create_subscription(message_type(diagnostics), diagnostics.name, seen.append, qos(diagnostics))
     whole.spin(lambda: whole.nodes["driver"].driver.stamp > 1100 * MS)  # type: ignore[attr-defined]
-    whole.spin(lambda: ready == set(MODULES))
-    assert {m.status[0].name for m in seen} >= set(MODULES) - {"recorder"}
+    whole.spin(lambda: ready == set(NODES))
+    assert {m.status[0].name for m in seen} >= set(NODES) - {"recorder"}

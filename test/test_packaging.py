@@ -1,6 +1,5 @@
 """The package installs twice from one tree: with pip into a prefix, with colcon into a workspace."""
 
-import ast
 import importlib.metadata
 import os
 import re
@@ -15,16 +14,16 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-import rclpy
 import yaml
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 from catkin_pkg.package import parse_package
+from conftest import LONG
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-from rclpy.node import Node
 
-from wam_ros import bring_up
+from wam_description.nodes import NODES as TABLE
 
+pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[1]
 SHIPPED = (
     "LICENSE",
@@ -37,17 +36,7 @@ SHIPPED = (
     "resource",
     "scripts",
 )
-NODES = (
-    "contact_estimator",
-    "driver",
-    "force_loop",
-    "gravity",
-    "recorder",
-    "scenario",
-    "transform",
-    "velocity_loop",
-)
-DOMAIN = 150 + os.getpid() % 80
+NODES = tuple(TABLE)
 
 
 def copy_tree(target: Path) -> Path:
@@ -70,8 +59,8 @@ def environment(prefix: Path, **more: str) -> dict[str, str]:
         "HOME": str(prefix),
         "ROS_LOG_DIR": str(prefix / "ros_log"),
         "MPLCONFIGDIR": str(prefix / "matplotlib"),
-        "ROS_DOMAIN_ID": str(DOMAIN),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DOMAIN_ID": os.environ["ROS_DOMAIN_ID"],
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"],
         "AMENT_PREFIX_PATH": str(prefix),
         "PYTHONPATH": os.pathsep.join(str(path) for path in prefix.glob("lib/python3*/site-packages")),
         **{name: os.environ[name] for name in wheels if name in os.environ},
@@ -91,7 +80,7 @@ def sourced(workspace: Path) -> list[str]:
 
 def run(*command: str | Path, cwd: Path, env: dict[str, str]) -> str:
     """Run a command to its end; its output, or a failure that shows it."""
-    done = subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, timeout=LONG, check=False)
     assert done.returncode == 0, f"{command} gave {done.returncode}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 
@@ -142,7 +131,7 @@ def test_ament_index_finds_the_package(installed, monkeypatch):
 
 def test_every_node_is_where_ros2_run_looks(installed):
     executables = installed / "lib" / "wam_stack"
-    assert files_in(executables) - {"wam"} == set(NODES)
+    assert files_in(executables) - {"wam"} == {*NODES, "node"}
     assert all(os.access(path, os.X_OK) for path in executables.iterdir())
 
 
@@ -158,10 +147,10 @@ def test_pip_puts_one_command_on_path_and_colcon_none(prefix, workspace):
     assert "demo" in run(prefix / "bin" / "wam", "--help", cwd=prefix, env=environment(prefix))
 
 
-def test_launchers_and_console_scripts_name_the_same_modules(prefix, workspace):
+def test_launchers_and_console_scripts_have_the_same_names_and_start_the_same_module(prefix, workspace):
     launchers = {}
     for path in (prefix / "lib" / "wam_stack").iterdir():
-        launchers[path.name] = re.search(r"from (\S+) import main", path.read_text())[1]
+        launchers[path.name] = re.search(r"-m (\S+)", path.read_text())[1]
     (egg_info,) = (workspace / "install").glob("wam_stack/lib/python3*/site-packages/*.egg-info")
     (distribution,) = importlib.metadata.distributions(path=[str(egg_info.parent)])
     scripts = {point.name: point.module for point in distribution.entry_points if point.name != "wam"}
@@ -188,27 +177,17 @@ def test_each_build_runs_its_own_copy(prefix, workspace):
     assert said.startswith(str(workspace))
 
 
-@pytest.fixture(scope="module")
-def onlooker() -> Iterator[Node]:
-    """A node that sees which others are there."""
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=DOMAIN)
-    node = rclpy.create_node("onlooker", context=context)
-    yield node
-    node.destroy_node()
-    rclpy.try_shutdown(context=context)
-
-
-def start_and_stop(command: list[str | Path], name: str, onlooker, cwd: Path, env: dict[str, str]) -> None:
+def start_and_stop(command: list[str | Path], name: str, ros, cwd: Path, env: dict[str, str]) -> None:
     """Start a node, wait until the ROS graph has it, interrupt it, and expect a clean end."""
+    onlooker = ros.node("onlooker")
     process = subprocess.Popen(command, cwd=cwd, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + LONG
         while not onlooker.wait_for_node(f"/wam/{name}", timeout=0.5):
             assert process.poll() is None, f"{name} ended with {process.returncode}:\n{process.stdout.read()}"
-            assert time.monotonic() < deadline, f"{name} did not appear within a minute"
+            assert time.monotonic() < deadline, f"{name} did not appear within {LONG} s"
         process.send_signal(signal.SIGINT)
-        said, _ = process.communicate(timeout=20)
+        said, _ = process.communicate(timeout=LONG)
         assert process.returncode == 0, f"{name} ended with {process.returncode}:\n{said}"
         assert "Traceback" not in said, said
     finally:
@@ -223,16 +202,16 @@ def arguments(prefix: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_every_executable_starts_its_node_and_stops_when_interrupted(prefix, onlooker, tmp_path, name):
+def test_every_executable_starts_its_node_and_stops_when_interrupted(prefix, ros, tmp_path, name):
     command = [prefix / "lib" / "wam_stack" / name, *arguments(prefix)]
-    start_and_stop(command, name, onlooker, tmp_path, environment(prefix))
+    start_and_stop(command, name, ros, tmp_path, environment(prefix))
 
 
-def test_a_sourced_colcon_workspace_starts_a_node(workspace, onlooker, tmp_path):
+def test_a_sourced_colcon_workspace_starts_a_node(workspace, ros, tmp_path):
     package = workspace / "install" / "wam_stack"
     command = [*sourced(workspace), package / "lib" / "wam_stack" / "velocity_loop", *arguments(package)]
     env = clean_environment(tmp_path)
-    start_and_stop(command, "velocity_loop", onlooker, tmp_path, env)
+    start_and_stop(command, "velocity_loop", ros, tmp_path, env)
 
 
 def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(prefix, monkeypatch):
@@ -258,7 +237,7 @@ def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(pr
     assert set(declared) == set(given)
     nodes = start.function(given)
     config = yaml.safe_load((share / "config" / "wam.yaml").read_text())
-    assert [node.name for node in nodes] == [*config["/**"]["ros__parameters"]["nodes"], "recorder"]
+    assert [node.executable for node in nodes] == [*config["/**"]["ros__parameters"]["nodes"], "recorder"]
     assert {node.executable for node in nodes} <= set(NODES)
     assert {node.package for node in nodes} == {"wam_stack"}
     assert {node.namespace for node in nodes} == {"left"}
@@ -306,10 +285,3 @@ def test_constraints_pin_every_package_that_make_test_installs(prefix, monkeypat
     needed = {canonicalize_name(one.name) for one in reached("wam_stack", frozenset({"ros", "test"}), set())}
     installed = {name: importlib.metadata.version(name) for name in needed}
     assert installed == {name: pins.get(name) for name in needed}
-
-
-def test_setup_and_bring_up_name_the_same_nodes() -> None:
-    """setup.py cannot import the package that it installs, so the table stands there a second time."""
-    tree = ast.parse((ROOT / "setup.py").read_text(encoding="utf-8"))
-    (table,) = (n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "NODES")
-    assert ast.literal_eval(table) == bring_up.MODULES

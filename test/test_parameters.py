@@ -1,6 +1,5 @@
 """Parameters: refused by name, described to ROS, changed as a set or not at all."""
 
-import importlib
 import math
 import os
 import subprocess
@@ -11,13 +10,16 @@ from typing import Any
 
 import pytest
 import yaml
+from conftest import LONG
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
+from wam_description.interface import declared
+from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build, fields, parameter, require, values
-from wam_ros.bring_up import MODULES, node_class
+from wam_ros.node import make_node
 
 ROOT = Path(__file__).parents[1]
 WAM = Configuration.load(packaged("wam"))
@@ -92,9 +94,8 @@ def test_a_set_with_something_wrong_is_refused_by_name(change: dict[str, Any], t
 
 
 def own_class(node: str) -> Any:
-    """The parameter class of a node: what its module calls PARAMETERS, or <Node>Parameters."""
-    module = importlib.import_module(MODULES[node])
-    return getattr(module, "PARAMETERS", None) or getattr(module, f"{node.capitalize()}Parameters")
+    """The parameter class of a node."""
+    return declared(node).parameter_class
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -104,7 +105,7 @@ def test_every_section_of_every_configuration_builds_the_class_of_its_node(path:
     assert build(Shared, shared) == configuration.shared
     assert set(values(configuration.shared)) == set(shared), "nothing is left over"
     sections = set(configuration.sections) - {"/**"}
-    assert sections <= set(MODULES), "every section is that of a node"
+    assert sections <= set(NODES), "every section is that of a node"
     assert set(configuration.shared.nodes) <= sections, "every node of the bring-up has one"
     for name in sections:
         built = configuration.node(name, own_class(name))
@@ -112,7 +113,7 @@ def test_every_section_of_every_configuration_builds_the_class_of_its_node(path:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-@pytest.mark.parametrize("name", [name for name in MODULES if name != "recorder"])
+@pytest.mark.parametrize("name", [name for name in NODES if name != "recorder"])
 def test_every_node_starts_with_its_section_of_every_configuration(path: Path, name: str, ros: Any) -> None:
     node = make(ros, name, path)
     configuration = Configuration.load(path)
@@ -123,7 +124,8 @@ def test_every_node_starts_with_its_section_of_every_configuration(path: Path, n
 
 def make(ros: Any, name: str, path: Path = WAM.path) -> Any:
     return ros.add(
-        node_class(name)(
+        make_node(
+            name,
             context=ros.context,
             namespace="/wam",
             cli_args=["--ros-args", "--params-file", str(path)],
@@ -149,7 +151,7 @@ def test_every_parameter_is_described_to_ros(ros: Any) -> None:
     for field, there in zip(described, answer.descriptors, strict=True):
         assert there.description.startswith(field.doc)
         assert (f"[{field.unit}]" in there.description) == bool(field.unit)
-        assert there.read_only is not field.live
+        assert there.read_only is (not field.live or field.name.startswith("servo."))
         assert there.additional_constraints == field.allowed
         for limits in (*there.floating_point_range, *there.integer_range):
             assert limits.from_value == max(field.low, -1e308)
@@ -171,10 +173,12 @@ def change(ros: Any, node: str, **given: Any) -> Any:
 def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
     node = make(ros, "velocity_loop")
     doubled, halved = [0.03, 0.03, 0.03, 0.02], [0.4, 0.4, 0.4, 0.25]
-    assert change(ros, "velocity_loop", proportional_gain=doubled, integral_gain=halved).successful
-    assert node._loop._kp == tuple(doubled)
-    assert node._loop._ki == tuple(halved)
-    request = GetParameters.Request(names=["proportional_gain", "integral_gain"])
+    assert change(
+        ros, "velocity_loop", **{"servo.proportional_gain": doubled, "servo.integral_gain": halved}
+    ).successful
+    assert node.node._loop._kp == tuple(doubled)
+    assert node.node._loop._ki == tuple(halved)
+    request = GetParameters.Request(names=["servo.proportional_gain", "servo.integral_gain"])
     answer = call(ros, GetParameters, "velocity_loop/get_parameters", request)
     assert [list(value.double_array_value) for value in answer.values] == [doubled, halved]
 
@@ -195,22 +199,29 @@ def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
 )
 def test_a_set_with_one_wrong_value_changes_nothing_over_ros(given: dict[str, Any], text: str, ros: Any) -> None:
     node = make(ros, "force_loop")
-    before = node._loop.parameters
+    before = node.node._loop.parameters
     result = change(ros, "force_loop", **given)
     assert not result.successful
     assert text in result.reason
-    assert node._loop.parameters == before
+    assert node.node._loop.parameters == before
     assert tuple(node.get_parameter("force_gain").value) == before.force_gain
     assert change(ros, "force_loop", force_gain=[0.02]).successful
-    assert node._loop.parameters.force_gain == (0.02,), "the good part alone is taken"
+    assert node.node._loop.parameters.force_gain == (0.02,), "the good part alone is taken"
+
+
+def test_servo_gains_are_live_at_the_velocity_loop_alone(ros: Any) -> None:
+    make(ros, "gravity")
+    result = change(ros, "gravity", **{"servo.proportional_gain": [0.01] * 4})
+    assert not result.successful
+    assert "servo.proportional_gain" in result.reason
 
 
 def test_gains_of_a_wrong_number_are_refused_over_ros(ros: Any) -> None:
     node = make(ros, "velocity_loop")
-    before = node._loop._kp
-    result = change(ros, "velocity_loop", proportional_gain=[0.1] * 3, integral_gain=[0.1] * 3)
-    assert result.reason == "proportional_gain has 3 values; the arm has 4 motors"
-    assert node._loop._kp == before
+    before = node.node._loop._kp
+    result = change(ros, "velocity_loop", **{"servo.proportional_gain": [0.1] * 3, "servo.integral_gain": [0.1] * 3})
+    assert result.reason == "parameter 'servo.proportional_gain' has 3 values; 4 names need 4"
+    assert node.node._loop._kp == before
 
 
 def test_a_parameter_that_is_not_live_cannot_be_set_while_running(ros: Any) -> None:
@@ -221,12 +232,12 @@ def test_a_parameter_that_is_not_live_cannot_be_set_while_running(ros: Any) -> N
     assert "command_timeout" in result.reason
 
 
-def run_node(name: str, *arguments: str, timeout: float = 20.0) -> subprocess.CompletedProcess[str]:
+def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", MODULES[name], *arguments],
+        [sys.executable, "-m", "wam_ros.program", name, *arguments],
         capture_output=True,
         text=True,
-        timeout=timeout,
+        timeout=LONG,
         check=False,
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
@@ -236,7 +247,7 @@ def run_node(name: str, *arguments: str, timeout: float = 20.0) -> subprocess.Co
 @pytest.mark.parametrize(
     ("name", "right", "wrong", "text"),
     [
-        ("velocity_loop", "integral_gain:", "integral_gian:", "unknown parameter 'integral_gian'"),
+        ("velocity_loop", "integral_gain:", "integral_gian:", "missing parameter 'servo.integral_gain'"),
         ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
         ("force_loop", "force_gain: [1.5e-2]", "force_gain: [0.5]", "times the largest linearly stable one"),
         ("transform", "mode: realtime", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of realtime"),
@@ -257,7 +268,7 @@ def test_a_wrong_parameter_stops_the_process_with_its_name(
 
 
 def test_a_parameter_on_the_command_line_wins_over_the_file(domain_id: int) -> None:
-    done = run_node("driver", "--ros-args", "--params-file", str(packaged("wam")), "-p", "watchdog:=0.5", timeout=5.0)
+    done = run_node("driver", "--ros-args", "--params-file", str(packaged("wam")), "-p", "watchdog:=0.5")
     assert "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05" in done.stderr
 
 

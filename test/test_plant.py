@@ -99,6 +99,7 @@ def ring(plant: Plant, joint: int, ratio: float, stiffness: float, cable: float,
     return np.array(heard)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ratio", "surface"), [(14.0, 500.0), (14.0, 1751.0), (14.0, 2e4), (7.0, 1751.0), (28.0, 1751.0)]
 )
@@ -131,7 +132,7 @@ def test_both_resonances_of_joint_4_are_those_of_4_4(surface: float) -> None:
 F_STATIC, F_DYNAMIC = 0.06, 0.045
 
 
-def rubbing(where: str, viscous: float = 0.0) -> Arm:
+def with_friction(where: str, viscous: float = 0.0) -> Arm:
     """One joint, dry friction of the same size at the motor shaft, whether at the motor or at the joint.
 
     The cable is damped: an undamped one rings to twice the torque put on and breaks the joint away.
@@ -159,7 +160,7 @@ def creep(plant: Plant, torque: float, seconds: float) -> float:
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_rotor_under_nine_tenths_of_its_static_friction_stays_for_ten_seconds(way: float) -> None:
-    plant = released(rubbing("motors"))
+    plant = released(with_friction("motors"))
     begin = plant.theta[0]
     drive(plant, 10.0, [0.9 * way * F_STATIC])
     assert abs(plant.theta[0] - begin) < 1e-9
@@ -168,7 +169,7 @@ def test_rotor_under_nine_tenths_of_its_static_friction_stays_for_ten_seconds(wa
 
 
 def test_joint_under_nine_tenths_of_its_static_friction_stays() -> None:
-    plant = released(rubbing("joints"))
+    plant = released(with_friction("joints"))
     drive(plant, 0.5, [0.0])
     begin = plant.q[0]
     torque = np.array([0.0, 0.0, 0.9 * 14 * F_STATIC])
@@ -181,21 +182,21 @@ def test_joint_under_nine_tenths_of_its_static_friction_stays() -> None:
 
 
 def test_friction_as_mujoco_solves_it_by_itself_creeps(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert creep(released(rubbing("motors")), 0.9 * F_STATIC, 1.0) < 1e-9
+    assert creep(released(with_friction("motors")), 0.9 * F_STATIC, 1.0) < 1e-9
 
     def soft(arm: Arm, step: float, world: World, effects: Effects) -> str:
         return re.sub(r'(sol\w+friction|noslip_\w+)="[^"]*"', "", mjcf(arm, step, world, effects))
 
     monkeypatch.setattr(wam_driver.plant, "mjcf", soft)
-    assert creep(released(rubbing("motors")), 0.9 * F_STATIC, 1.0) > 1e-4
+    assert creep(released(with_friction("motors")), 0.9 * F_STATIC, 1.0) > 1e-4
 
 
 @pytest.mark.parametrize("where", ["motors", "joints"])
 def test_between_dynamic_and_static_friction_rest_stays_rest_and_motion_motion(where: str) -> None:
     between = (F_STATIC + F_DYNAMIC) / 2
-    resting = released(rubbing(where))
+    resting = released(with_friction(where))
     assert creep(resting, between, 1.0) < 1e-9
-    moving = released(rubbing(where))
+    moving = released(with_friction(where))
     drive(moving, 0.15, [1.5 * F_STATIC])
     drive(moving, 0.1, [between])
     speed = moving.thetad[0]
@@ -203,13 +204,15 @@ def test_between_dynamic_and_static_friction_rest_stays_rest_and_motion_motion(w
     inertia = 4.067e-5 + LINK_INERTIA / 14**2
     gained = (between - F_DYNAMIC) / inertia * 0.5
     assert moving.thetad[0] - speed == pytest.approx(gained, rel=0.01)
-    same = changed(rubbing(where), **{where: {"static_friction": getattr(rubbing(where), where).dynamic_friction}})
+    same = changed(
+        with_friction(where), **{where: {"static_friction": getattr(with_friction(where), where).dynamic_friction}}
+    )
     assert creep(released(same), between, 1.0) > 0.1
 
 
 @pytest.mark.parametrize("where", ["motors", "joints"])
 def test_what_has_come_to_rest_sticks_again(where: str) -> None:
-    plant = released(rubbing(where))
+    plant = released(with_friction(where))
     drive(plant, 0.3, [1.5 * F_STATIC])
     drive(plant, 2.0, [0.0])
     assert creep(plant, (F_STATIC + F_DYNAMIC) / 2, 1.0) < 1e-9
@@ -218,7 +221,7 @@ def test_what_has_come_to_rest_sticks_again(where: str) -> None:
 
 @pytest.mark.parametrize("where", ["motors", "joints"])
 def test_rotor_breaks_away_at_static_friction(where: str) -> None:
-    plant = released(rubbing(where))
+    plant = released(with_friction(where))
     torque, begin = 0.0, plant.q[0]
     while abs(plant.q[0] - begin) < 1e-6:
         torque += 2e-5  # slow against the cable
@@ -229,7 +232,7 @@ def test_rotor_breaks_away_at_static_friction(where: str) -> None:
 
 @pytest.mark.parametrize("where", ["motors", "joints"])
 def test_sliding_arm_loses_its_momentum_at_the_rate_of_dynamic_friction_and_stops(where: str) -> None:
-    plant = released(rubbing(where))
+    plant = released(with_friction(where))
     plant.data.qvel[:] = (20.0, 20.0 / 14)
     inertia = np.array([4.067e-5, LINK_INERTIA / 14])  # moment along the rigid motion, seen at the motor
     stop = 20.0 * (inertia[0] + inertia[1] / 14) / F_DYNAMIC
@@ -245,7 +248,7 @@ def test_sliding_arm_loses_its_momentum_at_the_rate_of_dynamic_friction_and_stop
 @pytest.mark.parametrize("where", ["motors", "joints"])
 def test_steady_speed_is_what_coulomb_and_viscous_friction_leave(where: str) -> None:
     viscous = 5e-3
-    plant = released(rubbing(where, viscous))
+    plant = released(with_friction(where, viscous))
     drive(plant, 6.5, [0.1])
     assert plant.q[0] < 2.9
     assert plant.qd[0] * 14 == pytest.approx((0.1 - F_DYNAMIC) / viscous, rel=1e-5)
@@ -325,6 +328,7 @@ def axis_height(q: list[float], x: float) -> float:
 DOWN = (-40.0, 0.0, -40.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [1e3, 4e3, 2e4, 1e5])
 def test_one_contact_pushes_with_stiffness_times_depth_along_the_normal(stiffness: float) -> None:
     low = cover_frame(TILTED, "outer_link") @ [TIP, 0.0, 0.0, 1.0]
@@ -340,6 +344,7 @@ def test_one_contact_pushes_with_stiffness_times_depth_along_the_normal(stiffnes
     assert load.place == pytest.approx(float(pose[:3, 0] @ (touching - pose[:3, 3])), abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [1e3, 4e3, 2e4, 1e5])
 def test_two_contacts_share_the_stiffness_of_their_surface(stiffness: float) -> None:
     near, far = 0.5, 0.65
@@ -359,6 +364,7 @@ def test_two_contacts_share_the_stiffness_of_their_surface(stiffness: float) -> 
     assert load.place == pytest.approx(middle / pose[0, 0], abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 def test_contact_cables_gravity_and_push_are_in_balance(friction: float) -> None:
     low = cover_frame(TILTED, "outer_link") @ [TIP, 0.0, 0.0, 1.0]
@@ -389,7 +395,7 @@ def test_arm_that_starts_in_contact_feels_it_at_once() -> None:
 
 def mujocos_own_slip(plant: Plant) -> None:
     """Let MuJoCo choose what the friction of contacts aims at: slip falls at damping/impedance."""
-    match = plant._match_surfaces
+    match = plant._surfaces.apply
 
     def match_normals() -> None:
         own = plant.data.efc_aref.copy()
@@ -397,7 +403,7 @@ def mujocos_own_slip(plant: Plant) -> None:
         for row, size in zip(plant.data.contact.efc_address, plant.data.contact.dim, strict=True):
             plant.data.efc_aref[row + 1 : row + size] = own[row + 1 : row + size]
 
-    plant._match_surfaces = match_normals  # type: ignore[method-assign]
+    plant._surfaces.apply = match_normals  # type: ignore[method-assign]
 
 
 def slides(
@@ -422,6 +428,7 @@ def slides(
     return np.array(forces[-200:]), way[-1] - way[2500]
 
 
+@pytest.mark.slow
 def test_friction_of_a_resting_contact_is_steady() -> None:
     forces, _ = slides(0.4, 0.0)
     assert forces[:, 2].min() > 5.0
@@ -430,6 +437,7 @@ def test_friction_of_a_resting_contact_is_steady() -> None:
     assert np.ptp(alternating[:, :2], axis=0).max() > 1.0
 
 
+@pytest.mark.slow
 def test_contact_friction_holds_below_its_cone_and_takes_its_share_above() -> None:
     held, crept = slides(1.0, 2.0)
     assert abs(crept) < 1e-6
@@ -559,6 +567,7 @@ def pushing(time: float) -> tuple[float, float, float]:
     return (2.0, 6.0 * math.sin(9 * time), -5.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pushed", [False, True])
 def test_strain_torque_is_what_moves_the_links(pushed: bool) -> None:
     """Inverse dynamics of the links alone, from differences of the velocity, less what the world adds."""
@@ -604,9 +613,9 @@ def test_joint_friction_hides_a_light_push_from_the_cables_but_not_from_the_stra
     force = np.array([0.0, light, 0.0])
     plant.push("outer_link", force, np.cross([0.3, 0.0, 0.0], force))
     drive(plant, 1.0, [0.0] * 4)
-    felt = torques(plant.q, "outer_link", (0.3, 0, 0), force)
-    np.testing.assert_allclose(plant.strain_torque - before[0], -felt, atol=1e-3)
-    assert abs(plant.cable_torque[3] - before[1][3]) < 1e-3 < abs(felt[3])
+    push = torques(plant.q, "outer_link", (0.3, 0, 0), force)
+    np.testing.assert_allclose(plant.strain_torque - before[0], -push, atol=1e-3)
+    assert abs(plant.cable_torque[3] - before[1][3]) < 1e-3 < abs(push[3])
 
 
 # energy
@@ -645,6 +654,7 @@ def energies(arm: Arm, seed: int, seconds: float, step: float) -> np.ndarray:
     return np.array(result[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_energy_of_the_undriven_arm_never_grows(seed: int) -> None:
     found = energies(changed(WAM, joints=WIDE), seed, 1.5, STEP)
@@ -659,6 +669,7 @@ def test_stop_gives_back_less_than_it_takes() -> None:
     assert found.max() < found[0] + 0.01
 
 
+@pytest.mark.slow
 def test_energy_of_the_frictionless_arm_stays() -> None:
     found = energies(changed(frictionless(WAM), joints=WIDE), 1, 1.0, 1e-4)
     assert np.ptp(found) < 0.02
@@ -699,7 +710,7 @@ def test_halving_the_step_changes_a_motion_by_little_and_brings_it_nearer() -> N
 
 def story(plant: Plant) -> list[float]:
     """A motion with brakes, pushes and a fall onto the foam; every number on its way."""
-    said: list[float] = []
+    values: list[float] = []
     for k in range(3000):
         plant.brake(k < 50 or k > 2500)
         if k == 200:
@@ -708,10 +719,10 @@ def story(plant: Plant) -> list[float]:
             plant.release()
         plant.step([0.3, 0.1 * math.sin(k / 50), -0.2, 0.1])
         if k % 5 == 0:
-            said += [*plant.theta, *plant.thetad, *plant.q, *plant.qd, *plant.strain_torque, *plant.cable_torque]
+            values += [*plant.theta, *plant.thetad, *plant.q, *plant.qd, *plant.strain_torque, *plant.cable_torque]
             for load in plant.loads():
-                said += [load.place, *load.force]
-    return said
+                values += [load.place, *load.force]
+    return values
 
 
 def test_plants_that_are_fed_the_same_are_equal_bit_for_bit() -> None:

@@ -1,4 +1,4 @@
-"""What cables, pulleys and motors do to the torque on its way: the plant against closed forms worked out here.
+"""Cables, pulleys and motors of the plant against closed forms worked out here.
 
 Nothing comes from wam_theory or from the matrices of the simulator; thesis numbers are in pounds and inches.
 """
@@ -30,22 +30,22 @@ NO_RIPPLES = Ripples((), (), (), (), ())
 THOUSANDTH = 1e-3  # what the issue asks of creep, loss, ripple and slack
 
 
-def plant(arm: Arm, step: float = STEP, springs: Springs = NO_SPRINGS, **effects: Any) -> Plant:
+def plant_of(arm: Arm, step: float = STEP, springs: Springs = NO_SPRINGS, **effects: Any) -> Plant:
     """An arm with its brakes off, and only the effects that are named."""
     made = Plant(arm, World(NOWHERE, springs), dataclasses.replace(no_effects(arm), **effects), step)
     made.brake(False)
     return made
 
 
-def drive(machine: Plant, seconds: float, torque: list[float], step: float = STEP) -> None:
+def drive(plant: Plant, seconds: float, torque: list[float], step: float = STEP) -> None:
     for _ in range(round(seconds / step)):
-        machine.step(torque)
+        plant.step(torque)
 
 
-def load(machine: Plant, torque: list[float]) -> None:
-    """Torques of the world on the joints, N m, until told otherwise."""
+def load(plant: Plant, torque: list[float]) -> None:
+    """Torques of the world on the joints, N m, until the next call."""
     n = len(torque)
-    machine.data.qfrc_applied[n:] = torque
+    plant.data.qfrc_applied[n:] = torque
 
 
 def damped(arm: Arm, damping: float = 0.06, **joints: tuple[float, ...]) -> Arm:
@@ -69,13 +69,13 @@ def test_braked_joint_gives_way_as_its_cables_in_series(arm: Arm, expected: list
     """Static, so only as exact as the printed numbers and the settling: 0.5 %."""
     soft = changed(frictionless(arm), gravity=WEIGHTLESS, cables={"damping": (0.06,) * len(expected)})
     for joint, stiffness in enumerate(expected):
-        machine = plant(soft)
-        machine.brake(True)
+        plant = plant_of(soft)
+        plant.brake(True)
         torque = [0.0] * len(expected)
         torque[joint] = 2.0
-        load(machine, torque)
-        drive(machine, 2.0, [0.0] * len(expected))
-        assert machine.q[joint] - soft.joints.start[joint] == pytest.approx(2.0 / stiffness, rel=5e-3)
+        load(plant, torque)
+        drive(plant, 2.0, [0.0] * len(expected))
+        assert plant.q[joint] - soft.joints.start[joint] == pytest.approx(2.0 / stiffness, rel=5e-3)
 
 
 def test_stages_are_in_series_and_parallel_circuits_carry_together() -> None:
@@ -89,12 +89,12 @@ def test_stages_are_in_series_and_parallel_circuits_carry_together() -> None:
         "stage_circuits": (1.0, 4.0),
         "stage_ratio": (1.0, 3.0),
     }
-    machine = plant(damped(changed(arm, cables=stages)))
-    machine.brake(True)
-    load(machine, [5.0])
-    drive(machine, 3.0, [0.0])
+    plant = plant_of(damped(changed(arm, cables=stages)))
+    plant.brake(True)
+    load(plant, [5.0])
+    drive(plant, 3.0, [0.0])
     series = 1 / (1 / 20.0 + 1 / (4 * 45.0 / 3**2))
-    assert machine.q[0] == pytest.approx(5.0 / (N**2 * series), rel=1e-6)  # settled
+    assert plant.q[0] == pytest.approx(5.0 / (N**2 * series), rel=1e-6)  # settled
 
 
 @pytest.mark.parametrize("mode", [0, 1])
@@ -113,13 +113,13 @@ def test_reducer_at_the_motor_makes_the_span_n_times_softer_and_lowers_the_reson
     scale = np.diag([ROTOR**-0.5, LINK_INERTIA**-0.5])
     squares, shapes = np.linalg.eigh(scale @ stiffness @ scale)
     spring = Springs(("joint1",), (pounds * LB / INCH,), (0.9144,), (0.0,), (True,))
-    machine = plant(changed(one_joint(), cables={"reducer": (reducer,)}), step, spring)
+    plant = plant_of(changed(one_joint(), cables={"reducer": (reducer,)}), step, spring)
     shape = scale @ shapes[:, mode]
-    machine.data.qpos[:] = 0.1 * shape / abs(shape[0])
+    plant.data.qpos[:] = 0.1 * shape / abs(shape[0])
     heard = []
     for _ in range(round(40 * math.pi / math.sqrt(squares[mode]) / step)):
-        machine.step([0.0])
-        heard.append(machine.theta[0])
+        plant.step([0.0])
+        heard.append(plant.theta[0])
     signal = np.array(heard)
     k = np.flatnonzero(np.diff(np.sign(signal)))
     crossings = k + signal[k] / (signal[k] - signal[k + 1])
@@ -133,13 +133,13 @@ def test_cable_damping_lets_rotor_and_link_ring_out() -> None:
     damping, step = 2e-3, 1e-5
     w = math.sqrt(CABLE * (1 / ROTOR + N**2 / LINK_INERTIA))
     zeta = damping * w / (2 * CABLE)
-    machine = plant(damped(one_joint(), damping), step)
-    machine.data.qpos[0] = 0.1
+    plant = plant_of(damped(one_joint(), damping), step)
+    plant.data.qpos[0] = 0.1
     time = np.arange(1, 5001) * step
     heard = []
     for _ in time:
-        machine.step([0.0])
-        heard.append((machine.theta[0] - N * machine.q[0]) / 0.1)
+        plant.step([0.0])
+        heard.append((plant.theta[0] - N * plant.q[0]) / 0.1)
     wd = w * math.sqrt(1 - zeta**2)
     expected = np.exp(-zeta * w * time) * (np.cos(wd * time) + zeta / math.sqrt(1 - zeta**2) * np.sin(wd * time))
     np.testing.assert_allclose(heard, expected, atol=5e-3)
@@ -160,112 +160,112 @@ STRETCHES = [-3.0, -1.0, -0.73, -0.71, -0.2, 0.0, 0.3, 0.71, 0.73, 1.5, 3.0]  # 
 @pytest.mark.parametrize("stretch", STRETCHES)
 @pytest.mark.parametrize("slack", [True, False])
 def test_torque_on_the_link_is_that_of_strands_that_only_pull(stretch: float, slack: bool) -> None:
-    machine = plant(one_joint(), slack=slack)
-    machine.brake(True)
-    machine.data.qpos[0] = stretch
-    machine.step([0.0])
+    plant = plant_of(one_joint(), slack=slack)
+    plant.brake(True)
+    plant.data.qpos[0] = stretch
+    plant.step([0.0])
     tight, loose = strand_tensions(stretch)
     torque = PINION * (tight - loose) if slack else CABLE * stretch
-    assert machine.qd[0] / STEP * LINK_INERTIA == pytest.approx(N * torque, rel=THOUSANDTH, abs=1e-9)
-    assert machine.circuit_torque[0] == pytest.approx(torque, rel=THOUSANDTH, abs=1e-9)
+    assert plant.qd[0] / STEP * LINK_INERTIA == pytest.approx(N * torque, rel=THOUSANDTH, abs=1e-9)
+    assert plant.circuit_torque[0] == pytest.approx(torque, rel=THOUSANDTH, abs=1e-9)
     expected = sorted((tight, loose), reverse=True) if slack else PRETENSION + np.array([1, -1]) * abs(torque) / 0.02
-    np.testing.assert_allclose(machine.tensions[0], expected, rtol=THOUSANDTH, atol=1e-6)
+    np.testing.assert_allclose(plant.tensions[0], expected, rtol=THOUSANDTH, atol=1e-6)
 
 
 @pytest.mark.parametrize("pretension", [0.0, 5.0])
 def test_arm_that_hangs_in_slack_cables_starts_at_rest(pretension: float) -> None:
     loose = changed(WAM, cables={"pretension": (pretension,) * 4})
-    machine = plant(frictionless(loose, damping=1.0), slack=True)
-    machine.brake(True)
-    assert min(low for _, low in machine.tensions) == 0.0
-    drive(machine, 0.5, [0.0] * 4)
-    np.testing.assert_allclose(machine.q, WAM.joints.start, atol=1e-9)
+    plant = plant_of(frictionless(loose, damping=1.0), slack=True)
+    plant.brake(True)
+    assert min(low for _, low in plant.tensions) == 0.0
+    drive(plant, 0.5, [0.0] * 4)
+    np.testing.assert_allclose(plant.q, WAM.joints.start, atol=1e-9)
 
 
 # creep and loss
 
 
-def turn(machine: Plant, way: float, seconds: float, torque: float) -> tuple[float, float, float]:
+def turn(plant: Plant, way: float, seconds: float, torque: float) -> tuple[float, float, float]:
     """Turn the rotor smoothly by an angle against a load; travel, work put in, work got out at the joint."""
-    begin, speed = machine.theta[0], 0.0
+    begin, speed = plant.theta[0], 0.0
     travel = put_in = got_out = 0.0
     steps = round(seconds / STEP)
     for k in range(1, steps + 1):
         s = k / steps
         goal = begin + way * (s - math.sin(2 * math.pi * s) / (2 * math.pi))
         goal_speed = way / seconds * (1 - math.cos(2 * math.pi * s))
-        before = machine.theta[0], machine.q[0]
-        speed = machine.thetad[0]
+        before = plant.theta[0], plant.q[0]
+        speed = plant.thetad[0]
         tau = torque + 5.0 * (goal - before[0]) + 0.02 * (goal_speed - speed)
-        machine.step([tau])
-        travel += abs(machine.theta[0] - before[0])
-        put_in += tau * (machine.theta[0] - before[0])
-        got_out += torque * N * (machine.q[0] - before[1])
+        plant.step([tau])
+        travel += abs(plant.theta[0] - before[0])
+        put_in += tau * (plant.theta[0] - before[0])
+        got_out += torque * N * (plant.q[0] - before[1])
     return travel, put_in, got_out
 
 
 def loaded(torque: float, creep: bool, **joints: tuple[float, ...]) -> Plant:
     """One joint, at rest under a load that asks for a torque at its motor."""
-    machine = plant(damped(one_joint(), **joints), creep=creep)
-    machine.brake(True)
-    load(machine, [-N * torque])
-    drive(machine, 2.0, [torque])
-    machine.brake(False)
-    drive(machine, 1.0, [torque])
-    return machine
+    plant = plant_of(damped(one_joint(), **joints), creep=creep)
+    plant.brake(True)
+    load(plant, [-N * torque])
+    drive(plant, 2.0, [torque])
+    plant.brake(False)
+    drive(plant, 1.0, [torque])
+    return plant
 
 
 @pytest.mark.parametrize("torque", [4.0, -1.5])
 @pytest.mark.parametrize("creep", [True, False])
 def test_rotor_that_goes_out_and_back_leaves_the_joint_where_its_load_pulls_it(torque: float, creep: bool) -> None:
     """(6.19): the joint yields by travel x tau/(r EA)/N; strand length 1 m, so that EA is its stiffness."""
-    machine = loaded(torque, creep)
-    before = machine.theta[0], machine.q[0]
+    plant = loaded(torque, creep)
+    before = plant.theta[0], plant.q[0]
     travel = 0.0
     for way in (1.5, -1.5):
-        travel += turn(machine, way, 2.0, torque)[0]
+        travel += turn(plant, way, 2.0, torque)[0]
     assert travel == pytest.approx(3.0, rel=0.01)
-    machine.brake(True)
-    drive(machine, 1.0, [torque])
-    yielded = machine.theta[0] - before[0] - N * (machine.q[0] - before[1])
+    plant.brake(True)
+    drive(plant, 1.0, [torque])
+    yielded = plant.theta[0] - before[0] - N * (plant.q[0] - before[1])
     if creep:
         assert yielded == pytest.approx(travel * torque / (PINION * STRAND), rel=THOUSANDTH)
-        assert machine.theta[0] == pytest.approx(before[0], abs=1e-4)
-        assert np.sign(before[1] - machine.q[0]) == np.sign(torque)
+        assert plant.theta[0] == pytest.approx(before[0], abs=1e-4)
+        assert np.sign(before[1] - plant.q[0]) == np.sign(torque)
     else:
         assert abs(yielded) < 1e-9
 
 
 def test_rotor_that_does_not_turn_does_not_creep() -> None:
-    machine = plant(frictionless(WAM, damping=1.0), creep=True)
-    machine.brake(True)
-    begin = machine.q
-    drive(machine, 5.0, [0.0] * 4)
-    np.testing.assert_allclose(machine.q, begin, atol=1e-12)
+    plant = plant_of(frictionless(WAM, damping=1.0), creep=True)
+    plant.brake(True)
+    begin = plant.q
+    drive(plant, 5.0, [0.0] * 4)
+    np.testing.assert_allclose(plant.q, begin, atol=1e-12)
 
 
 def efficiency(arm: Arm, creep: bool, way: float, torque: float) -> tuple[float, float]:
     """Power out over power in, and the torque at the motor over that of the load, at a slow and steady speed."""
-    machine = plant(
+    plant = plant_of(
         changed(arm, gravity=WEIGHTLESS, joints={"start": (-0.5 * way,), "lower": (-9.0,), "upper": (9.0,)}),
         creep=creep,
     )
-    machine.brake(True)
-    load(machine, [-N * torque])
-    drive(machine, 2.0, [0.0])
-    machine.brake(False)
-    begin, speed = machine.theta[0], way * 6.0
+    plant.brake(True)
+    load(plant, [-N * torque])
+    drive(plant, 2.0, [0.0])
+    plant.brake(False)
+    begin, speed = plant.theta[0], way * 6.0
     put_in = got_out = turned = 0.0
     for k in range(4000):
         time = (k + 1) * STEP
         goal = begin + speed * (time - 0.5 if time > 1.0 else 0.5 * time * time)
-        before = machine.theta[0], machine.q[0]
-        tau = torque + 5.0 * (goal - before[0]) + 0.02 * (speed * min(1.0, time) - machine.thetad[0])
-        machine.step([tau])
+        before = plant.theta[0], plant.q[0]
+        tau = torque + 5.0 * (goal - before[0]) + 0.02 * (speed * min(1.0, time) - plant.thetad[0])
+        plant.step([tau])
         if time > 1.4:  # the jerk at 1 s has rung out
-            put_in += tau * (machine.theta[0] - before[0])
-            got_out += torque * N * (machine.q[0] - before[1])
-            turned += machine.theta[0] - before[0]
+            put_in += tau * (plant.theta[0] - before[0])
+            got_out += torque * N * (plant.q[0] - before[1])
+            turned += plant.theta[0] - before[0]
     assert turned == pytest.approx(speed * 0.6, rel=0.01)
     return (got_out / put_in if put_in > 0.0 else put_in / got_out), put_in / (turned * torque)
 
@@ -282,6 +282,7 @@ SINGLE: dict[str, Any] = {
 FULL = 60 * IN_LB  # of the testbed's motor; 160 lb on its pinion of 0.375 in, EA = 9500 lb
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reducer", ["joint", "motor"])
 @pytest.mark.parametrize("way", [1.0, -1.0])  # -1: the load drives the motor
 def test_efficiency_is_6_15_and_the_loss_is_counted_once(way: float, reducer: str) -> None:
@@ -315,14 +316,14 @@ def test_every_circuit_of_the_arm_loses_what_two_equal_stages_lose(joint: int) -
 # ripple and cogging
 
 
-def shaft_torque(machine: Plant, dof: int, inertia: float, angles: np.ndarray) -> np.ndarray:
+def shaft_torque(plant: Plant, dof: int, inertia: float, angles: np.ndarray) -> np.ndarray:
     """Torque on a shaft at rest at each angle, by its acceleration; the other shaft is moved along."""
     found = []
     for angle in angles:
-        machine.data.qpos[:] = (angle, angle / N) if dof == 0 else (N * angle, angle)
-        machine.data.qvel[:] = 0.0
-        machine.step([0.0])
-        found.append(machine.data.qvel[dof] / STEP * inertia)
+        plant.data.qpos[:] = (angle, angle / N) if dof == 0 else (N * angle, angle)
+        plant.data.qvel[:] = 0.0
+        plant.step([0.0])
+        found.append(plant.data.qvel[dof] / STEP * inertia)
     return np.array(found)
 
 
@@ -340,13 +341,13 @@ def test_ripple_of_a_pulley_has_its_amplitude_its_cycles_and_its_phase(
 ) -> None:
     """(6.23): 0.010 in under 50 lb make 1 in lb at the pulley, `ratio` times as much on the shaft."""
     amplitude, phase = 2 * (0.010 * INCH) * (50 * LB), 0.7
-    machine = plant(
+    plant = plant_of(
         changed(one_joint(), joints={"lower": (-9.0,), "upper": (9.0,)}),
         ripples=Ripples((shaft,), (ratio,), (amplitude,), (cycles,), (phase,)),
     )
     turn_of_shaft = 2 * math.pi / (abs(ratio) * cycles)
     angles = np.arange(48) / 48 * turn_of_shaft
-    found = shaft_torque(machine, dof, inertia, angles)
+    found = shaft_torque(plant, dof, inertia, angles)
     expected = ratio * 1.0 * IN_LB * np.sin(cycles * ratio * angles + phase)
     np.testing.assert_allclose(found, expected, atol=THOUSANDTH * abs(ratio) * IN_LB)
     first = 2 / 48 * np.abs(np.sum(found * np.exp(-2j * np.pi * np.arange(48) / 48)))
@@ -356,7 +357,7 @@ def test_ripple_of_a_pulley_has_its_amplitude_its_cycles_and_its_phase(
 def test_ripples_on_one_shaft_add_up() -> None:
     ripples = Ripples(("motor1", "joint1", "motor1"), (1.0, 1.0, 0.5), (0.1, 5.0, 0.2), (24, 1, 3), (0.0, 0.0, 0.4))
     angles = np.linspace(-3.0, 3.0, 40)
-    found = shaft_torque(plant(one_joint(), ripples=ripples), 0, ROTOR, angles)
+    found = shaft_torque(plant_of(one_joint(), ripples=ripples), 0, ROTOR, angles)
     expected = 0.1 * np.sin(24 * angles) + 0.5 * 0.2 * np.sin(3 * 0.5 * angles + 0.4)
     np.testing.assert_allclose(found, expected, atol=1e-4)
 
@@ -365,17 +366,17 @@ def test_without_ripple_there_is_none() -> None:
     off = Ripples(("motor1", "joint1"), (1.0, 3.0), (0.0, 0.0), (24, 1), (0.3, 0.0))
     angles = np.linspace(-3.0, 3.0, 40)
     for ripples in (NO_RIPPLES, off):
-        found = shaft_torque(plant(one_joint(), ripples=ripples), 0, ROTOR, angles)
+        found = shaft_torque(plant_of(one_joint(), ripples=ripples), 0, ROTOR, angles)
         np.testing.assert_allclose(found, 0.0, atol=1e-12)
 
 
 def test_cogging_holds_a_rotor_below_its_amplitude_and_lets_it_go_above() -> None:
     ripples = Ripples(("motor1",), (1.0,), (0.1,), (4,), (math.pi,))  # a detent at angle zero
     for share, holds in ((0.9, True), (1.1, False)):
-        machine = plant(damped(one_joint(), 0.02), ripples=ripples)
+        plant = plant_of(damped(one_joint(), 0.02), ripples=ripples)
         for k in range(4000):
-            machine.step([0.1 * share * min(1.0, k / 3000)])
-        assert (abs(machine.theta[0]) < math.pi / 8) is holds
+            plant.step([0.1 * share * min(1.0, k / 3000)])
+        assert (abs(plant.theta[0]) < math.pi / 8) is holds
 
 
 # friction that grows with tension
@@ -387,7 +388,7 @@ BASE, COEFFICIENT = 0.02, 5e-5  # N m, N m/N
 def gripping(pretension: float, slack: bool = True) -> Plant:
     base = {"static_friction": (BASE,), "dynamic_friction": (BASE / 2,)}
     arm = changed(damped(one_joint(), 0.02), cables={"pretension": (pretension,)}, motors=base)
-    return plant(arm, slack=slack, tension_friction=(COEFFICIENT,))
+    return plant_of(arm, slack=slack, tension_friction=(COEFFICIENT,))
 
 
 def sum_of_tensions(pretension: float, torque: float) -> float:
@@ -408,29 +409,30 @@ TENSIONS = [
 
 def gripping_under_load(pretension: float, torque: float, slack: bool) -> Plant:
     """At rest under a load that the motor carries with `torque`, brakes released just now."""
-    machine = gripping(pretension, slack)
-    machine.brake(True)
-    load(machine, [-N * torque])
-    drive(machine, 5.0, [torque])
-    machine.brake(False)
-    return machine
+    plant = gripping(pretension, slack)
+    plant.brake(True)
+    load(plant, [-N * torque])
+    drive(plant, 5.0, [torque])
+    plant.brake(False)
+    return plant
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pretension", "torque", "slack"), TENSIONS)
 def test_rotor_breaks_away_at_a_friction_in_proportion_to_both_tensions(
     pretension: float, torque: float, slack: bool
 ) -> None:
     """Constant until a strand is slack, then growing; 0.1 %: the torque rises by 0.01 % a step."""
-    machine = gripping_under_load(pretension, torque, slack)
-    drive(machine, 0.1, [torque])
+    plant = gripping_under_load(pretension, torque, slack)
+    drive(plant, 0.1, [torque])
     both = sum_of_tensions(pretension, torque if slack else 0.0)
     expected = BASE + COEFFICIENT * both
     way = math.copysign(1.0, torque)
-    excess, begin = 0.95 * expected, machine.theta[0]
-    while abs(machine.theta[0] - begin) < 1e-7:
+    excess, begin = 0.95 * expected, plant.theta[0]
+    while abs(plant.theta[0] - begin) < 1e-7:
         excess += 1e-4 * expected
         assert excess < 1.1 * expected
-        machine.step([torque + way * excess])
+        plant.step([torque + way * excess])
     assert excess == pytest.approx(expected, rel=THOUSANDTH)
 
 
@@ -439,63 +441,63 @@ def test_turning_rotor_loses_momentum_to_a_friction_in_proportion_to_both_tensio
     pretension: float, torque: float, slack: bool
 ) -> None:
     """Both inertias slow down together by F; the tension that counts is that of the decelerating link."""
-    machine = gripping_under_load(pretension, torque, slack)
-    machine.data.qvel[:] = (20.0, 20.0 / N)
-    drive(machine, 0.15, [torque])
+    plant = gripping_under_load(pretension, torque, slack)
+    plant.data.qvel[:] = (20.0, 20.0 / N)
+    drive(plant, 0.15, [torque])
     whole = ROTOR + LINK_INERTIA / N**2
     friction = BASE / 2 + COEFFICIENT * 2 * pretension
     for _ in range(50):  # the link's own inertia takes from the tension what it gives to the motion
         carried = torque - LINK_INERTIA / N**2 * friction / whole
         friction = BASE / 2 + COEFFICIENT * sum_of_tensions(pretension, carried if slack else 0.0)
-    momentum = ROTOR * machine.thetad[0] + LINK_INERTIA / N * machine.qd[0]
-    drive(machine, 0.1, [torque])
-    lost = momentum - ROTOR * machine.thetad[0] - LINK_INERTIA / N * machine.qd[0]
-    assert machine.thetad[0] > 1.0
+    momentum = ROTOR * plant.thetad[0] + LINK_INERTIA / N * plant.qd[0]
+    drive(plant, 0.1, [torque])
+    lost = momentum - ROTOR * plant.thetad[0] - LINK_INERTIA / N * plant.qd[0]
+    assert plant.thetad[0] > 1.0
     assert lost / 0.1 == pytest.approx(friction, rel=THOUSANDTH)
 
 
 def test_friction_of_a_slack_cable_goes_when_the_cable_is_tight_again() -> None:
     """Under 5 N m the rotor holds more; without, 0.02 N m and 40 N x 5e-5 m, 0.1 % as above."""
-    machine = gripping(20.0)
+    plant = gripping(20.0)
     stretch = 2 * 20 * PINION / CABLE + (5.0 - 2 * 20 * PINION) / (CABLE / 2)
-    machine.data.qpos[0] = stretch
-    load(machine, [-N * 5.0])
-    drive(machine, 0.1, [5.0])
-    assert min(machine.tensions[0]) == 0.0
-    load(machine, [0.0])
-    machine.data.qpos[0] -= stretch  # at once, so that nothing else changes the friction
-    drive(machine, 0.1, [0.0])
-    excess, begin, expected = 0.0, machine.theta[0], BASE + COEFFICIENT * 40.0
-    while abs(machine.theta[0] - begin) < 1e-7 and excess < 2 * expected:
+    plant.data.qpos[0] = stretch
+    load(plant, [-N * 5.0])
+    drive(plant, 0.1, [5.0])
+    assert min(plant.tensions[0]) == 0.0
+    load(plant, [0.0])
+    plant.data.qpos[0] -= stretch  # at once, so that nothing else changes the friction
+    drive(plant, 0.1, [0.0])
+    excess, begin, expected = 0.0, plant.theta[0], BASE + COEFFICIENT * 40.0
+    while abs(plant.theta[0] - begin) < 1e-7 and excess < 2 * expected:
         excess += 1e-4 * expected
-        machine.step([excess])
+        plant.step([excess])
     assert excess == pytest.approx(expected, rel=THOUSANDTH)
 
 
 def test_parallel_circuits_of_the_first_stage_share_its_tension() -> None:
     """2 N m on 10 mm are 200 N for one cable, 100 N each for two; slack from 2 x 300 N x 10 mm x 2 on."""
     for circuits, difference in ((1.0, 200.0), (2.0, 100.0)):
-        machine = plant(changed(damped(one_joint()), cables={"stage_circuits": (circuits,)}), slack=True)
-        machine.brake(True)
-        load(machine, [2.0 * N])
-        drive(machine, 2.0, [0.0])
-        np.testing.assert_allclose(machine.tensions[0], (300 + difference / 2, 300 - difference / 2), rtol=1e-6)
-        assert machine.q[0] * N == pytest.approx(2.0 / (CABLE * circuits), rel=1e-6)
-        load(machine, [9.0 * N])
-        drive(machine, 2.0, [0.0])
-        assert (min(machine.tensions[0]) == 0.0) is (circuits == 1.0)
+        plant = plant_of(changed(damped(one_joint()), cables={"stage_circuits": (circuits,)}), slack=True)
+        plant.brake(True)
+        load(plant, [2.0 * N])
+        drive(plant, 2.0, [0.0])
+        np.testing.assert_allclose(plant.tensions[0], (300 + difference / 2, 300 - difference / 2), rtol=1e-6)
+        assert plant.q[0] * N == pytest.approx(2.0 / (CABLE * circuits), rel=1e-6)
+        load(plant, [9.0 * N])
+        drive(plant, 2.0, [0.0])
+        assert (min(plant.tensions[0]) == 0.0) is (circuits == 1.0)
 
 
 def test_what_rubs_on_a_joint_adds_to_its_friction_at_once() -> None:
     """Momentum over time, while it slides."""
-    machine = plant(damped(one_joint(), 0.02))
-    machine.data.qvel[:] = (20.0, 20.0 / N)
+    plant = plant_of(damped(one_joint(), 0.02))
+    plant.data.qvel[:] = (20.0, 20.0 / N)
     for rod in (0.0, 0.8, 0.3):
-        machine.rub([rod])
-        drive(machine, 0.1, [0.0])
-        momentum = ROTOR * machine.thetad[0] + LINK_INERTIA / N * machine.qd[0]
-        drive(machine, 0.1, [0.0])
-        lost = momentum - ROTOR * machine.thetad[0] - LINK_INERTIA / N * machine.qd[0]
+        plant.set_added_friction([rod])
+        drive(plant, 0.1, [0.0])
+        momentum = ROTOR * plant.thetad[0] + LINK_INERTIA / N * plant.qd[0]
+        drive(plant, 0.1, [0.0])
+        lost = momentum - ROTOR * plant.thetad[0] - LINK_INERTIA / N * plant.qd[0]
         assert lost / 0.1 == pytest.approx(rod / N, rel=THOUSANDTH, abs=1e-9)
 
 
@@ -507,48 +509,48 @@ EVERYTHING = Effects(
     creep=True,
     slack=True,
     tension_friction=(1e-5,) * 4,
-    rubbing_friction=(0.05,) * 4,
+    added_coulomb_friction=(0.05,) * 4,
 )
 
 
-def story(machine: Plant) -> list[float]:
+def story(plant: Plant) -> list[float]:
     """A motion with every effect on; every number on its way."""
-    said: list[float] = []
+    values: list[float] = []
     for k in range(2000):
-        machine.brake(k < 50 or 1200 < k < 1300)
+        plant.brake(k < 50 or 1200 < k < 1300)
         if k == 600:
-            machine.push("outer_link", np.array([0.0, 6.0, 30.0]), np.array([0.1, 0.0, 0.5]))
-        machine.step([0.6, 0.5 * math.sin(k / 50), -0.5, 0.4])
-        said += [*machine.theta, *machine.q, *machine.qd, *machine.strain_torque, *sum(machine.tensions, ())]
-    return said
+            plant.push("outer_link", np.array([0.0, 6.0, 30.0]), np.array([0.1, 0.0, 0.5]))
+        plant.step([0.6, 0.5 * math.sin(k / 50), -0.5, 0.4])
+        values += [*plant.theta, *plant.q, *plant.qd, *plant.strain_torque, *sum(plant.tensions, ())]
+    return values
 
 
 def test_plants_with_every_effect_are_equal_bit_for_bit_and_reset_undoes_creep() -> None:
     arm = changed(WAM, cables={"pretension": (20.0,) * 4})
     first = Plant(arm, World(NOWHERE, NO_SPRINGS), EVERYTHING, STEP)
-    told = story(first)
-    assert 0.0 in told  # a strand was slack
-    assert told == story(Plant(arm, World(NOWHERE, NO_SPRINGS), EVERYTHING, STEP))
+    first_story = story(first)
+    assert 0.0 in first_story  # a strand was slack
+    assert first_story == story(Plant(arm, World(NOWHERE, NO_SPRINGS), EVERYTHING, STEP))
     first.reset()
-    assert told == story(first)
+    assert first_story == story(first)
     first.release()
-    assert told != story(first)
+    assert first_story != story(first)
 
 
 def test_rotors_in_slack_cables_are_gripped_from_the_first_step_on_after_every_reset() -> None:
     arm = changed(WAM, cables={"pretension": (5.0,) * 4}, joints={"start": (0.0, -1.5, 0.0, 0.5)})
-    machine = plant(arm, slack=True, tension_friction=(1e-3,) * 4)
-    assert min(low for _, low in machine.tensions) == 0.0
-    told = []
+    plant = plant_of(arm, slack=True, tension_friction=(1e-3,) * 4)
+    assert min(low for _, low in plant.tensions) == 0.0
+    first_story = []
     for _ in range(2):
-        machine.brake(False)
-        machine.step([0.0] * 4)
-        first = machine.thetad
-        drive(machine, 1.0, [0.0] * 4)
-        told.append([*first, *machine.thetad, *machine.q])
-        machine.reset()
-    assert told[0] == told[1]
-    base, gripped = plant(arm, slack=True), plant(arm, slack=True, tension_friction=(1e-3,) * 4)
+        plant.brake(False)
+        plant.step([0.0] * 4)
+        first = plant.thetad
+        drive(plant, 1.0, [0.0] * 4)
+        first_story.append([*first, *plant.thetad, *plant.q])
+        plant.reset()
+    assert first_story[0] == first_story[1]
+    base, gripped = plant_of(arm, slack=True), plant_of(arm, slack=True, tension_friction=(1e-3,) * 4)
     for one in (base, gripped):
         one.step([0.0] * 4)
     pull, (tight, _) = 2.0 * 5.0, gripped.tensions[1]

@@ -20,7 +20,7 @@ from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.driver import DriverParameters
 from wam_driver.plant import Plant
 from wam_theory.regimes import gamma_b
-from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess, simulate
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
 from wam_theory.stiction import stiction_cycle_force, stiction_cycle_period
 
 STEP = 5e-4  # s, as configured
@@ -115,6 +115,7 @@ def test_both_resonances_of_the_testbed_are_those_of_4_4(ratio: float, stiffness
     np.testing.assert_allclose(found, stepped(expected, step), rtol=3e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio_scale", [0.7, 1.0, 1.5])
 @pytest.mark.parametrize("stiffness", [50.0, 500.0, 5000.0])  # N m/rad at the joint
 @pytest.mark.parametrize("joint", [0, 3])
@@ -222,12 +223,13 @@ def in_the_cycle(model: FrictionNode, zeta: float) -> tuple[float, float]:
 CASES = [(0.02, 0.05, 4.0, 2.0), (0.05, 0.25, 4.0, 3.0), (0.1, 0.05, 4.0, 1.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "zeta", "static", "dynamic"), CASES)
 def test_stiction_cycle_is_that_of_the_exact_node(number: float, zeta: float, static: float, dynamic: float) -> None:
     """Inertia included, to 2 %: a slip of 40 to 80 steps ends within one of them, which halving the step halves."""
     model, gain, period = stiction(number, zeta, static, dynamic)
     start = in_the_cycle(model, zeta)
-    exact = assess(model, ForceLoop(gain), FORCE, (start[0], 0.0, start[1]))
+    exact = assess(model, IntegralLoop(gain), FORCE, (start[0], 0.0, start[1]))
     assert exact.verdict is Verdict.LIMIT_CYCLE
     found = [cycle(controlled(model, gain, 6.5 * period, step, start)) for step in (STEP, STEP / 2.0)]
     for one in found:
@@ -277,6 +279,7 @@ def test_motor_goes_to_and_fro_by_twice_the_friction_over_the_cable_above_gamma_
     assert abs(turns[1] - turns[0]) != pytest.approx(2.0 * 4.0 / KTR, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gamma", [0.2, 0.4, 0.5, 0.57])
 def test_motor_never_turns_back_below_gamma_b(gamma: float) -> None:
     """Straight to the desired force below gamma_a, by a staircase from there on; never beyond it."""
@@ -288,10 +291,10 @@ def test_motor_never_turns_back_below_gamma_b(gamma: float) -> None:
 
 
 def test_step_response_with_coulomb_friction_follows_the_exact_one() -> None:
-    """To 0.5 % of the step: a standstill lies up to one step beside the exact one."""
+    """To 0.5 % of the step: a stop differs from the exact one by up to one step."""
     model, gain = coulomb(0.9)
     response = controlled(model, gain, 0.4, STEP / 4.0, (0.0, 0.0))
-    exact = simulate(model, ForceLoop(gain), FORCE, 0.4).at(response.time)
+    exact = simulate(model, IntegralLoop(gain), FORCE, 0.4).at(response.time)
     np.testing.assert_allclose(response.contact, exact.contact_force, atol=5e-3 * FORCE)
     np.testing.assert_allclose(response.motor, exact.x_m, atol=5e-3 * FORCE / KC)
 
@@ -347,6 +350,7 @@ def test_impact_of_the_link_on_the_spring_of_the_testbed_is_that_of_3_1(stiffnes
     assert -angle.min() * LEVER * stiffness == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [200.0, 1751.27])
 def test_impact_carries_the_rotor_through_a_stiff_cable(stiffness: float) -> None:
     """J is everything rotary: link and N^2 J_m; the cable is 1000 times as stiff as the contact."""
@@ -369,6 +373,7 @@ def settled(plant: Plant, torque: float) -> None:
     assert max(map(abs, plant.qd)) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hardening", [0.0, 20.0, 200.0])
 @pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5])
 def test_surface_at_rest_pushes_with_its_law(stiffness: float, hardening: float) -> None:
@@ -494,6 +499,7 @@ def test_several_surfaces_push_on_both_links_each_with_its_own_stiffness() -> No
 # stick
 
 
+@pytest.mark.slow
 def test_testbed_under_nine_tenths_of_its_static_friction_stays_for_a_minute() -> None:
     """Motor and joint at once, spring pressed, cable stretched, everything of config/testbed.yaml on.
 
@@ -519,6 +525,7 @@ def test_testbed_under_nine_tenths_of_its_static_friction_stays_for_a_minute() -
     assert np.abs(np.array(plant.theta) - before[0]).max() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signs", [(1, 1, 1, 1), (1, -1, 1, -1), (-1, 1, 1, -1)])
 def test_arm_under_nine_tenths_of_its_static_friction_stays_for_a_minute(signs: tuple[int, ...]) -> None:
     """Every motor and every joint at once, cables stretched by it and by gravity, everything of config/wam.yaml on.
@@ -552,7 +559,11 @@ def everything_on(friction: float, hardening: float, damping: float = 20.0) -> t
     """The arm on loose cables above bars, with every effect that takes energy."""
     arm = changed(WAM, joints=WIDE, cables={"pretension": (80.0,) * 4})
     effects = dataclasses.replace(
-        WAM_DRIVER.effects, creep=True, slack=True, tension_friction=(1e-4,) * 4, rubbing_friction=(0.1, 0.0, 0.1, 0.2)
+        WAM_DRIVER.effects,
+        creep=True,
+        slack=True,
+        tension_friction=(1e-4,) * 4,
+        added_coulomb_friction=(0.1, 0.0, 0.1, 0.2),
     )
     return arm, World(bars(BARS, 4e3, friction, hardening, damping), NO_SPRINGS), effects
 
@@ -625,6 +636,7 @@ def thrown(seed: int, friction: float, hardening: float, step: float) -> Plant:
     return plant
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("friction", "hardening"), [(0.0, 0.0), (0.4, 50.0)])
 def test_energy_of_the_undriven_arm_never_grows_with_everything_on(
@@ -640,6 +652,7 @@ def test_energy_of_the_undriven_arm_never_grows_with_everything_on(
     assert (found - np.minimum.accumulate(found)).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
 def test_a_tube_that_bounces_flat_on_a_floor_gains_nothing(seed: int) -> None:
     """Undamped, energy while nothing touches; both ends touch in turns.
@@ -695,6 +708,7 @@ def test_creep_takes_from_a_twisted_cable_what_6_19_says_and_never_gives() -> No
 # ten pounds anywhere (7.2.2)
 
 
+@pytest.mark.slow
 def test_motors_hold_ten_pounds_at_any_point_in_any_pose_within_their_continuous_torque() -> None:
     """Section 7.2.2, by Monte Carlo on the compiled model: its own Jacobians and gravity.
 
@@ -748,28 +762,28 @@ def turn(plant: Plant, torque: float) -> None:
     plant.step([0.0])
 
 
-@pytest.mark.parametrize("rubbing", [0.0, 0.7, 3.0])
-def test_rod_raises_the_breakaway_torque_by_what_it_rubs(rubbing: float) -> None:
+@pytest.mark.parametrize("added", [0.0, 0.7, 3.0])
+def test_rod_adds_its_friction_to_the_breakaway_torque(added: float) -> None:
     """To three steps of a ramp by 1e-5 N m each; put on while the joint sticks."""
     plant = rod((0.19, 0.171))
     for _ in range(100):
         turn(plant, 0.1)
-    plant.rub([rubbing])
-    level = 0.188 + rubbing
+    plant.set_added_friction([added])
+    level = 0.188 + added
     while abs(plant.qd[0]) < 1e-10:
         turn(plant, level)
         level += 1e-5
-    assert level == pytest.approx(0.19 + rubbing, abs=3e-5)
+    assert level == pytest.approx(0.19 + added, abs=3e-5)
 
 
-@pytest.mark.parametrize("rubbing", [0.0, 0.7, 3.0])
-def test_rod_raises_the_sliding_friction_by_what_it_rubs(rubbing: float) -> None:
+@pytest.mark.parametrize("added", [0.0, 0.7, 3.0])
+def test_rod_adds_its_friction_to_the_sliding_friction(added: float) -> None:
     """By the momentum of link and rotor, to 1e-6 N m; put on and taken off while the joint slides."""
     plant = rod((0.19, 0.171))
     for _ in range(200):
         turn(plant, 6.0)
-    for more in (rubbing, 0.0):
-        plant.rub([more])
+    for more in (added, 0.0):
+        plant.set_added_friction([more])
         momentum = LINK_INERTIA * plant.qd[0] + RATIO * 4.067e-5 * plant.thetad[0]
         for _ in range(50):
             turn(plant, 6.0)
@@ -779,11 +793,11 @@ def test_rod_raises_the_sliding_friction_by_what_it_rubs(rubbing: float) -> None
 
 def test_rod_taken_off_lets_a_stuck_joint_go() -> None:
     plant = rod((0.19, 0.171))
-    plant.rub([2.0])
+    plant.set_added_friction([2.0])
     for _ in range(1000):
         turn(plant, 1.5)
     assert abs(plant.q[0]) < 1e-12
-    plant.rub([0.0])
+    plant.set_added_friction([0.0])
     for _ in range(10):
         turn(plant, 1.5)
     assert plant.q[0] > 1e-6

@@ -5,10 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wam_analysis.plant_figure import RATIOS, figure
-from wam_analysis.plant_study import LEVELS, STUDIES, cycle, resonances, stiction_cycle
+from wam_analysis.measures.limit_cycle import mean_cycle
+from wam_experiments.plant.effects import STUDIES, resonances, stiction_cycle
+from wam_experiments.plant.figure import RATIOS, figure
+from wam_experiments.plant.levels import LEVELS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "most"),
     [
@@ -28,7 +31,7 @@ def test_effect_is_as_near_to_theory_as_promised(name: str, most: float) -> None
 
 def test_stiction_cycle_is_within_two_percent_of_the_exact_one() -> None:
     curve = stiction_cycle()
-    plant, exact = cycle(curve.x, curve.plant), cycle(curve.x, curve.theory)
+    plant, exact = mean_cycle(curve.x, curve.plant), mean_cycle(curve.x, curve.theory)
     assert plant.peak_to_peak == pytest.approx(exact.peak_to_peak, rel=0.02)
     assert plant.period == pytest.approx(exact.period, rel=0.02)
     assert exact.peak_to_peak > 1.0
@@ -41,6 +44,7 @@ def test_both_resonances_are_those_of_4_4(ratio: float) -> None:
     np.testing.assert_allclose(found.upper.plant, found.upper.theory, rtol=3e-3)
 
 
+@pytest.mark.slow
 def test_figure_is_drawn_and_its_table_names_every_effect(tmp_path: Path) -> None:
     text = figure(tmp_path / "plant.png")
     assert (tmp_path / "plant.png").stat().st_size > 50_000
@@ -48,11 +52,12 @@ def test_figure_is_drawn_and_its_table_names_every_effect(tmp_path: Path) -> Non
         assert name in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "most"),
     [
-        ("friction with tension, breakaway", 1e-3),  # the motor needs some steps to be seen moving
-        ("rubbing, breakaway", 2e-3),  # and the link some more
+        ("friction by tension, breakaway", 1e-3),  # the motor needs some steps to be seen moving
+        ("added friction, breakaway", 2e-3),  # and the link some more
         ("damping of the circuit, decay", 1e-2),  # explicit damping, h d N^2/J
         ("amplifier, time to the continuous limit", 1e-3),  # a period of 1 ms
         ("sensor noise, 20 000 readings", 2e-2),  # 1/sqrt(2 n) is 0.5 %

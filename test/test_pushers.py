@@ -11,21 +11,21 @@ import pytest
 from arms import NOWHERE, WAM, ideal_mjcf
 
 from wam_description.configuration import Configuration, packaged
-from wam_description.departure import Departure, built
 from wam_description.effects import no_effects
+from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import ParameterError
 from wam_description.world import NO_SPRINGS, Pushers, World
 from wam_driver.plant import Plant
 
 STEP = 5e-4
-AS_CONFIGURED = Departure((1.0,) * 4, (1.0,) * 4, (1.0,) * 4, (1.0,) * 4, 0.0)
+AS_CONFIGURED = ModelMismatch((1.0,) * 4, (1.0,) * 4, (1.0,) * 4, (1.0,) * 4, 0.0)
 L3 = 0.5588
 
 
 def hand(**values: Any) -> Pushers:
-    """One hand, a frictionless sphere on the outer link where nothing else is said."""
+    """One hand, a frictionless sphere on the outer link by default."""
     given: dict[str, Any] = {
-        "names": "hand", "shapes": "sphere", "covers": "outer_link", "places": 0.25, "angles": 0.6, "force": 8.0,
+        "names": "hand", "shapes": "sphere", "covers": "outer_link", "positions": 0.25, "angles": 0.6, "force": 8.0,
         "begin": 0.05, "end": 0.4, "rise": 0.02, "clearance": 0.01, "slide": 0.0, "turn": 0.0, "stiffness": 2000.0,
         "damping": 10.0, "friction": 0.0,
     }  # fmt: skip
@@ -33,23 +33,23 @@ def hand(**values: Any) -> Pushers:
     return Pushers(sizes=sizes, **{key: (value,) for key, value in (given | values).items()})
 
 
-def plant(pushers: Pushers) -> Plant:
+def plant_of(pushers: Pushers) -> Plant:
     return Plant(WAM, World(NOWHERE, NO_SPRINGS, pushers), no_effects(WAM), STEP)
 
 
-def run(machine: Plant, seconds: float, torque: float = 0.0) -> None:
+def run(plant: Plant, seconds: float, torque: float = 0.0) -> None:
     for _ in range(round(seconds / STEP)):
-        machine.step([0.0, 0.0, 0.0, torque])
+        plant.step([0.0, 0.0, 0.0, torque])
 
 
 @pytest.mark.parametrize(("shape", "sizes"), [("sphere", (0.04, 0.0, 0.0)), ("box", (0.02, 0.04, 0.02))])
 @pytest.mark.parametrize("angle", [0.0, 0.6, -2.0])
 def test_a_hand_presses_with_its_force_at_its_place(shape: str, sizes: tuple[float, ...], angle: float) -> None:
-    machine = plant(hand(shapes=shape, sizes=sizes, angles=angle))
-    run(machine, 0.045)
-    assert machine.loads() == []
-    run(machine, 0.155)
-    (load,) = machine.loads()
+    plant = plant_of(hand(shapes=shape, sizes=sizes, angles=angle))
+    run(plant, 0.045)
+    assert plant.loads() == []
+    run(plant, 0.155)
+    (load,) = plant.loads()
     force = 8.0 * np.array((0.0, math.cos(angle), math.sin(angle)))
     assert load.cover == "outer_link"
     # a flat side that lies along the tube may carry at its edge
@@ -57,29 +57,29 @@ def test_a_hand_presses_with_its_force_at_its_place(shape: str, sizes: tuple[flo
     assert np.abs(np.subtract(load.force, force)).max() < 0.05
     # the line of the force meets the tube's axis there
     assert np.abs(np.subtract(load.moment, np.cross((load.place, 0.0, 0.0), force))).max() < 0.02
-    run(machine, 0.25)
-    assert machine.loads() == []
+    run(plant, 0.25)
+    assert plant.loads() == []
 
 
 def test_on_the_inner_link_the_moment_is_that_of_its_tilted_axis() -> None:
-    machine = plant(hand(covers="inner_link", places=0.3, angles=0.0))
-    run(machine, 0.2)
-    (load,) = machine.loads()
+    plant = plant_of(hand(covers="inner_link", positions=0.3, angles=0.0))
+    run(plant, 0.2)
+    (load,) = plant.loads()
     axis_point = np.array((0.3, 0.0, 0.3 / L3 * 0.04064))
     assert np.abs(np.subtract(load.force, (0.0, 8.0, 0.0))).max() < 0.05
     assert np.abs(np.subtract(load.moment, np.cross(axis_point, load.force))).max() < 0.02
 
 
 def test_a_hand_keeps_contact_with_a_link_that_swings_away_from_it() -> None:
-    machine = plant(hand(begin=0.02))
-    machine.brake(False)
+    plant = plant_of(hand(begin=0.02))
+    plant.brake(False)
     forces, speeds = [], []
     for tick in range(700):
         swing = math.sin(2.0 * math.pi * 4.0 * tick * STEP)
-        machine.step([0.3 * swing, 0.4 * swing, -0.3 * swing, 0.2 * swing])
-        speeds.append(max(map(abs, machine.qd)))
+        plant.step([0.3 * swing, 0.4 * swing, -0.3 * swing, 0.2 * swing])
+        speeds.append(max(map(abs, plant.qd)))
         if 120 <= tick < 700:
-            (load,) = machine.loads()
+            (load,) = plant.loads()
             forces.append(math.hypot(*load.force))
     assert max(speeds) > 2.0
     assert min(forces) == pytest.approx(8.0, rel=0.02)
@@ -88,12 +88,12 @@ def test_a_hand_keeps_contact_with_a_link_that_swings_away_from_it() -> None:
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_hand_that_slides_rubs_along_the_link_with_its_friction(way: float) -> None:
-    """Slip is that against the hand: MuJoCo itself takes a led body for one that stands still."""
-    machine = plant(hand(friction=0.4, slide=0.05 * way))
-    run(machine, 0.2)
-    (load,) = machine.loads()
+    """Slip is that against the hand: MuJoCo itself takes a moved body to be at rest."""
+    plant = plant_of(hand(friction=0.4, slide=0.05 * way))
+    run(plant, 0.2)
+    (load,) = plant.loads()
     assert load.force[0] == pytest.approx(way * 0.4 * 8.0, rel=0.02)
-    resting = plant(hand(friction=0.4))
+    resting = plant_of(hand(friction=0.4))
     run(resting, 0.2)
     (load,) = resting.loads()
     assert abs(load.force[0]) < 0.05 * 8.0
@@ -101,9 +101,9 @@ def test_a_hand_that_slides_rubs_along_the_link_with_its_friction(way: float) ->
 
 
 def test_a_hand_that_turns_round_the_link_twists_it() -> None:
-    machine = plant(hand(friction=0.4, turn=0.5, angles=0.0))
-    run(machine, 0.2)
-    (load,) = machine.loads()
+    plant = plant_of(hand(friction=0.4, turn=0.5, angles=0.0))
+    run(plant, 0.2)
+    (load,) = plant.loads()
     # a frictionless force has no moment about the axis; friction acts half way into the surface, 4 mm deep
     assert abs(load.moment[0]) == pytest.approx(0.4 * 8.0 * (WAM.covers.radius[1] - 0.002), rel=0.01)
 
@@ -127,25 +127,27 @@ def test_hands_that_cannot_be_are_refused(values: dict[str, Any], message: str) 
 )
 def test_hands_that_do_not_fit_the_arm_are_refused(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        plant(hand(**values))
+        plant_of(hand(**values))
 
 
 def test_a_hand_without_force_is_not_in_the_model() -> None:
     assert ideal_mjcf(WAM, STEP, NOWHERE).count("mocap") == 0
-    assert plant(hand(force=0.0)).model.nmocap == 0
-    assert plant(hand()).model.nmocap == 1
+    assert plant_of(hand(force=0.0)).model.nmocap == 0
+    assert plant_of(hand()).model.nmocap == 1
 
 
 # the arm as it is built
 
 
 def test_an_arm_without_departure_is_the_configured_one() -> None:
-    assert built(WAM, AS_CONFIGURED) == WAM
+    assert true_arm(WAM, AS_CONFIGURED) == WAM
 
 
-def test_what_departs_is_in_the_compiled_plant() -> None:
-    departure = Departure((1.1, 1.0, 0.9, 1.0), (1.2, 1.0, 1.0, 1.0), (1.0, 0.8, 1.0, 1.0), (1.0, 1.0, 1.0, 1.5), 0.0)
-    arm = built(WAM, departure)
+def test_model_mismatch_is_in_the_compiled_plant() -> None:
+    mismatch = ModelMismatch(
+        (1.1, 1.0, 0.9, 1.0), (1.2, 1.0, 1.0, 1.0), (1.0, 0.8, 1.0, 1.0), (1.0, 1.0, 1.0, 1.5), 0.0
+    )
+    arm = true_arm(WAM, mismatch)
     before, after = (mujoco.MjModel.from_xml_string(ideal_mjcf(a, STEP, NOWHERE)) for a in (WAM, arm))
     ratio = [after.body(name).mass[0] / before.body(name).mass[0] for name in WAM.links.names]
     assert ratio == pytest.approx([1.1, 1.0, 0.9, 1.0])
@@ -158,26 +160,26 @@ def test_a_payload_weighs_at_the_tool() -> None:
     """Arm stretched out level: joint 4 carries m g L4 more, and its inertia grows by m L4^2."""
     stretched = (0.0, -math.pi / 2, 0.0, math.pi / 2)
     level = dataclasses.replace(WAM, joints=dataclasses.replace(WAM.joints, start=stretched))
-    loaded = built(level, dataclasses.replace(AS_CONFIGURED, payload=0.2))
+    loaded = true_arm(level, dataclasses.replace(AS_CONFIGURED, payload=0.2))
     bias, inertia = [], []
     for arm in (level, loaded):
-        machine = Plant(arm, World(NOWHERE, NO_SPRINGS), no_effects(arm), STEP)
-        mujoco.mj_forward(machine.model, machine.data)
-        bias.append(machine.data.qfrc_bias[7])
+        plant = Plant(arm, World(NOWHERE, NO_SPRINGS), no_effects(arm), STEP)
+        mujoco.mj_forward(plant.model, plant.data)
+        bias.append(plant.data.qfrc_bias[7])
         column = np.zeros(8)
-        mujoco.mj_mulM(machine.model, machine.data, column, np.eye(8)[7])
+        mujoco.mj_mulM(plant.model, plant.data, column, np.eye(8)[7])
         inertia.append(column[7])
     assert abs(bias[1] - bias[0]) == pytest.approx(0.2 * 9.80665 * 0.4064, rel=1e-6)
     assert inertia[1] - inertia[0] == pytest.approx(0.2 * 0.4064**2, rel=1e-6)
 
 
 def test_departures_that_do_not_fit_are_refused() -> None:
-    with pytest.raises(ParameterError, match=r"departure.mass.*3 values"):
-        built(WAM, dataclasses.replace(AS_CONFIGURED, mass=(1.0,) * 3))
+    with pytest.raises(ParameterError, match=r"mismatch.mass.*3 values"):
+        true_arm(WAM, dataclasses.replace(AS_CONFIGURED, mass=(1.0,) * 3))
     askew = dataclasses.replace(WAM, tool=(0.4, 0.1, 0.0))
-    assert built(askew, AS_CONFIGURED) == askew
+    assert true_arm(askew, AS_CONFIGURED) == askew
     with pytest.raises(ParameterError, match=r"payload is 0.1 kg.*set it to 0"):
-        built(askew, dataclasses.replace(AS_CONFIGURED, payload=0.1))
+        true_arm(askew, dataclasses.replace(AS_CONFIGURED, payload=0.1))
 
 
 def test_a_configuration_goes_to_another_process_and_stays_read_only() -> None:

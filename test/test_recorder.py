@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 import yaml
+from conftest import LONG
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
@@ -26,18 +27,18 @@ from rosbags.interfaces import QosDurability, QosReliability
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 
-from wam_analysis.bag import read
-from wam_analysis.bag_file import contents
+from wam_bag.bag import read
+from wam_bag.bag_writer import BagWriter
+from wam_bag.contents import contents
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, flatten
-from wam_ros.bag import BagWriter
+from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.bring_up import Composition
-from wam_ros.messages import header
-from wam_ros.ports import message_type
+from wam_ros.header import header
+from wam_ros.messages import message_type
 from wam_ros.qos import qos
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
-from wam_ros.topics import BY_NAME, TOPICS
 
 CONFIG = Path(__file__).parents[1] / "config" / "wam.yaml"
 ROOT = Path(__file__).parents[1]
@@ -75,7 +76,7 @@ def received(node: RecorderNode, topic: str) -> int:
 def recorder_process(ros: Any, directory: Path, **choices: Any) -> Iterator[subprocess.Popen[str]]:
     file = directory / "recorder.yaml"
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters(directory, **choices)}}))
-    command = [sys.executable, "-m", "wam_ros.recorder_node", "--ros-args", "-r", "__ns:=/wam"]
+    command = [sys.executable, "-m", "wam_ros.program", "recorder", "--ros-args", "-r", "__ns:=/wam"]
     process = subprocess.Popen(
         [*command, "--params-file", str(file)],
         env=ros.environment,
@@ -254,7 +255,7 @@ def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any
     ros.wait(lambda: not node.parameters_of_nodes.missing)
     node.attend()
     assert not node.ready, "ready before the topics of gravity were there"
-    kept = [publisher(other, topic.name) for topic in TOPICS if "gravity" in topic.publisher]
+    kept = [publisher(other, topic) for topic in ("gravity_effort", "status", "/diagnostics")]
     ros.wait(lambda: states)
     assert kept
     assert (states[0].name, states[0].message) == ("recorder", "ready")
@@ -269,13 +270,13 @@ def test_parameters_of_all_nodes_are_attached_and_it_is_ready_only_then(ros: Any
 def test_a_process_closes_its_bag_when_told_to_stop(ros: Any, tmp_path: Path, stop: signal.Signals) -> None:
     sender = publisher(ros.node("driver"), "motor_states")
     with recorder_process(ros, tmp_path) as process:
-        ros.wait(matched(sender), timeout=20.0)
+        ros.wait(matched(sender))
         for k in range(1, 501):
             sender.publish(state(k, 0.0))
         file = tmp_path / "bag" / "bag_0.mcap"
         ros.wait(lambda: len(recovered(file)) >= 500)
         process.send_signal(stop)
-        _, said = process.communicate(timeout=10)
+        _, said = process.communicate(timeout=LONG)
         assert process.returncode == 0, said
     assert "none lost" in said
     with AnyReader([tmp_path / "bag"]) as reader:
@@ -286,7 +287,7 @@ def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Pat
     sender = publisher(ros.node("driver"), "motor_states")
     file = tmp_path / "bag" / "bag_0.mcap"
     with recorder_process(ros, tmp_path) as process:
-        ros.wait(matched(sender), timeout=20.0)
+        ros.wait(matched(sender))
         sent: list[int] = []
 
         def send() -> bool:
@@ -294,7 +295,7 @@ def test_a_killed_recorder_loses_at_most_the_last_second(ros: Any, tmp_path: Pat
             sender.publish(state(len(sent), 0.0))
             return len(sent) >= 250  # one each 10 ms of `wait`
 
-        ros.wait(send, timeout=20.0)
+        ros.wait(send)
         killed = time.time_ns()
         process.kill()
         process.wait()
@@ -352,7 +353,7 @@ def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
 
     row = BY_NAME["/diagnostics"]
     with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)})
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: "")
         for number in (1, 2, 3):
             machine.receive(row.name, data("driver"), 0, 0, number)
         for number in (1, 9):
@@ -372,7 +373,7 @@ def fill_disk(bag: BagWriter) -> None:
 def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> None:
     row = BY_NAME["contact/in_contact"]
     bag = BagWriter(tmp_path / "bag")
-    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)})
+    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)}, lambda name: "")
     machine.receive(row.name, b"\0\1\0\0\1", 1, 1, 1)
     assert not machine.failure
     fill_disk(bag)

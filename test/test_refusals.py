@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wam_ros.cli import main
+from wam_cli.main import main
 
 
 def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
@@ -19,6 +19,7 @@ def refused(capfd: pytest.CaptureFixture[str], *words: str) -> str:
     return line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "line"),
     [

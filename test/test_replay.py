@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 import yaml
 
-from wam_analysis.bag import BagError, raw, read
-from wam_analysis.replay import Compared, Replay, replay
-from wam_analysis.replay_wirings import WIRINGS
+from wam_bag.bag import BagError, raw, read
+from wam_bag.bag_writer import BagWriter
+from wam_bag.metadata import INFINITE
+from wam_cli import main as cli
+from wam_cli.commands.replay import reasons, told
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
-from wam_ros import cli
-from wam_ros.bag import BagWriter
-from wam_ros.bag_metadata import INFINITE
-from wam_ros.commands.replay import reasons, told
+from wam_sim.replay import REPLAYED, Compared, Replay, replay
 
 STEPS = {
     "steps": [
@@ -25,7 +24,8 @@ STEPS = {
             "posture": [0.1, -0.3, 0.05, 0.2],
             "push": {"cover": "outer_link", "place": 0.28, "newtons": [0.0, 12.0, 0.0], "begin": 0.05, "end": 0.3},
         },
-        {"name": "press", "seconds": 0.1, "force": {"frame": "outer_link", "newtons": [0.0, -5.0, 0.0]}},
+        {"name": "softer", "seconds": 0.05, "set": {"force_loop": {"posture_gain": 4.0}}},
+        {"name": "press", "seconds": 0.05, "force": {"frame": "outer_link", "newtons": [0.0, -5.0, 0.0]}},
     ]
 }
 QOS = {
@@ -89,7 +89,7 @@ def changed(
     return to
 
 
-@pytest.mark.parametrize("node", WIRINGS)
+@pytest.mark.parametrize("node", REPLAYED)
 def test_a_lockstep_recording_replays_bit_for_bit(bag: Path, node: str) -> None:
     done = replay(bag, node)
     assert done.mode == "lockstep"
@@ -108,7 +108,7 @@ def test_the_pushed_arm_says_something(bag: Path) -> None:
 @pytest.mark.parametrize(
     ("node", "value", "topic"),
     [
-        ("velocity_loop", {"velocity_loop:integral_gain": [2.5, 2.0, 2.0, 1.0]}, "motor_current_command"),
+        ("velocity_loop", {"servo.integral_gain": [2.5, 2.0, 2.0, 1.0]}, "motor_current_command"),
         ("force_loop", {"force_loop:posture_gain": 4.5}, "joint_velocity_command"),
         ("contact_estimator", {"contact_estimator:observer.time_constant": 0.03}, "external_joint_torques"),
         ("gravity", {"arm.gravity": [0.0, 0.0, -9.81]}, "gravity_effort"),
@@ -157,7 +157,7 @@ def test_parameters_that_are_not_in_the_bag_are_asked_for(bag: Path, tmp_path: P
             writer.add_topic(name, messages.type, QOS)
             for k, (time, data) in enumerate(zip(messages.log_time_ns.tolist(), messages.data, strict=True)):
                 writer.write(name, data, time, time, k)
-    with pytest.raises(BagError, match="no parameters in it; give a configuration with --config"):
+    with pytest.raises(BagError, match=r"no parameters.yaml in the bag; give a configuration with --config"):
         replay(tmp_path / "bare", "gravity")
     assert replay(tmp_path / "bare", "gravity", Configuration.load(packaged("wam"))).is_same
     with pytest.raises(BagError, match=r"recorded are joint1, joint2, joint3, joint4; the configuration has joint1$"):
@@ -188,7 +188,7 @@ def test_of_a_realtime_recording_the_share_that_differs_is_told() -> None:
 
 
 def test_the_driver_cannot_be_replayed(bag: Path) -> None:
-    with pytest.raises(ParameterError, match="no node 'driver' can be replayed; nodes: velocity_loop, transform"):
+    with pytest.raises(ParameterError, match="node 'driver' cannot be replayed; nodes: transform, velocity_loop"):
         replay(bag, "driver")
 
 

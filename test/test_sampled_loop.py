@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from arms import LEVER, changed, one_joint
 
-from wam_analysis.direct import DirectRun
 from wam_control.force_loop import ForceCommand
-from wam_control.sampled_loop import Axes, Feedback, SampledLoop, Servo
-from wam_control.scenario import Step
-from wam_description.arm import Arm, Timing
+from wam_control.sampled_loop import Axes, Feedback, SampledLoop
+from wam_control.scenario import ScenarioStep
+from wam_description.arm import Arm, Servo, Timing
 from wam_description.configuration import Configuration, packaged
+from wam_sim.simulation import Simulation
 from wam_theory.linear_loop import sampled_margin
 
 TESTBED = Configuration.load(packaged("testbed"))
@@ -73,21 +73,20 @@ def pressed(gain: float) -> float:
     conf = TESTBED.with_values({**nothing, "force_loop:force_gain": [gain], "force_loop:guard.mode": "off"})
     asked = [ForceCommand("base", (0.0, 0.0, -newtons)) for newtons in (20.0, 24.0)]
     steps = [
-        Step("release", 0.2, request="enable"),
-        Step("press", 1.5, force=asked[0]),
-        Step("step", 5.0, force=asked[1]),
+        ScenarioStep("release", 0.2, request="enable"),
+        ScenarioStep("press", 1.5, force=asked[0]),
+        ScenarioStep("step", 5.0, force=asked[1]),
     ]
-    run = DirectRun(conf, steps)
+    run = Simulation(conf, steps)
     assert run.play() == ""
     return float(np.ptp([row.values[2] for row in run.rows["force_measured"][-41:-1]]))
 
 
+@pytest.mark.slow
 def test_the_plant_swings_above_the_margin_and_rests_below_it() -> None:
     """MuJoCo shares nothing with the map: rotors, cables, velocity loop and hold of its own."""
     arm, shared = TESTBED.shared.arm, TESTBED.shared
-    own = TESTBED.sections["velocity_loop"]
-    servo = Servo(tuple(own["proportional_gain"]), tuple(own["integral_gain"]))
-    found = margin(arm, shared.timing, servo, 0.01, stiffness=1751.26835)
+    found = margin(arm, shared.timing, shared.servo, 0.01, stiffness=1751.26835)
     assert pressed(0.9 * found) < 2.0
     assert pressed(1.1 * found) > 20.0
     ideal = 1.73e-3 / 0.1129848 * LEVER**2  # section 5.6 at 50 Hz for a motor without lag, (rad/s)/(lb-in)

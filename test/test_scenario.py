@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from wam_control.force_loop import ForceCommand
-from wam_control.scenario import NO_FORCE, Chirp, Push, Scenario, ScenarioOutput, Setting, Step, load
+from wam_control.scenario import NO_FORCE, Chirp, Push, Scenario, ScenarioOutput, ScenarioStep, Setting, load
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -30,7 +30,7 @@ def touching(newtons: float) -> Contact:
 
 
 def test_path_begins_where_the_arm_is_and_ends_at_the_posture() -> None:
-    outs = play(Scenario([Step("go", 1.0, tuple(GOAL)), Step("stay", 1.0)]), 202)
+    outs = play(Scenario([ScenarioStep("go", 1.0, tuple(GOAL)), ScenarioStep("stay", 1.0)]), 202)
     assert outs[0].posture == START
     assert outs[200].posture == GOAL
     assert outs[201].posture == GOAL
@@ -38,7 +38,7 @@ def test_path_begins_where_the_arm_is_and_ends_at_the_posture() -> None:
 
 
 def test_path_has_the_smallest_jerk() -> None:
-    outs = play(Scenario([Step("go", 1.0, tuple(GOAL)), Step("stay", 1.0)]), 300)
+    outs = play(Scenario([ScenarioStep("go", 1.0, tuple(GOAL)), ScenarioStep("stay", 1.0)]), 300)
     for joint in range(4):
         path = np.array([out.posture[joint] for out in outs])
         reach = GOAL[joint] - START[joint]
@@ -51,7 +51,7 @@ def test_path_has_the_smallest_jerk() -> None:
 
 
 def test_the_next_path_goes_on_where_the_last_one_ended_even_if_the_arm_is_elsewhere() -> None:
-    scenario = Scenario([Step("there", 0.1, tuple(GOAL)), Step("back", 0.1, tuple(START))])
+    scenario = Scenario([ScenarioStep("there", 0.1, tuple(GOAL)), ScenarioStep("back", 0.1, tuple(START))])
     outs = play(scenario, 20) + play(scenario, 1, q=[9.0] * 4) + play(scenario, 20)
     assert outs[20].step == "back"
     assert outs[20].posture == GOAL
@@ -60,13 +60,15 @@ def test_the_next_path_goes_on_where_the_last_one_ended_even_if_the_arm_is_elsew
 
 
 def test_a_step_without_posture_keeps_the_last_one() -> None:
-    outs = play(Scenario([Step("wait", 0.1), Step("go", 0.1, tuple(GOAL)), Step("wait", 0.1)]), 60)
+    outs = play(
+        Scenario([ScenarioStep("wait", 0.1), ScenarioStep("go", 0.1, tuple(GOAL)), ScenarioStep("wait", 0.1)]), 60
+    )
     assert [outs[k].posture for k in (0, 19, 59)] == [START, START, GOAL]
 
 
-@pytest.mark.parametrize("last", [Step("lift off", 1.0, tuple(START)), Step("rest", 1.0)])
-def test_after_pressing_the_path_starts_from_the_measured_pose(last: Step) -> None:
-    scenario = Scenario([Step("go", 0.1, tuple(GOAL)), Step("press", 0.1, force=PRESS), last])
+@pytest.mark.parametrize("last", [ScenarioStep("lift off", 1.0, tuple(START)), ScenarioStep("rest", 1.0)])
+def test_after_pressing_the_path_starts_from_the_measured_pose(last: ScenarioStep) -> None:
+    scenario = Scenario([ScenarioStep("go", 0.1, tuple(GOAL)), ScenarioStep("press", 0.1, force=PRESS), last])
     play(scenario, 40)
     sunk = [0.21, -1.07, 0.1, 0.75]
     out = play(scenario, 1, q=sunk)[0]
@@ -77,15 +79,19 @@ def test_after_pressing_the_path_starts_from_the_measured_pose(last: Step) -> No
 
 def test_between_two_forces_the_posture_stays() -> None:
     harder = ForceCommand("base", (0.0, 0.0, -9.0))
-    steps = [Step("go", 0.1, tuple(GOAL)), Step("press", 0.1, force=PRESS), Step("more", 0.1, force=harder)]
+    steps = [
+        ScenarioStep("go", 0.1, tuple(GOAL)),
+        ScenarioStep("press", 0.1, force=PRESS),
+        ScenarioStep("more", 0.1, force=harder),
+    ]
     scenario = Scenario(steps)
     outs = play(scenario, 40) + play(scenario, 1, q=[9.0] * 4)
     assert [outs[k].force for k in (0, 20, 40)] == [NO_FORCE, PRESS, harder]
     assert outs[40].posture == GOAL
 
 
-def test_a_step_until_a_force_ends_when_it_is_felt() -> None:
-    scenario = Scenario([Step("lower", 1.0, tuple(GOAL), until_force=2.0), Step("then", 1.0)])
+def test_a_step_until_a_force_ends_when_it_is_detected() -> None:
+    scenario = Scenario([ScenarioStep("lower", 1.0, tuple(GOAL), until_force=2.0), ScenarioStep("then", 1.0)])
     assert play(scenario, 20, contact=touching(1.9))[-1].step == "lower"
     out = play(scenario, 1, contact=touching(-2.0))[0]
     assert out.step == "then"
@@ -95,20 +101,26 @@ def test_a_step_until_a_force_ends_when_it_is_felt() -> None:
 
 
 def test_a_contact_that_does_not_come_fails_and_asks_for_the_brakes() -> None:
-    scenario = Scenario([Step("lower", 0.1, until_force=2.0), Step("never", 1.0)])
+    scenario = Scenario([ScenarioStep("lower", 0.1, until_force=2.0), ScenarioStep("never", 1.0)])
     outs = play(scenario, 20)
     assert not any(out.done or out.request for out in outs)
     failed, after = play(scenario, 2)
     assert failed.done
     assert failed.request == "disable"
-    assert failed.failure == "step 'lower': no contact of 2 N felt in 0.1 s"
+    assert failed.failure == "step 'lower': no contact of 2 N detected within 0.1 s"
     assert after.done
     assert after.request == "", "asked once"
     assert failed.force == NO_FORCE
 
 
 def test_requests_are_made_once_when_their_step_begins() -> None:
-    scenario = Scenario([Step("on", 0.02, request="enable"), Step("wait", 0.02), Step("off", 0.02, request="disable")])
+    scenario = Scenario(
+        [
+            ScenarioStep("on", 0.02, request="enable"),
+            ScenarioStep("wait", 0.02),
+            ScenarioStep("off", 0.02, request="disable"),
+        ]
+    )
     outs = play(scenario, 14)
     assert [(k, out.request) for k, out in enumerate(outs) if out.request] == [(0, "enable"), (8, "disable")]
     assert [out.done for out in outs] == [False] * 12 + [True] * 2
@@ -118,7 +130,7 @@ def test_requests_are_made_once_when_their_step_begins() -> None:
 def test_a_push_is_the_wrench_about_the_origin_of_the_cover() -> None:
     force, place = (1.0, -7.0, 4.0), 0.3
     push = Push("outer_link", place, force, 0.05, 0.1)
-    outs = play(Scenario([Step("pushed", 0.2, push=push), Step("free", 0.1)]), 50)
+    outs = play(Scenario([ScenarioStep("pushed", 0.2, push=push), ScenarioStep("free", 0.1)]), 50)
     pushed = [k for k, out in enumerate(outs) if any(out.push_force)]
     assert pushed == list(range(10, 20)), "from begin until before end"
     assert outs[10].push_force == force
@@ -136,7 +148,7 @@ def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_pa
 
 
 def test_a_push_does_at_the_joints_what_a_force_at_its_place_does() -> None:
-    out = play(Scenario([Step("pushed", 0.2, push=Push("outer_link", 0.3, (1.0, -7.0, 4.0), 0.0, 1.0))]), 1)[0]
+    out = play(Scenario([ScenarioStep("pushed", 0.2, push=Push("outer_link", 0.3, (1.0, -7.0, 4.0), 0.0, 1.0))]), 1)[0]
     body = RigidBody(ARM)
     rotation = body.cover_pose(GOAL, "outer_link").rotation
     at_origin = body.point_jacobian(GOAL, "outer_link", (0.0, 0.0, 0.0))
@@ -170,8 +182,8 @@ def test_every_scenario_that_comes_with_the_package_can_be_loaded() -> None:
 def test_a_scenario_file_says_what_the_steps_are(tmp_path: Path) -> None:
     path = write(tmp_path, {"steps": [{"name": "a", "seconds": 1}, {**WHOLE, "request": "disable"}]})
     first, second = load(path, ARM)
-    assert first == Step("a", 1.0)
-    assert second == Step(
+    assert first == ScenarioStep("a", 1.0)
+    assert second == ScenarioStep(
         "b",
         2.5,
         (0.1, -0.7, 0.05, 0.4),
@@ -277,7 +289,7 @@ def test_a_chirp_swings_the_force_along_itself_from_the_first_frequency_to_the_l
     chirp = Chirp(2.0, 1.0, 8.0)
     press = ForceCommand("base", (0.0, -3.0, -4.0))
     dt = 1e-3
-    scenario = Scenario([Step("sweep", 6.0, force=press, chirp=chirp), Step("rest", 0.1, force=press)])
+    scenario = Scenario([ScenarioStep("sweep", 6.0, force=press, chirp=chirp), ScenarioStep("rest", 0.1, force=press)])
     forces = np.array([scenario.step(START, NO_CONTACT, dt).force.force for _ in range(6002)])
     swing = forces @ np.array([0.0, -0.6, -0.8]) - 5.0
     assert np.abs(forces @ np.array([1.0, 0.8, -0.6])).max() < 1e-12, "nothing across the force"
@@ -291,21 +303,23 @@ def test_a_chirp_swings_the_force_along_itself_from_the_first_frequency_to_the_l
 
 
 def test_settings_are_made_once_when_their_step_begins() -> None:
-    settings = (Setting("driver", "effects.rubbing_friction", (0.5,)),)
-    scenario = Scenario([Step("wait", 0.01), Step("rub", 0.02, settings=settings)])
+    settings = (Setting("driver", "effects.added_coulomb_friction", (0.5,)),)
+    scenario = Scenario([ScenarioStep("wait", 0.01), ScenarioStep("rub", 0.02, settings=settings)])
     assert [out.settings for out in play(scenario, 6)] == [(), (), settings, (), (), ()]
 
 
 def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) -> None:
-    def read(**body: Any) -> Step:
+    def read(**body: Any) -> ScenarioStep:
         file = tmp_path / "one.yaml"
         file.write_text(yaml.safe_dump({"steps": [{"name": "a", "seconds": 1.0, **body}]}))
         return load(file, ARM)[0]
 
     force = {"frame": "base", "newtons": [0.0, 0.0, -5.0]}
-    step = read(set={"driver": {"effects": {"rubbing_friction": [0.5, 0, 0, 0]}}, "force_loop": {"posture_gain": 2.0}})
+    step = read(
+        set={"driver": {"effects": {"added_coulomb_friction": [0.5, 0, 0, 0]}}, "force_loop": {"posture_gain": 2.0}}
+    )
     assert step.settings == (
-        Setting("driver", "effects.rubbing_friction", (0.5, 0, 0, 0)),
+        Setting("driver", "effects.added_coulomb_friction", (0.5, 0, 0, 0)),
         Setting("force_loop", "posture_gain", 2.0),
     )
     assert read(force=force, chirp={"newtons": 1, "from": 2, "to": 9}).chirp == Chirp(1.0, 2.0, 9.0)

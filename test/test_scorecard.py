@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wam_analysis.scorecard import measures, report
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
+from wam_experiments.scorecard import measures, report
 from wam_theory.requisites import Measures, Requisite, scorecard
 
 POSE = (0.0, -math.pi / 4, 0.0, 0.0)  # (A.2)
@@ -45,13 +45,13 @@ def test_every_requisite_of_section_3_2_has_rows_and_the_arm_meets_what_the_thes
     ]
     assert all(r.met is not False for r in rows)
     assert sum(r.met is True for r in rows) == 14
-    assert all(math.isnan(r.asked) is (r.met is None) for r in rows)
+    assert all(math.isnan(r.required) is (r.met is None) for r in rows)
 
 
 def test_friction_and_strength_are_the_printed_ones_in_pounds(arm: Measures) -> None:
     assert arm.friction_share == pytest.approx((0.014, 0.01, 0.01, 0.01), rel=1e-3)
-    assert arm.friction_asked == pytest.approx((0.014, 0.01, 0.01, 0.01))
-    assert arm.steady_force_asked == pytest.approx(10.0 * LB)
+    assert arm.friction_required == pytest.approx((0.014, 0.01, 0.01, 0.01))
+    assert arm.steady_force_required == pytest.approx(10.0 * LB)
     assert 10.0 < arm.steady_force / LB < 13.0
     assert arm.aspect_ratio == pytest.approx((22.0 / 4.4, 18.0 / 2.0), rel=1e-3)
     assert arm.pretension == pytest.approx(57.0 / (43.0 / 0.375 / 2.0), rel=1e-3)
@@ -108,7 +108,7 @@ def test_push_that_moves_no_joint_is_the_least_over_joints_and_the_greatest_over
             force += 0.02
         held.append(force)
     assert arm.least_force == pytest.approx(max(held), abs=0.03)
-    dynamic_range = row(scorecard(arm), "steady force over hidden force")
+    dynamic_range = row(scorecard(arm), "steady force over force masked")
     assert dynamic_range.value == pytest.approx(arm.steady_force / max(held), rel=0.01)
 
 
@@ -117,7 +117,7 @@ def test_push_that_moves_no_joint_is_the_least_over_joints_and_the_greatest_over
     [
         ({"steady_force": 40.0}, "steady force at any point"),
         ({"friction_share": (0.014, 0.02, 0.01, 0.01)}, "peak torque over friction, joint 2"),
-        ({"cable_tension": 1.1}, "tightest cable"),
+        ({"cable_tension": 1.1}, "greatest cable tension"),
         ({"pretension": 0.9}, "pretension"),
         ({"aspect_ratio": (5.0, 8.0)}, "length over width, link 2"),
         ({"efficiency": 0.9}, "limiting efficiency"),
@@ -140,7 +140,7 @@ def test_bandwidth_is_the_lowest_eigenvalue_of_any_joint(arm: Measures) -> None:
     found = row(scorecard(arm), "force bandwidth, joint 2 (4.4)")
     assert found.value == pytest.approx(min(lowest), rel=1e-6)
     rotor_alone = math.sqrt(arm.transmission_stiffness[1] / arm.rotor_inertia[1]) / (2.0 * math.pi)
-    share = row(scorecard(arm), "of its asymptote")
+    share = row(scorecard(arm), "over its asymptote")
     assert share.value == pytest.approx(min(lowest) / rotor_alone, rel=1e-6)
 
 
@@ -152,7 +152,7 @@ def test_a_bad_measure_and_another_arm_are_refused(arm: Measures) -> None:
 
 
 def test_the_command_prints_the_table(configuration: Configuration) -> None:
-    command = [sys.executable, "-m", "wam_ros.cli", "scorecard"]
+    command = [sys.executable, "-m", "wam_cli.main", "scorecard"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).resolve().parents[1])
     assert done.stdout == report(configuration)
     assert done.stdout.count("| yes |") == 14

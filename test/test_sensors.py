@@ -1,4 +1,4 @@
-"""What the sensors make of true values: steps, differences and noise with the statistics that were asked for."""
+"""Sensors: steps, differences and noise with the configured statistics."""
 
 import dataclasses
 import math
@@ -61,6 +61,7 @@ def test_velocity_of_a_turning_shaft_is_right_on_average() -> None:
     assert np.mean(found[1:]) == pytest.approx(0.3, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["motors", "joints"])
 def test_noise_of_an_angle_has_its_standard_deviation_and_no_offset_and_no_memory(side: str) -> None:
     """2 % and 2 % of a standard deviation: four sigma of 40 000 draws."""
@@ -98,12 +99,12 @@ NOISY = {
 
 
 def test_noise_is_that_of_the_seed() -> None:
-    def said(seed: int) -> list[object]:
+    def readings(seed: int) -> list[object]:
         read = sensors(seed, **NOISY)
         return [f([1.0] * 4, ZERO, ZERO, DT) for _ in range(50) for f in (read.motors, read.joints)]
 
-    assert said(7) == said(7)
-    assert said(7) != said(8)
+    assert readings(7) == readings(7)
+    assert readings(7) != readings(8)
 
 
 def test_after_a_reset_no_speed_is_made_of_the_way_back() -> None:

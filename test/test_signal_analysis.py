@@ -9,14 +9,14 @@ from wam_analysis.measures.efficiency import backdrivability, efficiency
 from wam_analysis.measures.force_accuracy import dynamic_range, force_accuracy
 from wam_analysis.measures.frequency import bandwidth, believable, fit_poles, frequency_response
 from wam_analysis.measures.friction import identify_friction
-from wam_analysis.measures.limit_cycle import limit_cycle
+from wam_analysis.measures.limit_cycle import last_cycle, limit_cycle, mean_cycle
 from wam_analysis.measures.loop_timing import latency, stamp_timing
 from wam_analysis.measures.response import step_response
 from wam_analysis.measures.ripple import ripple_spectrum
 from wam_analysis.measures.runs import runs, without_short
-from wam_analysis.measures.stability import Verdict, half_cycle_peaks, stability
+from wam_analysis.measures.stability import StabilityVerdict, half_cycle_peaks, stability
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases
-from wam_theory.stick_slip import ForceLoop, FrictionNode, simulate
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 
 MS = 1_000_000
 PRECISE = pytest.approx
@@ -85,7 +85,7 @@ def test_a_step_that_keeps_swinging_does_not_settle():
     time = np.arange(2000) / 1000.0
     found = step_response(time, 1.0 + 0.1 * np.sin(40.0 * time) - np.exp(-30.0 * time), 0.0, 1.0, 0.02)
     assert found.settling == math.inf
-    assert found.spread == near(0.1)
+    assert found.ripple == near(0.1)
 
 
 def test_a_signal_without_a_step_is_refused():
@@ -130,6 +130,19 @@ def random_walk(n: int) -> np.ndarray:
     return np.cumsum(draws(5, n, 1.0))
 
 
+def test_mean_and_last_cycle_of_a_signal_without_noise_are_those_of_its_second_half():
+    time = np.arange(0.0, 12.0, 1e-3)
+    size = 1.0 + 2.0 * (time < 6.0) + 0.5 * (time < 9.0)  # the last cycle alone has the size 2
+    sawtooth = 2.0 * size * ((time / 1.5) % 1.0 - 0.5) + 9.0
+    last, mean = last_cycle(time, sawtooth), mean_cycle(time, sawtooth)
+    assert last.peak_to_peak == pytest.approx(2.0, rel=0.01)
+    assert mean.peak_to_peak == pytest.approx(3.0, rel=0.01)
+    assert last.period == pytest.approx(1.5, rel=0.01)
+    assert mean.period == pytest.approx(1.5, rel=0.01)
+    assert math.isnan(last_cycle(time, time).period)
+    assert math.isnan(mean_cycle(time, time).peak_to_peak)
+
+
 @pytest.mark.parametrize(
     "value",
     [
@@ -168,7 +181,7 @@ def test_sticks_and_slips_are_told_apart_and_chatter_is_bridged():
 
 def test_the_exact_staircase_of_stick_and_slip_is_found_again():
     node = FrictionNode(1.0, 1.0, 2.0, 2.0, 0.8, 1.0)
-    trajectory = simulate(node, ForceLoop(gain=0.05), force=0.5, until=400.0)
+    trajectory = simulate(node, IntegralLoop(gain=0.05), force=0.5, until=400.0)
     times = np.arange(0.0, 400.0, 0.02)
     motion = trajectory.at(times)
     found = stick_slip_phases(np.asarray(motion.v), rest=1e-9, shortest=3)
@@ -312,7 +325,7 @@ def test_the_bandwidth_is_where_the_response_has_fallen_3_db():
 
 
 def test_an_input_that_stands_still_is_refused():
-    with pytest.raises(ValueError, match="does not move"):
+    with pytest.raises(ValueError, match="is constant"):
         frequency_response(100.0, np.ones(1000), np.ones(1000), 100)
 
 
@@ -324,7 +337,7 @@ def response(
 ) -> np.ndarray:
     """Exact error of the node with zeta = 0.25 (J = b = K = 1), from the theory's integrator."""
     node = FrictionNode(1.0, 1.0, 2.0, 2.0, friction, static)
-    trajectory = simulate(node, ForceLoop(gain=gamma), force=step, until=duration)
+    trajectory = simulate(node, IntegralLoop(gain=gamma), force=step, until=duration)
     times = np.arange(0.0, trajectory.until, 0.05)
     return step - trajectory.at(times).contact_force
 
@@ -334,15 +347,15 @@ def test_the_trap_of_the_first_two_peaks_is_not_fallen_into():
     first = half_cycle_peaks(error, 0.01)[:5]
     assert first == PRECISE([4.00, 2.70, 2.94, 3.06, 3.24], abs=0.01)
     found = stability(error, 0.01)
-    assert found.verdict is Verdict.DIVERGES
+    assert found.verdict is StabilityVerdict.DIVERGES
     assert found.growth > 1.01
     early = stability(error[: np.flatnonzero(np.abs(error) >= 3.05)[-1]][:300], 0.01)
-    assert early.verdict in {Verdict.UNDECIDED, Verdict.DIVERGES}
+    assert early.verdict in {StabilityVerdict.UNDECIDED, StabilityVerdict.DIVERGES}
 
 
 @pytest.mark.parametrize(("gamma", "step", "verdict"), [
-    (0.2, 5.0, Verdict.SETTLES), (0.8, 6.0, Verdict.SETTLES), (1.5, 3.0, Verdict.SETTLES),
-    (1.5, 6.0, Verdict.DIVERGES), (2.4, 1.5, Verdict.DIVERGES),
+    (0.2, 5.0, StabilityVerdict.SETTLES), (0.8, 6.0, StabilityVerdict.SETTLES), (1.5, 3.0, StabilityVerdict.SETTLES),
+    (1.5, 6.0, StabilityVerdict.DIVERGES), (2.4, 1.5, StabilityVerdict.DIVERGES),
 ])  # fmt: skip
 def test_the_verdict_agrees_with_the_regimes(gamma, step, verdict):
     error = response(gamma, step) + draws(14, len(response(gamma, step)), 0.01)
@@ -353,14 +366,14 @@ def test_a_limit_cycle_is_neither_settled_nor_divergent():
     time = np.arange(0.0, 30.0, 0.01)
     error = (1.0 + 3.0 * np.exp(-time / 3.0)) * np.cos(5.0 * time) + draws(15, len(time), 0.01)
     found = stability(error, 0.1)
-    assert found.verdict is Verdict.CYCLES
+    assert found.verdict is StabilityVerdict.CYCLES
     assert found.growth == PRECISE(1.0, abs=0.02)
     assert found.confidence > 0.5
 
 
 def test_two_peaks_decide_nothing():
     time = np.arange(0.0, 1.6, 0.01)
-    assert stability(np.exp(-0.1 * time) * np.cos(5.0 * time), 0.01).verdict is Verdict.UNDECIDED
+    assert stability(np.exp(-0.1 * time) * np.cos(5.0 * time), 0.01).verdict is StabilityVerdict.UNDECIDED
 
 
 # power

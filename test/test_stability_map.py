@@ -13,7 +13,7 @@ import pytest
 from wam_theory.many_slips import modes, slip
 from wam_theory.regimes import gamma_3, point_b
 from wam_theory.stability_map import largest_stable_steps
-from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess, largest_stable_step
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, largest_stable_step
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from comparing import solve_ivp
@@ -29,15 +29,16 @@ def random_points(count: int, seed: int) -> np.ndarray:
     return np.array([gamma, zeta, 10.0 ** rng.uniform(-1.0, 1.0, count), stiction])
 
 
-def loop_of(gamma: float, zeta: float, ratio: float, stiction: float) -> tuple[FrictionNode, ForceLoop]:
+def loop_of(gamma: float, zeta: float, ratio: float, stiction: float) -> tuple[FrictionNode, IntegralLoop]:
     """A node with J = 2, k_c = 3, F_dynamic = 0.7, and the loop of these coordinates."""
     inertia, kc, friction = 2.0, 3.0, 0.7
     ktr = ratio * kc
     damping = 2.0 * zeta * math.sqrt(inertia * (ktr + kc))
     node = FrictionNode(inertia, damping, ktr, kc, friction, friction * stiction)
-    return node, ForceLoop(gamma * damping / inertia * (1.0 / ktr + 1.0 / kc))
+    return node, IntegralLoop(gamma * damping / inertia * (1.0 / ktr + 1.0 / kc))
 
 
+@pytest.mark.slow
 def test_boundaries_are_those_of_bisection_by_brute_force() -> None:
     points = random_points(60, 58)
     found = largest_stable_steps(*points)

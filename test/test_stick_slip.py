@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from wam_theory.stick_slip import (
-    ForceLoop,
     FrictionNode,
+    IntegralLoop,
     Kind,
     Motion,
     Trajectory,
@@ -49,7 +49,7 @@ class SmallSteps:
     """
 
     node: FrictionNode
-    loop: ForceLoop
+    loop: IntegralLoop
     force: float
     held: float | None = None  # speed of the motor from the last sample, None in a continuous loop
 
@@ -128,22 +128,28 @@ class SmallSteps:
 
 REST = (0.0, 0.0, 0.0)
 CASES = {
-    "coulomb": (unit_node(), ForceLoop(1.5), 4.0, REST),
-    "stiction": (unit_node(0.7, 1.2), ForceLoop(0.9), 3.0, REST),
-    "frictionless from speed": (unit_node(0.0), ForceLoop(0.6), -2.0, (0.3, -1.0, 0.1)),
-    "saturated, with deadband": (unit_node(1.0, 1.3), ForceLoop(2.6, 1.1, 0.05), 4.0, REST),
-    "hold": (unit_node(0.4, 0.5), ForceLoop(0.8, sample_period=0.35), 3.0, REST),
-    "hold, two samples late, limited": (unit_node(0.4), ForceLoop(0.5, 1.5, 0.1, 0.2, 2), 3.0, REST),
-    "overdamped": (FrictionNode(1.0, 9.0, 2.0, 2.0, 0.3, 0.5), ForceLoop(0.5, 1.0, 0.02), 2.0, (0.0, 1.0, 0.0)),
-    "overdamped hold": (FrictionNode(1.0, 9.0, 2.0, 2.0, 0.3, 0.5), ForceLoop(2.0, sample_period=1.0), 2.0, REST),
-    "critical hold": (FrictionNode(1.0, 4.0, 2.0, 2.0, 0.3, 0.3), ForceLoop(2.0, sample_period=0.5), 2.0, REST),
-    "impact": (FrictionNode(1.0, 0.3, 2.0, 5.0, 0.1, 0.15, True), ForceLoop(0.5), 1.0, (-1.0, 2.0, -1.0)),
-    "rattle": (FrictionNode(1.0, 0.3, 2.0, 5.0, 0.02, 0.03, True), ForceLoop(1.2, 2.0, 0.1), 0.6, REST),
-    "rattle, held": (FrictionNode(1.0, 0.3, 2.0, 5.0, 0.02, 0.03, True), ForceLoop(1.2, sample_period=0.1), 0.6, REST),
-    "triple root": (FrictionNode(1.0, math.sqrt(12.0), 2.0, 2.0, 0.2, 0.2), ForceLoop(12**0.5 / 9), 2.0, REST),
+    "coulomb": (unit_node(), IntegralLoop(1.5), 4.0, REST),
+    "stiction": (unit_node(0.7, 1.2), IntegralLoop(0.9), 3.0, REST),
+    "frictionless from speed": (unit_node(0.0), IntegralLoop(0.6), -2.0, (0.3, -1.0, 0.1)),
+    "saturated, with deadband": (unit_node(1.0, 1.3), IntegralLoop(2.6, 1.1, 0.05), 4.0, REST),
+    "hold": (unit_node(0.4, 0.5), IntegralLoop(0.8, sample_period=0.35), 3.0, REST),
+    "hold, two samples late, limited": (unit_node(0.4), IntegralLoop(0.5, 1.5, 0.1, 0.2, 2), 3.0, REST),
+    "overdamped": (FrictionNode(1.0, 9.0, 2.0, 2.0, 0.3, 0.5), IntegralLoop(0.5, 1.0, 0.02), 2.0, (0.0, 1.0, 0.0)),
+    "overdamped hold": (FrictionNode(1.0, 9.0, 2.0, 2.0, 0.3, 0.5), IntegralLoop(2.0, sample_period=1.0), 2.0, REST),
+    "critical hold": (FrictionNode(1.0, 4.0, 2.0, 2.0, 0.3, 0.3), IntegralLoop(2.0, sample_period=0.5), 2.0, REST),
+    "impact": (FrictionNode(1.0, 0.3, 2.0, 5.0, 0.1, 0.15, True), IntegralLoop(0.5), 1.0, (-1.0, 2.0, -1.0)),
+    "rattle": (FrictionNode(1.0, 0.3, 2.0, 5.0, 0.02, 0.03, True), IntegralLoop(1.2, 2.0, 0.1), 0.6, REST),
+    "rattle, held": (
+        FrictionNode(1.0, 0.3, 2.0, 5.0, 0.02, 0.03, True),
+        IntegralLoop(1.2, sample_period=0.1),
+        0.6,
+        REST,
+    ),
+    "triple root": (FrictionNode(1.0, math.sqrt(12.0), 2.0, 2.0, 0.2, 0.2), IntegralLoop(12**0.5 / 9), 2.0, REST),
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_exact_motion_is_that_of_small_steps(name: str) -> None:
     node, loop, force, start = CASES[name]
@@ -162,7 +168,7 @@ def test_cases_reach_every_kind_of_event() -> None:
 
 
 # ---------------------------------------------------------------------------------------- properties
-def random_cases(count: int) -> list[tuple[FrictionNode, ForceLoop, float]]:
+def random_cases(count: int) -> list[tuple[FrictionNode, IntegralLoop, float]]:
     rng = np.random.default_rng(3)
     cases = []
     for _ in range(count):
@@ -176,7 +182,7 @@ def random_cases(count: int) -> list[tuple[FrictionNode, ForceLoop, float]]:
         deadband = rng.choice([0.0, 0.05])
         period = rng.choice([0.0, 0.0, 0.3])
         node = FrictionNode(inertia, damping, ktr, kc, dynamic, static, bool(rng.integers(2)))
-        loop = ForceLoop(gain, limit, deadband, period, int(rng.integers(3)) if period else 0)
+        loop = IntegralLoop(gain, limit, deadband, period, int(rng.integers(3)) if period else 0)
         cases.append((node, loop, rng.uniform(0.2, 6.0)))
     return cases
 
@@ -263,21 +269,22 @@ def test_frictionless_response_is_the_matrix_exponential() -> None:
     times = np.linspace(0.0, 30.0, 61)
     modes = np.linalg.solve(vectors, -rest)
     expected = [(rest + vectors @ (np.exp(values * t) * modes)).real for t in times]
-    motion = simulate(unit_node(0.0), ForceLoop(0.8), 3.0, 30.0).at(times)
+    motion = simulate(unit_node(0.0), IntegralLoop(0.8), 3.0, 30.0).at(times)
     np.testing.assert_allclose(np.transpose([motion.x, motion.v, motion.x_m]), expected, atol=1e-12)
 
 
 # --------------------------------------------------------------------------- the errata's numbers
 def test_first_peaks_shrink_and_the_response_still_diverges() -> None:
-    trajectory = simulate(unit_node(), ForceLoop(1.5), 4.0, 400.0)
+    trajectory = simulate(unit_node(), IntegralLoop(1.5), 4.0, 400.0)
     assert peaks(trajectory, 4.0)[:5] == pytest.approx([4.00, 2.70, 2.94, 3.06, 3.24], abs=0.006)
     assert max(peaks(trajectory, 4.0)) > 1e4
-    assert assess(unit_node(), ForceLoop(1.5), 4.0).verdict is Verdict.DIVERGED
+    assert assess(unit_node(), IntegralLoop(1.5), 4.0).verdict is Verdict.DIVERGED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gamma", "largest"), [(1.1, 25.3), (1.5, 3.45), (2.0, 1.17)])
 def test_largest_stable_step_of_domain_two(gamma: float, largest: float) -> None:
-    node, loop = unit_node(), ForceLoop(gamma)
+    node, loop = unit_node(), IntegralLoop(gamma)
     found = largest_stable_step(node, loop)
     assert found == pytest.approx(largest, rel=0.005)
     # small steps alone, just on either side: what is left of the error at the end of a long run
@@ -290,10 +297,10 @@ def test_largest_stable_step_of_domain_two(gamma: float, largest: float) -> None
 
 def test_domain_one_takes_every_step_and_domain_three_none() -> None:
     for step in (1e-2, 1.0, 30.0, 1e3):
-        assert assess(unit_node(), ForceLoop(0.97), step).verdict is Verdict.SETTLED
-        assert assess(unit_node(), ForceLoop(2.20), step).verdict is Verdict.DIVERGED
-    assert largest_stable_step(unit_node(), ForceLoop(0.97)) == math.inf
-    assert largest_stable_step(unit_node(), ForceLoop(2.20)) == 0.0
+        assert assess(unit_node(), IntegralLoop(0.97), step).verdict is Verdict.SETTLED
+        assert assess(unit_node(), IntegralLoop(2.20), step).verdict is Verdict.DIVERGED
+    assert largest_stable_step(unit_node(), IntegralLoop(0.97)) == math.inf
+    assert largest_stable_step(unit_node(), IntegralLoop(2.20)) == 0.0
 
 
 def test_early_verdicts_are_those_of_long_runs() -> None:
@@ -304,7 +311,7 @@ def test_early_verdicts_are_those_of_long_runs() -> None:
         zeta = 10.0 ** rng.uniform(-1.3, 0.2)
         static = rng.choice([1.0, 1.0, 1.4])
         damping = 4.0 * zeta
-        node, loop = FrictionNode(1.0, damping, 2.0, 2.0, 1.0, static), ForceLoop(gamma * damping)
+        node, loop = FrictionNode(1.0, damping, 2.0, 2.0, 1.0, static), IntegralLoop(gamma * damping)
         outcome = assess(node, loop, step)
         long = simulate(node, loop, step, 1e300, max_events=800)
         late = peaks(long, step)[-2:]
@@ -322,22 +329,22 @@ def test_early_verdicts_are_those_of_long_runs() -> None:
 
 
 def test_a_response_that_outgrows_friction_is_given_up_early() -> None:
-    early = assess(unit_node(), ForceLoop(1.5), 40.0)
+    early = assess(unit_node(), IntegralLoop(1.5), 40.0)
     assert early.verdict is Verdict.DIVERGED
     assert early.events < 10
 
 
 def test_routh_limit_without_friction() -> None:
-    assert assess(unit_node(0.0), ForceLoop(0.99), 1.0).verdict is Verdict.SETTLED
-    assert assess(unit_node(0.0), ForceLoop(1.01), 1.0).verdict is Verdict.DIVERGED
+    assert assess(unit_node(0.0), IntegralLoop(0.99), 1.0).verdict is Verdict.SETTLED
+    assert assess(unit_node(0.0), IntegralLoop(1.01), 1.0).verdict is Verdict.DIVERGED
 
 
 def test_slip_slower_than_gamma_a_never_ends() -> None:
-    slow = simulate(unit_node(), ForceLoop(0.30), 4.0, 1e4)
+    slow = simulate(unit_node(), IntegralLoop(0.30), 4.0, 1e4)
     assert slow.ended
     assert [event.kind for event in slow.events] == [Kind.START, Kind.SLIP]
     assert slow.at([1e4]).contact_force[0] == pytest.approx(4.0, abs=1e-12)
-    fast = simulate(unit_node(), ForceLoop(0.33), 4.0, 1e4)
+    fast = simulate(unit_node(), IntegralLoop(0.33), 4.0, 1e4)
     assert Kind.STICK in [event.kind for event in fast.events]
 
 
@@ -346,7 +353,7 @@ def test_slip_slower_than_gamma_a_never_ends() -> None:
 def test_slow_loop_has_the_stiction_cycle_of_5_8_and_5_9(damping: float, overshoot: float) -> None:
     # k_tr = k_c = 2, dF = 0.3, F_s = 1.3: jump of F_c = overshoot * 0.15, period by hand
     gain = 5e-4
-    outcome = assess(FrictionNode(1.0, damping, 2.0, 2.0, 1.0, 1.3), ForceLoop(gain), 0.5, REST, 1e-6)
+    outcome = assess(FrictionNode(1.0, damping, 2.0, 2.0, 1.0, 1.3), IntegralLoop(gain), 0.5, REST, 1e-6)
     assert outcome.verdict is Verdict.LIMIT_CYCLE
     assert outcome.peak_to_peak == pytest.approx(overshoot * 0.15, rel=1e-3)
     assert outcome.period == pytest.approx(4.0 / (gain * 2.0) * 2.0 * (2.6 / (overshoot * 0.3) - 1.0), rel=2e-3)
@@ -355,7 +362,7 @@ def test_slow_loop_has_the_stiction_cycle_of_5_8_and_5_9(damping: float, oversho
 def test_exact_cycle_comes_nearer_to_the_formula_as_the_loop_slows() -> None:
     jump = (1.0 + math.exp(-math.pi * 0.25 / math.sqrt(1.0 - 0.0625))) * 0.15
     off = [
-        abs(assess(unit_node(1.0, 1.3), ForceLoop(gain), 0.5, REST, 1e-7).peak_to_peak / jump - 1.0)
+        abs(assess(unit_node(1.0, 1.3), IntegralLoop(gain), 0.5, REST, 1e-7).peak_to_peak / jump - 1.0)
         for gain in (1e-1, 1e-2, 2e-3)
     ]
     assert off[0] > 5.0 * off[1] > 15.0 * off[2]
@@ -364,7 +371,7 @@ def test_exact_cycle_comes_nearer_to_the_formula_as_the_loop_slows() -> None:
 def test_inertialess_staircase_is_the_limit_of_the_exact_response() -> None:
     node = unit_node(1.0, 1.3)
     stairs = inertialess_staircase(node, 1e-5, 0.5, 12)
-    kept = [e for e in simulate(node, ForceLoop(1e-5), 0.5, 1e8).events if e.kind is Kind.STICK][:12]
+    kept = [e for e in simulate(node, IntegralLoop(1e-5), 0.5, 1e8).events if e.kind is Kind.STICK][:12]
     np.testing.assert_allclose(stairs.times[:6], [e.time for e in kept[:6]], rtol=2e-3)
     np.testing.assert_allclose(stairs.contact_forces, [e.contact_force for e in kept], atol=1e-4)
     # its cycle: up and down by one jump, and the times of (5.3) from one to the next
@@ -379,21 +386,21 @@ def test_inertialess_staircase_is_the_limit_of_the_exact_response() -> None:
 def test_deadband_of_half_the_stiction_cycle_ends_it_from_every_step_and_a_smaller_one_does_not() -> None:
     node = unit_node(1.0, 1.3)
     steps = [0.5 + 0.02 * n for n in range(12)]
-    half = assess(node, ForceLoop(0.02), 0.5).peak_to_peak / 2.0
+    half = assess(node, IntegralLoop(0.02), 0.5).peak_to_peak / 2.0
     for share, cycles in ((0.0, True), (0.5, True), (1.05, False)):
-        verdicts = {assess(node, ForceLoop(0.02, deadband=share * half), step).verdict for step in steps}
+        verdicts = {assess(node, IntegralLoop(0.02, deadband=share * half), step).verdict for step in steps}
         assert (Verdict.LIMIT_CYCLE in verdicts) is cycles
         assert verdicts <= {Verdict.LIMIT_CYCLE, Verdict.SETTLED}
 
 
 def test_saturation_lets_a_destabilising_step_survive() -> None:
     for step in (4.0, 40.0):
-        assert assess(unit_node(), ForceLoop(1.5), step).verdict is Verdict.DIVERGED
-        assert assess(unit_node(), ForceLoop(1.5, error_limit=1.0), step).verdict is Verdict.SETTLED
+        assert assess(unit_node(), IntegralLoop(1.5), step).verdict is Verdict.DIVERGED
+        assert assess(unit_node(), IntegralLoop(1.5, error_limit=1.0), step).verdict is Verdict.SETTLED
 
 
 def test_peak_and_period_of_the_cycle_are_those_of_the_sampled_motion() -> None:
-    node, loop = unit_node(1.0, 1.3), ForceLoop(1.5)
+    node, loop = unit_node(1.0, 1.3), IntegralLoop(1.5)
     outcome = assess(node, loop, 3.0)
     late = outcome.time + np.linspace(0.0, outcome.period, 20001)
     force = simulate(node, loop, 3.0, late[-1] + 1.0).at(late).contact_force
@@ -437,28 +444,28 @@ def test_sampled_loop_without_friction_diverges_beyond_its_linear_limit(delay: i
     margin = TESTBED_MARGIN[delay]
     assert growth_at_50_hz(0.999 * margin, delay) < 1.0 < growth_at_50_hz(1.001 * margin, delay)
     for factor, verdict in ((0.98, Verdict.SETTLED), (1.02, Verdict.DIVERGED)):
-        assert assess(testbed(0.0), ForceLoop(factor * margin, math.inf, 0.0, 0.02, delay), 36.0).verdict is verdict
+        assert assess(testbed(0.0), IntegralLoop(factor * margin, math.inf, 0.0, 0.02, delay), 36.0).verdict is verdict
 
 
 def test_friction_raises_the_gain_that_takes_small_steps_about_3_2_times() -> None:
     def verdict(factor: float) -> Verdict:
-        return assess(testbed(8.4), ForceLoop(factor * TESTBED_MARGIN[0], sample_period=0.02), 4.0).verdict
+        return assess(testbed(8.4), IntegralLoop(factor * TESTBED_MARGIN[0], sample_period=0.02), 4.0).verdict
 
     assert verdict(3.1) is Verdict.SETTLED
     assert verdict(3.6) is Verdict.DIVERGED
 
 
 def test_friction_at_one_and_a_half_times_the_margin_takes_small_steps_and_not_8_2_lb() -> None:
-    loop = ForceLoop(1.5 * TESTBED_MARGIN[0], sample_period=0.02)
+    loop = IntegralLoop(1.5 * TESTBED_MARGIN[0], sample_period=0.02)
     assert assess(testbed(8.4), loop, 8.0 * 36.0).verdict is Verdict.SETTLED
     assert assess(testbed(8.4), loop, 8.2 * 36.0).verdict is Verdict.DIVERGED
 
 
 def test_one_sample_more_reverses_what_friction_does() -> None:
-    late = ForceLoop(0.9 * TESTBED_MARGIN[1], sample_period=0.02, delay_samples=1)
+    late = IntegralLoop(0.9 * TESTBED_MARGIN[1], sample_period=0.02, delay_samples=1)
     assert assess(testbed(0.0), late, 4.0).verdict is Verdict.SETTLED
     assert assess(testbed(8.4), late, 4.0).verdict is Verdict.LIMIT_CYCLE
-    prompt = ForceLoop(1.5 * TESTBED_MARGIN[0], sample_period=0.02)
+    prompt = IntegralLoop(1.5 * TESTBED_MARGIN[0], sample_period=0.02)
     assert assess(testbed(0.0), prompt, 4.0).verdict is Verdict.DIVERGED
     assert assess(testbed(8.4), prompt, 4.0).verdict is Verdict.SETTLED
 
@@ -472,17 +479,17 @@ def test_one_sample_more_reverses_what_friction_does() -> None:
         (lambda: FrictionNode(1, 1, math.nan, 1, 1, 1), "transmission_stiffness is nan"),
         (lambda: FrictionNode(1, 1, 1, math.inf, 1, 1), "contact_stiffness is inf"),
         (lambda: FrictionNode(1, 1, 1, 1, 1, 0.9), "static_friction is 0.9"),
-        (lambda: ForceLoop(0.0), "gain is 0"),
-        (lambda: ForceLoop(1.0, 0.5, 0.5), "error_limit is 0.5"),
-        (lambda: ForceLoop(1.0, deadband=-0.1), "deadband is -0.1"),
-        (lambda: ForceLoop(1.0, delay_samples=1), "without a sample_period"),
-        (lambda: ForceLoop(1.0, sample_period=0.1, delay_samples=-1), "delay_samples is -1"),
-        (lambda: simulate(unit_node(), ForceLoop(1.0), math.nan, 1.0), "force is nan"),
-        (lambda: simulate(unit_node(), ForceLoop(1.0), 1.0, 0.0), "until is 0"),
-        (lambda: simulate(unit_node(), ForceLoop(1.0), 1.0, 1.0, (0.0, math.nan, 0.0)), "start is"),
-        (lambda: simulate(unit_node(), ForceLoop(1.0), 1.0, 1.0).at([2.0]), "times go from 2"),
-        (lambda: inertialess_staircase(unit_node(), 1.0, 1.0, 5), "nothing jumps"),
-        (lambda: largest_stable_step(unit_node(0.0), ForceLoop(1.0)), "static_friction is 0"),
+        (lambda: IntegralLoop(0.0), "gain is 0"),
+        (lambda: IntegralLoop(1.0, 0.5, 0.5), "error_limit is 0.5"),
+        (lambda: IntegralLoop(1.0, deadband=-0.1), "deadband is -0.1"),
+        (lambda: IntegralLoop(1.0, delay_samples=1), "without a sample_period"),
+        (lambda: IntegralLoop(1.0, sample_period=0.1, delay_samples=-1), "delay_samples is -1"),
+        (lambda: simulate(unit_node(), IntegralLoop(1.0), math.nan, 1.0), "force is nan"),
+        (lambda: simulate(unit_node(), IntegralLoop(1.0), 1.0, 0.0), "until is 0"),
+        (lambda: simulate(unit_node(), IntegralLoop(1.0), 1.0, 1.0, (0.0, math.nan, 0.0)), "start is"),
+        (lambda: simulate(unit_node(), IntegralLoop(1.0), 1.0, 1.0).at([2.0]), "times go from 2"),
+        (lambda: inertialess_staircase(unit_node(), 1.0, 1.0, 5), "no jumps"),
+        (lambda: largest_stable_step(unit_node(0.0), IntegralLoop(1.0)), "static_friction is 0"),
     ],
 )
 def test_a_refusal_names_the_value(build: object, names: str) -> None:

@@ -8,7 +8,7 @@ import yaml
 from rclpy.parameter import Parameter
 from test_lockstep import differences, play_directly, record_composed
 
-from wam_analysis.bag import JointColumns, read
+from wam_bag.bag import JointColumns, read
 from wam_description.configuration import Configuration, packaged
 from wam_ros.bring_up import Composition
 
@@ -66,25 +66,30 @@ def test_the_teflon_rod_is_pressed_on_while_the_testbed_runs(tmp_path: Path, dom
         node = composition.nodes["driver"]
         plant = node.driver.plant  # type: ignore[attr-defined]
         (before,) = plant.model.dof_frictionloss[1:]
-        (answer,) = node.set_parameters([Parameter("effects.rubbing_friction", value=[0.7])])
+        (answer,) = node.set_parameters([Parameter("effects.added_coulomb_friction", value=[0.7])])
         assert answer.successful
         stamp = node.driver.stamp  # type: ignore[attr-defined]
         composition.spin(lambda: node.driver.stamp > stamp + 5_000_000)  # type: ignore[attr-defined]
         assert plant.model.dof_frictionloss[1] == pytest.approx(before + 0.7)
-        (answer,) = node.set_parameters([Parameter("effects.rubbing_friction", value=[0.7, 0.7])])
+        (answer,) = node.set_parameters([Parameter("effects.added_coulomb_friction", value=[0.7, 0.7])])
         assert not answer.successful
-        assert "rubbing_friction' has 2 values" in answer.reason
-        (answer,) = node.set_parameters([Parameter("effects.rubbing_friction", value=[-0.1])])
+        assert "added_coulomb_friction' has 2 values" in answer.reason
+        (answer,) = node.set_parameters([Parameter("effects.added_coulomb_friction", value=[-0.1])])
         assert not answer.successful
 
 
 def test_settings_and_chirps_are_the_same_over_topics_and_without_ros(tmp_path: Path, domain_id: int) -> None:
     force = {"frame": "link", "newtons": [0.0, -20.0, 0.0]}
-    set_up = {"driver": {"effects.rubbing_friction": [0.7]}, "force_loop": {"force_gain": [0.009]}}
+    set_up = {"driver": {"effects.added_coulomb_friction": [0.7]}, "force_loop": {"force_gain": [0.009]}}
     steps = [
         {"name": "press", "seconds": 0.3, "request": "enable", "force": force, "set": set_up},
         {"name": "sweep", "seconds": 0.4, "force": force, "chirp": {"newtons": 6.0, "from": 2.0, "to": 20.0}},
-        {"name": "no rod", "seconds": 0.3, "force": force, "set": {"driver": {"effects.rubbing_friction": [0.0]}}},
+        {
+            "name": "no rod",
+            "seconds": 0.3,
+            "force": force,
+            "set": {"driver": {"effects.added_coulomb_friction": [0.0]}},
+        },
     ]
     configured = configured_testbed(tmp_path, "scenario", "recorder")
     (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": steps}))
@@ -101,7 +106,7 @@ def test_settings_and_chirps_are_the_same_over_topics_and_without_ros(tmp_path: 
 
 def test_a_setting_that_is_refused_ends_the_scenario_with_the_reason(tmp_path: Path, domain_id: int) -> None:
     configured = configured_testbed(tmp_path, "scenario")
-    body = {"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.rubbing_friction": [-1.0]}}}
+    body = {"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [-1.0]}}}
     (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": [body]}))
     with Composition(configured, domain_id=domain_id) as composition:
         scenario = composition.nodes["scenario"]

@@ -1,13 +1,12 @@
 """The inner loop on a rotor that is integrated here, against the closed form of its equation."""
 
 import cmath
-from dataclasses import replace
 
 import pytest
 
 from wam_control.dither import DitherParameters
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
-from wam_description.arm import Motors
+from wam_description.arm import Motors, Servo
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 
@@ -15,7 +14,8 @@ INERTIA, CONSTANT, PEAK = 4.0e-5, 0.25, 4.0
 KP, KI = 0.015, 0.8
 ONE = Motors(("motor1",), (INERTIA,), (CONSTANT,), (PEAK,), (1.0,), (0.0,), (0.0,), (0.0,))
 STILL = DitherParameters(0.0, (0.0,))
-GAINS = VelocityLoopParameters(STILL, (KP,), (KI,), 0.1)
+SERVO = Servo((KP,), (KI,))
+OWN = VelocityLoopParameters(STILL, 0.1)
 DT = 1e-3
 
 
@@ -23,7 +23,7 @@ class Rotor:
     """Inertia under the torque of a motor and a constant load; the loop closed around it."""
 
     def __init__(self, load: float = 0.0, dt: float = DT, law: "VelocityLoop | Naive | None" = None) -> None:
-        self.loop = law or VelocityLoop(ONE, GAINS)
+        self.loop = law or VelocityLoop(ONE, SERVO, OWN)
         self.load, self.dt = load, dt
         self.speed = self.torque = 0.0
         self.blocked = False
@@ -82,7 +82,7 @@ def test_feedforward_that_equals_the_load_keeps_the_rotor_at_rest() -> None:
 
 def test_a_blocked_motor_does_not_wind_up_and_recovers_at_once() -> None:
     speeds = []
-    for law in (VelocityLoop(ONE, GAINS), Naive()):
+    for law in (VelocityLoop(ONE, SERVO, OWN), Naive()):
         rotor = Rotor(law=law)
         rotor.blocked = True
         for _ in range(500):
@@ -101,7 +101,7 @@ def test_a_blocked_motor_does_not_wind_up_and_recovers_at_once() -> None:
 
 def test_a_motor_that_creeps_into_its_limit_leaves_it_when_the_error_turns() -> None:
     torques = []
-    for law in (VelocityLoop(ONE, GAINS), Naive()):
+    for law in (VelocityLoop(ONE, SERVO, OWN), Naive()):
         rotor = Rotor(law=law)
         rotor.blocked = True
         for _ in range(500):
@@ -114,11 +114,11 @@ def test_a_motor_that_creeps_into_its_limit_leaves_it_when_the_error_turns() -> 
     assert without == [PEAK] * 20
 
 
-def test_what_the_brakes_swallowed_does_not_come_out_when_they_open() -> None:
-    braked, flowing = VelocityLoop(ONE, GAINS), VelocityLoop(ONE, GAINS)
+def test_torque_commanded_against_the_brakes_is_forgotten_when_they_release() -> None:
+    braked, flowing = VelocityLoop(ONE, SERVO, OWN), VelocityLoop(ONE, SERVO, OWN)
     torque = 0.0
     for _ in range(1000):
-        braked.step([0.0], [0.0], [2.0], 0.0, [0.1], DT)  # asked for, but nothing flows
+        braked.step([0.0], [0.0], [2.0], 0.0, [0.1], DT)  # commanded, but no current flows
         torque = CONSTANT * flowing.step([0.0], [torque], [2.0], 0.0, [0.1], DT)[0]
     (current,) = braked.step([0.0], [0.0], [2.0], 0.0, [0.1], DT)
     assert current * CONSTANT == pytest.approx(KP * 2.0 + KI * 2.0 * DT + 0.1)
@@ -138,11 +138,11 @@ def test_an_empty_command_is_torque_only_and_forgets_the_integral() -> None:
 
 
 @pytest.mark.parametrize("command", [[30.0], []])
-def test_an_old_command_counts_as_standing_still(command: list[float]) -> None:
+def test_a_stale_command_counts_as_zero_velocity(command: list[float]) -> None:
     answers = []
-    for asked, age in ((command, 0.11), ([0.0], 0.0), (command, 0.1)):
-        loop = VelocityLoop(ONE, GAINS)
-        answers.append([loop.step([speed], [0.1], asked, age, [0.1], DT) for speed in (0.0, 3.0, 5.0)])
+    for commanded, age in ((command, 0.11), ([0.0], 0.0), (command, 0.1)):
+        loop = VelocityLoop(ONE, SERVO, OWN)
+        answers.append([loop.step([speed], [0.1], commanded, age, [0.1], DT) for speed in (0.0, 3.0, 5.0)])
     old, still, young = answers
     assert old == still
     assert young != still
@@ -150,7 +150,7 @@ def test_an_old_command_counts_as_standing_still(command: list[float]) -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_current_is_clipped_to_the_peak(sign: float) -> None:
-    loop = VelocityLoop(ONE, GAINS)
+    loop = VelocityLoop(ONE, SERVO, OWN)
     assert loop.step([0.0], [0.0], [], 0.0, [sign * 100.0], DT) == [sign * PEAK / CONSTANT]
     assert loop.step([0.0], [0.0], [sign * 1e6], 0.0, [0.0], DT) == [sign * PEAK / CONSTANT]
 
@@ -158,7 +158,7 @@ def test_current_is_clipped_to_the_peak(sign: float) -> None:
 def test_motors_do_not_mix() -> None:
     motors = Configuration.load(packaged("wam")).shared.arm.motors
     kp, ki = (0.01, 0.02, 0.03, 0.04), (0.1, 0.2, 0.3, 0.4)
-    loop = VelocityLoop(motors, VelocityLoopParameters(STILL, kp, ki, 0.1))
+    loop = VelocityLoop(motors, Servo(kp, ki), OWN)
     command, speed, feed = [1.0, 2.0, 3.0, 4.0], [0.5, -0.5, 0.0, 8.0], [0.1, 0.0, -0.1, 0.2]
     currents = loop.step(speed, [0.0] * 4, command, 0.0, feed, DT)
     expected = [
@@ -176,7 +176,7 @@ def test_gains_change_without_a_jump_of_the_integral() -> None:
     rotor.step([0.0])
     before = rotor.step([0.0])
     assert before == pytest.approx(0.8)
-    rotor.loop.tune(replace(GAINS, proportional_gain=(0.1,), integral_gain=(8.0,)))  # type: ignore[union-attr]
+    rotor.loop.tune(Servo((0.1,), (8.0,)), OWN)  # type: ignore[union-attr]
     assert rotor.step([0.0]) == before
     assert rotor.step([1.0]) == pytest.approx(before + 0.1 + 8.0 * DT)
 
@@ -184,18 +184,18 @@ def test_gains_change_without_a_jump_of_the_integral() -> None:
 @pytest.mark.parametrize(
     ("proportional", "integral", "text"),
     [
-        ((0.01,), (0.1, 0.1), "proportional_gain has 1 values, integral_gain 2; give one of each per motor"),
-        ((0.01, 0.01), (0.1, 0.1), "proportional_gain has 2 values; the arm has 1 motors"),
+        ((0.01,), (0.1, 0.1), "'servo.integral_gain' has 2 values; 1 names need 1"),
+        ((0.01, 0.01), (0.1, 0.1), "'servo.proportional_gain' has 2 values; 1 names need 1"),
     ],
 )
 def test_gains_of_a_wrong_number_are_refused(
     proportional: tuple[float, ...], integral: tuple[float, ...], text: str
 ) -> None:
     with pytest.raises(ParameterError, match=text):
-        VelocityLoop(ONE, VelocityLoopParameters(STILL, proportional, integral, 0.1))
-    loop = VelocityLoop(ONE, GAINS)
+        VelocityLoop(ONE, Servo(proportional, integral), OWN)
+    loop = VelocityLoop(ONE, SERVO, OWN)
     with pytest.raises(ParameterError, match=text):
-        loop.tune(VelocityLoopParameters(STILL, proportional, integral, 0.1))
-    assert loop.step([0.0], [0.0], [1.0], 0.0, [0.0], DT) == VelocityLoop(ONE, GAINS).step(
+        loop.tune(Servo(proportional, integral), OWN)
+    assert loop.step([0.0], [0.0], [1.0], 0.0, [0.0], DT) == VelocityLoop(ONE, SERVO, OWN).step(
         [0.0], [0.0], [1.0], 0.0, [0.0], DT
     ), "the gains in use stay"

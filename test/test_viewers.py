@@ -10,18 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import LONG
 from rosbags.rosbag2 import StoragePlugin, Writer
 from test_bag import STORE, joint_state, wrench
 
-from wam_analysis.bag import Bag, JointColumns, read
-from wam_analysis.findings.recording import recording_of
+from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.rerun_view import NoViewerError, _arrows, _quaternion, _turn, load_rerun, view, viewer
+from wam_bag.bag import Bag, JointColumns, read
+from wam_cli.main import main
 from wam_description.configuration import Configuration, packaged
 from wam_description.mjcf import rotation_xyz
 from wam_description.rigid_body import RigidBody
+from wam_description.topics import BY_NAME
 from wam_description.urdf import urdf
-from wam_ros.cli import main
-from wam_ros.topics import BY_NAME
 
 ROOT = Path(__file__).resolve().parents[1]
 LAYOUT: dict[str, Any] = json.loads((ROOT / "docs" / "foxglove.json").read_text(encoding="utf-8"))
@@ -37,13 +38,13 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("view") / "bag"
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         joints = writer.add_connection("/wam/joint_states", "sensor_msgs/msg/JointState", typestore=STORE)
-        felt = writer.add_connection("/wam/contact/wrench", "geometry_msgs/msg/WrenchStamped", typestore=STORE)
+        estimated = writer.add_connection("/wam/contact/wrench", "geometry_msgs/msg/WrenchStamped", typestore=STORE)
         for i, q in enumerate(MOTION.tolist()):
             stamp = (i + 1) * 5_000_000
             names = [f"joint{n}" for n in range(1, 5)]
             writer.write(joints, stamp, joint_state(stamp, names, q, [0.0] * 4, []))
             frame, force = ("outer_link", 7.0) if i >= 100 else ("base", 0.0)
-            writer.write(felt, stamp, wrench(stamp, frame, 0.0, force, 0.0, 0.0, 0.0, 0.0))
+            writer.write(estimated, stamp, wrench(stamp, frame, 0.0, force, 0.0, 0.0, 0.0, 0.0))
     return path
 
 
@@ -81,14 +82,14 @@ def rerun() -> Any:
 def rerun_says(*arguments: str) -> str:
     """What Rerun's own program says of a file."""
     command = [sys.executable, "-m", "rerun", "rrd", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONG, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def test_rerun_reads_the_arm_its_plots_and_nothing_broken(bag: Path, rerun: Any, tmp_path: Path) -> None:
     file = tmp_path / "view.rrd"
-    assert view(recording_of(read(bag)), file).startswith("100 poses of the arm")  # 100 Hz of 200
+    assert view(analysed_run(read(bag)), file).startswith("100 poses of the arm")  # 100 Hz of 200
     rerun_says("verify", str(file))
     said = rerun_says("stats", str(file))
     for path in (
@@ -102,7 +103,7 @@ def test_rerun_reads_the_arm_its_plots_and_nothing_broken(bag: Path, rerun: Any,
 
 
 def test_a_bag_without_joints_is_refused(bag: Path, rerun: Any, tmp_path: Path) -> None:
-    recording = recording_of(Bag(bag, {}, {}, {}, {}))
+    recording = analysed_run(Bag(bag, {}, {}, {}, {}))
     with pytest.raises(ValueError, match="no joint states"):
         view(recording, tmp_path / "view.rrd")
 
@@ -125,15 +126,15 @@ def test_turns_are_those_of_the_models() -> None:
 
 
 def test_arrows_stand_where_the_link_is_touched_and_nowhere_else(bag: Path) -> None:
-    felt = recording_of(read(bag)).summary.traces.felt
-    place = felt._replace(place=np.where(felt.acts, 0.25, np.nan))
-    rows = np.arange(len(place.frame))
-    origins, vectors = _arrows(place, rows, "outer_link")
+    estimated = analysed_run(read(bag)).summary.traces.estimated
+    position = estimated._replace(position=np.where(estimated.acts, 0.25, np.nan))
+    rows = np.arange(len(position.frame))
+    origins, vectors = _arrows(position, rows, "outer_link")
     assert np.all(vectors[:100] == 0.0)
     assert np.all(origins[100:, 0] == 0.25)
     assert np.ptp(vectors[100:, 1]) == 0.0
     assert vectors[150, 1] > 0.0
-    assert not np.any(_arrows(place, rows, "inner_link")[1])
+    assert not np.any(_arrows(position, rows, "inner_link")[1])
 
 
 # Foxglove

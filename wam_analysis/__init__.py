@@ -1,1 +1,14 @@
-"""From recordings to numbers and pictures, and runs without ROS."""
+"""From recordings to measures, findings, reports and pictures; nothing here runs the arm.
+
+recorded        the arm and its controllers, built from the parameters in a bag
+measures        step responses, limit cycles, friction ...: functions of arrays
+findings        the analysis behind `wam analyse`: sections of sentences and numbers, as text, HTML and JSON
+demo_traces     forces and contacts of a run on one time base
+demo_summary    the demonstration in numbers
+demo_report     its report, as text
+demo_figure     its picture
+arm_picture     the arm and its obstacles from the side
+arm_render      the process that renders it with MuJoCo
+rerun_view      a bag for the Rerun viewer
+table           tables of text, for a terminal and for Markdown
+"""

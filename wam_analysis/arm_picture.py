@@ -1,4 +1,4 @@
-"""The arm among its obstacles seen from the side: rendered by MuJoCo, or drawn where OpenGL does not work.
+"""The arm and its obstacles from the side: rendered by MuJoCo, or drawn if OpenGL does not work.
 
 Both are orthographic, in metres of the picture plane, so that arrows and labels fit both.
 """
@@ -32,12 +32,12 @@ Array = NDArray[np.float64]
 GL = ("egl", "osmesa")
 RENDER_TIMEOUT = 30.0  # s
 PIXELS_PER_METRE = 1500
-PEDESTAL = 0.07  # m, radius; the base is not in the parameters, it is drawn to stand on something
+PEDESTAL = 0.07  # m, radius; of the drawn base, which is not in the parameters
 TUBE_COLOURS = ("#5d6670", "#87919c")
 BLOCK_COLOUR = "#ecca88"
 PEDESTAL_COLOUR = "#c9ced4"
 OUTLINE = "#3b4148"
-LIGHT = np.array([-0.35, -0.55, 0.76])  # from where it shines, base frame
+LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame
 
 
 class Tube(NamedTuple):
@@ -50,7 +50,7 @@ class Tube(NamedTuple):
 
 
 class Face(NamedTuple):
-    """A flat face: corners (k, 3) in m and outward normal (3,), base frame, and of which shape it is a part."""
+    """A flat face: corners (k, 3) in m and outward normal (3,), base frame, and its shape."""
 
     corners: Array
     normal: Array
@@ -62,9 +62,9 @@ class View(NamedTuple):
 
     Attributes
     ----------
-    azimuth, elevation : direction in which the camera looks; elevation below zero looks down.
-    centre : (3,), point of the base frame in the middle of the picture.
-    width, height : of the part of the plane that is seen.
+    azimuth, elevation : viewing direction; a negative elevation looks down.
+    centre : (3,), centre of the picture, base frame.
+    width, height : of the picture.
     """
 
     azimuth: float
@@ -104,13 +104,13 @@ def tubes(arm: Arm, q: Sequence[float]) -> list[Tube]:
 
 
 def contact_on_surface(arm: Arm, q: Sequence[float], contact: Contact) -> tuple[Array, Array]:
-    """Where a contact presses on the surface of its cover and its force, base frame, m and N.
+    """Point of a contact on the surface of its cover, and its force, base frame, m and N.
 
     Parameters
     ----------
     arm : the arm.
     q : joint angles, rad.
-    contact : force of the world on a cover, N, and its place, m.
+    contact : force of the world on a cover, N, and its position, m.
     """
     covers = arm.covers
     i = covers.names.index(contact.cover)
@@ -168,25 +168,25 @@ def side_view(arm: Arm, q: Sequence[float], obstacles: Obstacles, aspect: float,
 
 
 def floor_height(obstacles: Obstacles) -> float:
-    """Height of the floor on which the lowest obstacle stands, m."""
+    """Height of the floor, at the bottom of the lowest obstacle, m."""
     return min([float(face.corners[:, 2].min()) for face in faces(obstacles)], default=-0.2)
 
 
 def render(
     arm: Arm, q: Sequence[float], obstacles: Obstacles, view: View, gl: Sequence[str] = GL
 ) -> NDArray[np.uint8] | None:
-    """The scene rendered by MuJoCo in a process of its own, because a broken OpenGL can end a process.
+    """The scene rendered by MuJoCo in a separate process, because a broken OpenGL can crash it.
 
     Parameters
     ----------
     arm, q, obstacles : the scene, q in rad.
     view : the camera.
-    gl : values of MUJOCO_GL that are tried one after the other.
+    gl : values of MUJOCO_GL to try in this order.
 
     Returns
     -------
     (height, width, 3) or None
-        RGB; None where none of them works.
+        RGB; None if none of them works.
     """
     scene = {
         "xml": mjcf(arm, 0.001, World(obstacles, NO_SPRINGS), no_effects(arm)),
@@ -250,7 +250,7 @@ def draw(axes: Axes, arm: Arm, q: Sequence[float], obstacles: Obstacles, view: V
 
 
 def _draw_pedestal(axes: Axes, view: View, floor: float) -> None:
-    """A rounded pillar, cut off where it stands on the floor."""
+    """A rounded pillar, cut off at the floor."""
     pillar = Tube(np.array([0.0, 0.0, floor]), np.zeros(3), PEDESTAL, PEDESTAL_COLOUR)
     angles = np.linspace(0.0, 2.0 * math.pi, 73)
     ring = PEDESTAL * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(73)]) + pillar.start
@@ -263,7 +263,7 @@ def _draw_pedestal(axes: Axes, view: View, floor: float) -> None:
 
 
 def _draw_tube(axes: Axes, view: View, tube: Tube, zorder: float, inside: Polygon | None = None) -> None:
-    """A tube shaded as a round one: stadiums inside each other, the brighter the nearer to the light."""
+    """A tube with the shading of a cylinder: nested stadiums, brighter towards the light."""
     ends = view.project(np.array([tube.start, tube.end]))
     light = view.axes[:2] @ LIGHT
     colour = np.array(to_rgb(tube.colour))

@@ -1,4 +1,4 @@
-"""Renders one scene with MuJoCo, as a process of its own: scene as JSON on stdin, RGB as .npy in a file."""
+"""Renders one scene with MuJoCo in a separate process: scene as JSON on stdin, RGB as .npy in a file."""
 
 import json
 import sys
@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-FLOOR_GAP = 0.002  # m below what stands on it, so that surfaces do not flicker
+FLOOR_GAP = 0.002  # m below the obstacles, so that surfaces do not flicker
 
 
 def main() -> None:
@@ -38,7 +38,7 @@ def _render(scene: dict[str, Any]) -> np.ndarray:
 
 
 def _lit(scene: dict[str, Any]) -> str:
-    """The model with light, a white floor and a base to stand on."""
+    """The model with light, a white floor and a base."""
     root = ElementTree.fromstring(scene["xml"])
     world = root.find("worldbody")
     if world is None:

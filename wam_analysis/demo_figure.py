@@ -1,4 +1,4 @@
-"""The picture of a demonstration: the arm while it presses, forces and places over time."""
+"""The picture of a demonstration: the arm while it presses, forces and contact positions over time."""
 
 import math
 import os
@@ -15,17 +15,23 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
-from wam_analysis.bag import Bag
-from wam_analysis.demo_summary import DemoSummary, Touch
-from wam_analysis.demo_traces import Numbers, Signal, Step, Traces
-from wam_analysis.recorded import RecordedArm, recorded_arm
+from wam_analysis.demo_summary import DemoSummary, StepContact
+from wam_analysis.demo_traces import ForceSignal, Numbers, Traces
+from wam_analysis.recorded import RecordedArm
 from wam_description.arm import Arm
 from wam_description.signals import Contact
+from wam_sim.recording import RecordedStep
 
 DPI = 200
 SIZE = (10.0, 4.3)  # inches
 INK = "#222222"
-ASKED, TRUE, MEASURED, FELT = "#222222", "#0072b2", "#009e73", "#d55e00"  # told apart by the colour-blind too
+# distinguishable with colour blindness
+COMMANDED, TRUE, MEASURED, ESTIMATED = (
+    "#222222",
+    "#0072b2",
+    "#009e73",
+    "#d55e00",
+)
 METRES_PER_NEWTON = 0.015
 STYLE: Any = {
     "font.family": "STIXGeneral",
@@ -43,25 +49,24 @@ STYLE: Any = {
 }
 
 
-def save(path: Path, summary: DemoSummary, bag: Bag, gl: Sequence[str] | None = None) -> tuple[str, ...]:
+def save(path: Path, summary: DemoSummary, recorded: RecordedArm, gl: Sequence[str] | None = None) -> tuple[str, ...]:
     """Draw the picture into a PNG file.
 
     Parameters
     ----------
     path : file to write.
     summary : what the bag shows.
-    bag : for the parameters of the arm.
-    gl : values of MUJOCO_GL to try; () draws with matplotlib; None stands for all that need no display.
+    recorded : the arm and what it touches.
+    gl : values of MUJOCO_GL to try; () draws with matplotlib; None for all that need no display.
 
     Returns
     -------
     tuple of str
-        what has to be said about the picture.
+        notes about the picture.
     """
     if gl is None:
-        asked = os.environ.get("MUJOCO_GL", "").lower()
-        gl = sorted(arm_picture.GL, key=lambda name: name != asked)
-    recorded = recorded_arm(bag, summary.namespace)
+        commanded = os.environ.get("MUJOCO_GL", "").lower()
+        gl = sorted(arm_picture.GL, key=lambda name: name != commanded)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=SIZE, dpi=DPI)
         FigureCanvasAgg(figure)
@@ -73,7 +78,7 @@ def save(path: Path, summary: DemoSummary, bag: Bag, gl: Sequence[str] | None = 
         above = figure.add_subplot(grid[0, 1])
         below = figure.add_subplot(grid[1, 1], sharex=above)
         draw_forces(above, summary)
-        draw_places(below, summary, recorded.arm)
+        draw_positions(below, summary, recorded.arm)
         figure.savefig(path, metadata={"Software": None})
     return (recorded.note,) if recorded.note else ()
 
@@ -88,7 +93,7 @@ def draw_arm(
 
     Parameters
     ----------
-    axes : to draw into; its place in the figure gives the shape of the view.
+    axes : to draw into; its size in the figure gives the aspect of the view.
     summary : what the bag shows.
     recorded : the arm and what it touches.
     gl : values of MUJOCO_GL to try; () draws with matplotlib.
@@ -120,18 +125,18 @@ def draw_arm(
 
 
 def _draw_contacts(axes: Axes, summary: DemoSummary, arm: Arm, q: Sequence[float], view: arm_picture.View) -> None:
-    """Arrows of the force on the arm where it acts, and beyond their tips how large it is."""
+    """Arrows of the contact force on the arm, labelled with its magnitude."""
     assert summary.moment is not None
     traces, row = summary.traces, summary.moment.row
     arrows = []
-    for signal, colour, label in ((traces.true, TRUE, "applied"), (traces.felt, FELT, "estimated")):
+    for signal, colour, label in ((traces.true, TRUE, "true"), (traces.estimated, ESTIMATED, "estimated")):
         contact = _contact(signal, row)
         if contact.cover in arm.covers.names and math.isfinite(contact.place):
             point, force = arm_picture.contact_on_surface(arm, q, contact)
             start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
             arrows.append((start, end, colour, f"{label} {np.linalg.norm(force):.1f} N"))
     for i, (start, end, colour, _) in enumerate(arrows):
-        width = 4.2 if colour is TRUE else 1.3  # the truth is seen under an estimate that is right
+        width = 4.2 if colour is TRUE else 1.3  # so that the true force is visible under a correct estimate
         head = f"-|>,head_width={0.14 + 0.05 * width:.2f},head_length={0.4 + 0.07 * width:.2f}"
         style = {"arrowstyle": head, "color": colour, "linewidth": width, "joinstyle": "miter"}
         arrow = axes.annotate("", end, start, arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=20 + i)
@@ -160,23 +165,23 @@ def _draw_contacts(axes: Axes, summary: DemoSummary, arm: Arm, q: Sequence[float
         )  # fmt: skip
 
 
-def _contact(signal: Signal, row: int) -> Contact:
+def _contact(signal: ForceSignal, row: int) -> Contact:
     x, y, z = signal.force[row].tolist()
-    return Contact(str(signal.frame[row]) if signal.acts[row] else "", float(signal.place[row]), (x, y, z))
+    return Contact(str(signal.frame[row]) if signal.acts[row] else "", float(signal.position[row]), (x, y, z))
 
 
 # time
 
 
 def _zero(summary: DemoSummary) -> int:
-    """Begin of the scenario, or of what was recorded, ns."""
+    """Start of the scenario, or of the recording, ns."""
     if summary.steps:
         return summary.steps[0].begin
     return int(summary.traces.stamp[0]) if len(summary.traces.stamp) else 0
 
 
 def seconds_at(summary: DemoSummary, stamp: int) -> float:
-    """Time on the axes of the pictures, s, of a stamp, ns."""
+    """Time axis of the pictures, s, of a stamp, ns."""
     return (stamp - _zero(summary)) / 1e9
 
 
@@ -186,33 +191,36 @@ def _seconds(summary: DemoSummary) -> Numbers:
 
 
 def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int = 105, most: int = 0) -> None:
-    """Along the force asked for, and magnitudes where none is asked for.
+    """Components along the commanded force; magnitudes if none is commanded.
 
     Parameters
     ----------
     axes : to draw into.
     summary : what the bag shows.
-    letter : beside the axes.
-    room : letters that fit into its width for the names of the steps, 0 for none.
-    most : points drawn of each line at most, 0 for all.
+    letter : label of the axes.
+    room : characters that fit into its width for the names of the steps, 0 for none.
+    most : largest number of points of each line, 0 for all.
     """
     summary = _thinned(summary, most)
     traces, time = summary.traces, _seconds(summary)
-    pressed = traces.asked.acts
+    pressed = traces.commanded.acts
 
-    def shown(signal: Signal, sign: float) -> Numbers:
+    def shown(signal: ForceSignal, sign: float) -> Numbers:
         values: Numbers = np.where(pressed, traces.along(signal, sign), signal.size)
         return values
 
-    asked = np.where(pressed, traces.asked.size, np.nan)
-    axes.plot(time, shown(traces.true, -1.0), color=TRUE, lw=1.6, label="applied (simulator)", zorder=3)
+    commanded = np.where(pressed, traces.commanded.size, np.nan)
+    axes.plot(time, shown(traces.true, -1.0), color=TRUE, lw=1.6, label="true (simulator)", zorder=3)
     measured = np.where(pressed, traces.along(traces.measured), np.nan)
-    axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured by the loop", zorder=6)
-    axes.plot(time, shown(traces.felt, -1.0), color=FELT, lw=1.0, label="estimated", zorder=5)
-    axes.plot(time, asked, color=ASKED, lw=1.1, ls=(0, (1.2, 1.2)), label="asked", zorder=7)
+    axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured (force loop)", zorder=6)
+    axes.plot(time, shown(traces.estimated, -1.0), color=ESTIMATED, lw=1.0, label="estimated", zorder=5)
+    axes.plot(time, commanded, color=COMMANDED, lw=1.1, ls=(0, (1.2, 1.2)), label="commanded", zorder=7)
     axes.set_ylabel("force [N]")
     axes.tick_params(labelbottom=False)
-    highest = [np.nanmax(values, initial=1.0) for values in (shown(traces.true, -1.0), shown(traces.felt, -1.0), asked)]
+    highest = [
+        np.nanmax(values, initial=1.0)
+        for values in (shown(traces.true, -1.0), shown(traces.estimated, -1.0), commanded)
+    ]
     axes.set_ylim(min(0.0, -0.02 * max(highest)), 1.6 * float(max(highest)))
     handles, labels = axes.get_legend_handles_labels()
     order = [3, 0, 1, 2]
@@ -224,35 +232,37 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     _name_steps(axes, summary, room)
 
 
-def draw_places(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c)", most: int = 0) -> None:
-    """Where on its link the arm was touched, true and felt; arguments as in `draw_forces`."""
+def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c)", most: int = 0) -> None:
+    """Contact position along the link, true and estimated; arguments as in `draw_forces`."""
     summary = _thinned(summary, most)
     traces, time = summary.traces, _seconds(summary)
     length = max(arm.covers.length) * 100.0
-    for signal, colour, width in ((traces.true, TRUE, 1.6), (traces.felt, FELT, 1.0)):
-        place = np.where(signal.acts, 100.0 * signal.place, np.nan)
-        axes.plot(time, place, color=colour, lw=width, zorder=4)
+    for signal, colour, width in ((traces.true, TRUE, 1.6), (traces.estimated, ESTIMATED, 1.0)):
+        position = np.where(signal.acts, 100.0 * signal.position, np.nan)
+        axes.plot(time, position, color=colour, lw=width, zorder=4)
     for touch in summary.touches:
         if touch.reason:
             middle = _middle(summary, touch)
-            axes.text(middle, 0.07 * length, "not\nobservable", ha="center", fontsize=8, color=FELT, linespacing=0.95)
+            axes.text(
+                middle, 0.07 * length, "not\nobservable", ha="center", fontsize=8, color=ESTIMATED, linespacing=0.95
+            )
     axes.set_ylim(0.0, 1.12 * length)
-    axes.set_ylabel("place on link [cm]")
+    axes.set_ylabel("position [cm]")
     axes.set_xlabel("time [s]")
     _frame(axes, summary, letter)
 
 
 def _thinned(summary: DemoSummary, most: int) -> DemoSummary:
-    """The summary with so many instants at most, evenly taken."""
+    """The summary with at most so many instants, evenly spaced."""
     traces = summary.traces
     if not most or len(traces.stamp) <= most:
         return summary
     rows = np.linspace(0, len(traces.stamp) - 1, most).astype(np.int64)
 
-    def some(signal: Signal) -> Signal:
-        return Signal(signal.frame[rows], signal.force[rows], signal.place[rows])
+    def some(signal: ForceSignal) -> ForceSignal:
+        return ForceSignal(signal.frame[rows], signal.force[rows], signal.position[rows])
 
-    signals = map(some, (traces.asked, traces.measured, traces.true, traces.felt, traces.push))
+    signals = map(some, (traces.commanded, traces.measured, traces.true, traces.estimated, traces.push))
     return summary._replace(traces=Traces(traces.stamp[rows], *signals))
 
 
@@ -270,12 +280,12 @@ def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _middle(summary: DemoSummary, step: Step | Touch) -> float:
+def _middle(summary: DemoSummary, step: RecordedStep | StepContact) -> float:
     return ((step.begin + step.end) / 2.0 - _zero(summary)) / 1e9
 
 
 def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:
-    """Names of the steps at the top, wrapped to the width of each; too narrow ones go without."""
+    """Names of the steps at the top, wrapped to the width of each; narrow steps get none."""
     whole = summary.steps[-1].end - summary.steps[0].begin if summary.steps else 0
     for step in summary.steps:
         room = round(letters * (step.end - step.begin) / max(whole, 1))

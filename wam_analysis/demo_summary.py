@@ -1,85 +1,73 @@
-"""What a recording of the demonstration shows, in numbers; taken from the bag alone."""
+"""The demonstration in numbers, from its bag alone: presses, contacts, loop timing and losses."""
 
 from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.bag import Bag, JointColumns
-from wam_analysis.bag_file import mode_of
-from wam_analysis.demo_traces import (
-    NAN,
-    RECORDED,
-    Mask,
-    Names,
-    Numbers,
-    Step,
-    Traces,
-    find_namespace,
-    length,
-    messages_of,
-    node_of,
-    steps_of,
-    traces_of,
-    values_of,
-)
+from wam_analysis.demo_traces import NAN, RECORDED, Mask, Names, Numbers, Traces, traces_of
 from wam_analysis.measures.runs import runs
-from wam_ros.bag_losses import PARAMETERS, losses
+from wam_bag.bag import Bag, TableColumns
+from wam_bag.losses import RECORDING, losses
+from wam_control.contact_table import reasons_of
+from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
+from wam_sim.replay import tables
 
 NO_LINK = "none"
 NOT_RECORDED = "not recorded"
-STEADY = 1.0  # s at the end of a step that count as steady state
-BOUNCE = 100_000_000  # ns without contact that do not end a contact
+UNFINISHED = "not finished: the recording ends before the scenario does"
+STEADY = 1.0  # s at the end of a step, taken as its steady state
+BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact
 
 
-class Press(NamedTuple):
-    """A pressing step in its steady state: means along the force asked for, N; NaN where unknown.
+class SteadyPress(NamedTuple):
+    """A pressing step in its steady state: means along the commanded force, N; NaN if unknown.
 
-    `spread` is half of the range of the applied force.
+    `ripple` is half of the range of the true force.
     """
 
     step: str
     begin: int
     end: int
-    asked: float
-    applied: float
-    spread: float
+    commanded: float
+    true: float
+    ripple: float
     measured: float
-    felt: float
+    estimated: float
 
     def error(self, force: float) -> float:
-        """Deviation from the force asked for, in per cent of it."""
-        return 100.0 * (force - self.asked) / self.asked
+        """Deviation from the commanded force, in per cent of it."""
+        return 100.0 * (force - self.commanded) / self.commanded
 
 
-class Touch(NamedTuple):
-    """The contact in one step: links, medians of place (m) and force (N) while it lasted.
+class StepContact(NamedTuple):
+    """The contact in one step: links, medians of position (m) and force (N) while it lasted.
 
     Attributes
     ----------
     begin, end : of the step, ns.
-    right : part of the contact's time in which the right link was felt.
-    delay : s from the begin of the true contact to the first estimate, below zero where something
-        was felt before; NaN where nothing was felt, None where the contact began in a step before.
-    reason : why the estimator knows no place, in its own words; '' where it knows one.
+    right : fraction of the contact's time in which the estimated link was the true one.
+    latency : s from the start of the true contact to its detection, below zero if a contact was reported before; NaN
+        if it was missed, None if the contact began in an earlier step.
+    reason : why the estimator gives no position, as it reports it; '' if it gives one.
     """
 
     step: str
     begin: int
     end: int
     link_true: str
-    link_felt: str
+    link_estimated: str
     right: float
-    place_true: float
-    place_felt: float
+    position_true: float
+    position_estimated: float
     force_true: float
-    force_felt: float
-    delay: float | None
+    force_estimated: float
+    latency: float | None
     reason: str
 
 
-class Loop(NamedTuple):
-    """The driver's clockwork; NaN where it was not recorded, as in lockstep.
+class LoopReport(NamedTuple):
+    """Timing of the driver's loop; NaN if it was not recorded, as in lockstep.
 
     The driver reports latencies every second: p50 and p99 are medians of these, `worst` is the highest p99.
     """
@@ -94,7 +82,7 @@ class Loop(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """The instant that is drawn: joint names and angles (rad), contact true and felt (row of the traces)."""
+    """The instant that is drawn: its row of the traces, joint names and angles (rad)."""
 
     stamp: int
     row: int
@@ -103,31 +91,32 @@ class Moment(NamedTuple):
 
 
 class DemoSummary(NamedTuple):
-    """What the bag shows.
+    """The demonstration in numbers.
 
     Attributes
     ----------
     namespace : of the arm, '/wam'.
     period : time between two instants of the traces, s.
-    outcome : 'done', why the scenario failed, or that the recording ended before it.
-    false_contact, longest_false_contact, free : s felt without contact, the longest such time, s without contact.
-    received, dropped : messages according to the recorder, -1 where it did not say.
-    gone : messages that were recorded and are not in the bag, as far as is known.
-    lost : sentences about what the bag lacks, none where nothing is known to be lost.
+    outcome : 'done', why the scenario failed, or that the recording ended before.
+    false_contact, longest_false_contact : time of false detections and the longest of them, s.
+    free : time without contact, s.
+    received, dropped : messages counted by the recorder, -1 if it wrote no counts.
+    gone : messages that were recorded and are no longer in the bag, as far as is known.
+    lost : sentences about what the bag lacks, none if no loss is known.
     notes : what is missing or not as it should be.
     """
 
     namespace: str
     period: float
     outcome: str
-    steps: tuple[Step, ...]
+    steps: tuple[RecordedStep, ...]
     traces: Traces
-    presses: tuple[Press, ...]
-    touches: tuple[Touch, ...]
+    presses: tuple[SteadyPress, ...]
+    touches: tuple[StepContact, ...]
     false_contact: float
     longest_false_contact: float
     free: float
-    loop: Loop
+    loop: LoopReport
     received: int
     dropped: int
     gone: int
@@ -137,65 +126,78 @@ class DemoSummary(NamedTuple):
 
 
 def summarize(bag: Bag) -> DemoSummary:
-    """Everything that the report says about a bag, whatever part of the demonstration is in it."""
-    namespace, notes = find_namespace(bag)
-    steps, outcome = steps_of(bag, namespace)
-    traces = traces_of(bag, namespace)
+    """Everything that the report needs, from a bag that may hold any part of the demonstration."""
+    return summary_of(recorded_run(bag))
+
+
+def summary_of(run: RecordedRun) -> DemoSummary:
+    """Everything that the report needs, from a run."""
+    bag = run.bag
+    steps = run.steps if run.unfinished is None else (*run.steps, run.unfinished)
+    traces = traces_of(run)
+    notes = []
+    if len(run.arms) > 1:
+        notes.append(f"arms in this bag: {', '.join(run.arms)}; this is {run.namespace}")
     if not steps:
         notes.append("no step of a scenario was recorded (status of node scenario)")
-    missing = [name for name in RECORDED if not length(bag, namespace, name)]
+    missing = [name for name in RECORDED if not _length(run, name)]
     if missing:
         notes.append(f"not recorded: {', '.join(missing)}")
     presses = tuple(press for step in steps if (press := _press(traces, step)))
-    known = traces.true.is_known & traces.felt.is_known
-    false = known & ~traces.true.acts & traces.felt.acts
+    known = traces.true.is_known & traces.estimated.is_known
+    false = known & ~traces.true.acts & traces.estimated.acts
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
-    received, dropped = _counts(bag.metadata.get("recording", {}))
+    received, dropped = _counts(bag.metadata.get(RECORDING, {}))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
     return DemoSummary(
-        namespace=namespace,
+        namespace=run.namespace,
         period=period,
-        outcome=outcome,
+        outcome=run.outcome or UNFINISHED,
         steps=steps,
         traces=traces,
         presses=presses,
-        touches=_touches(bag, namespace, traces, steps),
+        touches=_touches(run, traces, steps),
         false_contact=int(np.sum(false)) * period,
         longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * period,
         free=int(np.sum(known & ~traces.true.acts)) * period,
-        loop=_loop(bag),
+        loop=_loop(run),
         received=received,
         dropped=dropped,
         gone=lost.gone,
-        lost=tuple(lost.said(bag.first_ns)),
-        moment=_moment(bag, namespace, traces, presses),
-        notes=(*notes, *_faults(bag, namespace)),
+        lost=tuple(lost.sentences(bag.first_ns)),
+        moment=_moment(run, traces, presses),
+        notes=(*notes, *run.parameters.notes, *_faults(run)),
     )
 
 
-def _press(traces: Traces, step: Step) -> Press | None:
-    whole = traces.during(step.begin, step.end) & traces.asked.acts
+def _length(run: RecordedRun, topic: str) -> int:
+    columns = run.bag.topics.get(f"{run.namespace}/{topic}")
+    return 0 if columns is None else len(columns.log_time_ns)
+
+
+def _press(traces: Traces, step: RecordedStep) -> SteadyPress | None:
+    whole = traces.during(step.begin, step.end) & traces.commanded.acts
     if not np.any(whole):
         return None
     begin = max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
-    steady = traces.during(begin, step.end) & traces.asked.acts
+    steady = traces.during(begin, step.end) & traces.commanded.acts
     if not np.any(steady):
         steady = whole
-    applied = traces.along(traces.true, -1.0)[steady]
-    return Press(
+    true = traces.along(traces.true, -1.0)[steady]
+    return SteadyPress(
         step=step.name,
         begin=begin,
         end=step.end,
-        asked=_mean(traces.asked.size[steady]),
-        applied=_mean(applied),
-        spread=float(np.ptp(applied)) / 2.0,
+        commanded=_mean(traces.commanded.size[steady]),
+        true=_mean(true),
+        ripple=float(np.ptp(true)) / 2.0,
         measured=_mean(traces.along(traces.measured)[steady]),
-        felt=_mean(traces.along(traces.felt, -1.0)[steady]),
+        estimated=_mean(traces.along(traces.estimated, -1.0)[steady]),
     )
 
 
 def _mean(values: Numbers) -> float:
-    """Mean where at least half of the values are known, else NaN."""
+    """Mean if at least half of the values are known, else NaN."""
     known = values[~np.isnan(values)]
     return float(np.mean(known)) if 2 * len(known) >= len(values) > 0 else NAN
 
@@ -206,7 +208,7 @@ def _median(values: Numbers) -> float:
 
 
 def _contacts(traces: Traces) -> list[tuple[int, int]]:
-    """Rows [begin, end) of each true contact, bounces bridged."""
+    """Rows [begin, end) of each true contact; bounces do not end it."""
     contacts: list[tuple[int, int]] = []
     for begin, end in runs(traces.true.acts).tolist():
         if contacts and traces.stamp[begin] - traces.stamp[contacts[-1][1] - 1] <= BOUNCE:
@@ -216,40 +218,42 @@ def _contacts(traces: Traces) -> list[tuple[int, int]]:
     return contacts
 
 
-def _touches(bag: Bag, namespace: str, traces: Traces, steps: tuple[Step, ...]) -> tuple[Touch, ...]:
+def _touches(run: RecordedRun, traces: Traces, steps: tuple[RecordedStep, ...]) -> tuple[StepContact, ...]:
     touches = []
-    told: set[int] = set()
+    seen: set[int] = set()
     for step in steps:
         rows = traces.during(step.begin, step.end)
-        if np.any(rows & (traces.push.acts | traces.asked.acts)):
-            touches.append(_touch(traces, step, rows, told, _reasons(bag, namespace, step)))
+        if np.any(rows & (traces.push.acts | traces.commanded.acts)):
+            touches.append(_touch(traces, step, rows, seen, _reasons(run, step)))
     return tuple(touches)
 
 
-def _touch(traces: Traces, step: Step, rows: Mask, told: set[int], reasons: Counter[tuple[str, str]]) -> Touch:
-    true, felt = traces.true, traces.felt
+def _touch(
+    traces: Traces, step: RecordedStep, rows: Mask, seen: set[int], reasons: Counter[tuple[str, str]]
+) -> StepContact:
+    true, estimated = traces.true, traces.estimated
     touching = rows & true.acts
     link_true = _most(true.frame[touching])
     if link_true == NO_LINK and not np.any(rows & true.is_known):
-        link_true, touching = NOT_RECORDED, rows & felt.acts
-    both = touching & felt.acts
-    link_felt = _most(felt.frame[both]) if np.any(felt.is_known) else NOT_RECORDED
-    right = both & (felt.frame == true.frame)
-    place_felt = _median(felt.place[right])
-    known = [reason for (link, reason), _ in reasons.most_common() if link == link_felt and reason]
-    return Touch(
+        link_true, touching = NOT_RECORDED, rows & estimated.acts
+    both = touching & estimated.acts
+    link_estimated = _most(estimated.frame[both]) if np.any(estimated.is_known) else NOT_RECORDED
+    right = both & (estimated.frame == true.frame)
+    position_estimated = _median(estimated.position[right])
+    known = [reason for (link, reason), _ in reasons.most_common() if link == link_estimated and reason]
+    return StepContact(
         step=step.name,
         begin=step.begin,
         end=step.end,
         link_true=link_true,
-        link_felt=link_felt,
+        link_estimated=link_estimated,
         right=float(np.mean(right[touching])) if np.any(touching & true.acts) else NAN,
-        place_true=_median(true.place[touching & (true.frame == link_true)]),
-        place_felt=place_felt,
+        position_true=_median(true.position[touching & (true.frame == link_true)]),
+        position_estimated=position_estimated,
         force_true=_median(true.size[touching & true.acts]),
-        force_felt=_median(felt.size[both]),
-        delay=_delay(traces, rows, told),
-        reason=known[0] if known and np.isnan(place_felt) else "",
+        force_estimated=_median(estimated.size[both]),
+        latency=_latency(traces, rows, seen),
+        reason=known[0] if known and np.isnan(position_estimated) else "",
     )
 
 
@@ -257,19 +261,19 @@ def _most(names: Names) -> str:
     return Counter(names.tolist()).most_common(1)[0][0] if len(names) else NO_LINK
 
 
-def _delay(traces: Traces, rows: Mask, told: set[int]) -> float | None:
+def _latency(traces: Traces, rows: Mask, seen: set[int]) -> float | None:
     for begin, end in _contacts(traces):
         if not np.any(rows[begin:end]):
             continue
-        if begin in told:
+        if begin in seen:
             return None
-        told.add(begin)
-        felt = traces.felt.acts
-        if felt[begin]:
-            before = np.flatnonzero(~felt[:begin])
+        seen.add(begin)
+        estimated = traces.estimated.acts
+        if estimated[begin]:
+            before = np.flatnonzero(~estimated[:begin])
             first = before[-1] + 1 if len(before) else 0
         else:
-            after = np.flatnonzero(felt[begin:end])
+            after = np.flatnonzero(estimated[begin:end])
             if not len(after):
                 return NAN
             first = begin + after[0]
@@ -277,33 +281,35 @@ def _delay(traces: Traces, rows: Mask, told: set[int]) -> float | None:
     return NAN
 
 
-def _reasons(bag: Bag, namespace: str, step: Step) -> Counter[tuple[str, str]]:
+def _reasons(run: RecordedRun, step: RecordedStep) -> Counter[tuple[str, str]]:
     """(link, reason) of the most probable hypothesis in each message of a step."""
-    found: Counter[tuple[str, str]] = Counter()
-    for array in messages_of(bag, f"{namespace}/contact/hypotheses"):
-        stamp = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
-        if array.status and step.begin <= stamp < step.end:
-            found[str(array.status[0].name), str(array.status[0].message).split(";")[0]] += 1
-    return found
+    columns = run.bag.topics.get(f"{run.namespace}/contact/hypotheses")
+    if not isinstance(columns, TableColumns):
+        return Counter()
+    stamped = zip(columns.stamp_ns.tolist(), tables(columns), strict=True)
+    return Counter(
+        (table.frame, (*reasons_of(table.rows[0]), "")[0])
+        for stamp, table in stamped
+        if table.rows and step.begin <= stamp < step.end
+    )
 
 
-def _loop(bag: Bag) -> Loop:
+def _loop(run: RecordedRun) -> LoopReport:
     reports = [
-        values_of(status)
-        for array in messages_of(bag, "/diagnostics")
-        for status in array.status
-        if node_of(status) == "driver"
+        status.facts
+        for array in messages_of(run.bag, "/diagnostics")
+        for status in map(status_of, array.status)
+        if status.node == "driver"
     ]
     timed = [facts for facts in reports if "rate [Hz]" in facts]
-    mode = mode_of(bag.metadata, bag.attachments.get(PARAMETERS))
-    mode = "realtime" if mode == "unknown" and timed else mode
+    mode = "realtime" if run.mode == "unknown" and timed else run.mode
     if not timed:
-        return Loop(mode, NAN, NAN, NAN, NAN, -1, -1)
+        return LoopReport(mode, NAN, NAN, NAN, NAN, -1, -1)
     p50, p99 = (np.array([float(facts.get(f"latency {p} [us]", NAN)) for facts in timed]) for p in ("p50", "p99"))
     worst = float(np.nanmax(p99)) if not np.all(np.isnan(p99)) else NAN
     last = timed[-1]
     missed, periods = (int(last.get(key, -1)) for key in ("missed periods", "periods"))
-    return Loop(mode, float(last["rate [Hz]"]), _median(p50), _median(p99), worst, missed, periods)
+    return LoopReport(mode, float(last["rate [Hz]"]), _median(p50), _median(p99), worst, missed, periods)
 
 
 def _counts(recording: dict[str, str]) -> tuple[int, int]:
@@ -316,33 +322,21 @@ def _counts(recording: dict[str, str]) -> tuple[int, int]:
     return received, dropped
 
 
-def _faults(bag: Bag, namespace: str) -> list[str]:
-    said = [
-        f"driver fault at {int(values['stamp']) / 1e9:.2f} s: {values['fault']}"
-        for status in messages_of(bag, f"{namespace}/status")
-        if node_of(status) == "driver" and (values := values_of(status)).get("fault") and "stamp" in values
-    ]
-    return list(dict.fromkeys(said))
+def _faults(run: RecordedRun) -> list[str]:
+    texts = [f"driver fault at {fault.stamp / 1e9:.2f} s: {fault.reason}" for fault in run.faults]
+    return list(dict.fromkeys(texts))
 
 
-def _moment(bag: Bag, namespace: str, traces: Traces, presses: tuple[Press, ...]) -> Moment | None:
+def _moment(run: RecordedRun, traces: Traces, presses: tuple[SteadyPress, ...]) -> Moment | None:
     """Middle of the steady state of the hardest press, else of the first contact, else the last pose."""
-    joints = next(
-        (
-            columns
-            for name in ("sim/joint_states", "joint_states")
-            if isinstance(columns := bag.topics.get(f"{namespace}/{name}"), JointColumns)
-            and len(columns.stamp_ns)
-            and columns.position.size
-        ),
-        None,
-    )
+    found = [columns for name in ("sim/joint_states", "joint_states") if (columns := run.joints(name)) is not None]
+    joints = next((columns for columns in found if columns.position.size), None)
     if joints is None or not len(traces.stamp):
         return None
     contacts = _contacts(traces)
     stamp = int(traces.stamp[-1])
     if presses:
-        hardest = max(presses, key=lambda press: press.asked)
+        hardest = max(presses, key=lambda press: press.commanded)
         stamp = (hardest.begin + hardest.end) // 2
     elif contacts:
         stamp = int(traces.stamp[sum(contacts[0]) // 2])

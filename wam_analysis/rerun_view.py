@@ -1,4 +1,4 @@
-"""A bag for the Rerun viewer: the arm that moves, the forces on it, and plots.
+"""A bag for the Rerun viewer: the moving arm, the forces on it, and plots.
 
 Rerun comes with the extra 'view' and is imported only when it is needed.
 """
@@ -16,12 +16,12 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from wam_analysis.arm_picture import side_view
-from wam_analysis.bag import JointColumns
-from wam_analysis.demo_figure import ASKED, FELT, MEASURED, METRES_PER_NEWTON, TRUE
-from wam_analysis.demo_traces import Signal, messages_of, node_of, values_of
-from wam_analysis.findings.recording import Recording, by_names
+from wam_analysis.demo_figure import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, TRUE
+from wam_analysis.demo_traces import ForceSignal
+from wam_analysis.findings.analysed_run import AnalysedRun, by_names
 from wam_analysis.findings.timing import STAMPED
 from wam_analysis.recorded import RecordedArm, recorded_arm
+from wam_bag.bag import JointColumns
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 
@@ -33,7 +33,12 @@ PROGRAM = "rerun"
 TIMELINE = "time"
 DISTANCE = 1.3  # of the eye, in heights of what it sees
 POSES = 100.0  # poses of the arm in a second at most
-COLOURS = {"asked": ASKED, "applied": TRUE, "measured": MEASURED, "estimated": FELT}  # as in all our pictures
+COLOURS = {
+    "commanded": COMMANDED,
+    "true": TRUE,
+    "measured": MEASURED,
+    "estimated": ESTIMATED,
+}
 
 
 class NoViewerError(OSError):
@@ -41,18 +46,18 @@ class NoViewerError(OSError):
 
 
 def viewer() -> str:
-    """Path of Rerun's own program: beside this Python, where its package puts it, else on the search path.
+    """Path of Rerun's program: next to this Python, where its package puts it, else on the search path.
 
     Raises
     ------
     NoViewerError
-        where it is in neither place; the message says what to do.
+        if it is in neither; the message says what to do.
     """
-    beside = Path(sys.executable).parent
-    found = shutil.which(PROGRAM, path=str(beside)) or shutil.which(PROGRAM)
+    own = Path(sys.executable).parent
+    found = shutil.which(PROGRAM, path=str(own)) or shutil.which(PROGRAM)
     if found is None:
         raise NoViewerError(
-            f"Rerun's program '{PROGRAM}' is neither in {beside} nor on PATH; pip install 'wam_stack[view]', or write "
+            f"Rerun's program '{PROGRAM}' is neither in {own} nor on PATH; pip install 'wam_stack[view]', or write "
             "a file with --save and open it where the program is"
         )
     return found
@@ -64,7 +69,7 @@ def load_rerun() -> Any:
     Raises
     ------
     NoViewerError
-        where it is not installed; the message says how to install it.
+        if it is not installed; the message says how to install it.
     """
     try:
         import rerun
@@ -74,8 +79,8 @@ def load_rerun() -> Any:
     return rerun
 
 
-def view(recording: Recording, save: Path | None) -> str:
-    """Log a recording, into a file or into a viewer that is opened.
+def view(recording: AnalysedRun, save: Path | None) -> str:
+    """Send a recording to a file or to a viewer, which is opened.
 
     Parameters
     ----------
@@ -90,15 +95,15 @@ def view(recording: Recording, save: Path | None) -> str:
     Raises
     ------
     NoViewerError
-        where Rerun is not installed.
+        if Rerun is not installed.
     ValueError
-        where the bag has nothing to look at.
+        if the bag has no joint states.
     """
     rerun = load_rerun()
-    arm = recorded_arm(recording.bag, recording.namespace)
+    arm = recorded_arm(recording.run.parameters)
     joints = _joints(recording, arm.arm)
     if joints is None and not any(isinstance(c, JointColumns) for c in recording.bag.topics.values()):
-        raise ValueError(f"{recording.bag.path} has no joint states; there is nothing to view")
+        raise ValueError(f"{recording.bag.path} has no joint states; nothing can be shown")
     stream = rerun.RecordingStream(APPLICATION, recording_id=recording.bag.path.name)
     if save is None:
         os.environ["PATH"] = f"{Path(viewer()).parent}{os.pathsep}{os.environ.get('PATH', '')}"  # spawn looks there
@@ -120,10 +125,10 @@ def view(recording: Recording, save: Path | None) -> str:
     return f"{poses} poses of the arm, {len(recording.summary.traces.stamp)} instants of its forces"
 
 
-def _joints(recording: Recording, arm: Arm) -> tuple[Times, Numbers] | None:
-    """Stamps and angles of the arm's joints, as near to the truth as the bag has them, POSES a second."""
+def _joints(recording: AnalysedRun, arm: Arm) -> tuple[Times, Numbers] | None:
+    """Stamps and angles of the joints, from the best topic in the bag, POSES per second."""
     for name in ("sim/joint_states", "joint_sensors", "joint_states"):
-        columns = recording.joints(name)
+        columns = recording.run.joints(name)
         angles = None if columns is None else by_names(columns, "position", arm.joints.names)
         if columns is not None and angles is not None:
             good = np.flatnonzero(np.all(np.isfinite(angles), axis=1))
@@ -134,20 +139,20 @@ def _joints(recording: Recording, arm: Arm) -> tuple[Times, Numbers] | None:
     return None
 
 
-def _zero(recording: Recording) -> int:
+def _zero(recording: AnalysedRun) -> int:
     topics = recording.bag.topics.values()
     return min((int(c.stamp_ns[0]) for c in topics if isinstance(c, STAMPED) and len(c.stamp_ns)), default=0)
 
 
 def _blueprint(rerun: Any, recorded: RecordedArm, joints: tuple[Times, Numbers] | None) -> Any:
-    """The arm on the left, seen from the side as in our pictures; plots and status on the right."""
+    """The arm on the left, from the side as in the other pictures; plots and status on the right."""
     show = rerun.blueprint
     eye = None
     if joints is not None and len(joints[1]):
         side = side_view(recorded.arm, joints[1][len(joints[1]) // 2].tolist(), recorded.obstacles, aspect=1.0)
         position = side.centre - DISTANCE * side.height * side.axes[2]
         eye = show.EyeControls3D(position=position, look_target=side.centre, eye_up=[0.0, 0.0, 1.0])
-    plots = [show.TimeSeriesView(origin=f"/plots/{name}", name=name) for name in ("force", "place", "joints")]
+    plots = [show.TimeSeriesView(origin=f"/plots/{name}", name=name) for name in ("force", "position", "joints")]
     right = show.Vertical(*plots, show.TextLogView(origin="/status", name="status"))
     left = show.Spatial3DView(origin="/arm", name="arm", eye_controls=eye)
     return show.Blueprint(
@@ -160,7 +165,7 @@ def _times(rerun: Any, stamps: Times, zero: int) -> list[Any]:
 
 
 def _log_arm(rerun: Any, stream: Any, recorded: RecordedArm, joints: tuple[Times, Numbers], zero: int) -> int:
-    """Covers as capsules that move, obstacles where they stand; returns the number of poses."""
+    """Moving covers as capsules, and the obstacles; returns the number of poses."""
     arm, covers = recorded.arm, recorded.arm.covers
     stream.log("arm", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     body = RigidBody(arm)
@@ -191,24 +196,24 @@ def _log_obstacles(rerun: Any, stream: Any, recorded: RecordedArm) -> None:
         triple = slice(3 * i, 3 * i + 3)
         centre, sizes = obstacles.positions[triple], obstacles.sizes[triple]
         quaternion = rerun.Quaternion(xyzw=_quaternion(*obstacles.rotations[triple]))
-        place = {"centers": [centre], "quaternions": [quaternion], "colors": [(0xEC, 0xCA, 0x88)]}
+        pose = {"centers": [centre], "quaternions": [quaternion], "colors": [(0xEC, 0xCA, 0x88)]}
         if shape == "cylinder":
-            solid = rerun.Cylinders3D(lengths=[2.0 * sizes[1]], radii=[sizes[0]], fill_mode="solid", **place)
+            solid = rerun.Cylinders3D(lengths=[2.0 * sizes[1]], radii=[sizes[0]], fill_mode="solid", **pose)
         else:
             half = (*sizes[:2], sizes[2] if shape == "box" else 0.001)
-            solid = rerun.Boxes3D(half_sizes=[half], fill_mode="solid", **place)
+            solid = rerun.Boxes3D(half_sizes=[half], fill_mode="solid", **pose)
         stream.log(f"arm/world/{name}", solid, static=True)
 
 
 def _log_contacts(
-    rerun: Any, stream: Any, recording: Recording, arm: Arm, joints: tuple[Times, Numbers], zero: int
+    rerun: Any, stream: Any, recording: AnalysedRun, arm: Arm, joints: tuple[Times, Numbers], zero: int
 ) -> None:
-    """Arrows of the force on the arm where it acts, true and felt, in the frame of the touched cover."""
+    """Arrows of the contact force on the arm, true and estimated, in the frame of the cover in contact."""
     traces = recording.summary.traces
     if not len(traces.stamp):
         return
     rows = np.clip(np.searchsorted(traces.stamp, joints[0], side="right") - 1, 0, len(traces.stamp) - 1)
-    for name, signal in (("applied", traces.true), ("estimated", traces.felt)):
+    for name, signal in (("true", traces.true), ("estimated", traces.estimated)):
         for cover in arm.covers.names:
             origins, vectors = _arrows(signal, rows, cover)
             if not np.any(vectors):
@@ -219,18 +224,18 @@ def _log_contacts(
             stream.send_columns(path, _times(rerun, joints[0], zero), columns)
 
 
-def _arrows(signal: Signal, rows: NDArray[np.intp], cover: str) -> tuple[Numbers, Numbers]:
-    """Begin and length of each arrow, m, in the cover's frame; of no length where it is not touched."""
-    there = (signal.frame[rows] == cover) & signal.acts[rows] & np.isfinite(signal.place[rows])
+def _arrows(signal: ForceSignal, rows: NDArray[np.intp], cover: str) -> tuple[Numbers, Numbers]:
+    """Origin and vector of each arrow, m, in the cover's frame; zero without contact."""
+    there = (signal.frame[rows] == cover) & signal.acts[rows] & np.isfinite(signal.position[rows])
     origins, vectors = np.zeros((len(rows), 3)), np.zeros((len(rows), 3))
-    origins[there, 0] = signal.place[rows][there]
+    origins[there, 0] = signal.position[rows][there]
     vectors[there] = METRES_PER_NEWTON * signal.force[rows][there]
     return origins, vectors
 
 
-def _log_plots(rerun: Any, stream: Any, recording: Recording, zero: int) -> None:
+def _log_plots(rerun: Any, stream: Any, recording: AnalysedRun, zero: int) -> None:
     for path, stamps, values in _series(recording):
-        if np.any(np.isfinite(values)):  # a value that is not known breaks the line
+        if np.any(np.isfinite(values)):  # NaN interrupts the line
             name = path.rsplit("/", 1)[-1]
             colours = {"colors": [_rgb(COLOURS[name])]} if name in COLOURS else {}
             stream.log(path, rerun.SeriesLines(names=[name], **colours), static=True)
@@ -238,17 +243,15 @@ def _log_plots(rerun: Any, stream: Any, recording: Recording, zero: int) -> None
             stream.send_columns(path, _times(rerun, stamps, zero), columns)
 
 
-def _series(recording: Recording) -> Iterator[tuple[str, Times, Numbers]]:
+def _series(recording: AnalysedRun) -> Iterator[tuple[str, Times, Numbers]]:
     """Path, stamps and values of each line."""
     traces = recording.summary.traces
     if len(traces.stamp):
-        signals = {
-            "asked": traces.asked, "applied": traces.true, "measured": traces.measured, "estimated": traces.felt,
-        }  # fmt: skip
+        signals = {name: getattr(traces, name) for name in COLOURS}
         for name, signal in signals.items():
             yield f"plots/force/{name}", traces.stamp, signal.size
-        for name in ("applied", "estimated"):
-            yield f"plots/place/{name}", traces.stamp, np.where(signals[name].acts, signals[name].place, math.nan)
+        for name in ("true", "estimated"):
+            yield f"plots/position/{name}", traces.stamp, np.where(signals[name].acts, signals[name].position, math.nan)
     topics = [name for name, columns in recording.bag.topics.items() if isinstance(columns, JointColumns)]
     own = f"{recording.namespace}/joint_states"
     for topic in [own] if own in topics else topics:
@@ -258,12 +261,11 @@ def _series(recording: Recording) -> Iterator[tuple[str, Times, Numbers]]:
                 yield f"plots/joints/{name}", columns.stamp_ns, columns.position[:, i]
 
 
-def _log_status(rerun: Any, stream: Any, recording: Recording, zero: int) -> None:
-    for status in messages_of(recording.bag, f"{recording.namespace}/status"):
-        facts = values_of(status)
-        if "stamp" in facts:
-            stream.set_time(TIMELINE, duration=max((int(facts["stamp"]) - zero) / 1e9, 0.0))
-            stream.log(f"status/{node_of(status)}", rerun.TextLog(str(status.message)))
+def _log_status(rerun: Any, stream: Any, recording: AnalysedRun, zero: int) -> None:
+    for status in recording.run.statuses:
+        if status.stamp:
+            stream.set_time(TIMELINE, duration=max((status.stamp - zero) / 1e9, 0.0))
+            stream.log(f"status/{status.node}", rerun.TextLog(status.message))
 
 
 def _rgb(colour: str) -> tuple[int, int, int]:

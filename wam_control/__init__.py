@@ -1,1 +1,31 @@
-"""The joint side: transform, gravity, velocity and force loops, contact estimation; each law beside its node."""
+"""The joint side: force control and contact estimation, as plain classes with ``step(..., dt)``.
+
+Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``, ``force_loop_node``,
+``contact_estimator_node``, ``scenario_node``) declare the nodes: inputs, outputs and steps.
+
+================================  ==============================================================================
+``transform``                     motor states to joint states, joint commands to motor commands, (A.5)
+``velocity_loop``                 inner loop: PI control of each motor's velocity, torque feed-forward
+``dither``                        alternating motor torque against stiction, for contact detection at rest
+``force_loop``                    outer loop: force along a direction, posture elsewhere, or joint torques
+``force_command``                 - which commands are admitted: limits and age
+``contact_position``              - where the force acts: estimated or configured contact position
+``force_measurement``             - the measured force, by the feedback that is chosen; low pass
+``force_law``                     - error to velocity of one axis: saturation, deadband, G_I, G_P; delay line
+``hybrid_velocity``               - joint velocities of force and posture together
+``bumpless_transfer``             - no jump of velocity where the law changes
+``guard_supervision``             - the guard's part: admits a parameter set, scales its gains
+``force_loop_parameters``         - its parameters
+``stability_guard``               domain, margin and largest saturation of a parameter set on the arm
+``guard_watch``, ``guard_report`` the guard while the arm moves; its report
+``sampled_loop``                  arm, velocity loop and force loop as one linear map from sample to sample
+``friction_trial``                the same map with saturation and friction, for an arm of one joint
+``friction_verdict``              domain, stable error and limit cycle of one friction node, chapter 5
+``contact_estimator``             what touches the arm: observer, detection and inference together
+``momentum_observer``             - external joint torques and their covariance
+``contact_inference``             - which link is touched, where and how hard
+``contact_fit``                   - the probability of contact positions along straight links
+``contact_table``                 hypotheses as rows of numbers, as the topic carries them, and back
+``scenario``                      steps of a task, as data
+================================  ==============================================================================
+"""

@@ -1,4 +1,4 @@
-"""What touches the arm: momentum observer, detection and inference together, as one machine."""
+"""Contact estimation: momentum observer, detection and inference together."""
 
 import math
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ class ContactEstimatorParameters:
 
     observer: ObserverParameters
     inference: InferenceParameters
-    use_joint_sensors: bool = parameter("feel with the joint sensors instead of the motors alone")
-    detect: float = parameter("r^T S^-1 r of the external torques above which something touches", low=0.0)
-    release: float = parameter("the same, below which nothing touches any more", low=0.0)
+    use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
+    detect: float = parameter("r^T S^-1 r of the external torques above which a contact is detected", low=0.0)
+    release: float = parameter("the same, below which the contact has ended", low=0.0)
 
     def __post_init__(self) -> None:
         require(
@@ -37,24 +37,24 @@ class ContactEstimatorParameters:
 
 
 class ContactEstimate(NamedTuple):
-    """What the world does to the arm.
+    """External torques, and the contact that explains them.
 
     Attributes
     ----------
     external_torques : (n,), torques of the world on the joints, N m.
     torque_sd : (n,), their standard deviations, N m.
     statistic : r^T S^-1 r of the external torques.
-    in_contact : whether something touches.
-    link : name of the touched cover, '' without contact.
-    place : m along the cover's x axis, NaN where it cannot be observed.
-    place_sd : m, NaN with the place.
-    probability : that this link is touched, NaN without contact.
-    direction_sd : rad, of the angle of the force round the link, NaN without contact.
+    in_contact : whether a contact is detected.
+    link : name of the cover in contact, '' without contact.
+    place : contact position, m along the cover's x axis, NaN where it cannot be observed.
+    position_sd : m, NaN with the place.
+    probability : that this link is in contact, NaN without contact.
+    direction_sd : rad, of the angle of the force about the link, NaN without contact.
     force : (3,), N, of the world on the link, in the cover's frame; zeros without contact, the
-        least possible force where the place is NaN.
+        smallest possible force where the position is NaN.
     moment : (3,), N m, of that force about the origin of the cover's frame.
     hypotheses : every explanation, the most probable first, empty without contact.
-    reason : why the place is NaN or the answer not to be trusted, '' where neither.
+    reason : why the position is NaN or the estimate not reliable, '' where neither.
     """
 
     external_torques: tuple[float, ...]
@@ -63,7 +63,7 @@ class ContactEstimate(NamedTuple):
     in_contact: bool
     link: str
     place: float
-    place_sd: float
+    position_sd: float
     probability: float
     direction_sd: float
     force: tuple[float, float, float]
@@ -73,11 +73,11 @@ class ContactEstimate(NamedTuple):
 
 
 NOTHING = (0.0, 0.0, 0.0)
-TOO_EARLY = "not enough has been observed"
+TOO_EARLY = "too few samples yet"
 
 
 class ContactEstimator:
-    """Observes at the inner rate, says what touches at the outer one.
+    """Observes at the inner rate, estimates contacts at the outer one.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class ContactEstimator:
     Raises
     ------
     ParameterError
-        where joint sensors are asked for and the arm has none, or the sets do not fit each other.
+        where joint sensors are to be used and the arm has none, or parameters do not fit each other.
     """
 
     def __init__(self, arm: Arm, timing: Timing, parameters: ContactEstimatorParameters) -> None:
@@ -109,15 +109,15 @@ class ContactEstimator:
         self.refused = 0
 
     def brake(self, on: bool) -> None:
-        """Say whether brakes hold the motors, which then tell nothing; joint sensors feel on."""
+        """Set whether brakes hold the motors, whose torques then carry no information."""
         self._is_blind = on and not self._parameters.use_joint_sensors
 
     def tare(self) -> str:
-        """Take what is felt now as the payload, within what is declared; '' or why that cannot be."""
-        return self._observer.weigh()
+        """Identify the payload, within the declared range, from the present torques; '' or why that is not possible."""
+        return self._observer.identify_payload()
 
     def reset(self) -> None:
-        """Forget everything seen."""
+        """Forget all samples."""
         self._observer.reset()
         self._in_contact = False
 
@@ -127,14 +127,14 @@ class ContactEstimator:
         Parameters
         ----------
         motor : theta, rad, thetad, rad/s, motor torque in the period that ends, N m, each (n,).
-        sensors : q, rad, qd, rad/s, strain torque, N m, each (n,); not looked at without
-            `use_joint_sensors`, needed with it.
+        sensors : q, rad, qd, rad/s, strain torque, N m, each (n,); ignored without
+            `use_joint_sensors`, required with it.
         dt : time since the call before, s, from stamps.
 
         Returns
         -------
         bool
-            False where the sample is refused; `refused` counts these.
+            False if the sample is refused; `refused` counts these.
         """
         if self._is_blind:
             self.reset()
@@ -146,10 +146,10 @@ class ContactEstimator:
         return is_taken
 
     def estimate(self) -> ContactEstimate:
-        """Say what touches, from everything observed."""
+        """Estimate the contact from the samples so far."""
         observer, parameters = self._observer, self._parameters
-        felt, covariance = observer.torques()
-        torques = tuple(felt)
+        residual, covariance = observer.torques()
+        torques = tuple(residual)
         sd = tuple(math.sqrt(variance) for variance in covariance.diagonal().tolist())
         if not observer.is_ready:
             self._in_contact = False
@@ -158,7 +158,7 @@ class ContactEstimator:
         statistic = detection_statistic(torques, precision)
         self._in_contact = statistic > (parameters.release if self._in_contact else parameters.detect)
         if not self._in_contact:
-            return _nothing(torques, sd, statistic, "nothing touches")
+            return _nothing(torques, sd, statistic, "no contact")
         hypotheses = self._inference.infer(observer.q, torques, precision)
         best = hypotheses[0]
         return ContactEstimate(
@@ -168,7 +168,7 @@ class ContactEstimator:
             in_contact=True,
             link=best.cover,
             place=best.place,
-            place_sd=best.place_sd,
+            position_sd=best.position_sd,
             probability=best.probability,
             direction_sd=best.direction_sd,
             force=best.force,
@@ -186,7 +186,7 @@ def _nothing(torques: tuple[float, ...], sd: tuple[float, ...], statistic: float
         in_contact=False,
         link="",
         place=math.nan,
-        place_sd=math.nan,
+        position_sd=math.nan,
         probability=math.nan,
         direction_sd=math.nan,
         force=NOTHING,

@@ -1,13 +1,13 @@
-"""One contact on one of some straight links, found among many places with the force integrated out.
+"""One contact on one of several straight links: probability of its position, the force integrated out.
 
-A contact at place x pushes across the link, tau_ext = (A + x B) f, with f the two components of
-the force across the link, N.  Friction lets the force lean: across the link it then misses the
-axis of the tube, which adds a twist t about it; along the link it adds a force a, which attacks at
-the surface and so turns the link too.  Both are unknown, of the size of the force times the
-friction.  All that is needed of arm and torques are inner products, weighted with the inverse of
-the covariance: the Gram matrix of Z = (r, A_1, A_2, B_1, B_2, t, a), 7 by 7.
+A contact at position x pushes across the link, tau_ext = (A + x B) f, with f the two components of
+the force across the link, N.  Friction adds a tangential force.  Around the link it gives the force
+a moment arm about the tube's axis, a twist t; along the link it adds a force a, which acts at the
+surface and so has a moment, too.  Both are unknown and proportional to force and friction.  All that
+is needed of arm and torques are inner products, weighted with the inverse of the covariance: the
+Gram matrix of Z = (r, A_1, A_2, B_1, B_2, t, a), 7 by 7.
 
-Scalar Python does what is small; only the row of places is numpy's.
+Small operations are scalar Python; only the row of positions is a numpy array.
 """
 
 import math
@@ -21,38 +21,38 @@ Array = NDArray[np.float64]
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
-LEAST_FORCE = 1e-6  # N, keeps the lean of no force from dividing by zero
-REACH = 8.0  # of the log of probability, below which a place does not matter
-FEW = 6  # places of a peak below which it is looked at more closely
-PARTS = 12  # pieces of it then, two thirds of a standard deviation each
-ROUNDING = 1e-12  # of a determinant, below which it is lost in rounding
-WEAK_PRIOR = 1e-9  # of the force prior: keeps directions that no joint sees from dividing by zero
+LEAST_FORCE = 1e-6  # N, avoids a division by zero where there is no force
+REACH = 8.0  # of the log of probability; positions further below the maximum are neglected
+FEW = 6  # positions in a peak; with fewer, it is refined
+PARTS = 12  # pieces of a refined peak, two thirds of a standard deviation each
+ROUNDING = 1e-12  # of a determinant; below it is rounding error
+WEAK_PRIOR = 1e-9  # of the force prior: avoids a division by zero in directions that no joint measures
 SET = 0.9  # probability of the set that is reported
 
 
 class Fit(NamedTuple):
-    """What the torques say of a contact on one link.
+    """The most likely contact on one link.
 
     Attributes
     ----------
-    place, place_sd : m, mean and standard deviation of the place.
+    place, position_sd : m, mean and standard deviation of the contact position.
     force : (2,), N, most likely components across the link at `place`.
-    force_sd : N, standard deviation of the size of the force, the place unknown.
-    direction_sd : rad, standard deviation of its direction round the link, the place unknown.
-    told_sd : m, standard deviation of the place by the torques alone, without what is likely of places and
-        forces; infinite where they do not tell it.
-    force_at_end : (2,), N, the force if the place were the end of the link, the longest lever.
-    residual : what the best contact leaves unexplained, chi^2.
+    force_sd : N, standard deviation of the size of the force, the position unknown.
+    direction_sd : rad, standard deviation of its direction about the link, the position unknown.
+    torque_position_sd : m, standard deviation of the position by the torques alone, without priors of position
+        and force; infinite where they do not determine it.
+    force_at_end : (2,), N, the force if the position were the end of the link, the longest lever.
+    residual : what the best contact does not explain, chi^2.
     probability : of this link among all.
     low, high : m, ends of the part of the link that is in the 90 % set, NaN where none is.
     """
 
     place: float
-    place_sd: float
+    position_sd: float
     force: Pair
     force_sd: float
     direction_sd: float
-    told_sd: float
+    torque_position_sd: float
     force_at_end: Pair
     residual: float
     probability: float
@@ -62,22 +62,22 @@ class Fit(NamedTuple):
 
 Terms = tuple[Triple, Triple, Triple, Triple, Triple]
 Triangle = tuple[float, ...]  # 15: the rows of the upper triangle of a matrix 5 by 5, one after the other
-# a piece of a link: log of the probability of a contact just there, per metre; place and width, m; link
+# a piece of a link: log of the probability density of a contact, per metre; position and width, m; link
 Cell = tuple[float, float, float, int]
 
 
 class ContactFit:
-    """Places, forces and odds of one contact on straight links.
+    """Positions, forces and probabilities of one contact on straight links.
 
     Parameters
     ----------
-    start, end : (links,), m, where each link begins and ends along x.
+    start, end : (links,), m, ends of each link along x.
     radius : (links,), m, of the tubes.
-    weights : (links,), how often each is touched, relatively.
-    force_scale : N, sd of each component of the force before anything is felt.
-    miss : sd of the distance by which the line of the force misses the axis of the tube, per radius.
-    friction : sd of the force of friction along the link, per force.
-    places : how many places of each link are tried, at least 3.
+    weights : (links,), relative frequency of contacts on each.
+    force_scale : N, prior sd of each component of the force.
+    moment_arm_offset : sd of the distance between the line of the force and the axis of the tube, per radius.
+    friction : sd of the friction force along the link, per force.
+    positions : number of positions tried on each link, at least 3.
     """
 
     def __init__(
@@ -88,18 +88,18 @@ class ContactFit:
         weights: Sequence[float],
         *,
         force_scale: float,
-        miss: float,
+        moment_arm_offset: float,
         friction: float,
-        places: int,
+        positions: int,
     ) -> None:
         self._ends = list(zip(start, end, strict=True))
         self._radius = list(radius)
-        self._miss = [miss * r for r in radius]
-        # logs of the metres over which a touch is spread
-        self._spread = [math.log((b - a) / weight) for (a, b), weight in zip(self._ends, weights, strict=True)]
+        self._offset = [moment_arm_offset * r for r in radius]
+        # logs of the metres over which a contact is distributed
+        self._log_length = [math.log((b - a) / weight) for (a, b), weight in zip(self._ends, weights, strict=True)]
         self._precision, self._friction = force_scale**-2, friction
-        self._widths = [(b - a) / places for a, b in self._ends]
-        steps = (np.arange(places) + 0.5) / places  # the middle of each
+        self._widths = [(b - a) / positions for a, b in self._ends]
+        steps = (np.arange(positions) + 0.5) / positions  # the middle of each
         row = np.array([a + (b - a) * steps for a, b in self._ends])
         self._row = row.tolist()
         self._powers = np.stack((np.ones_like(row), row, row * row), axis=1)
@@ -113,8 +113,8 @@ class ContactFit:
         """
         full = gram.tolist()
         links = [
-            _Link(*_leaning(one, self._precision, 0.5 * (start + end), miss, self._friction, radius))
-            for one, (start, end), miss, radius in zip(full, self._ends, self._miss, self._radius, strict=True)
+            _Link(*_with_tangential_force(one, self._precision, 0.5 * (start + end), offset, self._friction, radius))
+            for one, (start, end), offset, radius in zip(full, self._ends, self._offset, self._radius, strict=True)
         ]
         log_density = self._log_density(links)
         top = max(map(max, log_density))
@@ -125,23 +125,25 @@ class ContactFit:
         return [self._fit(i, link, *part) for i, (link, part) in enumerate(zip(links, parts, strict=True))]
 
     def _log_density(self, links: "list[_Link]") -> list[list[float]]:
-        """Log of the probability of the torques for a contact of any likely force, place by place, up to a constant.
+        """Log of the probability of the torques for a contact at each position, up to a constant.
 
         -1/2 (r^T (S + s^2 G G^T)^-1 r + log abs(1 + s^2 G^T W G)), G = A + x B, s the scale of the force;
-        every place of a link is as likely as every other.
+        all positions on a link are equally likely a priori.
         """
         n11, n12, n22, c1, c2 = (np.array([link.terms for link in links]) @ self._powers).transpose(1, 0, 2)
         across = n12 / n11
         rest, left = n22 - across * n12, c2 - across * c1
         log_density = c1 * c1 / n11 + left * left / rest - np.log(n11 * rest)
-        constant = [[2.0 * (link.constant + spread)] for link, spread in zip(links, self._spread, strict=True)]
+        constant = [
+            [2.0 * (link.constant + log_length)] for link, log_length in zip(links, self._log_length, strict=True)
+        ]
         result: list[list[float]] = (0.5 * (log_density - constant)).tolist()
         return result
 
     def _cells(self, i: int, link: "_Link", values: list[float], top: float) -> list[Cell]:
-        """The places of a link that matter; pieces of them where the peak is narrow.
+        """The positions of a link that matter; a narrow peak is refined.
 
-        A narrow peak is the exponential of a parabola, sought by parabolas through three places, ever nearer.
+        Such a peak is the exponential of a parabola, found by parabolas through three positions, ever closer.
         """
         row, width, floor = self._row[i], self._widths[i], top - REACH
         top_value = max(values)
@@ -163,22 +165,22 @@ class ContactFit:
             if again:
                 x = min(max(x, start), end)
                 before, at, after = self._three(link, x, near)
-        at, sd = link.log_density(x) - link.constant - self._spread[i], math.sqrt(-0.5 / bend)
+        at, sd = link.log_density(x) - link.constant - self._log_length[i], math.sqrt(-0.5 / bend)
         left, right = max(start, x - 4.0 * sd), min(end, x + 4.0 * sd)
-        if left >= right:  # the peak lies beyond the end of the link; all of it is at the end
+        if left >= right:  # the peak lies beyond the end of the link, which gets all of it
             left, right = (end - sd, end) if x > end else (start, start + sd)
         part = (right - left) / PARTS
-        places = [left + (k + 0.5) * part for k in range(PARTS)]
-        return [(at + bend * (place - x) ** 2, place, part, i) for place in places]
+        positions = [left + (k + 0.5) * part for k in range(PARTS)]
+        return [(at + bend * (position - x) ** 2, position, part, i) for position in positions]
 
     @staticmethod
     def _three(link: "_Link", x: float, near: float) -> tuple[float, float, float]:
         return link.log_density(x - near), link.log_density(x), link.log_density(x + near)
 
     def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float]]:
-        """Probability, mean and variance of the place, low and high end of the 90 % set, of each link.
+        """Probability, mean and variance of the position, low and high end of the 90 % set, of each link.
 
-        The set takes the most probable places first, which is how `cells` come.
+        The set takes the most probable positions first: `cells` are in this order.
         """
         top = cells[0][0]
         sums = [[0.0, 0.0, 0.0] for _ in self._ends]
@@ -196,7 +198,7 @@ class ContactFit:
         for weight, (_, x, width, i) in zip(weights, cells, strict=True):
             if passed >= enough:
                 break
-            # of the last place only the part that fills the set, on the side of the others
+            # of the last piece only the part that fills the set, on the side of the others
             passed += weight
             unused = width * (passed - enough) / weight if passed > enough else 0.0
             part, half = inside[i], 0.5 * width
@@ -230,11 +232,11 @@ class ContactFit:
         about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22 + (u1 * d2 - u2 * d1) ** 2 * variance
         return Fit(
             place=place,
-            place_sd=math.sqrt(variance),
+            position_sd=math.sqrt(variance),
             force=force,
             force_sd=math.sqrt(along),
             direction_sd=min(math.sqrt(about) / size, math.pi),
-            told_sd=link.told_sd(place, force),
+            torque_position_sd=link.torque_position_sd(place, force),
             force_at_end=link.force(self._ends[i][1])[0],
             residual=max(0.0, link.rr - explained - self._precision * size * size),
             probability=probability,
@@ -250,7 +252,7 @@ class _Link:
         self.rr, *_ = triangle
         self._slopes = triangle[7:9] + triangle[10:]
         self.precision = precision
-        self.constant = 0.5 * (self.rr + log_widening)  # what the log of the probability lacks at every place
+        self.constant = 0.5 * (self.rr + log_widening)  # subtracted from the log of the probability at every position
         self.terms = _terms(triangle, precision)
 
     def force(self, x: float) -> tuple[Pair, float, Triple]:
@@ -261,15 +263,15 @@ class _Link:
         """Log of the probability of the torques for a contact at x, up to a constant of the link; see `ContactFit`."""
         (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = self.terms
         n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
-        told1, told2 = c0 + x * c1, e0 + x * e1
+        torque1, torque2 = c0 + x * c1, e0 + x * e1
         determinant = max(n11 * n22 - n12 * n12, ROUNDING * n11 * n22)
-        explained = (told1 * (n22 * told1 - 2.0 * n12 * told2) + n11 * told2 * told2) / determinant
+        explained = (torque1 * (n22 * torque1 - 2.0 * n12 * torque2) + n11 * torque2 * torque2) / determinant
         return 0.5 * (explained - math.log(determinant))
 
-    def told_sd(self, x: float, force: Pair) -> float:
-        """Standard deviation of the place, m, by the torques alone, the force unknown: a Schur complement.
+    def torque_position_sd(self, x: float, force: Pair) -> float:
+        """Standard deviation of the position, m, by the torques alone, the force unknown: a Schur complement.
 
-        Not by a pseudo-inverse of the whole information, which is small exactly where the place is not told.
+        Not by a pseudo-inverse of the whole information, which is small exactly where the position is undetermined.
         """
         (p0, p1, p2), (q0, q1, q2), (s0, s1, s2) = self.terms[:3]
         a1b1, a1b2, a2b1, a2b2, b11, b12, b22 = self._slopes
@@ -296,30 +298,30 @@ def _terms(triangle: Triangle, precision: float) -> Terms:
 
 
 def _force(terms: Terms, x: float) -> tuple[Pair, float, Triple]:
-    """Most likely force at place x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
+    """Most likely force at position x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
     (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = terms
     n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
-    told1, told2 = c0 + x * c1, e0 + x * e1
+    torque1, torque2 = c0 + x * c1, e0 + x * e1
     determinant = n11 * n22 - n12 * n12
-    f1, f2 = (n22 * told1 - n12 * told2) / determinant, (n11 * told2 - n12 * told1) / determinant
-    return (f1, f2), f1 * told1 + f2 * told2, (n22 / determinant, -n12 / determinant, n11 / determinant)
+    f1, f2 = (n22 * torque1 - n12 * torque2) / determinant, (n11 * torque2 - n12 * torque1) / determinant
+    return (f1, f2), f1 * torque1 + f2 * torque2, (n22 / determinant, -n12 / determinant, n11 / determinant)
 
 
-def _leaning(
-    gram: list[list[float]], precision: float, middle: float, miss: float, friction: float, radius: float
+def _with_tangential_force(
+    gram: list[list[float]], precision: float, middle: float, offset: float, friction: float, radius: float
 ) -> tuple[Triangle, float, float]:
-    """What makes a `_Link` with the lean of the force, as large as at the middle of the link, in the covariance.
+    """Arguments of `_Link` with the tangential force, of the size at the middle of the link, in the covariance.
 
-    Twist: the line of the force misses the axis by some part of the radius.  Axial: a force along
-    the surface, which is where the force comes from, one radius off the axis.  With z the two in
-    torques of one standard deviation, S + z z^T has the Gram matrix G - u (1 + v)^-1 u^T,
-    u = Z^T W z, v = z^T W z (Woodbury).  Written out: this is most of the work, and loops double it.
+    Twist: the line of the force has a moment arm about the axis.  Axial: a friction force along the
+    surface, one radius off the axis.  With z these two as torques of one standard deviation,
+    S + z z^T has the Gram matrix G - u (1 + v)^-1 u^T, u = Z^T W z, v = z^T W z (Woodbury).  Written
+    out in scalars because this is most of the work, and loops double its time.
     """
     (r, g1, g2, g3, g4, t, a) = gram
     triangle = (*r[:5], *g1[1:5], *g2[2:5], *g3[3:5], g4[4])
     (f1, f2), _, _ = _force(_terms(triangle, precision), middle)
     size = math.hypot(f1, f2) + LEAST_FORCE
-    sd, arm, turn = friction * size, miss * size, friction * radius
+    sd, arm, turn = friction * size, offset * size, friction * radius
     b1, b2 = turn * f1, turn * f2
     u0, u1, u2, u3, u4 = arm * t[0], arm * t[1], arm * t[2], arm * t[3], arm * t[4]
     v0, v1, v2 = (

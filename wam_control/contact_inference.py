@@ -1,7 +1,8 @@
-"""Which link is touched, where and how hard, from the torques of the world on the joints.
+"""Contact isolation and identification: which link, where and how hard, from the external joint torques.
 
-Salisbury (1984): place and force from joint torques.  On the outer link there are four equations
-for place, angle and force; on the inner link axes 1-3 meet in the shoulder and see the moment only.
+Salisbury (1984): position and force from joint torques.  On the outer link there are four equations
+for position, angle and force; on the inner link axes 1-3 meet in the shoulder and measure the
+moment only.
 """
 
 import math
@@ -20,32 +21,37 @@ from wam_description.rigid_body import RigidBody
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-NEAR = math.cos(math.radians(20.0))  # how near to an ambiguous pose or direction it is named
-SMALL = 1e-9  # m, lever arms that are zero but for rounding
+NEAR = math.cos(math.radians(20.0))  # how close to an ambiguous pose or direction that is given as the reason
+SMALL = 1e-9  # m, lever arms that are zero apart from rounding
 
-MOMENT_ONLY = "sees only the moment: the place is unknown, the force is at least what is given"
-BENT = "elbow at 90 deg and force in plane: place and force cannot be told apart"
-STRAIGHT = "elbow straight and force out of plane: place and force cannot be told apart"
-SHOULDER = "theta2 = 0: axes 1 and 3 are in line and one moment of the shoulder is not seen"
-WEAK = "the torques are too small for their uncertainty to tell the place"
-ELBOW = "tau3 and tau4 near 0: a contact at the elbow and one on the inner link cannot be told apart"
-STRAIGHT_LINK = "elbow straight and force out of plane: the links cannot be told apart"
-LINKS = "the torques do not tell which link is touched"
+MOMENT_ONLY = "measures only the moment: the contact position is unknown, the force is a lower bound"
+BENT = "elbow at 90 deg and force in plane: contact position and force cannot be separated"
+STRAIGHT = "elbow straight and force out of plane: contact position and force cannot be separated"
+SHOULDER = "theta2 = 0: axes 1 and 3 are aligned and one moment of the shoulder is not measured"
+WEAK = "the torques are too small, compared with their uncertainty, to identify the contact position"
+ELBOW = "tau3 and tau4 near 0: a contact at the elbow and one on the inner link cannot be distinguished"
+STRAIGHT_LINK = "elbow straight and force out of plane: the links cannot be distinguished"
+LINKS = "the torques do not identify the link"
 MORE = "one contact does not explain the torques"
+REASONS = (MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE)  # as bits of a number
 
 
 @dataclass(frozen=True)
 class InferenceParameters:
-    """What is taken for likely before anything is felt."""
+    """Prior probabilities of a contact, before it is detected."""
 
     weights: tuple[float, ...] = parameter(
-        "how often each cover is touched, relatively; the outer one sweeps more", low=1e-3, high=1e3
+        "relative frequency of contacts on each cover; the outer one sweeps more", low=1e-3, high=1e3
     )
-    force_scale: float = parameter("sd of each component of a contact's force before it is felt", "N", low=0.1)
-    miss: float = parameter("sd by which the line of a force misses the tube's axis, per radius", low=0.0, high=2.0)
-    friction: float = parameter("sd of the force of friction along a cover, per force", low=0.0, high=2.0)
-    places: int = parameter("places along a link that are tried", low=9, high=200)
-    sure: float = parameter("probability above which a link counts as told", low=0.5, high=1.0)
+    force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1)
+    moment_arm_offset: float = parameter(
+        "sd of the distance between the line of the force and the tube's axis, per radius", low=0.0, high=2.0
+    )
+    friction: float = parameter("sd of the friction force along a cover, per force", low=0.0, high=2.0)
+    positions: int = parameter("contact positions tried along a link", low=9, high=200)
+    identification_threshold: float = parameter(
+        "probability from which the link in contact is identified", low=0.5, high=1.0
+    )
     largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", low=0.0)
 
 
@@ -54,27 +60,27 @@ class Hypothesis(NamedTuple):
 
     Attributes
     ----------
-    cover : name of the touched cover.
+    cover : name of the cover.
     probability : of this hypothesis among all, 0..1.
-    place : m along the cover's x axis, NaN where it cannot be observed.
-    place_sd : m, NaN with the place.
-    low, high : m, ends of the part of the cover that is in the 90 % set of places on all covers; NaN
+    place : contact position, m along the cover's x axis, NaN where it cannot be observed.
+    position_sd : m, NaN with the place.
+    low, high : m, ends of the part of the cover that is in the 90 % set of positions on all covers; NaN
         where no part is.
-    force : (3,), N, of the world on the link, in the cover's frame; where the place is NaN the
-        least force that explains the torques, that at the far end of the link.
+    force : (3,), N, of the world on the link, in the cover's frame; where the position is NaN the
+        smallest force that explains the torques, that at the far end of the link.
     force_sd : N, standard deviation of its size; NaN where it is a lower bound.
-    is_lower_bound : True where `force` is that least force.
-    direction : rad, angle of the force round the link, from the cover's y to its z axis.
+    is_lower_bound : True where `force` is that smallest force.
+    direction : rad, angle of the force about the link, from the cover's y to its z axis.
     direction_sd : rad.
     moment : (3,), N m, of the force about the origin of the cover's frame, in that frame.
-    residual : chi^2 that the contact leaves unexplained.
-    reason : why the place is not known or the answer not to be trusted, '' where neither.
+    residual : chi^2 that the contact does not explain.
+    reason : why the position is unknown or the estimate not reliable, '' where neither.
     """
 
     cover: str
     probability: float
     place: float
-    place_sd: float
+    position_sd: float
     low: float
     high: float
     force: Triple
@@ -95,8 +101,8 @@ class _Cover(NamedTuple):
     across: Array  # (3, 2), directions across the tube, near the cover's y and z
     directions: list[list[float]]  # the same
     hinge: Array  # (3,), axis of the link's joint in the cover's frame
-    joints: int  # that move the cover
-    sees_moment_only: bool
+    joints: int  # number of joints that move the cover
+    is_moment_only: bool
 
 
 def detection_statistic(torques: Sequence[float], precision: Array) -> float:
@@ -106,10 +112,10 @@ def detection_statistic(torques: Sequence[float], precision: Array) -> float:
 
 
 class ContactInference:
-    """One hypothesis for each cover, from its probability at places along it, by the arm's own kinematics.
+    """One hypothesis per cover, by the probability of contact positions along it.
 
-    The joints, links and covers may be any; reasons name the WAM's poses where the arm has its
-    geometry: four joints, an inner cover from shoulder to elbow, an outer one from the elbow on.
+    Any joints, links and covers will do; reasons name poses of the WAM if the arm has its geometry:
+    four joints, an inner cover from shoulder to elbow, an outer one from the elbow on.
     """
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
@@ -123,14 +129,14 @@ class ContactInference:
             arm.covers.radius,
             parameters.weights,
             force_scale=parameters.force_scale,
-            miss=parameters.miss,
+            moment_arm_offset=parameters.moment_arm_offset,
             friction=parameters.friction,
-            places=parameters.places,
+            positions=parameters.positions,
         )
         self._is_wam = (
             len(arm.joints.names) == 4
             and [cover.joints for cover in self._covers] == [3, 4]
-            and self._covers[0].sees_moment_only
+            and self._covers[0].is_moment_only
         )
 
     def infer(self, q: Sequence[float], torques: Sequence[float], precision: Array) -> tuple[Hypothesis, ...]:
@@ -145,24 +151,28 @@ class ContactInference:
         Returns
         -------
         tuple of Hypothesis
-            one for each cover, the most probable first; probabilities add up to 1.
+            one per cover, the most probable first; probabilities add up to 1.
         """
         rows = np.empty((len(self._covers), 7, len(torques)))
         rows[:, 0] = torques
         for i, cover in enumerate(self._covers):
             np.matmul(cover.wrenches, self._body.cover_jacobian(q, cover.name), out=rows[i, 1:])
         fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1))
-        doubt = self._doubt(q, fits) if max(fit.probability for fit in fits) < self._parameters.sure else ""
-        found = [self._hypothesis(q, cover, fit, doubt) for cover, fit in zip(self._covers, fits, strict=True)]
+        ambiguity = (
+            self._ambiguity(q, fits)
+            if max(fit.probability for fit in fits) < self._parameters.identification_threshold
+            else ""
+        )
+        found = [self._hypothesis(q, cover, fit, ambiguity) for cover, fit in zip(self._covers, fits, strict=True)]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
 
-    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, doubt: str) -> Hypothesis:
+    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str) -> Hypothesis:
         start, end = cover.start, cover.end
         length = end[0] - start[0]
-        is_unknown = cover.sees_moment_only or fit.told_sd > length
+        is_unknown = cover.is_moment_only or fit.torque_position_sd > length
         reasons = [self._why_unknown(q, cover, fit)] if is_unknown else []
-        if doubt:
-            reasons.append(doubt)
+        if ambiguity:
+            reasons.append(ambiguity)
         if fit.residual > self._parameters.largest_residual:
             reasons.append(MORE)
         place = end[0] if is_unknown else fit.place
@@ -174,7 +184,7 @@ class ContactInference:
             cover=cover.name,
             probability=fit.probability,
             place=math.nan if is_unknown else place,
-            place_sd=math.nan if is_unknown else fit.place_sd,
+            position_sd=math.nan if is_unknown else fit.position_sd,
             low=fit.low,
             high=fit.high,
             force=force,
@@ -188,9 +198,9 @@ class ContactInference:
         )
 
     def _why_unknown(self, q: Sequence[float], cover: _Cover, fit: Fit) -> str:
-        if cover.sees_moment_only:
-            seer = "the shoulder" if self._is_wam else "the only joint" if cover.joints == 1 else "the pivot"
-            return f"{seer} {MOMENT_ONLY}"
+        if cover.is_moment_only:
+            joint = "the shoulder" if self._is_wam else "the only joint" if cover.joints == 1 else "the pivot"
+            return f"{joint} {MOMENT_ONLY}"
         if not self._is_wam:
             return WEAK
         in_plane, straight, bent = self._elbow(q, cover, fit)
@@ -202,20 +212,20 @@ class ContactInference:
             return SHOULDER
         return WEAK
 
-    def _doubt(self, q: Sequence[float], fits: list[Fit]) -> str:
-        """Why no link stands out."""
+    def _ambiguity(self, q: Sequence[float], fits: list[Fit]) -> str:
+        """Why the link is not identified."""
         if not self._is_wam:
             return LINKS
         outer, fit = self._covers[1], fits[1]
         in_plane, straight, _ = self._elbow(q, outer, fit)
         if straight > NEAR and in_plane < math.sqrt(1.0 - NEAR**2):
             return STRAIGHT_LINK
-        if fit.place - outer.start[0] < 2.0 * fit.place_sd:
+        if fit.place - outer.start[0] < 2.0 * fit.position_sd:
             return ELBOW
         return LINKS
 
     def _elbow(self, q: Sequence[float], cover: _Cover, fit: Fit) -> tuple[float, float, float]:
-        """How far, 0..1, the force lies in the plane of the links, the elbow is straight, is at 90 deg."""
+        """How much, 0..1, the force lies in the plane of the links, the elbow is straight, the elbow is at 90 deg."""
         inner = self._body.cover_pose(q, self._covers[0].name).rotation[:, 0]
         outer = self._body.cover_pose(q, cover.name).rotation[:, 0]
         cosine = min(1.0, abs(float(inner @ outer)))
@@ -256,7 +266,7 @@ def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
         directions=across.tolist(),
         hinge=_hinge(body, name, joints),
         joints=joints,
-        sees_moment_only=_sees_moment_only(arm, body, name, origin),
+        is_moment_only=_is_moment_only(arm, body, name, origin),
     )
 
 
@@ -270,11 +280,11 @@ def _wrenches(origin: Array, slope: Array, axis: Array, across: Array) -> Array:
 
 
 def _hinge(body: RigidBody, name: str, joints: int) -> Array:
-    """Axis of the cover's own joint in the cover's frame."""
+    """Axis of the joint that carries the cover, in the cover's frame."""
     return body.cover_jacobian([0.0] * len(body.arm.joints.names), name)[3:, joints - 1]
 
 
-def _sees_moment_only(arm: Arm, body: RigidBody, name: str, origin: Array) -> bool:
-    """Whether all joint axes meet the tube's axis at x = 0, so that x and force come as a product."""
+def _is_moment_only(arm: Arm, body: RigidBody, name: str, origin: Array) -> bool:
+    """Whether all joint axes meet the tube's axis at x = 0: only the product of x and force is measured then."""
     poses = ([0.3 * (i + 1) * sign for i in range(len(arm.joints.names))] for sign in (1.0, -1.0))
     return all(float(np.abs(body.point_jacobian(q, name, origin)).max()) < SMALL for q in poses)

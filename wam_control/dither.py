@@ -1,7 +1,7 @@
-"""Dither: a small alternating motor torque that keeps friction from hiding a touch while the arm rests.
+"""Dither: a small alternating motor torque, so that friction does not hide a contact while the arm is at rest.
 
-A shaft that slips to and fro bears Coulomb friction in both directions, which cancels over a whole
-cycle; what is left of the torques is what the world does.  A shaft that sticks tells nothing.
+Coulomb friction on a shaft that slips back and forth cancels over a whole cycle; the remaining torque
+is external.  The torque of a shaft that sticks carries no information.
 """
 
 import math
@@ -19,19 +19,21 @@ from wam_description.transmission_map import TransmissionMap
 
 @dataclass(frozen=True)
 class DitherParameters:
-    """Size and shape of the dither; how long it takes is `timing.dither_cycle`."""
+    """Size and shape of the dither; its period is `timing.dither_cycle`."""
 
-    level: float = parameter("amplitude per static friction of motor and joints, seen at the motor", low=0.0, high=3.0)
+    level: float = parameter(
+        "amplitude per static friction of motor and joints, reflected to the motor", low=0.0, high=3.0
+    )
     phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", low=-1.0, high=1.0)
 
 
 class DitherCost(NamedTuple):
-    """What the dither costs.
+    """Side effects of the dither.
 
     Attributes
     ----------
     tip_motion : m, peak to peak, of the tool without any friction; with friction it is far less.
-    heat : (n,), share of the heat that each winding stands for ever.
+    heat : (n,), heat in each winding per rated (continuous) heat.
     """
 
     tip_motion: float
@@ -39,12 +41,12 @@ class DitherCost(NamedTuple):
 
 
 class Dither:
-    """Torques of the dither, by the stamp of the state that they answer: the same for every run.
+    """Torques of the dither as a function of the state's stamp: the same in every run.
 
     Parameters
     ----------
     arm : the arm; the amplitudes come from its friction.
-    timing : with the cycle, none where `dither_cycle` is 0.
+    timing : `dither_cycle` 0 is no dither.
     parameters : level and phases.
     """
 
@@ -71,16 +73,16 @@ class Dither:
         ]
 
     def torque(self, stamp: int) -> list[float]:
-        """Torque of each motor, (n,), N m, on top of what else is asked of it, at a stamp, ns; empty without dither."""
+        """Torque added to each motor, (n,), N m, at a stamp, ns; empty without dither."""
         return self._torque[stamp // self._period_ns % len(self._torque)] if self._torque else []
 
     def added(self, stamp: int, effort: Sequence[float]) -> Sequence[float]:
-        """Feed-forward torques (n,), N m, with the dither on top."""
+        """Feed-forward torques plus dither, (n,), N m."""
         torque = self.torque(stamp)
         return [a + b for a, b in zip(effort, torque, strict=True)] if torque else effort
 
     def cost(self, q: Sequence[float]) -> DitherCost:
-        """What the dither costs in pose q, (n,), rad.
+        """Side effects of the dither in pose q, (n,), rad.
 
         x = J M^-1 tau/omega^2 with the rotors and pulleys in M, the largest over a cycle; heat
         (tau_rms/tau_continuous)^2.
@@ -104,7 +106,7 @@ SHORTEST_CYCLE = 4  # periods; a shorter one is no sine
 def friction_at_motors(arm: Arm) -> list[float]:
     """Torque of each motor, (n,), N m, that overcomes its own static friction and its share of the joints'.
 
-    A joint that several motors move is shared among them by what each can give.
+    A joint that several motors drive is divided among them in proportion to their transmission ratios.
     """
     inverse = np.abs(TransmissionMap.of(arm).motor_from_joint)
     share = inverse / inverse.sum(axis=0)

@@ -1,12 +1,13 @@
-"""What an axis of the force loop makes of its error: saturation, dead zone, G_I and G_P (5.5), (5.7), (5.23).
+"""The law of one axis of the force loop: saturation, deadband, G_I and G_P (5.5), (5.7), (5.23).
 
-The order is that of `wam_theory.stick_slip.ForceLoop`: the error is saturated first, and at the
-input of G_I a dead zone takes its width from what is left, so that the velocity is continuous in
-the error.  G_P acts on velocity level as the rate of the saturated error for one and the same set
+The order is that of `wam_theory.stick_slip.IntegralLoop`: the error is saturated first, and the
+deadband at the input of G_I is subtracted from the rest, so that the velocity is continuous in the
+error.  G_P acts as a velocity proportional to the rate of the saturated error at constant set
 point: a step of the set point moves the arm through G_I alone, without a jerk.
 """
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,19 +20,19 @@ class ForceLaw:
 
     Parameters
     ----------
-    group : beginning of the parameters' names, 'force' or 'torque', for messages.
+    group : prefix of the parameters' names, 'force' or 'torque', for messages.
     names : of the axes: x y z of the force's frame, or the joints.
     gain : G_I, velocity per error.
     proportional_gain : G_P, displacement per error.
     error_limit : saturation of the error.
-    deadband : width that is taken from the error at the input of G_I.
+    deadband : subtracted from the size of the error at the input of G_I.
 
-    Each is one value for every axis or a single one for all; SI, N and m or N m and rad.
+    Each has one value per axis or one for all; SI, N and m or N m and rad.
 
     Raises
     ------
     ParameterError
-        where a list has another length, or a saturation is not above its dead zone.
+        where a list has another length, or a saturation is not above its deadband.
     """
 
     group: str
@@ -48,7 +49,7 @@ class ForceLaw:
             require(
                 limit > deadband,
                 f"{self.group}_error_limit of {name} is {limit:g}; it must be above {self.group}_deadband, "
-                f"{deadband:g}: raise the one or lower the other",
+                f"{deadband:g}: raise the first or lower the second",
             )
 
     def limited(self, axis: int, error: float) -> float:
@@ -57,7 +58,7 @@ class ForceLaw:
         return min(max(error, -limit), limit)
 
     def effective(self, axis: int, error: float) -> float:
-        """Error that G_I sees, after saturation and dead zone."""
+        """Error at the input of G_I, after saturation and deadband."""
         return math.copysign(max(min(abs(error), self.error_limit[axis]) - self.deadband[axis], 0.0), error)
 
     def velocity(self, axis: int, error: float, before: float, dt: float) -> float:
@@ -65,9 +66,9 @@ class ForceLaw:
 
         Parameters
         ----------
-        axis : which, counted from 0.
-        error : set point less what is measured.
-        before : the same set point less what was measured one period before.
+        axis : index of the axis.
+        error : set point minus measurement.
+        before : the same set point minus the measurement of the period before.
         dt : period, s.
         """
         velocity = self.gain[axis] * self.effective(axis, error)
@@ -76,14 +77,39 @@ class ForceLaw:
             velocity += proportional * (self.limited(axis, error) - self.limited(axis, before)) / dt
         return velocity
 
+    def velocities(self, errors: Sequence[float], before: Sequence[float], dt: float) -> list[float]:
+        """Velocity of every axis; arguments as those of `velocity`, one of each per axis."""
+        return [self.velocity(i, *pair, dt) for i, pair in enumerate(zip(errors, before, strict=True))]
+
+
+class DelayLine:
+    """Delays the velocities of a law by whole periods."""
+
+    def __init__(self) -> None:
+        self._held: deque[list[float]] = deque()
+
+    def reset(self) -> None:
+        """Forget all inputs."""
+        self._held.clear()
+
+    def step(self, velocities: list[float], samples: int) -> list[float]:
+        """Input of `samples` periods ago; zeros before there was one."""
+        if not samples:
+            self._held.clear()
+            return velocities
+        self._held.append(velocities)
+        while len(self._held) > samples + 1:
+            self._held.popleft()
+        return self._held.popleft() if len(self._held) > samples else [0.0] * len(velocities)
+
 
 def per_axis(field: str, given: Sequence[float], names: Sequence[str]) -> tuple[float, ...]:
-    """One value for every axis, from as many or from a single one.
+    """One value per axis, from as many or from one for all.
 
     Raises
     ------
     ParameterError
-        where there is another number of values.
+        where the number of values is another.
     """
     values = tuple(given)
     require(

@@ -1,11 +1,12 @@
-"""Parameters of the force loop, and the laws that they make."""
+"""Parameters of the force loop, and the laws built from them."""
 
 from dataclasses import dataclass
 
 from wam_control.force_law import ForceLaw
 from wam_control.sampled_loop import Feedback
-from wam_control.stability_guard import GuardParameters, Task
-from wam_description.parameters import parameter
+from wam_control.stability_guard import GuardedTask, GuardParameters
+from wam_description.arm import Arm
+from wam_description.parameters import lengths, parameter, require
 
 AXES = ("x", "y", "z")  # of the force command's frame
 
@@ -22,7 +23,7 @@ class ForceLoopParameters:
         live=True,
     )
     feedback: str = parameter(
-        "where F_c comes from", choices=("joint_sensors", "contact_estimate", "joint_position"), live=True
+        "source of the measured force F_c", choices=("joint_sensors", "contact_estimate", "joint_position"), live=True
     )
     force_gain: tuple[float, ...] = parameter(
         "G_I of each axis x y z of the force command's frame, or one for all: velocity per force error",
@@ -39,7 +40,7 @@ class ForceLoopParameters:
     force_deadband: tuple[float, ...] = parameter(
         "deadband at the input of G_I of each axis (5.7), or one for all", "N", low=0.0, live=True
     )
-    force_limit: float = parameter("largest force that may be asked for", "N", low=0.0, live=True)
+    force_limit: float = parameter("largest force that may be commanded", "N", low=0.0, live=True)
     torque_gain: tuple[float, ...] = parameter(
         "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", low=0.0, live=True
     )
@@ -52,43 +53,65 @@ class ForceLoopParameters:
     torque_deadband: tuple[float, ...] = parameter(
         "deadband at the input of each joint's G_I, or one for all", "N m", low=0.0, live=True
     )
-    torque_limit: float = parameter("largest torque of a joint that may be asked for", "N m", low=0.0, live=True)
-    delay_samples: int = parameter(
-        "outer periods for which the velocity of the law is held back; zero answers at once", low=0, high=20, live=True
-    )
+    torque_limit: float = parameter("largest joint torque that may be commanded", "N m", low=0.0, live=True)
+    delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
     blend_time: float = parameter(
-        "time constant with which the velocity goes over from what it was to what the law asks for, when a command "
-        "begins or ends, the mode or a gain is changed, or the motors start; zero for at once",
+        "time constant of the bumpless transfer of the velocity when a command begins or ends, the mode or a gain is "
+        "changed, or the motors start; zero for none",
         "s",
         low=0.0,
         live=True,
     )
     posture_gain: float = parameter("joint velocity per posture error", "1/s", low=0.0, live=True)
     joint_speed_limit: float = parameter(
-        "largest joint speed that posture and force ask for", "rad/s", low=0.0, live=True
+        "largest joint speed due to the posture and to the force", "rad/s", low=0.0, live=True
     )
     force_filter: float = parameter("time constant of the low pass on the measured force", "s", low=0.0, live=True)
     spring_stiffness: tuple[float, ...] = parameter(
         "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", low=0.0, live=True
     )
-    spring_rest: tuple[float, ...] = parameter("joint angle at which that spring is not pressed", "rad", live=True)
+    spring_rest: tuple[float, ...] = parameter("joint angle at which that spring is relaxed", "rad", live=True)
     command_timeout: float = parameter(
-        "age at which a force command no longer counts and the arm holds where it is", "s", low=0.001, live=True
-    )
-    contact_cover: str = parameter("cover that is taken to touch while no contact is felt", live=True)
-    contact_place: float = parameter("place on it", "m", live=True)
-    schedule: str = parameter(
-        "off: the gains stay; place: the gains follow the estimated place so that the margin stays what it is at "
-        "contact_place, and fall back to the worst place of the cover where the estimate is not sure",
-        choices=("off", "place"),
+        "age at which a force command is stale: the arm stops pressing and holds its position",
+        "s",
+        low=0.001,
         live=True,
     )
-    place_uncertainty_limit: float = parameter(
-        "standard deviation of an estimated place up to which it is sure", "m", low=0.0, live=True
+    contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
+    contact_position: float = parameter("contact position assumed along it", "m", live=True)
+    schedule: str = parameter(
+        "off: the gains stay; position: the gains follow the estimated contact position so that the stability margin "
+        "stays the one at contact_position; where the estimate is not certain, the worst position of the cover counts",
+        choices=("off", "position"),
+        live=True,
+    )
+    position_uncertainty_limit: float = parameter(
+        "largest standard deviation of an estimated contact position that is used", "m", low=0.0, live=True
     )
     link_probability_limit: float = parameter(
-        "probability of the touched link from which its place is sure", low=0.0, high=1.0, live=True
+        "least probability of the estimated link with which its contact position is used", low=0.0, high=1.0, live=True
     )
+
+
+def require_fit(parameters: ForceLoopParameters, arm: Arm) -> None:
+    """Refuse parameters that do not fit the arm.
+
+    Raises
+    ------
+    ParameterError
+        names the parameter and what is allowed.
+    """
+    covers = arm.covers.names
+    require(
+        parameters.contact_cover in covers,
+        f"contact_cover is '{parameters.contact_cover}'; allowed: {', '.join(covers)}",
+    )
+    require(
+        parameters.feedback == "contact_estimate" or arm.joint_sensors,
+        f"feedback is '{parameters.feedback}' but arm.joint_sensors is false; use 'contact_estimate'",
+    )
+    springs = {"spring_stiffness": parameters.spring_stiffness, "spring_rest": parameters.spring_rest}
+    lengths("force_loop", arm.joints.names, springs)
 
 
 def force_law(parameters: ForceLoopParameters) -> ForceLaw:
@@ -115,10 +138,10 @@ def torque_law(parameters: ForceLoopParameters, joints: tuple[str, ...]) -> Forc
     )
 
 
-def task_of(parameters: ForceLoopParameters, law: ForceLaw) -> Task:
-    """What the guard has to know of a set."""
+def task_of(parameters: ForceLoopParameters, law: ForceLaw) -> GuardedTask:
+    """What the guard needs to know of a parameter set."""
     is_joints = parameters.mode == "joint_torque"
-    return Task(
+    return GuardedTask(
         law=law,
         is_joints=is_joints,
         feedback=Feedback(parameters.feedback, parameters.spring_stiffness, parameters.guard.feedback_lag),

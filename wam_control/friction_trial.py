@@ -1,8 +1,8 @@
-"""Trial of a saturated loop with dry friction on an arm of one joint, behind its real velocity loop.
+"""Simulation of a saturated loop with dry friction on an arm of one joint, including its velocity loop.
 
-Many trials run side by side, one a column.  Time goes in parts of the inner period; within a part
-all but friction is exact, and friction is the constant torque that brings the joint to rest at the
-part's end, where it can: up to F_static while it stuck, else F_dynamic.
+Many trials run in parallel, one per column.  Each inner period has PARTS steps.  Within a step all
+but friction is exact; friction is the constant torque that would bring the joint to rest at the end
+of the step, limited to F_static if the joint was sticking, else F_dynamic.
 """
 
 import math
@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.friction_verdict import CYCLE_EXCESS, STEPS, SURE
-from wam_control.sampled_loop import Axes, Feedback, SampledLoop, held
+from wam_control.sampled_loop import Axes, Feedback, SampledLoop
 from wam_theory.stick_slip import FrictionNode
+from wam_theory.zero_order_hold import zero_order_hold
 
 Array = NDArray[np.float64]
-PARTS = 2  # of an inner period
-SHARE = 0.2  # of the saturation, peak to peak, that a response may have left at its end
-RISES = 1.5  # times that the largest step takes at the saturated speed, which a trial lasts
-OSCILLATIONS = 60.0  # of the node, that it lasts besides
+PARTS = 2  # steps in an inner period
+SHARE = 0.2  # of the saturation: peak to peak at the end of a response that counts as rest
+RISES = 1.5  # duration of a trial, in times that the largest step takes at the saturated speed
+OSCILLATIONS = 60.0  # of the node, added to that duration
 CANDIDATES = (60.0, 30.0, 15.0, 8.0, 5.0, 3.5, 2.5, 1.7, 1.2, 0.8, 0.5)  # saturations, in F_static
 
 
@@ -33,14 +34,14 @@ def stable_error(
     deadband: float,
     cycle: float,
 ) -> float:
-    """Largest saturation with which steps of every size come to rest, or to the cycle of stiction; 0 for none.
+    """Largest saturation with which steps of every size end at rest or in the stiction cycle; 0 for none.
 
     Parameters
     ----------
     loop, q, axes, contact, feedback : as in `SampledLoop.margin`; one joint, one axis.
-    node : the same as a friction node along the axis.
+    node : the same arm as a friction node along the axis.
     deadband : of the law, N or N m.
-    cycle : peak to peak of the cycle of stiction, N or N m.
+    cycle : peak to peak of the stiction limit cycle, N or N m.
     """
     limits = np.array([part * node.static_friction for part in CANDIDATES])
     limits = limits[limits > deadband / SURE]
@@ -71,12 +72,12 @@ def _rest(
     steps: Array,
 ) -> Array:
     """Peak to peak of the force in the last eighth of each trial, N or N m."""
-    free, felt = loop.plant(q, contact, feedback)
+    free, shown = loop.plant(q, contact, feedback)
     inertia = loop.body.mass_matrix(q) + loop.armature
     push = np.array([[0.0], [0.0], [0.0], [1.0 / float(inertia[0, 0])]])
-    drift, drive = held(free, np.hstack([loop.inlet, push]), loop.tick / PARTS)
+    drift, drive = zero_order_hold(free, np.hstack([loop.inlet, push]), loop.tick / PARTS)
     motor, joint = drive[:, :1], drive[:, 1:]
-    row = (axes.sense @ felt)[0]
+    row = (axes.sense @ shown)[0]
     share = float((axes.sense @ loop.body.mass_matrix(q) / inertia)[0, 0]) if feedback.kind == "joint_sensors" else 0.0
     reduction, move = float(loop.motor_from_joint[0, 0]), float(axes.move[0, 0])
     levers = node.static_friction, node.dynamic_friction
@@ -87,7 +88,7 @@ def _rest(
     whole, late = divmod(axes.delay, loop.divisor)
     count = limits.size
     x, integral, friction = np.zeros((4, count)), np.zeros(count), np.zeros(count)
-    force, said, earlier = np.zeros(count), np.zeros(count), [np.zeros(count)] * whole
+    force, commanded, earlier = np.zeros(count), np.zeros(count), [np.zeros(count)] * whole
     sticks = np.ones(count, dtype=bool)
     periods = math.ceil(_duration(node, gain) / outer)
     least, most = np.full(count, math.inf), np.full(count, -math.inf)
@@ -97,9 +98,9 @@ def _rest(
         error, old = (np.clip(steps - value, -limits, limits) for value in (force, before))
         effective = np.sign(error) * np.maximum(np.abs(error) - deadband, 0.0)
         earlier = [*earlier, move * (gain * effective + proportional * (error - old) / outer)]
-        says, *earlier = earlier
+        command, *earlier = earlier
         for tick in range(loop.divisor):
-            e = reduction * (said if tick < late else says) - x[1]
+            e = reduction * (commanded if tick < late else command) - x[1]
             integral = integral + float(loop.ki[0, 0]) * loop.tick * e
             torque = float(loop.kp[0, 0]) * e + integral
             for _ in range(PARTS):
@@ -108,7 +109,7 @@ def _rest(
                 sticks = np.abs(needed) <= np.where(sticks, static, dynamic)
                 friction = np.where(sticks, needed, np.copysign(dynamic, needed))
                 x = ahead + joint * friction
-        said = says
+        commanded = command
         if period >= periods * 7 // 8:
             pressed = contact[0, 0] * x[2] * move
             least, most = np.minimum(least, pressed), np.maximum(most, pressed)
@@ -117,7 +118,7 @@ def _rest(
 
 
 def _duration(node: FrictionNode, gain: float) -> float:
-    """Time that the largest step and the last oscillations take, s."""
+    """Duration of a trial, s."""
     ktr, kc = node.transmission_stiffness, node.contact_stiffness
     frequency = math.sqrt((ktr + kc) / node.inertia)
     return RISES * max(STEPS) * (ktr + kc) / (ktr * kc * gain) + OSCILLATIONS * 2.0 * math.pi / frequency

@@ -1,7 +1,7 @@
-"""Verdict of chapter 5 on one axis with friction: domain, stable error, limit cycle, dead zone.
+"""Chapter 5 applied to one axis with friction: domain, stable error, limit cycle, deadband.
 
-One friction node behind an actuator that does at once what it is told, by the exact integrator of
-`wam_theory.stick_slip`; sampling and delay are part of it.
+One friction node behind an ideal velocity source, with sampling and delay, by the exact integrator
+of `wam_theory.stick_slip`.
 """
 
 import math
@@ -10,15 +10,15 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from wam_theory.linear_loop import damping_ratio, routh_gain, sampled_margin
-from wam_theory.stick_slip import ForceLoop, FrictionNode, Verdict, assess
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 from wam_theory.stiction import deadband_against_stiction, stiction_cycle_force, stiction_cycle_period
 
-SOFTER = (1.0, 0.6, 0.35, 0.2, 0.1, 0.03)  # parts of the worst contact stiffness that are looked at as well
-STEPS = (0.3, 0.8, 1.0, 1.5, 3.0, 10.0, 50.0)  # of F_des, in saturations, that have to come to rest
+SOFTER = (1.0, 0.6, 0.35, 0.2, 0.1, 0.03)  # fractions of the largest contact stiffness that are considered
+STEPS = (0.3, 0.8, 1.0, 1.5, 3.0, 10.0, 50.0)  # of F_des, in saturations, which have to come to rest
 CANDIDATES = (100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)  # saturations, in F_static
-SURE = 0.7  # part of the largest saturation found good that is accepted: between two candidates and steps lies more
+SURE = 0.7  # accepted fraction of the largest saturation found good: between the candidates tried, worse ones may be
 EVENTS = 4000  # of the exact integrator, after which a response counts as not settled
-CYCLE_EXCESS = 1.5  # cycle that counts as that of stiction, in sizes of (5.8)
+CYCLE_EXCESS = 1.5  # largest cycle that counts as the stiction cycle, in sizes of (5.8)
 
 
 class Domain(StrEnum):
@@ -27,14 +27,13 @@ class Domain(StrEnum):
     I = "I"  # noqa: E741 - the thesis's name
     II = "II"
     III = "III"
-    BEYOND = "beyond I"  # II or III: nobody looked whether friction holds it
+    BEYOND = "beyond I"  # II or III: whether friction stabilises it has not been examined
 
 
-class Cycle(NamedTuple):
-    """Stiction limit cycle of F_c that small errors end in; zeros where there is no stiction.
+class PredictedCycle(NamedTuple):
+    """Stiction limit cycle of F_c in which small errors end; zeros where there is no stiction.
 
-    `peak_to_peak` N or N m by (5.8), `period` s by (5.9) corrected, `deadband` the one that removes it,
-    half of the first.
+    `peak_to_peak` N or N m by (5.8), `period` s by (5.9) corrected; `deadband`, half of the first, removes it.
     """
 
     peak_to_peak: float
@@ -43,24 +42,24 @@ class Cycle(NamedTuple):
 
 
 class FrictionVerdict(NamedTuple):
-    """What chapter 5 says of one axis.
+    """Prediction of chapter 5 for one axis.
 
     Attributes
     ----------
     domain : of figure 5.8.
-    margin : largest linearly stable gain, over all contacts up to the worst.
+    margin : largest gain that is linearly stable with every contact stiffness.
     stable_error : largest saturation that is accepted; infinite in domain I, 0 in domain III.
-    cycle : what stiction makes of small errors.
+    cycle : stiction limit cycle of small errors.
     """
 
     domain: Domain
     margin: float
     stable_error: float
-    cycle: Cycle
+    cycle: PredictedCycle
 
 
-def judge(node: FrictionNode, loop: ForceLoop) -> FrictionVerdict:
-    """Verdict on a node, with its contact and every softer one, under a loop; its saturation is not looked at."""
+def friction_verdict(node: FrictionNode, loop: IntegralLoop) -> FrictionVerdict:
+    """Verdict on a node under a loop, with its contact and every softer one; the saturation of the loop is ignored."""
     nodes = [replace(node, contact_stiffness=part * node.contact_stiffness) for part in SOFTER]
     margins = [linear_margin(each, loop) for each in nodes]
     cycle = stiction_cycle(node, loop.gain)
@@ -71,7 +70,7 @@ def judge(node: FrictionNode, loop: ForceLoop) -> FrictionVerdict:
     return FrictionVerdict(Domain.II if error else Domain.III, min(margins), error, cycle)
 
 
-def linear_margin(node: FrictionNode, loop: ForceLoop) -> float:
+def linear_margin(node: FrictionNode, loop: IntegralLoop) -> float:
     """Largest linearly stable G_I without friction, 0 without damping."""
     plant = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     if not node.damping:
@@ -81,23 +80,23 @@ def linear_margin(node: FrictionNode, loop: ForceLoop) -> float:
     return sampled_margin(*plant, loop.sample_period, loop.delay_samples).gain
 
 
-def stiction_cycle(node: FrictionNode, gain: float) -> Cycle:
-    """Limit cycle of (5.8), (5.9), and the dead zone that removes it."""
+def stiction_cycle(node: FrictionNode, gain: float) -> PredictedCycle:
+    """Limit cycle of (5.8), (5.9), and the deadband that removes it."""
     stiffness = node.transmission_stiffness, node.contact_stiffness
     friction = node.static_friction, node.dynamic_friction
     if node.static_friction <= node.dynamic_friction or not gain:
-        return Cycle(0.0, 0.0, 0.0)
+        return PredictedCycle(0.0, 0.0, 0.0)
     zeta = damping_ratio(node.inertia, node.damping, *stiffness)
     size = float(stiction_cycle_force(*stiffness, *friction, zeta))
     period = float(stiction_cycle_period(gain, *stiffness, *friction, zeta))
-    return Cycle(size, period, float(deadband_against_stiction(size)))
+    return PredictedCycle(size, period, float(deadband_against_stiction(size)))
 
 
-def stable_error(node: FrictionNode, loop: ForceLoop) -> float:
-    """Largest saturation of F_error with which every response comes to rest or to the cycle of stiction; 0 for none.
+def stable_error(node: FrictionNode, loop: IntegralLoop) -> float:
+    """Largest saturation of F_error with which every response ends at rest or in the stiction cycle; 0 for none.
 
-    The largest stable step is no answer: a loop that saturates at it shakes for ever after a larger
-    step, by several times the saturation.  So each candidate is tried with steps up to 50 times as
+    Do not use the largest stable step as the saturation limit: after a larger step the loop oscillates
+    indefinitely, by several times that limit.  So each candidate is tried with steps up to 50 times as
     large, and with the node thrown at the contact.
     """
     if not node.static_friction:
@@ -110,7 +109,7 @@ def stable_error(node: FrictionNode, loop: ForceLoop) -> float:
     return 0.0
 
 
-def _comes_to_rest(node: FrictionNode, loop: ForceLoop, cycle: float) -> bool:
+def _comes_to_rest(node: FrictionNode, loop: IntegralLoop, cycle: float) -> bool:
     limit = loop.error_limit
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     thrown = 3.0 * limit / node.contact_stiffness * frequency

@@ -1,10 +1,10 @@
-"""What the stability guard says of the set in force, in words and numbers."""
+"""The stability guard's report on the parameters in force, as text and numbers."""
 
 import math
 from typing import NamedTuple
 
 from wam_control.guard_watch import Watch
-from wam_control.stability_guard import LARGEST, Judgement
+from wam_control.stability_guard import LARGEST, GuardAssessment
 
 
 class Report(NamedTuple):
@@ -15,43 +15,43 @@ class Report(NamedTuple):
     facts: dict[str, str]
 
 
-def report(judgement: Judgement | None, watch: Watch | None, mode: str, is_joints: bool) -> Report:
-    """What there is to say.
+def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, is_joints: bool) -> Report:
+    """Report on the parameters in force.
 
     Parameters
     ----------
-    judgement : of the set in force, None where nothing is judged.
+    assessment : of these parameters; None where the guard is off or nothing is fed back.
     watch : what the guard does while the arm moves.
     mode : of the guard.
-    is_joints : whether the joints are controlled, else the force along a direction.
+    is_joints : whether joint torques are controlled, else the force along a direction.
     """
-    if judgement is None or watch is None:
-        return Report("ready", False, {"guard": "off: nothing is judged" if mode == "off" else "no feedback"})
+    if assessment is None or watch is None:
+        return Report("ready", False, {"guard": "off" if mode == "off" else "no feedback"})
     force, length = ("N m", "rad") if is_joints else ("N", "m")
-    here = min(watch.scale, judgement.scale)
-    message = f"domain {judgement.domain}"
-    if judgement.reason:
-        message = f"not stable: {judgement.reason}"
+    here = min(watch.scale, assessment.scale)
+    message = f"domain {assessment.domain}"
+    if assessment.reason:
+        message = f"not stable: {assessment.reason}"
     elif watch.factor < 1.0 and mode != "warn":
-        message += f", gains taken {watch.factor:.3g} times: the arm is stiffer where it touches now"
-    cycle = judgement.cycle
+        message += f", gains scaled by {watch.factor:.3g}: the contact is stiffer here than where they were tuned"
+    cycle = assessment.cycle
     facts = {
         "guard": mode,
-        "domain": str(judgement.domain),
-        "margin": _margin(judgement.scale),
+        "domain": str(assessment.domain),
+        "margin": _margin(assessment.scale),
         "margin here": _margin(here),
         "gain factor": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
-        "worst": judgement.where,
-        f"effective stiffness [{force}/{length}]": f"{judgement.stiffness:.4g}",
-        f"stable error [{force}]": "any" if math.isinf(judgement.stable_error) else f"{judgement.stable_error:.4g}",
+        "worst": assessment.where,
+        f"effective stiffness [{force}/{length}]": f"{assessment.stiffness:.4g}",
+        f"stable error [{force}]": "any" if math.isinf(assessment.stable_error) else f"{assessment.stable_error:.4g}",
         f"limit cycle [{force}]": f"{cycle.peak_to_peak:.4g}",
         "limit cycle [s]": f"{cycle.period:.4g}",
         f"deadband that removes it [{force}]": f"{cycle.deadband:.4g}",
-        "verdict": judgement.reason or "accepted",
+        "verdict": assessment.reason or "accepted",
     }
-    return Report(message, bool(judgement.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
+    return Report(message, bool(assessment.reason) or (watch.factor < 1.0 and mode != "warn"), facts)
 
 
 def _margin(scale: float) -> str:
-    """How much larger the gains may be."""
+    """Factor by which the gains may be larger."""
     return f"more than {LARGEST:g}" if scale >= LARGEST else f"{scale:.4g}"

@@ -1,4 +1,4 @@
-"""Torques of the world on the joints, from the arm's generalized momentum, and how sure they are.
+"""External joint torques from the arm's generalized momentum, and their covariance.
 
 De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), section III-E.
 """
@@ -18,39 +18,43 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
 
-SETTLED = 2.0  # time constants from the first sample until the estimate counts
-LOAD_DIVISOR = 4  # samples between two looks at the payload, which needs no more
-NO_MASS = 1e-6  # kg, the least that a link may have
+SETTLED = 2.0  # time constants from the first sample until the estimate is ready
+LOAD_DIVISOR = 4  # samples per update of the payload's torque, which changes slowly
+NO_MASS = 1e-6  # kg, the smallest mass that a link may have
 
 
 @dataclass(frozen=True)
 class ObserverParameters:
-    """The nominal model of the observer, which is not the plant, and how far it is trusted."""
+    """The observer's nominal model, which differs from the plant, and its uncertainty."""
 
     time_constant: float = parameter("time in which the estimate reaches 63 % of a step", "s", low=1e-3, high=1.0)
     mass_scale: tuple[float, ...] = parameter(
         "nominal mass and inertia of each link per configured one", low=0.1, high=10.0
     )
     friction_scale: float = parameter("nominal friction per configured friction", low=0.0, high=10.0)
-    mass_uncertainty: float = parameter(
-        "sd of the torque that moves and carries the links, per torque", low=0.0, high=1.0
+    mass_uncertainty: float = parameter("sd of the model torque of inertia and gravity, per torque", low=0.0, high=1.0)
+    moving_uncertainty: float = parameter(
+        "sd of the friction of a moving shaft, per dynamic friction", low=0.0, high=10.0
     )
-    moving_uncertainty: float = parameter("sd of the friction of what moves, per dynamic friction", low=0.0, high=10.0)
-    rest_uncertainty: float = parameter("sd of the friction of what rests, per static friction", low=0.0, high=10.0)
+    rest_uncertainty: float = parameter(
+        "sd of the friction of a shaft at rest, per static friction", low=0.0, high=10.0
+    )
     motor_rest_velocity: float = parameter("motor speed above which Coulomb friction is full", "rad/s", low=1e-6)
     joint_rest_velocity: float = parameter("joint speed above which Coulomb friction is full", "rad/s", low=1e-6)
     friction_memory: float = parameter(
-        "time in which a shaft that came to rest forgets the way its friction acted", "s", low=1e-4, high=1.0
+        "time constant with which the friction of a shaft that came to rest becomes unknown", "s", low=1e-4, high=1.0
     )
     motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6)
     joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6)
-    payload: tuple[float, ...] = parameter("least and largest mass that the tool may carry", "kg", low=0.0, high=50.0)
+    payload: tuple[float, ...] = parameter(
+        "smallest and largest mass that the tool may carry", "kg", low=0.0, high=50.0
+    )
 
     def __post_init__(self) -> None:
         low, high = self.payload if len(self.payload) == 2 else (1.0, 0.0)
         require(
             low <= high,
-            f"parameter 'observer.payload' is {list(self.payload)}; it needs the least and the largest mass",
+            f"parameter 'observer.payload' is {list(self.payload)}; it needs the smallest and the largest mass",
         )
 
 
@@ -61,18 +65,18 @@ class MomentumObserver:
     r' = (tau_ext - r) / T.  Solved exactly over a period in which the torques are constant:
     r_k = a r_(k-1) + (1 - a) ((p_k - p_(k-1)) / dt - known torques), a = exp(-dt / T).
 
-    Motor side: cables taken as rigid, q = M theta (A.5); the momentum has the rotors, reflected
-    through (A.5), and the pulleys in it; Coulomb friction has the sign of each motor's velocity,
-    that of the joints the sign of the joint's.  Link side (joint sensors): links alone, tau is the
-    strain torque behind the friction.  Motor torques are those that acted in the period that ends.
+    Motor side: cables assumed rigid, q = M theta (A.5); the momentum includes rotors, reflected
+    through (A.5), and pulleys; Coulomb friction has the sign of each motor's velocity, that of the
+    joints the sign of the joint's.  Link side (joint sensors): links alone, tau is the strain torque,
+    measured after the friction.  Motor torques are those that acted in the period that ends.
 
-    Friction errs as a bias, not as noise: what is wrong with its level stays wrong, at 1 kHz sample
-    after sample, with the sign of the motion.  So the signed share of Coulomb friction goes through
-    the same filter as the torques, and the share of the time in which a shaft rests.
+    The error of friction is a bias, not noise: a wrong level stays wrong in every sample, with the
+    sign of the motion.  So the signed fraction of Coulomb friction, and the fraction of the time that
+    a shaft is at rest, go through the same filter as the torques.
 
-    A dither of the motor torques (velocity loop) keeps the shafts from resting: torques and shares
-    are averaged over the last `dither_cycle` samples, one whole cycle, in which the sign of friction
-    and the dither itself cancel.
+    A dither of the motor torques (velocity loop) keeps the shafts moving: torques and fractions are
+    averaged over the last `dither_cycle` samples, one whole cycle, in which the sign of friction and
+    the dither itself cancel.
 
     Parameters
     ----------
@@ -110,7 +114,7 @@ class MomentumObserver:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything seen."""
+        """Forget all samples."""
         n = self._n
         self.q: list[float] = [0.0] * n
         self._residual: list[float] = [0.0] * n
@@ -140,8 +144,8 @@ class MomentumObserver:
         Returns
         -------
         bool
-            False where the sample is refused: a wrong length, a value that is not finite, dt <= 0.
-            The state stays as it was; the next good sample covers the gap.
+            False if the sample is refused: a wrong length, a value that is not finite, dt <= 0.
+            The observer stays as it was; the next good sample covers the gap.
         """
         n = self._n
         if not (0.0 < dt < math.inf):
@@ -155,14 +159,14 @@ class MomentumObserver:
         if self._link_side:
             return self._update(_Torques(position, velocity, effort, self._zero, *self._unknown), dt)
         if not any(effort) and max(map(abs, velocity)) < self._parameters.motor_rest_velocity:
-            # at rest without current the brakes or stiction hold: the motors tell nothing
+            # at rest without current, brakes or stiction hold: motor torques carry no information
             self.reset()
             return True
         return self._update(self._from_motors(position, velocity, effort, dt), dt)
 
     def _from_motors(self, theta: list[float], thetad: list[float], tau_motor: list[float], dt: float) -> "_Torques":
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        # a dither stops a shaft at both ends of each swing, held there by what the world does
+        # with dither a shaft stops at both ends of each swing, held there by the external torque
         keep = 0.0 if self._cycle else math.exp(-dt / self._parameters.friction_memory)
         motor_friction, motor_sliding, motor_resting = self._motor_friction.of(thetad, keep)
         joint_friction, joint_sliding, joint_resting = self._joint_friction.of(qd, keep)
@@ -189,7 +193,7 @@ class MomentumObserver:
                 for i in range(self._n)
             ]
             model = [keep * model[i] + take * (rate[i] - 0.5 * (bias[i] + self._bias[i])) for i in range(self._n)]
-        # else a gap too long to say what acted in it: go on from here
+        # else the torques in so long a gap are unknown: continue from here
         if not math.isfinite(sum(momentum) + sum(known) + sum(residual) + sum(model)):
             self._gap += dt
             return False
@@ -203,8 +207,8 @@ class MomentumObserver:
         if self._cycle:
             self._ring[self._filled % self._cycle] = residual + self._sliding + self._resting
             self._filled += 1
-        # brakes let go with a jolt that a model without elastic cables does not know;
-        # half a cycle of a dither would pass for a push
+        # releasing the brakes gives a jolt that a model with rigid cables does not predict;
+        # half a cycle of a dither would look like a push
         self._age += span
         settled = self._age > SETTLED * self._parameters.time_constant and self._filled >= 2 * self._cycle
         self.is_ready = self.is_ready or (before is not None and settled)
@@ -214,14 +218,14 @@ class MomentumObserver:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2.
 
         S = M^-T diag(sd_motor^2) M^-1 + diag(sd_joint^2) + diag((u tau_model)^2) + (u_load tau_load)(...)^T:
-        friction at the motors mapped as torques are (A.5), friction at the joints or the gauges, the
-        mass uncertainty u of the torque that carries and moves the links, the payload.
+        friction at the motors, mapped like torques (A.5); friction at the joints, or strain gauges; the
+        mass uncertainty u of the model torque; the payload.
         """
         n, residual, sliding, resting = self._n, self._residual, self._sliding, self._resting
         if self._cycle and self._filled:
             mean = self._ring[: self._filled].mean(axis=0).tolist()
             residual, sliding, resting = mean[:n], mean[n : 3 * n], mean[3 * n :]
-            # a shaft that slips in both directions within a cycle rests at both ends of what stiction bears
+            # a shaft that slips in both directions within a cycle stops at both limits of its stiction
             resting = [share * share for share in resting]
         uncertainty = self._parameters.mass_uncertainty
         if self._link_side:
@@ -242,20 +246,21 @@ class MomentumObserver:
         sized = np.array(load.torque) * load.sd
         return residual, covariance + np.outer(sized, sized)
 
-    def weigh(self) -> str:
-        """Take what is felt now as the payload; '' or why that cannot be."""
+    def identify_payload(self) -> str:
+        """Identify the payload from the present external torques; '' or why that is not possible."""
         if self._load is None:
-            return "no payload is declared; set observer.payload to the least and the largest mass"
+            return "no payload is declared; set observer.payload to the smallest and the largest mass"
         if not self.is_ready:
-            return "not enough has been observed"
+            return "too few samples yet"
         torques, covariance = self.torques()
-        return self._load.weigh(torques, covariance)
+        return self._load.identify_payload(torques, covariance)
 
 
 class _Torques(NamedTuple):
     """One sample on the joint side: state, torque, friction; each (n,).
 
-    Signed share of Coulomb friction that acts, and how much each shaft rests, 0..1; motors, then joints, (2 n,).
+    `sliding` is the signed fraction of Coulomb friction that acts, `resting` how far each shaft is at rest, 0..1;
+    motors, then joints, (2 n,).
     """
 
     q: list[float]
@@ -267,11 +272,11 @@ class _Torques(NamedTuple):
 
 
 class _Friction:
-    """Nominal friction of some shafts, by their own velocities, and its variance.
+    """Nominal friction of shafts as a function of their velocities, and its variance.
 
-    f = k (F_d (s + (1 - |s|) h) + b v), s = v / v_rest within -1..1, h the sign of the last full motion, which fades:
-    a shaft that has just stopped is held as it was slowed down, one that rests long by what nobody knows.
-    Variance (u_moving k F_d s)^2 + (u_rest k F_s d)^2 + sd_torque^2, d = 1 - s^2 the share of rest, k the
+    f = k (F_d (s + (1 - |s|) h) + b v), s = v / v_rest within -1..1, h the sign of the last full motion, which decays:
+    the friction on a shaft that has just stopped still acts as it did, that on a shaft long at rest is unknown.
+    Variance (u_moving k F_d s)^2 + (u_rest k F_s d)^2 + sd_torque^2, d = 1 - s^2 the fraction at rest, k the
     friction scale.
     """
 
@@ -295,9 +300,9 @@ class _Friction:
         self._held = [0.0] * len(self._levels)
 
     def of(self, velocity: Sequence[float], keep: float) -> tuple[list[float], list[float], list[float]]:
-        """Friction torques, N m, signed share of Coulomb friction, share of rest, each (n,), at velocities, rad/s.
+        """Friction torques, N m, signed fraction of Coulomb friction and fraction at rest, each (n,).
 
-        `keep` is the part of what is remembered that outlives the period.
+        `velocity` (n,), rad/s; `keep` is the decay of the memory in one period.
         """
         friction, sliding, resting, held = [], [], [], self._held
         for i, ((coulomb, viscous), v) in enumerate(zip(self._levels, velocity, strict=True)):
@@ -309,7 +314,7 @@ class _Friction:
         return friction, sliding, resting
 
     def variance(self, sliding: Sequence[float], resting: Sequence[float]) -> list[float]:
-        """Variance, (n,), N^2 m^2, of friction that slid and rested so much on average."""
+        """Variance, (n,), N^2 m^2, of friction at these mean fractions."""
         return [
             moving * share * share + rest * stuck * stuck + self._torque_variance
             for moving, rest, share, stuck in zip(self._moving, self._rest, sliding, resting, strict=True)
@@ -317,7 +322,7 @@ class _Friction:
 
 
 class _Load:
-    """What one kilogram at the tool does to the joints, through the filter of the observer; and how much is there."""
+    """Joint torques per kilogram at the tool, through the filter of the observer; and the mass estimated there."""
 
     def __init__(self, arm: Arm, payload: tuple[float, ...]) -> None:
         n = len(arm.links.names)
@@ -327,7 +332,7 @@ class _Load:
         )
         self._body = RigidBody(dataclasses.replace(arm, links=links))
         low, high = payload
-        # the arm without anything in its hand counts as the rule; sd of an even spread, about the least
+        # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
         self.mass, self.sd = low, (high - low) / math.sqrt(3.0)
         self._payload = payload
         self.torque: list[float] = [0.0] * n
@@ -351,21 +356,21 @@ class _Load:
         bias = (body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)).tolist()
         if self._before is None:
             self._bias, keep = bias, 0.0
-        # as a torque of the world: what the load takes from the motors, the other way round
+        # as an external torque: that of the motors on the load, with the opposite sign
         terms = zip(self.torque, momentum, self._before or momentum, bias, self._bias, strict=True)
         self.torque = [keep * t + (1.0 - keep) * (0.5 * (b + a) - (p - o) / span) for t, p, o, b, a in terms]
         self._before, self._bias = momentum, bias
 
-    def weigh(self, torques: list[float], covariance: NDArray[np.float64]) -> str:
-        """Correct the mass so that it explains torques, (n,), N m, with covariance (n, n); '' or why not."""
+    def identify_payload(self, torques: list[float], covariance: NDArray[np.float64]) -> str:
+        """Correct the mass to explain torques, (n,), N m, with covariance (n, n); '' or why that is not possible."""
         unit = np.array(self.torque)
-        # the prior, one sd of the declared range, is part of the covariance
+        # the covariance includes the prior, one sd of the declared range
         gain = self.sd**2 * np.linalg.solve(covariance, unit)
         mass = self.mass + float(gain @ np.array(torques))
         low, high = self._payload
         margin = 0.1 * (high - low)
         if not low - margin <= mass <= high + margin:
-            return f"what is felt would be a payload of {mass:.3g} kg; declared are {low:g} to {high:g} kg"
+            return f"the external torques mean a payload of {mass:.3g} kg; declared: {low:g} to {high:g} kg"
         self.mass = min(max(mass, low), high)
         self.sd *= math.sqrt(max(0.0, 1.0 - float(gain @ unit)))
         return ""

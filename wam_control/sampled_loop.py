@@ -3,8 +3,8 @@
 Rotors, cables, links and the contact move freely for one inner period under the torque that the
 velocity loop has set; the velocity loop answers every inner period, the force loop every outer one.
 All of it is linear between samples and is carried from sample to sample in closed form, so that
-hold, delay and the lag of the velocity loop are exact.  Friction is bounded: where this map is
-stable, no force loop with friction can diverge.
+hold, delay and the lag of the velocity loop are exact.  Friction is bounded: if this map is stable,
+no force loop with friction can diverge.
 """
 
 import math
@@ -15,25 +15,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_description.arm import Arm, Timing
+from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
+from wam_theory.zero_order_hold import zero_order_hold
 
 Array = NDArray[np.float64]
-ON_THE_CIRCLE = 1e-7  # by which a mode may grow in one period and count as standing
-
-
-class Servo(NamedTuple):
-    """Gains of the velocity loop of each motor, N m s/rad and N m/rad."""
-
-    proportional: tuple[float, ...]
-    integral: tuple[float, ...]
+ON_THE_CIRCLE = 1e-7  # growth of a mode in one period that counts as none
 
 
 class Feedback(NamedTuple):
-    """Where the controlled force comes from.
+    """Source of the controlled force.
 
-    `kind` is that of the force loop; `spring` (n,) N m/rad belongs to joint_position; `lag` s is the
-    time constant of the estimate in contact_estimate.
+    `kind` is the parameter feedback of the force loop; `spring` (n,) N m/rad is for joint_position; `lag` s is
+    the time constant of the estimate for contact_estimate.
     """
 
     kind: str
@@ -49,9 +43,9 @@ class Axes(NamedTuple):
     sense : (p, n), force of each axis, N or N m, per torque of the world on the joints.
     move : (n, p), joint velocity per velocity of each axis.
     gain, proportional_gain : (p,), G_I and G_P.
-    hold : (n, n), joint velocity per joint angle by which the posture is held beside the force, 1/s.
+    hold : (n, n), joint velocity per joint angle, by which the posture is held, 1/s.
     filter_time : time constant of the low pass on the force, s; the rate of G_P is taken behind it.
-    delay : inner periods from the sample to the answer's use, whole outer periods included.
+    delay : inner periods from the sample to the use of its command, whole outer periods included.
     """
 
     sense: Array
@@ -68,7 +62,7 @@ class SampledLoop:
 
     Parameters
     ----------
-    arm : as the controller knows it.
+    arm : the arm as the controller knows it.
     timing : periods of the loops.
     servo : gains of the velocity loop.
     """
@@ -100,7 +94,7 @@ class SampledLoop:
         viscous = np.hstack([zero, zero, zero, np.diag(arm.joints.viscous_friction)])
         self._joint = self.motor_from_joint.T @ self._cable - viscous
         self.inlet = np.vstack([zero, np.diag(rotor[:, 0]), zero, zero])
-        self.kp, self.ki = np.array(servo.proportional)[:, None], np.array(servo.integral)[:, None]
+        self.kp, self.ki = np.array(servo.proportional_gain)[:, None], np.array(servo.integral_gain)[:, None]
 
     def margin(
         self, q: Sequence[float], axes: Axes, contact: Array, feedback: Feedback, scales: Sequence[float]
@@ -112,8 +106,8 @@ class SampledLoop:
         q : joint angles, (n,), rad.
         axes : what is controlled.
         contact : (n, n), torque of the contact on the joints per joint angle, N m/rad.
-        feedback : where the force comes from.
-        scales : of the gains, rising, that are tried before the last one is returned.
+        feedback : source of the force.
+        scales : scales to try, in rising order; the last one is returned where all are stable.
 
         Returns
         -------
@@ -142,58 +136,43 @@ class SampledLoop:
         """The map of one outer period with all gains times `scale`; arguments as in `margin`.
 
         States: theta, thetad, q, qd, integrals of the velocity loop, filtered force, joint velocities
-        said one period ago, and those of the law that are held back.
+        commanded one period ago, and those of the law still to come.
         """
         n, p = self._n, len(axes.gain)
-        free, felt = self.plant(q, contact, feedback)
-        drift, drive = held(free, self.inlet, self.tick)
+        free, shown = self.plant(q, contact, feedback)
+        drift, drive = zero_order_hold(free, self.inlet, self.tick)
         whole, late = divmod(axes.delay, self.divisor)
         begins = np.cumsum([0, 4 * n, n, p, n, *[n] * whole]).tolist()
         state = np.eye(begins[-1])
-        x, integral, before, said, *earlier = (state[a:b] for a, b in pairwise(begins))
+        x, integral, before, commanded, *earlier = (state[a:b] for a, b in pairwise(begins))
         outer = self.tick * self.divisor
         lag = axes.filter_time + (feedback.lag if feedback.kind == "contact_estimate" else 0.0)
-        force = before + (axes.sense @ felt @ x - before) * outer / (outer + lag)
+        force = before + (axes.sense @ shown @ x - before) * outer / (outer + lag)
         speed = axes.gain[:, None] * force + axes.proportional_gain[:, None] * (force - before) / outer
         law = [*earlier, -scale * axes.move @ speed]
-        says = law[0] - axes.hold @ (self.joint_from_motor @ x[:n])
-        first, then = self.motor_from_joint @ said, self.motor_from_joint @ says
+        command = law[0] - axes.hold @ (self.joint_from_motor @ x[:n])
+        first, then = self.motor_from_joint @ commanded, self.motor_from_joint @ command
         for tick in range(self.divisor):
             error = (first if tick < late else then) - x[n : 2 * n]
             integral = integral + self.ki * self.tick * error
             x = drift @ x + drive @ (self.kp * error + integral)
-        return np.vstack([x, integral, force, says, *law[1:]])
+        return np.vstack([x, integral, force, command, *law[1:]])
 
     def plant(self, q: Sequence[float], contact: Array, feedback: Feedback) -> tuple[Array, Array]:
-        """Rate of the states theta, thetad, q, qd by themselves, (4n, 4n), and what the feedback shows of them.
+        """Rate of the states theta, thetad, q, qd, (4n, 4n), and the torque that the feedback measures.
 
-        The second, (n, 4n), is the torque of the arm on the world.
+        The second, (n, 4n), is the torque of the arm on the world per state.
         """
         n = self._n
         links = self.body.mass_matrix(q)
         pressed = np.hstack([np.zeros((n, 2 * n)), contact, np.zeros((n, n))])
         qdd = np.linalg.solve(links + self.armature, self._joint - pressed)
-        felt = pressed
+        shown = pressed
         if feedback.kind == "joint_sensors":
-            felt = links @ qdd + pressed
+            shown = links @ qdd + pressed
         elif feedback.kind == "joint_position":
-            felt = np.hstack([np.zeros((n, 2 * n)), np.diag(feedback.spring), np.zeros((n, n))])
-        return np.vstack([self._motor_rate, self._motor, self._joint_rate, qdd]), felt
-
-
-def held(free: Array, inlet: Array, period: float) -> tuple[Array, Array]:
-    """State and inlet matrices of one period with the input held."""
-    rows, columns = inlet.shape
-    step = np.zeros((rows + columns, rows + columns))
-    step[:rows, :rows], step[:rows, rows:] = free * period, inlet * period
-    halvings = max(0, math.ceil(math.log2(max(1.0, float(np.abs(step).sum(axis=1).max()))))) + 3
-    term = total = np.eye(rows + columns)
-    for power in range(1, 13):
-        term = term @ step / (power * 2.0**halvings)
-        total = total + term
-    for _ in range(halvings):
-        total = total @ total
-    return total[:rows, :rows], total[:rows, rows:]
+            shown = np.hstack([np.zeros((n, 2 * n)), np.diag(feedback.spring), np.zeros((n, n))])
+        return np.vstack([self._motor_rate, self._motor, self._joint_rate, qdd]), shown
 
 
 def _grows(period: Array) -> bool:

@@ -1,4 +1,4 @@
-"""A scenario: steps of a task as data, played into the stack at the outer rate."""
+"""A scenario: the steps of a task as data, played at the outer rate."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,33 +8,34 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from wam_control.force_loop import ForceCommand
 from wam_description import yaml_text
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, flatten, parameter, require
-from wam_description.signals import Contact
+from wam_description.signals import Contact, ForceCommand
 
 REQUESTS = ("", "enable", "disable")
-TUNABLE = ("driver", "force_loop")  # they wait for the scenario in lockstep: a setting meets them at its own stamp
+TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
 NO_FORCE = ForceCommand("base", (0.0, 0.0, 0.0))
 ROUNDING = 1e-9  # s, of a sum of periods
 
 
 @dataclass(frozen=True)
 class ScenarioParameters:
-    """Which task is played."""
+    """The task to play."""
 
-    script: str = parameter("YAML file with the steps; a bare name is looked up in the configurations' folder")
+    script: str = parameter(
+        "YAML file with the steps; a name without a path is looked up in the folder of the configurations"
+    )
 
 
 class Push(NamedTuple):
-    """A push on a cover, seconds counted from the start of the step.
+    """A push on a cover; times count from the start of the step.
 
     It acts on the tube's axis, which may be off the x axis of the cover's frame.
     """
 
     cover: str
-    place: float  # m
+    place: float  # m along the cover
     force: tuple[float, float, float]  # N, in the cover's frame
     begin: float  # s
     end: float  # s
@@ -42,7 +43,7 @@ class Push(NamedTuple):
 
 
 class Chirp(NamedTuple):
-    """A sine on top of a step's force, its frequency growing by the same factor in every second."""
+    """A sine added to a step's force; its frequency grows exponentially."""
 
     newtons: float  # amplitude
     start: float  # Hz
@@ -57,22 +58,22 @@ class Setting(NamedTuple):
     value: float | int | bool | str | tuple[float | int | bool | str, ...]
 
 
-class Step(NamedTuple):
+class ScenarioStep(NamedTuple):
     """One step of a scenario."""
 
     name: str
     seconds: float
     posture: tuple[float, ...] = ()  # rad; empty keeps the last one
-    until_force: float = 0.0  # N; above zero the step ends once a contact of this force is felt
+    until_force: float = 0.0  # N; above zero the step ends when a contact of this force is detected
     force: ForceCommand = NO_FORCE
     push: Push | None = None
-    request: str = ""  # asked of the driver when the step begins
+    request: str = ""  # to the driver, when the step begins
     chirp: Chirp | None = None  # along the force
-    settings: tuple[Setting, ...] = ()  # made when the step begins
+    settings: tuple[Setting, ...] = ()  # applied when the step begins
 
 
 class ScenarioOutput(NamedTuple):
-    """What the scenario asks for in one outer period."""
+    """Commands of the scenario in one outer period."""
 
     posture: list[float]
     force: ForceCommand
@@ -89,11 +90,11 @@ class ScenarioOutput(NamedTuple):
 class Scenario:
     """Plays steps one after the other.
 
-    Postures are reached along minimum-jerk paths.  A step that waits for a contact and does not
-    feel one fails the scenario: brakes are asked for and it is done.
+    Postures are reached along minimum-jerk paths.  If a step waits for a contact and none is
+    detected, the scenario fails: it requests the brakes and ends.
     """
 
-    def __init__(self, steps: Sequence[Step]) -> None:
+    def __init__(self, steps: Sequence[ScenarioStep]) -> None:
         require(len(steps) > 0, "the scenario has no steps")
         self._steps = list(steps)
         self._index = -1
@@ -109,7 +110,7 @@ class Scenario:
         Parameters
         ----------
         q : joint angles (n,), rad.
-        contact : what is felt.
+        contact : estimated contact.
         dt : outer period, s.
         """
         begins = self._index < 0
@@ -145,22 +146,24 @@ class Scenario:
         self._index, self._elapsed = index, 0.0
         step = self._steps[index]
         if pressed and (step.posture or step.force == NO_FORCE):
-            self._posture = list(q)  # the arm has moved along the force, off the posture
+            self._posture = list(q)  # the arm has moved along the force, away from the posture
         self._from = list(self._posture)
 
     def _advance(self, q: Sequence[float], contact: Contact) -> bool:
-        """Go on to the next step where this one is over; whether a request may have to be sent."""
+        """Go on to the next step if this one is over; whether a request may be due."""
         step = self._steps[self._index]
         if self.done:
             return False
-        felt = bool(contact.cover) and math.hypot(*contact.force) >= step.until_force > 0.0
-        if not felt and self._elapsed < step.seconds - ROUNDING:
+        detected = bool(contact.cover) and math.hypot(*contact.force) >= step.until_force > 0.0
+        if not detected and self._elapsed < step.seconds - ROUNDING:
             return False
-        if step.until_force > 0.0 and not felt:
-            self.failure = f"step '{step.name}': no contact of {step.until_force:g} N felt in {step.seconds:g} s"
+        if step.until_force > 0.0 and not detected:
+            self.failure = (
+                f"step '{step.name}': no contact of {step.until_force:g} N detected within {step.seconds:g} s"
+            )
             self.done = True
             return True
-        if step.posture and not felt:
+        if step.posture and not detected:
             self._posture = list(step.posture)
         if self._index + 1 == len(self._steps):
             self.done = True
@@ -168,27 +171,27 @@ class Scenario:
         self._begin(self._index + 1, q)
         return True
 
-    def _force(self, step: Step) -> ForceCommand:
+    def _force(self, step: ScenarioStep) -> ForceCommand:
         if step.chirp is None:
             return step.force
         share = swept_sine(step.chirp, self._elapsed, step.seconds) / math.hypot(*step.force.force)
         x, y, z = (newtons * (1.0 + share) for newtons in step.force.force)
         return ForceCommand(step.force.frame, (x, y, z))
 
-    def _on_path(self, step: Step) -> list[float]:
+    def _on_path(self, step: ScenarioStep) -> list[float]:
         s = min(self._elapsed / step.seconds, 1.0)
         blend = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
         return [a + (b - a) * blend for a, b in zip(self._from, step.posture, strict=True)]
 
 
 def swept_sine(chirp: Chirp, elapsed: float, seconds: float) -> float:
-    """Force of a chirp, N, at a time since its begin, s, of `seconds` in all."""
+    """Force of a chirp of `seconds`, N, at the time `elapsed`, s."""
     growth = math.log(chirp.end / chirp.start)
     turns = chirp.start * seconds / growth * math.expm1(growth * elapsed / seconds)
     return chirp.newtons * math.sin(2.0 * math.pi * turns)
 
 
-def load(path: Path, arm: Arm) -> list[Step]:
+def load(path: Path, arm: Arm) -> list[ScenarioStep]:
     """Read the steps of a scenario.
 
     Raises
@@ -209,7 +212,7 @@ def load(path: Path, arm: Arm) -> list[Step]:
     return [_step(f"{path}, step {i + 1}", body, arm) for i, body in enumerate(tree["steps"])]
 
 
-def _step(where: str, body: Any, arm: Arm) -> Step:
+def _step(where: str, body: Any, arm: Arm) -> ScenarioStep:
     if not isinstance(body, dict):
         raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
     keys = ("name", "seconds", "posture", "until_force", "force", "chirp", "push", "request", "set")
@@ -221,12 +224,10 @@ def _step(where: str, body: Any, arm: Arm) -> Step:
     seconds = _float(where, "seconds", body["seconds"])
     require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
     until_force = _float(where, "until_force", body.get("until_force", 0.0))
-    require(until_force >= 0.0, f"{where}: until_force is {until_force:g}; it must be 0 (no contact awaited) or above")
+    require(until_force >= 0.0, f"{where}: until_force is {until_force:g}; it must be 0 (no contact expected) or above")
     force = _force(where, body["force"], arm) if "force" in body else NO_FORCE
-    require(
-        "chirp" not in body or any(force.force), f"{where}: chirp needs a force above 0 N, whose direction it takes"
-    )
-    return Step(
+    require("chirp" not in body or any(force.force), f"{where}: chirp needs a force above 0 N, along which it acts")
+    return ScenarioStep(
         name=name,
         seconds=seconds,
         posture=_posture(where, body["posture"], arm) if "posture" in body else (),

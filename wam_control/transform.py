@@ -26,5 +26,5 @@ class Transform:
         return self._map.motor_velocities(velocity) if velocity else []
 
     def motor_effort(self, gravity: Sequence[float], effort: Sequence[float]) -> list[float]:
-        """Motor torques (n,), N m, that carry the links and give the joint torques `effort` on top."""
+        """Motor torques (n,), N m, for gravity plus the joint torques `effort`."""
         return self._map.motor_torques([a + b for a, b in zip(gravity, effort, strict=True)])

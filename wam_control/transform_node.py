@@ -1,63 +1,38 @@
 """Node `transform`: motor space to joint space and back."""
 
-from typing import Any
-
-from rclpy.node import Node
-
 from wam_control.transform import Transform
+from wam_description.arm import Shared
 from wam_description.parameters import Nothing
 from wam_description.signals import State
-from wam_ros.lockstep import Gate, Need
-from wam_ros.messages import read_joint_state
-from wam_ros.parameters import declare
-from wam_ros.ports import Ports
-from wam_ros.run import run
-
-PARAMETERS = Nothing
+from wam_description.synchroniser import Inputs
+from wam_description.wiring import Input, Outputs, reaction
 
 
-class TransformNode(Node):
-    """Converts each message as it comes and hands its stamp on."""
+class TransformNode:
+    """Converts each message as it comes; the stamp stays that of the state that caused it."""
 
-    def __init__(self, **ros: Any) -> None:
-        super().__init__("transform", **ros)
-        shared, _ = declare(self, PARAMETERS)
+    name, parameters = "transform", Nothing
+
+    def __init__(self, shared: Shared, own: Nothing) -> None:
         self._transform = Transform(shared.arm)
-        self._ports = Ports(self, shared)
-        self._timing = shared.timing
-        motors, joints = list(shared.arm.motors.names), list(shared.arm.joints.names)
-        self._none = [0.0] * len(joints)
-        effort = {"joint_effort_command": Need(outer=True, streamed=self._ports.streamed("force_loop"))}
-        feed = self._ports.feed
-        states = Gate(self._timing, "motor_states", {})
-        feed(states, "motor_states", lambda m: read_joint_state(m, motors, "position velocity effort"), self._states)
-        velocities = Gate(self._timing, "joint_velocity_command", {})
-        feed(velocities, "joint_velocity_command", lambda m: read_joint_state(m, joints, "velocity?"), self._velocity)
-        efforts = Gate(self._timing, "gravity_effort", effort)
-        for topic in ("gravity_effort", "joint_effort_command"):
-            feed(efforts, topic, lambda m: read_joint_state(m, joints, "effort"), self._effort)
+        self._no_effort = State([], [], [0.0] * len(shared.arm.joints.names))
 
-    def _states(self, stamp: int, inputs: dict[str, Any]) -> None:
-        if self._timing.is_outer(stamp):
-            self._ports.publish_joints("joint_states", stamp, self._transform.joint_state(inputs["motor_states"]))
-        self._ports.report(stamp)
+    @reaction(Input("motor_states"), outputs=("joint_states",), thinned=True)
+    def states(self, inputs: Inputs) -> Outputs:
+        """Joint states of the motor states, at the outer rate."""
+        return {"joint_states": self._transform.joint_state(inputs["motor_states"])}
 
-    def _velocity(self, stamp: int, inputs: dict[str, Any]) -> None:
+    @reaction(Input("joint_velocity_command", "velocity?"), outputs=("motor_velocity_command",))
+    def velocity(self, inputs: Inputs) -> Outputs:
+        """Motor velocities of the commanded joint velocities."""
         velocity = self._transform.motor_velocity(inputs["joint_velocity_command"].velocity)
-        self._ports.publish_motors("motor_velocity_command", stamp, State([], velocity, []))
+        return {"motor_velocity_command": State([], velocity, [])}
 
-    def _effort(self, stamp: int, inputs: dict[str, Any]) -> None:
-        command = inputs["joint_effort_command"]
-        effort = self._transform.motor_effort(
-            inputs["gravity_effort"].effort, command.effort if command else self._none
-        )
-        self._ports.publish_motors("motor_effort_command", stamp, State([], [], effort))
-
-
-def main() -> None:
-    """Run the node as this process."""
-    run(TransformNode)
-
-
-if __name__ == "__main__":
-    main()
+    @reaction(
+        Input("gravity_effort", "effort"), Input("joint_effort_command", "effort"), outputs=("motor_effort_command",)
+    )
+    def effort(self, inputs: Inputs) -> Outputs:
+        """Motor torques that carry the links and give the commanded joint torques on top."""
+        command = inputs["joint_effort_command"] or self._no_effort
+        effort = self._transform.motor_effort(inputs["gravity_effort"].effort, command.effort)
+        return {"motor_effort_command": State([], [], effort)}

@@ -4,54 +4,49 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wam_control.dither import DitherParameters
-from wam_description.arm import Motors
-from wam_description.parameters import parameter, require
+from wam_description.arm import Motors, Servo
+from wam_description.parameters import lengths, parameter
 
 
 @dataclass(frozen=True)
 class VelocityLoopParameters:
-    """Gains of the velocity servo, one per motor, and the dither on top of it."""
+    """Dither and time limit of the velocity loop; its gains are `wam_description.arm.Servo`."""
 
     dither: DitherParameters
-    proportional_gain: tuple[float, ...] = parameter("torque per velocity error", "N m s/rad", low=0.0, live=True)
-    integral_gain: tuple[float, ...] = parameter("torque per angle error", "N m/rad", low=0.0, live=True)
     command_timeout: float = parameter(
-        "age at which a velocity command, also an empty one, no longer counts and the motors are held still",
+        "age at which a velocity command, also an empty one, is stale: zero velocity is commanded",
         "s",
         low=0.001,
     )
 
-    def __post_init__(self) -> None:
-        require(
-            len(self.proportional_gain) == len(self.integral_gain),
-            f"proportional_gain has {len(self.proportional_gain)} values, integral_gain {len(self.integral_gain)}; "
-            "give one of each per motor",
-        )
-
 
 class VelocityLoop:
-    """PI control of motor velocity plus feed-forward; torque asked for, as current.
+    """PI control of motor velocity plus torque feed-forward, as motor currents.
 
     tau = K_p e + K_i integral(e) + tau_ff, e = commanded minus measured velocity, clipped to the
-    peak torque; i = tau/k_t.  The integral stands still where it would only push further into a
-    limit, and starts anew where the torque asked for does not flow at all (brakes, fault), so that
+    peak torque; i = tau/k_t.  The integral is frozen where it would only push further into a limit
+    (anti-windup), and reset where the commanded torque does not act at all (brakes, fault), so that
     an enabled arm starts without a jolt.
     """
 
-    def __init__(self, motors: Motors, parameters: VelocityLoopParameters) -> None:
+    def __init__(self, motors: Motors, servo: Servo, parameters: VelocityLoopParameters) -> None:
+        self._motors = motors
         self._peak = motors.peak_torque
         self._constant = motors.torque_constant
         self._integral = [0.0] * len(self._peak)
-        self._asked = [0.0] * len(self._peak)
-        self.tune(parameters)
+        self._commanded = [0.0] * len(self._peak)
+        self.tune(servo, parameters)
 
-    def tune(self, parameters: VelocityLoopParameters) -> None:
-        """Take new gains; the integral, kept as a torque, does not jump."""
-        require(
-            len(parameters.proportional_gain) == len(self._peak),
-            f"proportional_gain has {len(parameters.proportional_gain)} values; the arm has {len(self._peak)} motors",
-        )
-        self._kp, self._ki = parameters.proportional_gain, parameters.integral_gain
+    def tune(self, servo: Servo, parameters: VelocityLoopParameters) -> None:
+        """Take new gains; the integral, kept as a torque, does not jump.
+
+        Raises
+        ------
+        ParameterError
+            where there is not one of each gain per motor; the gains in use stay.
+        """
+        lengths("servo", self._motors.names, vars(servo))
+        self._kp, self._ki = servo.proportional_gain, servo.integral_gain
         self._timeout = parameters.command_timeout
 
     def step(
@@ -63,14 +58,14 @@ class VelocityLoop:
         feedforward: Sequence[float],
         dt: float,
     ) -> list[float]:
-        """Currents that answer one measurement.
+        """Currents for one measurement.
 
         Parameters
         ----------
         thetad : measured motor velocities (n,), rad/s.
         tau_motor : torques that the motors gave in the last period (n,), N m.
-        command : motor velocities asked for (n,), rad/s; empty for torque only.
-        command_age : time since the state that the command answers, s; an old command, also one for torque
+        command : commanded motor velocities (n,), rad/s; empty for torque only.
+        command_age : time since the state that the command answers, s; a stale command, also one for torque
             only, counts as zero velocity.
         feedforward : torques (n,), N m.
         dt : time since the last measurement, s.
@@ -88,7 +83,7 @@ class VelocityLoop:
                 self._integral[i] = 0.0
                 torque = feedforward[i]
             else:
-                if tau_motor[i] == 0.0 and self._asked[i] != 0.0:
+                if tau_motor[i] == 0.0 and self._commanded[i] != 0.0:
                     self._integral[i] = 0.0
                 error = command[i] - thetad[i]
                 torque = self._kp[i] * error + self._integral[i] + feedforward[i]
@@ -97,6 +92,6 @@ class VelocityLoop:
                     self._integral[i] += growth
                     torque += growth
             torque = min(max(torque, -peak), peak)
-            self._asked[i] = torque
+            self._commanded[i] = torque
             currents.append(torque / self._constant[i])
         return currents

@@ -1,1 +1,17 @@
-"""What the arm is: constants, parameters, transmission map, kinematics, MJCF and URDF."""
+"""The arm as data: constants, parameters, kinematics and models, and the topics that the nodes share.
+
+- constants: every number of the arm and the testbed, as printed or assumed
+- units: conversion to SI
+- parameters: parameter classes with unit, range and meaning, and their checks
+- parameter_history: what parameters were in earlier versions, for old recordings
+- configuration, yaml_text: parameter files, which may build on one another
+- arm: parameters that every node shares
+- cables, effects, mismatch: parameters of the cables, of further effects of the plant, of model mismatch
+- world: parameters of what the arm can touch
+- transmission_map: motors to joints and back, (A.5)
+- rigid_body, jacobian: kinematics and dynamics of the links; the hand Jacobian (A.7) in closed form
+- mjcf, urdf: the arm as a model for MuJoCo and for ROS
+- wiring, synchroniser: declaration of a node; its inputs brought together by stamp
+- nodes, topics, interface: table of nodes, table of topics, who publishes and takes each topic
+- signals, status: the values that nodes exchange; the status of a node
+"""

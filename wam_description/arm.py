@@ -1,7 +1,7 @@
-"""The arm as parameters: what every node of the stack must agree on.
+"""Parameters that every node of the stack shares: the arm and the timing.
 
-Arrays run over motors, joints, links or covers in the order of the `names` beside them.  Nested
-arrays are flattened row by row because ROS parameters know no others.
+Arrays run over motors, joints, links or covers in the order of the `names` of the same group.  Nested
+arrays are flattened row by row because ROS parameters cannot be nested.
 """
 
 from dataclasses import dataclass
@@ -13,21 +13,23 @@ from wam_description.parameters import lengths, parameter, require
 
 def _distinct(group: str, names: tuple[str, ...]) -> None:
     require(len(names) > 0, f"parameter '{group}.names' is empty; name at least one")
-    require(len(set(names)) == len(names), f"parameter '{group}.names' has a name twice: {', '.join(names)}")
+    require(len(set(names)) == len(names), f"parameter '{group}.names' has a duplicate name: {', '.join(names)}")
 
 
 @dataclass(frozen=True)
 class Motors:
     """The motors, one per cable circuit."""
 
-    names: tuple[str, ...] = parameter("motor names, as they stand in JointState messages")
+    names: tuple[str, ...] = parameter("motor names, as in JointState messages")
     inertia: tuple[float, ...] = parameter("rotor inertia", "kg m^2", low=1e-9)
     torque_constant: tuple[float, ...] = parameter("torque per current", "N m/A", low=1e-6)
-    peak_torque: tuple[float, ...] = parameter("torque at which the amplifier clips", "N m", low=0.0)
-    continuous_torque: tuple[float, ...] = parameter("torque that can be held for ever", "N m", low=1e-6)
-    static_friction: tuple[float, ...] = parameter("breakaway torque of rotor and first pinion", "N m", low=0.0)
-    dynamic_friction: tuple[float, ...] = parameter("Coulomb torque while turning", "N m", low=0.0)
-    viscous_friction: tuple[float, ...] = parameter("torque per velocity", "N m s/rad", low=0.0)
+    peak_torque: tuple[float, ...] = parameter("peak torque, at which the amplifier clips", "N m", low=0.0)
+    continuous_torque: tuple[float, ...] = parameter("rated (continuous) torque", "N m", low=1e-6)
+    static_friction: tuple[float, ...] = parameter(
+        "static friction F_s (breakaway torque) of rotor and first pinion", "N m", low=0.0
+    )
+    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion", "N m", low=0.0)
+    viscous_friction: tuple[float, ...] = parameter("viscous friction", "N m s/rad", low=0.0)
 
     def __post_init__(self) -> None:
         _distinct("arm.motors", self.names)
@@ -42,9 +44,9 @@ class Motors:
 
 @dataclass(frozen=True)
 class Joints:
-    """The joints in Craig's Denavit-Hartenberg convention (A.4); angles of the joints are the state."""
+    """The joints in Craig's Denavit-Hartenberg convention (A.4)."""
 
-    names: tuple[str, ...] = parameter("joint names, as they stand in JointState messages")
+    names: tuple[str, ...] = parameter("joint names, as in JointState messages")
     twist: tuple[float, ...] = parameter("alpha_(i-1), link twist before the joint", "rad")
     length: tuple[float, ...] = parameter("a_(i-1), link length before the joint", "m")
     offset: tuple[float, ...] = parameter("d_i, link offset along the joint axis", "m")
@@ -52,10 +54,12 @@ class Joints:
     upper: tuple[float, ...] = parameter("upper stop", "rad")
     start: tuple[float, ...] = parameter("angle at power-up, brakes on", "rad")
     armature: tuple[float, ...] = parameter("inertia of the pulleys that turn with the joint", "kg m^2", low=0.0)
-    static_friction: tuple[float, ...] = parameter("breakaway torque at the joint", "N m", low=0.0)
-    dynamic_friction: tuple[float, ...] = parameter("Coulomb torque while turning, at the joint", "N m", low=0.0)
-    viscous_friction: tuple[float, ...] = parameter("torque per velocity at the joint", "N m s/rad", low=0.0)
-    speed_limit: tuple[float, ...] = parameter("speed that faults the driver", "rad/s", low=0.0)
+    static_friction: tuple[float, ...] = parameter(
+        "static friction F_s (breakaway torque) at the joint", "N m", low=0.0
+    )
+    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion, at the joint", "N m", low=0.0)
+    viscous_friction: tuple[float, ...] = parameter("viscous friction at the joint", "N m s/rad", low=0.0)
+    speed_limit: tuple[float, ...] = parameter("speed above which there is a fault", "rad/s", low=0.0)
 
     def __post_init__(self) -> None:
         _distinct("arm.joints", self.names)
@@ -78,7 +82,7 @@ def _friction(group: str, names: tuple[str, ...], static: tuple[float, ...], dyn
 class Links:
     """The rigid links; link i moves with joint i, its frame is frame i of (A.4)."""
 
-    names: tuple[str, ...] = parameter("link names, one per joint, as they stand in frame ids")
+    names: tuple[str, ...] = parameter("link names, one per joint, as in frame ids")
     mass: tuple[float, ...] = parameter("mass", "kg", low=1e-6)
     centre: tuple[float, ...] = parameter("centre of mass in the link's frame, x y z of each link", "m")
     inertia: tuple[float, ...] = parameter("principal inertia about the centre of mass, x y z", "kg m^2", low=0.0)
@@ -93,17 +97,17 @@ class Links:
 class Covers:
     """The foam-covered tubes that touch the world.
 
-    Each has a frame of its own, named like the cover: origin where the kinematic link begins, x
-    along the kinematic link, axes turned from its link's frame by `rotation`.  A place on the
-    cover is the distance x along that frame.
+    Each has a frame of its own, named like the cover: its origin is the start of the kinematic link, its x
+    axis lies along the kinematic link, and `rotation` turns the link's axes into its axes.  A contact position is
+    x in that frame.
     """
 
     names: tuple[str, ...] = parameter("cover names; contacts and pushes use them as frame ids")
     links: tuple[str, ...] = parameter("link that carries the cover")
     origin: tuple[float, ...] = parameter("origin of the cover's frame in its link's frame, x y z", "m")
-    rotation: tuple[float, ...] = parameter("turn from the link's axes to the cover's, roll pitch yaw", "rad")
+    rotation: tuple[float, ...] = parameter("rotation from the link's axes to the cover's, roll pitch yaw", "rad")
     length: tuple[float, ...] = parameter("length of the kinematic link, along x", "m", low=0.0)
-    start: tuple[float, ...] = parameter("begin of the tube's axis in the cover's frame, x y z", "m")
+    start: tuple[float, ...] = parameter("start of the tube's axis in the cover's frame, x y z", "m")
     end: tuple[float, ...] = parameter("end of the tube's axis in the cover's frame, x y z", "m")
     radius: tuple[float, ...] = parameter("outer radius of the tube, rounded ends", "m", low=1e-4)
 
@@ -114,16 +118,16 @@ class Covers:
         lengths("arm.covers", self.names, spatial, width=3)
 
     def aside(self, name: str, place: float) -> tuple[float, float]:
-        """How far the tube's axis is off the frame's x axis at a place, m: y and z, m."""
+        """Offset of the tube's axis from the frame's x axis, y and z, m, at a contact position x, m."""
         at = 3 * self.names.index(name)
         start, end = self.start[at : at + 3], self.end[at : at + 3]
-        share = (place - start[0]) / (end[0] - start[0]) if end[0] != start[0] else 0.0
-        return start[1] + share * (end[1] - start[1]), start[2] + share * (end[2] - start[2])
+        fraction = (place - start[0]) / (end[0] - start[0]) if end[0] != start[0] else 0.0
+        return start[1] + fraction * (end[1] - start[1]), start[2] + fraction * (end[2] - start[2])
 
 
 @dataclass(frozen=True)
 class Arm:
-    """Everything about the arm that all nodes must agree on."""
+    """The arm: mechanics, names and sensors."""
 
     motors: Motors
     cables: Cables
@@ -131,10 +135,10 @@ class Arm:
     links: Links
     covers: Covers
     name: str = parameter("name of the arm, also of its URDF and MJCF")
-    joint_from_motor: tuple[float, ...] = parameter("the matrix of (A.5), joint = matrix motor, row by row")
+    joint_from_motor: tuple[float, ...] = parameter("matrix M of (A.5), q = M theta, row by row")
     tool: tuple[float, ...] = parameter("origin of the tool frame in the last link's frame, x y z", "m")
     gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2")
-    joint_sensors: bool = parameter("whether joint-side encoders and strain gauges are mounted")
+    joint_sensors: bool = parameter("true if joint-side encoders and strain gauges are mounted")
 
     def __post_init__(self) -> None:
         motors, joints = len(self.motors.names), len(self.joints.names)
@@ -163,58 +167,66 @@ class Arm:
 
 @dataclass(frozen=True)
 class Timing:
-    """The clockwork: motor side every `period`, joint side every `outer_divisor` periods."""
+    """Timing: the motor side runs every `period`, the joint side every `outer_divisor` periods."""
 
     mode: str = parameter(
-        "realtime: the driver runs on the steady clock; lockstep: it waits for every answer",
+        "realtime: the driver runs on the steady clock; lockstep: it waits for every command",
         choices=("realtime", "lockstep"),
     )
     period: float = parameter("period of the inner loop and of motor_states", "s", low=1e-4, high=0.1)
     substeps: int = parameter("steps of the plant in one period", low=1, high=1000)
     outer_divisor: int = parameter("inner periods in one period of the joint side", low=1, high=1000)
     outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", low=0, high=1)
-    display_divisor: int = parameter("outer periods between messages that are made for people", low=1, high=1000)
+    display_divisor: int = parameter("outer periods between messages at the display rate", low=1, high=1000)
     niceness: int = parameter(
-        "scheduling priority of driver and velocity_loop in realtime, where the system grants it", low=-20, high=0
+        "scheduling priority of driver and velocity_loop in realtime, if the system grants it", low=-20, high=0
     )
-    timeout: float = parameter("longest wait for an answer in lockstep, steady clock", "s", low=0.1)
+    timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1)
     dither_cycle: int = parameter(
-        "inner periods in one cycle of the dither of the motor torques, by which contact is felt at rest; 0: no dither",
+        "inner periods in one cycle of the dither of the motor torques, which detects contact at rest; 0: none",
         low=0,
         high=1000,
     )
 
-    @property
+    @cached_property
     def period_ns(self) -> int:
         """Period of the inner loop in nanoseconds."""
         return round(self.period * 1e9)
 
-    @property
+    @cached_property
     def outer_period_ns(self) -> int:
         """Period of the joint side in nanoseconds."""
         return self.period_ns * self.outer_divisor
 
-    @property
+    @cached_property
     def substep(self) -> float:
         """Step of the plant in seconds."""
         return self.period / self.substeps
 
     def outer_stamp(self, stamp: int) -> int:
         """Stamp of the outer period that `stamp` falls into, ns; the first period, tick 1, is an outer one."""
-        tick = stamp // self.period_ns
-        return (1 + (tick - 1) // self.outer_divisor * self.outer_divisor) * self.period_ns
+        period, divisor = self.period_ns, self.outer_divisor
+        return (1 + (stamp // period - 1) // divisor * divisor) * period
 
     def is_outer(self, stamp: int) -> bool:
         """Whether the joint side works on the state of this stamp, ns."""
         return self.outer_stamp(stamp) == stamp
 
     def is_display(self, stamp: int) -> bool:
-        """Whether messages that are made for people are due at this stamp, ns."""
+        """Whether messages at the display rate are due at this stamp, ns."""
         return (stamp - self.period_ns) % (self.outer_period_ns * self.display_divisor) == 0
 
 
+@dataclass(frozen=True)
+class Servo:
+    """Gains of the velocity loop of each motor; the velocity loop uses them, the stability guard relies on them."""
+
+    proportional_gain: tuple[float, ...] = parameter("torque per velocity error", "N m s/rad", low=0.0, live=True)
+    integral_gain: tuple[float, ...] = parameter("torque per angle error", "N m/rad", low=0.0, live=True)
+
+
 def seconds(nanoseconds: int) -> float:
-    """Time in seconds, the nearest number there is; everything that needs a dt takes it from here."""
+    """Time in seconds, correctly rounded; every dt is computed here."""
     return nanoseconds / 1_000_000_000
 
 
@@ -224,4 +236,5 @@ class Shared:
 
     timing: Timing
     arm: Arm
-    nodes: tuple[str, ...] = parameter("nodes that belong to this bring-up; lockstep waits until all are there")
+    servo: Servo
+    nodes: tuple[str, ...] = parameter("nodes of this bring-up; lockstep starts when all are present")

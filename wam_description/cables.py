@@ -1,4 +1,4 @@
-"""The cable circuits as parameters, stage by stage, and what they come to at the motors."""
+"""Parameters of the cable circuits, stage by stage, and the properties of each circuit at its motor."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ from wam_theory.cable import slack_stretch, stage_compliance, stage_loss
 class Cables:
     """The cable circuit of each motor: pretension and limits per motor, then its stages one by one.
 
-    The first stage of a circuit spans the distance from the motor; it runs fast where the reducer
-    is at the joint and slow, with N such cables side by side for the same stress, where it is at
-    the motor.  Pretension and breaking strength are those of one cable.
+    The first stage of a circuit spans the distance from the motor.  It runs fast if the reducer is at the joint.  It
+    runs slowly if the reducer is at the motor, with N such cables in parallel for the same stress.  Pretension
+    and breaking strength are those of one cable.
     """
 
     pretension: tuple[float, ...] = parameter("T_0 of the first stage", "N", low=0.0)
     breaking_strength: tuple[float, ...] = parameter("tension at which a first-stage cable breaks", "N", low=1.0)
     damping: tuple[float, ...] = parameter("material damping of the circuit, motor side", "N m s/rad", low=0.0)
-    reducer: tuple[str, ...] = parameter("where the speed reducer sits", choices=("joint", "motor"))
+    reducer: tuple[str, ...] = parameter("location of the speed reducer", choices=("joint", "motor"))
     stage_motors: tuple[str, ...] = parameter("motor of each stage, from the motor towards the joint")
     stage_ea: tuple[float, ...] = parameter("E A of one cable of the stage", "N", low=1.0)
     stage_length: tuple[float, ...] = parameter("free length of a strand", "m", low=0.0)
@@ -36,11 +36,11 @@ class Cables:
 
 
 class Circuit(NamedTuple):
-    """What the stages of one motor's circuit come to, seen at the motor."""
+    """Properties of one motor's circuit, seen at the motor."""
 
     stiffness: float  # k_tr, N m/rad
     radius: float  # torque at the motor per tension difference of a first-stage cable, m: its pinion's radius
-    loss_per_torque: float  # share of the speed lost per torque at the motor, 1/(N m), (6.4) over all stages
+    loss_per_torque: float  # fraction of the speed lost per torque at the motor, 1/(N m), (6.4) over all stages
     pretension: float  # N
     breaking_strength: float  # N
     damping: float  # N m s/rad
@@ -63,7 +63,7 @@ def circuits(motors: Sequence[str], joint_from_motor: Sequence[float], cables: C
     Raises
     ------
     ParameterError
-        where a stage belongs to no motor, a motor has no stage, or a circuit gives no way at all.
+        if a stage belongs to no motor, a motor has no stage, or a circuit has zero compliance.
     """
     for name in cables.stage_motors:
         require(name in motors, f"arm.cables.stage_motors names '{name}'; motors: {', '.join(motors)}")
@@ -83,7 +83,7 @@ def _circuit(cables: Cables, i: int, motor: str, reduction: float) -> Circuit:
         radius, parallel = cables.stage_radius[k], cables.stage_circuits[k]
         compliance += float(stage_compliance(ea, cables.stage_length[k], radius, parallel, ratio))
         loss += float(stage_loss(1.0, radius, ea, parallel, ratio))
-    require(compliance > 0.0, f"{motor}: its cable stages give no way at all; give one a stage_length above zero")
+    require(compliance > 0.0, f"{motor}: its cable stages have zero compliance; give one a stage_length above zero")
     return Circuit(
         stiffness=1.0 / compliance,
         radius=cables.stage_radius[first] * cables.stage_circuits[first] / cables.stage_ratio[first],

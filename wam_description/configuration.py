@@ -1,4 +1,4 @@
-"""Configurations: one ROS parameter file that holds the values of every node, read without ROS."""
+"""Configurations: one ROS parameter file with the values of every node, read without ROS."""
 
 import hashlib
 import os
@@ -16,6 +16,7 @@ from wam_description.parameters import ParameterError, build, flatten
 
 T = TypeVar("T")
 SHARED = "/**"
+BASE = "base"  # key of an overlay that names the configuration it changes
 PARAMETERS = "ros__parameters"
 
 
@@ -24,8 +25,8 @@ class Configuration(NamedTuple):
 
     Attributes
     ----------
-    path : where the file lies.
-    text : YAML that gives these values; the file's own text where nothing was replaced.
+    path : of the file.
+    text : YAML with these values; the file's own text if nothing was replaced.
     sections : flat ``{dotted name: value}`` of every section; '/**' is shared, the others are
         named like their node.
     """
@@ -35,13 +36,18 @@ class Configuration(NamedTuple):
     sections: Mapping[str, Mapping[str, Any]]
 
     @classmethod
-    def load(cls, path: str | Path) -> "Configuration":
+    def load(cls, path: str | Path, _above: tuple[Path, ...] = ()) -> "Configuration":
         """Read a ROS parameter file.
 
         Raises
         ------
         ParameterError
-            where the file is missing, is not YAML or is not built like a parameter file.
+            if the file is missing, is not YAML or does not have the structure of a parameter file.
+
+        Notes
+        -----
+        A file with ``base: NAME`` at its top, the name of a configuration of the package or a path relative to the
+        file, holds only what differs from that one: values, and sections of nodes that the base does not have.
         """
         path = Path(path)
         if not path.is_file():
@@ -50,7 +56,11 @@ class Configuration(NamedTuple):
             text = path.read_text(encoding="utf-8")
         except UnicodeDecodeError as error:
             raise ParameterError(f"configuration {path} is not a text file: {error}") from error
-        return cls(path, text, _sections(path, text))
+        tree = _tree(path, text)
+        if not isinstance(tree, dict) or BASE not in tree:
+            return cls(path, text, _sections(path, tree))
+        base = cls.load(_base(path, tree.pop(BASE), _above), (*_above, path.resolve()))
+        return base._overlaid(path, _sections(path, tree, whole=False))
 
     @property
     def sha256(self) -> str:
@@ -59,7 +69,7 @@ class Configuration(NamedTuple):
 
     @property
     def shared(self) -> Shared:
-        """What every node reads, from the section '/**'."""
+        """The parameters of every node, from the section '/**'."""
         return self._build(SHARED, Shared)
 
     def node(self, name: str, cls: type[T]) -> T:
@@ -76,7 +86,7 @@ class Configuration(NamedTuple):
         Raises
         ------
         ParameterError
-            where the configuration has no such parameter.
+            if the configuration has no such parameter.
         """
         sections = {name: dict(flat) for name, flat in self.sections.items()}
         for key, value in values.items():
@@ -91,8 +101,29 @@ class Configuration(NamedTuple):
             flat[parameter] = list(value) if isinstance(value, tuple) else value
         return Configuration(self.path, _text(sections), _frozen(sections))
 
+    def _overlaid(self, path: Path, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
+        """The configuration of `path`: this one with changed values and further sections."""
+        new = {name: dict(flat) for name, flat in changes.items() if name not in self.sections}
+        sections = {**new, **{name: dict(flat) for name, flat in self.sections.items()}}
+        whole = Configuration(path, "", _frozen(sections))
+        listed = changes.get(SHARED, {}).get("nodes", self.sections[SHARED].get("nodes", []))
+        for name in new:
+            if not any(_may_be(str(entry), name) for entry in listed):
+                known = ", ".join(section for section in self.sections if section != SHARED)
+                raise ParameterError(
+                    f"{path}: section '{SHARED}/{name}' is of no node in 'nodes'; the base has {known}"
+                )
+        return whole.with_values(
+            {
+                key if name == SHARED else f"{name}:{key}": value
+                for name, flat in changes.items()
+                if name in self.sections
+                for key, value in flat.items()
+            }
+        )
+
     def __reduce__(self) -> tuple[Any, ...]:
-        """Read-only mappings cannot be pickled; other processes get plain ones and make them read-only again."""
+        """Pickle plain mappings: read-only ones cannot be pickled, and are made read-only again on the other side."""
         return _thawed, (self.path, self.text, {name: dict(flat) for name, flat in self.sections.items()})
 
     def _section(self, node: str) -> str:
@@ -112,13 +143,13 @@ class Configuration(NamedTuple):
 def packaged(name: str) -> Path:
     """The file of a configuration that comes with the package, as ``packaged('wam')``.
 
-    Looked for beside the packages (source tree), below ``share/wam_stack/config`` of every folder
-    that holds this file, of the prefixes in AMENT_PREFIX_PATH and of Python's own prefix.
+    It is searched next to the packages (source tree), then in ``share/wam_stack/config`` of every folder
+    above this file, of the prefixes in AMENT_PREFIX_PATH and of Python's own prefix.
 
     Raises
     ------
     ParameterError
-        where there is none of this name; the message lists those that exist.
+        if there is none of this name; the message lists those that exist.
     """
     folders = [folder for folder in dict.fromkeys(_folders()) if folder.is_dir()]
     for folder in folders:
@@ -128,7 +159,7 @@ def packaged(name: str) -> Path:
     raise ParameterError(
         f"no configuration '{name}' comes with wam_stack; there are: {', '.join(found) or 'none'} "
         f"(looked in {', '.join(map(str, folders)) or 'share/wam_stack/config of every prefix'}); "
-        f"a file of your own is given by its path"
+        f"give the path of a file of your own"
     )
 
 
@@ -140,17 +171,38 @@ def _folders() -> Iterator[Path]:
         yield prefix / "share" / "wam_stack" / "config"
 
 
-def _sections(path: Path, text: str) -> Mapping[str, Mapping[str, Any]]:
+def _may_be(entry: str, name: str) -> bool:
+    """Whether an entry of 'nodes' can be the node of a name; that of a 'module:Class' is known once it is imported."""
+    return entry == name or ":" in entry
+
+
+def _tree(path: Path, text: str) -> Any:
     try:
-        tree = yaml_text.parse(text)
+        return yaml_text.parse(text)
     except yaml.YAMLError as error:
         raise ParameterError(f"{path} is not YAML: {error}") from error
-    if not isinstance(tree, dict) or SHARED not in tree:
-        raise ParameterError(f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top")
-    if list(tree)[-1] != SHARED:
+
+
+def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
+    """The file that an overlay names as its base."""
+    if not isinstance(name, str):
         raise ParameterError(
-            f"{path}: section '{list(tree)[-1]}' stands after '{SHARED}'; let '{SHARED}' be the last one, "
-            "else ROS lets the file win over what is given on a command line"
+            f"{path}: {BASE} is {name!r}; give the name of a configuration or a path relative to the file"
+        )
+    base = path.parent / name if name.endswith((".yaml", ".yml")) else packaged(name)
+    if base.resolve() in (path.resolve(), *above):
+        raise ParameterError(f"{path}: {BASE} is the file itself, or one that builds on it; name another configuration")
+    return base
+
+
+def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping[str, Any]]:
+    """Flat sections of a parameter file; `whole` where it must have the shared one, as its last."""
+    if not isinstance(tree, dict) or (whole and SHARED not in tree):
+        raise ParameterError(f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top")
+    if whole and list(tree)[-1] != SHARED:
+        raise ParameterError(
+            f"{path}: section '{list(tree)[-1]}' comes after '{SHARED}'; make '{SHARED}' the last one, "
+            "otherwise ROS prefers the file to values given on a command line"
         )
     sections = {}
     for key, body in tree.items():
@@ -159,7 +211,7 @@ def _sections(path: Path, text: str) -> Mapping[str, Mapping[str, Any]]:
             raise ParameterError(f"{path}: section {key!r} is not allowed; write '{SHARED}' or '{SHARED}/<node name>'")
         if not isinstance(body, dict) or list(body) != [PARAMETERS] or not isinstance(body[PARAMETERS], dict):
             raise ParameterError(
-                f"{path}: section '{key}' needs '{PARAMETERS}:' and below it names and values, no more"
+                f"{path}: section '{key}' needs '{PARAMETERS}:' with names and values below it, and nothing else"
             )
         sections[name] = flatten(body[PARAMETERS])
     return _frozen(sections)

@@ -1,7 +1,7 @@
-"""Every constant of the MIT/WAM arm and of the testbed: as printed, or assumed and why.
+"""Every constant of the MIT/WAM arm and of the testbed: as printed, or assumed with the reason.
 
-The only home of these numbers beside ``config/``, which carries them in SI units; a test holds the
-two against each other.  Corrections of printed numbers stand in `erratum`.
+These numbers are only here and, in SI units, in ``config/``; a test compares the two.  `erratum` explains
+corrections of printed numbers.
 """
 
 import math
@@ -17,16 +17,16 @@ class Constant:
 
     Attributes
     ----------
-    symbol : the thesis's letter, or the nearest there is.
-    meaning : what it is, for which part.
-    value : number or numbers in `unit`, as printed; corrected where `erratum` says what is printed.
+    symbol : the thesis's letter, or the closest one.
+    meaning : the quantity and its part.
+    value : number or numbers in `unit`, as printed; corrected if `erratum` gives the printed one.
     unit : unit as printed, a key of `units.FACTORS`.
-    mark : 'thesis' where printed or computed from printed numbers alone, 'assumed' where not.
-    source : section, table or equation; empty where nothing is printed.
-    parameter : dotted name in ``config/`` that carries it; empty where none does.
+    mark : 'thesis' if printed or computed from printed numbers alone, otherwise 'assumed'.
+    source : section, table or equation; empty if not printed.
+    parameter : dotted name in ``config/`` with this value; empty if there is none.
     index : elements of the parameter that it covers; empty for all.
-    reason : why this value; filled where assumed.
-    erratum : what is wrong in print; empty where nothing is.
+    reason : for this value, if it is assumed.
+    erratum : what is wrong in print; empty if nothing is.
     """
 
     symbol: str
@@ -78,13 +78,13 @@ L3, L4, ASIDE = 22.0, 16.0, 1.6  # in
 PEAK = 43.0  # in-lb
 N1, N2, N4 = 29.97, 30.40, 19.15
 FRICTION = (0.014, 0.01, 0.01, 0.01)  # of peak torque
-MOTOR_SHARE = 0.75
+MOTOR_FRACTION = 0.75
 DYNAMIC = 0.9
 JOINT_RATIO = (N1, 2.0 * N2, N2, N4)  # largest joint torque per motor torque, (A.5) by power
 
-_MOTOR_STATIC = tuple(MOTOR_SHARE * share * PEAK for share in FRICTION)
+_MOTOR_STATIC = tuple(MOTOR_FRACTION * friction * PEAK for friction in FRICTION)
 _JOINT_STATIC = tuple(
-    (1.0 - MOTOR_SHARE) * share * ratio * PEAK for share, ratio in zip(FRICTION, JOINT_RATIO, strict=True)
+    (1.0 - MOTOR_FRACTION) * friction * ratio * PEAK for friction, ratio in zip(FRICTION, JOINT_RATIO, strict=True)
 )
 _MOTOR_FRICTION = "the joint friction of 7.2.2, 75 % of it at the motor ('the major source is at each motor')"
 _JOINT_FRICTION = "the 25 % of 7.2.2 that is not at the motor; joint peak is the motors' through (A.5)"
@@ -129,7 +129,7 @@ ARM_PRINTED: tuple[Constant, ...] = (
     _printed("EA", "stiffness per length of the differential's cable", 51500.0, "lb", "7.2.2"),
     _printed("", "free cable in the differential", 0.0, "in", "7.2.2"),
     _printed("", "span of the joint-4 cable circuit", 22.0, "in", "7.2.2"),
-    _printed("", "twist that the joint-4 circuit bears, each way", 180.0, "deg", "7.2.2"),
+    _printed("", "largest twist of the joint-4 circuit, each way", 180.0, "deg", "7.2.2"),
     # Appendix A
     _printed("alpha_(i-1)", "link twist", (0.0, math.pi / 2, -math.pi / 2, math.pi / 2), "rad", "App. A",
         parameter="arm.joints.twist"),
@@ -159,7 +159,7 @@ ARM_ASSUMED: tuple[Constant, ...] = (
     _assumed("k_t", "torque constant", 0.25, "N m/A",
         "none is printed; it puts the peak torque at 19 A, the size of a servo amplifier of the time",
         parameter="arm.motors.torque_constant"),
-    _assumed("", "part of the friction that sits at the motor", MOTOR_SHARE, "1",
+    _assumed("", "fraction of the friction at the motor", MOTOR_FRACTION, "1",
         "7.2.2 says 'major'; 70 to 80 %"),
     _assumed("F_d/F_s", "dynamic over static friction", DYNAMIC, "1",
         "not printed; low-stiction cable drive"),
@@ -176,11 +176,11 @@ ARM_ASSUMED: tuple[Constant, ...] = (
         "7.2.2: scaled so that the cables of each stage have the same stress; two equal reductions",
         parameter="arm.cables.stage_ea", index=(1, 3, 5, 7)),
     _assumed("L", "free length of the fast stages", (8.0, 8.0, 8.0, 22.0), "in",
-        "joint 4 spans the inner link (7.2.2); the others stand in the base",
+        "joint 4 spans the inner link (7.2.2); the others are in the base",
         parameter="arm.cables.stage_length", index=(0, 2, 4, 6)),
     _assumed("L", "effective free length of the slow stages", _SLOW_LENGTH, "in",
-        "7.2.2: 'very close to zero'; the cable on the pulleys gives too: k_tr becomes 34 and 11.8 N m/rad, "
-        "where the fast stages alone have 37.7 and 13.7", parameter="arm.cables.stage_length", index=(1, 3, 5, 7)),
+        "7.2.2: 'very close to zero'; the cable on the pulleys is elastic too: k_tr becomes 34 and 11.8 N m/rad; "
+        "the fast stages alone have 37.7 and 13.7", parameter="arm.cables.stage_length", index=(1, 3, 5, 7)),
     _assumed("r", "radius of the pinions", 0.375, "in", "not printed; that of the testbed",
         parameter="arm.cables.stage_radius"),
     _assumed("", "parallel circuits", 1.0, "1", "what runs in parallel is in EA",
@@ -213,22 +213,22 @@ ARM_ASSUMED: tuple[Constant, ...] = (
         parameter="arm.joints.upper"),
     _assumed("theta", "pose at power-up", (0.0, -0.6, 0.0, 0.5), "rad",
         "near (A.2), far from stops and singular poses", parameter="arm.joints.start"),
-    _assumed("", "joint speeds that fault the driver", (4.0, 4.0, 6.0, 6.0), "rad/s",
-        "none is printed; above the 2.5 rad/s at which contacts are still to be felt",
+    _assumed("", "joint speeds above which there is a fault", (4.0, 4.0, 6.0, 6.0), "rad/s",
+        "none is printed; above the 2.5 rad/s up to which contacts must be detected",
         parameter="arm.joints.speed_limit"),
     _assumed("m", "masses of the links", (7.68, 3.59, 1.95, 1.06), "kg", _LINKS, parameter="arm.links.mass"),
     _assumed("", "centres of mass of links 1, 2 and 4, in their frames",
         (0.0, 0.0, -0.029, 0.0, -0.027, 0.022, 0.136, 0.0, 0.0), "m", _LINKS, parameter="arm.links.centre",
         index=(0, 1, 2, 3, 4, 5, 9, 10, 11)),
-    _assumed("", "centre of mass of link 3; 0.331 m from the shoulder, frame 3 stands at the elbow",
+    _assumed("", "centre of mass of link 3; 0.331 m from the shoulder, frame 3 is at the elbow",
         (-0.011, 0.0, 0.331 - 0.5588), "m", _LINKS, parameter="arm.links.centre", index=(6, 7, 8)),
     _assumed("I", "principal inertia of the links about their centres",
         (0.068, 0.036, 0.063, 0.013, 0.010, 0.009, 0.094, 0.094, 0.0019, 0.0007, 0.0205, 0.0205), "kg m^2",
         _LINKS, parameter="arm.links.inertia"),
     _assumed("", "origins of the covers' frames", (0.0, 0.0, -L3, 0.0, 0.0, 0.0), "in",
-        "convention: places count from the shoulder and from the elbow, as x in (2.2)",
+        "convention: positions count from the shoulder and from the elbow, as x in (2.2)",
         parameter="arm.covers.origin"),
-    _assumed("", "turn of the covers' frames", (0.0, -90.0, 0.0, 0.0, 0.0, 0.0), "deg",
+    _assumed("", "rotation of the covers' frames", (0.0, -90.0, 0.0, 0.0, 0.0, 0.0), "deg",
         "convention: x along the kinematic link; z of the inner cover away from the folded outer link",
         parameter="arm.covers.rotation"),
     _assumed("", "near ends of the tubes", 0.0, "in",
@@ -332,11 +332,11 @@ TESTBED: tuple[Constant, ...] = (
         parameter="arm.joints.lower"),
     _assumed("", "upper stop", 0.7, "rad", "not printed; as the lower one", parameter="arm.joints.upper"),
     _assumed("", "angle at power-up", 0.0, "rad", "5.6: the link lies horizontally", parameter="arm.joints.start"),
-    _assumed("", "joint speed that faults the driver", 20.0, "rad/s",
+    _assumed("", "joint speed above which there is a fault", 20.0, "rad/s",
         "far above any motion of 5.6, so that an instability can be watched", parameter="arm.joints.speed_limit"),
     _assumed("", "frame of the cover", (0.0, 0.0, 0.0), "in", "convention: that of the link",
         parameter="arm.covers.origin"),
-    _assumed("", "turn of the cover's frame", (0.0, 0.0, 0.0), "rad", "convention: x along the link",
+    _assumed("", "rotation of the cover's frame", (0.0, 0.0, 0.0), "rad", "convention: x along the link",
         parameter="arm.covers.rotation"),
     _assumed("", "near end of the link", (0.0, 0.0, 0.0), "in", "drawn from the axis", parameter="arm.covers.start"),
     _assumed("", "radius of the link", 1.0, "in", "6.4.5: the manipulator is 2 in wide", parameter="arm.covers.radius"),

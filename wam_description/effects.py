@@ -1,4 +1,4 @@
-"""Effects of the transmission beyond its stiffness, each of which can be switched off."""
+"""Effects of the transmission besides its stiffness; each can be switched off."""
 
 from dataclasses import dataclass
 
@@ -14,9 +14,9 @@ class Ripples:
     amplitude 2 epsilon T_0, (6.23), and one cycle.
     """
 
-    shafts: tuple[str, ...] = parameter("motor or joint that each ripple sits on, directly or geared")
+    shafts: tuple[str, ...] = parameter("motor or joint of each ripple, directly or geared")
     ratio: tuple[float, ...] = parameter("turns of the pulley per turn of that shaft")
-    amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley, zero for none", "N m", low=0.0)
+    amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley; 0: none", "N m", low=0.0)
     cycles: tuple[int, ...] = parameter("cycles per turn of the pulley", low=1)
     phase: tuple[float, ...] = parameter("phase at angle zero", "rad")
 
@@ -27,18 +27,18 @@ class Ripples:
 
 @dataclass(frozen=True)
 class Effects:
-    """Which effects the plant shows, and how strongly."""
+    """Which effects the plant has, and their size."""
 
     ripples: Ripples
-    creep: bool = parameter("whether cables creep on their pulleys, (6.19), which is also their loss, (6.15)")
-    slack: bool = parameter("whether the loose strand can go slack; else the pretension counts as endless")
+    creep: bool = parameter("true if cables creep on their pulleys, (6.19), which is also their loss, (6.15)")
+    slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
     tension_friction: tuple[float, ...] = parameter(
-        "static friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
+        "friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
         "N m/N",
         low=0.0,
     )
-    rubbing_friction: tuple[float, ...] = parameter(
-        "extra dry friction at each joint, like the Teflon rod of section 5.6", "N m", low=0.0, live=True
+    added_coulomb_friction: tuple[float, ...] = parameter(
+        "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", low=0.0, live=True
     )
 
 
@@ -49,5 +49,5 @@ def no_effects(arm: Arm) -> Effects:
         creep=False,
         slack=False,
         tension_friction=(0.0,) * len(arm.motors.names),
-        rubbing_friction=(0.0,) * len(arm.joints.names),
+        added_coulomb_friction=(0.0,) * len(arm.joints.names),
     )

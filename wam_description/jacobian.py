@@ -1,4 +1,4 @@
-"""The hand Jacobian of the WAM in closed form, (A.7) with the erratum; what general code is checked by."""
+"""The hand Jacobian of the WAM in closed form, (A.7) with its erratum corrected; a check of the general code."""
 
 from math import cos, sin
 

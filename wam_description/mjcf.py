@@ -1,8 +1,8 @@
 """The arm as a MuJoCo model (MJCF), from the same parameters as everything else.
 
-Structure: one body per link with a hinge along z of frame i (A.4); one free-standing body per
-rotor; one fixed tendon per cable circuit, of length theta_m - (row of the inverse of (A.5)) q, so
-that its spring is the transmission stiffness k_tr on the motor side.
+Structure: one body per link with a hinge along z of frame i (A.4); one body per rotor, fixed in the
+base; two fixed tendons (strands) per cable circuit, of length theta_m - (row of the inverse of (A.5)) q, whose
+springs together are the transmission stiffness k_tr on the motor side.
 """
 
 import math
@@ -16,11 +16,11 @@ from wam_description.effects import Effects, Ripples
 from wam_description.parameters import lengths, require
 from wam_description.world import SHAPES, Obstacles, Pushers, Springs, World
 
-NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, where slack is switched off
-FAR = 1e6  # rad or m, farther than any tendon gets
-NEVER_YIELDS = 1e9  # a yield torque, which only makes room for the creep in MuJoCo's state
-FAR_AWAY = 50.0  # m, where pushers wait for their time
-ROTOR_MASS = 1e-3  # kg; a rotor turns about its centre, so that its mass moves nothing
+NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, if slack is switched off
+FAR = 1e6  # rad or m, beyond the range of every tendon
+NEVER_YIELDS = 1e9  # N m; a yield torque that is never reached adds the creep to MuJoCo's state
+FAR_AWAY = 50.0  # m; position of pushers before their start
+ROTOR_MASS = 1e-3  # kg; without effect, as a rotor turns about its centre of mass
 
 
 def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
@@ -43,7 +43,7 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     Raises
     ------
     ParameterError
-        where an obstacle is named like a cover, or springs and effects do not fit the arm.
+        if an obstacle has the name of a cover, or springs and effects do not fit the arm.
     """
     _refuse_misfits(arm, world, effects)
     root = ElementTree.Element("mujoco", model=arm.name)
@@ -69,10 +69,10 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
 def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
     motors, joints = arm.motors.names, arm.joints.names
     for name in world.obstacles.names:
-        require(name not in arm.covers.names, f"obstacle '{name}' is named like a cover of the arm; rename it")
+        require(name not in arm.covers.names, f"obstacle '{name}' has the name of a cover of the arm; rename it")
     for name, cover in zip(world.pushers.names, world.pushers.covers, strict=True):
         taken = (*arm.covers.names, *world.obstacles.names)
-        require(name not in taken, f"pusher '{name}' is named like a cover or an obstacle; rename it")
+        require(name not in taken, f"pusher '{name}' has the name of a cover or an obstacle; rename it")
         known = ", ".join(arm.covers.names)
         require(cover in arm.covers.names, f"pusher '{name}' presses on '{cover}'; covers: {known}")
     for name in world.springs.joints:
@@ -81,7 +81,7 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
         shafts = (*motors, *joints)
         require(name in shafts, f"effects.ripples.shafts names '{name}'; motors and joints: {', '.join(shafts)}")
     lengths("effects", motors, {"tension_friction": effects.tension_friction})
-    lengths("effects", joints, {"rubbing_friction": effects.rubbing_friction})
+    lengths("effects", joints, {"added_coulomb_friction": effects.added_coulomb_friction})
 
 
 def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
@@ -97,8 +97,8 @@ def _triple(values: Sequence[float], i: int) -> str:
 
 
 def _add_solver(root: ElementTree.Element, arm: Arm, step: float) -> None:
-    # damping as a plain force: implicitfast forgets what couples rotor and joint, as if each rotor had
-    # step x damping more inertia (5 %), and the strain torque were off by 0.1 N m
+    # explicit damping: implicitfast omits the terms that couple rotor and joint, which acts like an additional
+    # inertia of step x damping on each rotor (5 %) and an error of 0.1 N m in the strain torque
     option = _add(
         root,
         "option",
@@ -220,7 +220,7 @@ def _add_obstacle(world: ElementTree.Element, obstacles: Obstacles, i: int, name
 
 
 def _add_pushers(world: ElementTree.Element, pushers: Pushers) -> None:
-    """Bodies that the plant leads, far away at first."""
+    """Bodies whose pose the plant prescribes, far away at first."""
     for i, name in enumerate(pushers.names):
         if pushers.force[i] == 0.0:
             continue
@@ -253,14 +253,14 @@ def _add_pair(
         geom2=other,
         condim="3" if friction > 0.0 else "1",
         friction=_numbers((friction, friction, 0.0, 0.0, 0.0)),
-        # so small an impedance lets the plant set the force itself, see plant.py
+        # with so small an impedance the plant can set the force itself, see wam_driver/surfaces.py
         solimp="0.001 0.001 0.001 0.5 2",
         solref=_numbers((-stiffness, -damping)),
     )
 
 
 def _add_cables(tendons: ElementTree.Element, arm: Arm, slack: bool) -> None:
-    """Two strands per circuit, each half the stiffness, stretched beforehand, unable to push."""
+    """Two strands per circuit, each with half the stiffness, pretensioned, unable to push."""
     size = len(arm.motors.names)
     motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(size, size))
     for i, (motor, circuit) in enumerate(zip(arm.motors.names, arm.circuits, strict=True)):
@@ -311,7 +311,7 @@ def _add_actuators(root: ElementTree.Element, arm: Arm, ripples: Ripples) -> Non
             joint=shaft,
             input="none",
             gear=repr(ripples.ratio[i]),
-            # MuJoCo asks for a winding; without input no current flows through it
+            # MuJoCo needs a winding; without input it carries no current
             resistance="1",
             motorconst="0",
             cogging=_numbers((ripples.amplitude[i], ripples.cycles[i], ripples.phase[i])),

@@ -1,13 +1,13 @@
 """Parameters as data: frozen dataclasses that carry unit, range and meaning of every field.
 
-A parameter class is the only place that says what a parameter means; its value stands in one
-YAML file below ``config/`` and nowhere else.  The same classes check the values, name what is
-wrong, describe the parameters to ROS and fill ``docs/parameters.md``.
+A parameter class alone defines what a parameter means; its value is in one YAML file in ``config/`` and
+nowhere else.  The same classes check the values, describe the parameters to ROS and fill
+``docs/parameters.md``.
 """
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 T = TypeVar("T")
@@ -19,7 +19,7 @@ class ParameterError(ValueError):
 
 
 class Field(NamedTuple):
-    """One parameter: its dotted name, Python type and what the class says of it."""
+    """One parameter: its dotted name, its Python type and its declaration."""
 
     name: str
     kind: type
@@ -30,10 +30,11 @@ class Field(NamedTuple):
     high: float
     choices: tuple[str, ...]
     live: bool
+    before: Value | Callable[[Mapping[str, Any]], Value] | None
 
     @property
     def allowed(self) -> str:
-        """The allowed values in words, empty where anything of the type is allowed."""
+        """The allowed values in words, empty if every value of the type is allowed."""
         if self.choices:
             return "one of " + ", ".join(self.choices)
         if math.isinf(self.low) and math.isinf(self.high):
@@ -52,6 +53,7 @@ def parameter(
     high: float = math.inf,
     choices: tuple[str, ...] = (),
     live: bool = False,
+    before: Value | Callable[[Mapping[str, Any]], Value] | None = None,
 ) -> Any:
     """Declare a field of a parameter class.
 
@@ -61,11 +63,20 @@ def parameter(
     unit : SI unit, empty for pure numbers and names.
     low, high : inclusive range of each number.
     choices : allowed strings.
-    live : True where a running node may take a new value.
+    live : True if a running node may take a new value.
+    before : the value that a recording without this parameter had in effect, or a function of the node's
+        other parameters, see `one_each`.  Only recordings may lack a parameter; a configuration has to give it.
     """
     return dataclasses.field(
-        metadata={"doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live}
-    )
+        metadata={
+            "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live, "before": before,
+        }
+    )  # fmt: skip
+
+
+def one_each(names: str, value: bool | int | float | str) -> Callable[[Mapping[str, Any]], Value]:
+    """The same value for each of some names, as ``before=one_each("arm.joints.names", 0.0)``."""
+    return lambda others: (value,) * len(others[names])
 
 
 def fields(cls: type, prefix: str = "") -> Iterator[Field]:
@@ -126,13 +137,13 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
 
 
 def build_part(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:
-    """Make a parameter object from its part of flat names and values, among which others stand.
+    """Make a parameter object from its part of flat names and values, which also hold other parameters.
 
     Parameters
     ----------
     cls : parameter class.
     flat : values by name, as those of a node.
-    prefix : what its names begin with there, as 'world.'; without one, names that it does not know belong to others.
+    prefix : of its names there, as 'world.'; without one, names that it does not know belong to others.
 
     Raises
     ------

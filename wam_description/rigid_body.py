@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 class Pose(NamedTuple):
-    """A frame seen from the base.
+    """A frame in base coordinates.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Pose(NamedTuple):
 
 
 class RigidBody:
-    """The chain of links: places, Jacobians, gravity, inertia; no rotors, pulleys or friction.
+    """The chain of links: positions, Jacobians, gravity, inertia; no rotors, pulleys or friction.
 
     Joint i turns about z of frame i of (A.4).  Base frame: frame 0, z up.  Joint angles q, rad,
     and velocities qd, rad/s, have shape (n,) and may be any sequence.  Every result is a new array.
@@ -39,7 +39,7 @@ class RigidBody:
     Raises
     ------
     ValueError
-        where `mass_scale` has another length than the links or a factor is not above zero.
+        if `mass_scale` has not one factor per link or a factor is not above zero.
     """
 
     def __init__(self, arm: Arm, mass_scale: Sequence[float] | None = None) -> None:
@@ -52,11 +52,11 @@ class RigidBody:
         self._joint = {name: self._model.frames[frame].parentJoint for name, frame in self._frame.items()}
 
     def cover_pose(self, q: ArrayLike, cover: str) -> Pose:
-        """Frame of a cover, seen from the base."""
+        """Frame of a cover in base coordinates."""
         return self._pose(q, self._known(cover))
 
     def tool_pose(self, q: ArrayLike) -> Pose:
-        """Frame of the tool (frame 5 of A.4), seen from the base."""
+        """Frame of the tool (frame 5 of A.4) in base coordinates."""
         return self._pose(q, self._tool)
 
     def point(self, q: ArrayLike, cover: str, p: ArrayLike) -> Array:
@@ -79,13 +79,13 @@ class RigidBody:
         """
         frame = self._known(cover)
         jacobians = _columns(pin.computeJointJacobians(self._model, self._data, _vector(q)))
-        place = pin.updateFramePlacement(self._model, self._data, frame).act(_vector(p))
-        result: Array = jacobians[:3] - pin.skew(place) @ jacobians[3:]
+        point = pin.updateFramePlacement(self._model, self._data, frame).act(_vector(p))
+        result: Array = jacobians[:3] - pin.skew(point) @ jacobians[3:]
         result[:, self._joint[cover] :] = 0.0
         return result
 
     def cover_jacobian(self, q: ArrayLike, cover: str) -> Array:
-        """Motion of a cover per joint velocity, seen from the cover.
+        """Motion of a cover per joint velocity, in the cover's frame.
 
         Parameters
         ----------
@@ -116,11 +116,11 @@ class RigidBody:
         return pin.computeGeneralizedGravity(self._model, self._data, _vector(q))
 
     def mass_matrix(self, q: ArrayLike) -> Array:
-        """Inertia of the links at the joints, (n, n), kg m^2, symmetric; pulleys and rotors not in it."""
+        """Inertia of the links at the joints, (n, n), kg m^2, symmetric, without pulleys and rotors."""
         return pin.crba(self._model, self._data, _vector(q))
 
     def coriolis_transpose_times_velocity(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """C(q, qd)^T qd, (n,), N m, with dM/dt = C + C^T: what a momentum observer adds to the torques."""
+        """C(q, qd)^T qd, (n,), N m, with dM/dt = C + C^T: the term of a momentum observer."""
         velocity = _vector(qd)
         return pin.computeCoriolisMatrix(self._model, self._data, _vector(q), velocity).T @ velocity
 
@@ -159,7 +159,7 @@ def cover_placement(arm: Arm, i: int) -> pin.SE3:
 
 
 def _columns(jacobian: Array) -> Array:
-    """A Jacobian as (6, n); pinocchio returns a flat array where there is one joint."""
+    """A Jacobian as (6, n); pinocchio returns a flat array for one joint."""
     return jacobian.reshape(6, -1)
 
 

@@ -1,12 +1,19 @@
-"""What travels between machines: plain values without time stamps, the same for topics and for loops."""
+"""The values that nodes exchange, without time stamps: the same on topics, in the simulation and in a replay."""
 
+from collections.abc import Mapping
+from enum import IntEnum
 from typing import NamedTuple
+
+BASE = "base"  # frame of the arm's base, and of a contact that is none
+Triple = tuple[float, float, float]
+ZERO: Triple = (0.0, 0.0, 0.0)
 
 
 class State(NamedTuple):
     """Positions, velocities and torques of the motors or of the joints, each (n,).
 
     Motor side: theta rad, thetad rad/s, motor torque N m.  Joint side: q rad, qd rad/s, torque N m.
+    An array that a topic does not carry is empty.
     """
 
     position: list[float]
@@ -14,26 +21,113 @@ class State(NamedTuple):
     effort: list[float]
 
 
+class Wrench(NamedTuple):
+    """Force (3,) N and torque (3,) N m in a named frame."""
+
+    frame: str
+    force: Triple
+    torque: Triple
+
+
+class Point(NamedTuple):
+    """A position (3,), m, in a named frame; NaN where it is not known."""
+
+    frame: str
+    position: Triple
+
+
+class Table(NamedTuple):
+    """Rows of numbers under the column names of the topic; no row where there is nothing to report."""
+
+    frame: str
+    rows: tuple[tuple[float, ...], ...]
+
+
+class ForceCommand(NamedTuple):
+    """Commanded force of the arm on the world; `frame` is 'base' or a cover."""
+
+    frame: str
+    force: Triple  # N
+
+
 class Contact(NamedTuple):
     """A force of the world on one cover."""
 
     cover: str  # '' where nothing touches
     place: float  # m along the cover, NaN where it is not known
-    force: tuple[float, float, float]  # N, in the cover's frame
-    place_sd: float = float("nan")  # m, standard deviation of the place, NaN where nobody tells it
-    probability: float = float("nan")  # that this cover is touched, of all that may be; NaN where nobody tells it
+    force: Triple  # N, in the cover's frame
+    position_sd: float = float("nan")  # m, standard deviation of the position, NaN where it is not known
+    probability: float = float("nan")  # that this cover is touched and no other, NaN where it is not known
+    direction_sd: float = float("nan")  # rad, of the angle of the force about the cover, NaN where it is not known
 
 
-NO_CONTACT = Contact("", float("nan"), (0.0, 0.0, 0.0))
+NO_CONTACT = Contact("", float("nan"), ZERO)
 
 
 class Load(NamedTuple):
-    """What the world truly does to one cover, as the simulator knows it."""
+    """The true load of the world on one cover, known to the simulator only."""
 
     cover: str  # '' where nothing touches
     place: float  # m along the cover, NaN where there is none
-    force: tuple[float, float, float]  # N, in the cover's frame
-    moment: tuple[float, float, float]  # N m, about the origin of the cover's frame, in that frame
+    force: Triple  # N, in the cover's frame
+    moment: Triple  # N m, about the origin of the cover's frame, in that frame
 
 
-NO_LOAD = Load("", float("nan"), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+NO_LOAD = Load("", float("nan"), ZERO, ZERO)
+
+
+class LikelyRange(NamedTuple):
+    """A part of a cover where the contact is likely, m along it."""
+
+    cover: str
+    low: float
+    high: float
+
+
+class ContactView(NamedTuple):
+    """What a viewer draws of a contact: link, position and force, and where else it may be."""
+
+    contact: Contact
+    likely: tuple[LikelyRange, ...]
+
+
+class Level(IntEnum):
+    """How serious a status is, numbered as in diagnostic_msgs."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+class NodeStatus(NamedTuple):
+    """What a node reports about itself; `wam_description.status` writes and reads it as key-value pairs.
+
+    Attributes
+    ----------
+    level : how serious it is.
+    message : one line for people.
+    node : name of the node; filled in by the adapter where it is empty.
+    connected : whether all publishers and subscribers that the node expects are there.
+    mode : of the driver: braked, enabled or fault; '' for other nodes.
+    fault : why the driver has stopped, '' where it has not.
+    step : of the scenario, '' for other nodes.
+    stamp : time of the arm that the status belongs to, ns, 0 where it has none.
+    facts : further values for people, by name.
+    """
+
+    level: Level
+    message: str
+    node: str = ""
+    connected: bool = False
+    mode: str = ""
+    fault: str = ""
+    step: str = ""
+    stamp: int = 0
+    facts: Mapping[str, str] = {}
+
+
+class Answer(NamedTuple):
+    """The answer of a service: whether it was done, and what to do next where it was not."""
+
+    success: bool
+    message: str

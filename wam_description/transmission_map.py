@@ -13,7 +13,7 @@ LARGEST_CONDITION = 1e8
 class TransmissionMap:
     """Positions, velocities and torques from motors to joints and back, (A.5).
 
-    With q = M theta, equal power on both sides asks for tau_motor = M^T tau.  The methods take and
+    With q = M theta, equal power on both sides gives tau_motor = M^T tau.  The methods take and
     return plain lists of n numbers: on four numbers scalar Python is faster than numpy.
 
     Parameters
@@ -28,7 +28,7 @@ class TransmissionMap:
     Raises
     ------
     ValueError
-        where the matrix is not square, not finite or singular.
+        if the matrix is not square, not finite or singular.
     """
 
     def __init__(self, matrix: ArrayLike) -> None:
@@ -72,7 +72,7 @@ class TransmissionMap:
         return _product(self._forward_transposed, tau)
 
     def largest_joint_torques(self, peak_torque: Sequence[float]) -> list[float]:
-        """Largest torque at each joint alone, n, N m, where motors give up to peak_torque, n, N m."""
+        """Largest torque at each joint alone, n, N m, with up to peak_torque, n, N m, from each motor."""
         absolute = [[(j, abs(factor)) for j, factor in row] for row in self._inverse_transposed]
         return _product(absolute, peak_torque)
 
@@ -86,8 +86,8 @@ def _check(matrix: NDArray[np.float64]) -> None:
     if not condition < LARGEST_CONDITION:
         raise ValueError(
             f"joint_from_motor is singular (condition number {condition:.3g}, allowed below "
-            f"{LARGEST_CONDITION:g}): no motor angles belong to some joint angles; each joint needs a "
-            f"combination of motors of its own, got {matrix.tolist()}"
+            f"{LARGEST_CONDITION:g}): some joint angles have no motor angles; each joint needs its own "
+            f"combination of motors, got {matrix.tolist()}"
         )
 
 

@@ -1,4 +1,4 @@
-"""The only place where units are converted; everywhere else values are in SI units and radians.
+"""Conversion of units; everywhere else values are in SI units and radians.
 
 The factors rest on five exact definitions: inch, pound (mass), standard gravity, ounce and degree.
 In the thesis 'lb' and 'oz' are forces, except in the weight of a motor; that mass is 'lbm' here.
@@ -52,7 +52,7 @@ def si(value: float, unit: str) -> float:
     Raises
     ------
     ValueError
-        where the unit is not known.
+        if the unit is not known.
     """
     if unit not in FACTORS:
         raise ValueError(f"unit '{unit}' is not known; known units: {', '.join(sorted(FACTORS))}")

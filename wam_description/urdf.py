@@ -1,4 +1,4 @@
-"""The arm as URDF, for robot_state_publisher, viewers and other people's tools.
+"""The arm as URDF, for robot_state_publisher, viewers and other tools.
 
 Links: ``base``, the links of the arm, a frame for each cover (named like the cover, so that
 contacts find it in TF) and ``tool``.  The tubes are drawn as cylinders with spheres at both ends.
@@ -22,8 +22,8 @@ TOOL = "tool"
 def urdf(arm: Arm) -> str:
     """URDF of the arm: kinematics, inertia of the links, limits and tubes.
 
-    A joint's effort limit is its peak torque through the motors that drive it, its velocity limit
-    the speed that faults the driver.  Lengths in m, angles in rad, frames of (A.4).
+    A joint's effort limit is the peak torque of the motors that drive it, its velocity limit the speed
+    above which the driver faults.  Lengths in m, angles in rad, frames of (A.4).
     """
     robot = Element("robot", name=arm.name)
     SubElement(robot, "link", name=BASE)
@@ -69,8 +69,8 @@ def _add_joint(robot: Element, arm: Arm, i: int, effort: float) -> None:
 
 def _add_cover(robot: Element, arm: Arm, i: int) -> None:
     SubElement(robot, "link", name=arm.covers.names[i])
-    place = _origin(_triple(arm.covers.origin, i), _triple(arm.covers.rotation, i))
-    _add_fixed(robot, arm.covers.links[i], arm.covers.names[i], place)
+    origin = _origin(_triple(arm.covers.origin, i), _triple(arm.covers.rotation, i))
+    _add_fixed(robot, arm.covers.links[i], arm.covers.names[i], origin)
 
 
 def _add_tube(link: Element, arm: Arm, i: int) -> None:
@@ -86,9 +86,9 @@ def _add_tube(link: Element, arm: Arm, i: int) -> None:
         _add_shape(link, tag, _origin(end, turn), "sphere", radius=radius)
 
 
-def _add_shape(link: Element, tag: str, place: Element, shape: str, **size: str) -> None:
+def _add_shape(link: Element, tag: str, origin: Element, shape: str, **size: str) -> None:
     part = SubElement(link, tag)
-    part.append(place)
+    part.append(origin)
     SubElement(SubElement(part, "geometry"), shape, size)
 
 

@@ -1,4 +1,4 @@
-"""What the arm can touch: surfaces, and springs under a joint's lever."""
+"""What the arm can touch: obstacles, springs and pushers."""
 
 from dataclasses import dataclass
 
@@ -14,15 +14,13 @@ class Obstacles:
     names: tuple[str, ...] = parameter("names of the obstacles")
     shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(SHAPES))
     positions: tuple[float, ...] = parameter("centre in the base frame, x y z of each", "m")
-    rotations: tuple[float, ...] = parameter("turn from the base frame, roll pitch yaw of each", "rad")
+    rotations: tuple[float, ...] = parameter("rotation from the base frame, roll pitch yaw of each", "rad")
     sizes: tuple[float, ...] = parameter(
         "three numbers each: box half lengths; cylinder radius, half length, 0; plane half lengths, 0", "m", low=0.0
     )
     stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
     damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0)
-    hardening: tuple[float, ...] = parameter(
-        "F = k_c x (1 + hardening x), x the depth: zero for a linear surface", "1/m", low=0.0
-    )
+    hardening: tuple[float, ...] = parameter("h of F = k_c x (1 + h x) with depth x; 0: linear surface", "1/m", low=0.0)
     friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0)
 
     def __post_init__(self) -> None:
@@ -33,7 +31,7 @@ class Obstacles:
         require("" not in self.names, "parameter 'obstacles.names' has an empty name; name every obstacle")
         require(
             len(set(self.names)) == len(self.names),
-            f"parameter 'obstacles.names' has a name twice: {', '.join(self.names)}",
+            f"parameter 'obstacles.names' has a duplicate name: {', '.join(self.names)}",
         )
         for i, (name, shape) in enumerate(zip(self.names, self.shapes, strict=True)):
             require(shape in SHAPES, f"{name}: obstacles.shapes is '{shape}'; allowed: {', '.join(SHAPES)}")
@@ -50,10 +48,10 @@ class Springs:
     """Springs that push on the lever of a joint, like the one under the tip of the testbed (section 5.6)."""
 
     joints: tuple[str, ...] = parameter("joint of each spring")
-    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever, zero for no spring", "N/m", low=0.0)
+    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m", low=0.0)
     lever: tuple[float, ...] = parameter("distance of the spring from the joint's axis", "m", low=1e-3)
-    rest: tuple[float, ...] = parameter("joint angle at which the spring is not pressed", "rad")
-    bilateral: tuple[bool, ...] = parameter("whether it also pulls; else it pushes towards larger angles only")
+    rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad")
+    bilateral: tuple[bool, ...] = parameter("true if it also pulls; otherwise it only pushes towards larger angles")
 
     def __post_init__(self) -> None:
         keys = ("stiffness", "lever", "rest", "bilateral")
@@ -68,11 +66,11 @@ PUSHER_SHAPES = ("sphere", "box")
 
 @dataclass(frozen=True)
 class Pushers:
-    """Hands that follow a moving link and press on it: rigid bodies with a soft surface, led by the simulator.
+    """Hands that follow a moving link and press on it: rigid bodies with a soft surface, moved by the simulator.
 
-    Each comes from `clearance` away, presses with its force from `begin` to `end` (s since power-up),
-    goes along with the link, over which it slides, and leaves.  The force is that of the surface,
-    k_c times depth: what truly acts is what the simulator's contacts say.
+    Each approaches from `clearance`, presses with its force from `begin` to `end` (s since power-up), moves
+    with the link, slides over it if configured, and leaves.  `force` is k_c times depth; the true
+    contact force is on `sim/contact/wrench`.
     """
 
     names: tuple[str, ...] = parameter("names of the pushers")
@@ -83,15 +81,15 @@ class Pushers:
         low=0.0,
     )
     covers: tuple[str, ...] = parameter("cover that each presses on")
-    places: tuple[float, ...] = parameter("where along the cover each begins to press", "m", low=0.0)
-    angles: tuple[float, ...] = parameter("direction of the force round the cover, from its y to its z axis", "rad")
-    force: tuple[float, ...] = parameter("force across the link, zero for no pusher", "N", low=0.0)
-    begin: tuple[float, ...] = parameter("when each touches", "s", low=0.0)
-    end: tuple[float, ...] = parameter("when each leaves", "s", low=0.0)
-    rise: tuple[float, ...] = parameter("time in which the force grows and falls", "s", low=1e-3)
-    clearance: tuple[float, ...] = parameter("distance from the link where each waits", "m", low=1e-3)
+    positions: tuple[float, ...] = parameter("position along the cover where each touches first", "m", low=0.0)
+    angles: tuple[float, ...] = parameter("direction of the force about the cover, from its y to its z axis", "rad")
+    force: tuple[float, ...] = parameter("force at right angles to the link; 0: no pusher", "N", low=0.0)
+    begin: tuple[float, ...] = parameter("time of first contact, since power-up", "s", low=0.0)
+    end: tuple[float, ...] = parameter("time of release, since power-up", "s", low=0.0)
+    rise: tuple[float, ...] = parameter("time in which the force rises and falls", "s", low=1e-3)
+    clearance: tuple[float, ...] = parameter("distance from the link before and after contact", "m", low=1e-3)
     slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s")
-    turn: tuple[float, ...] = parameter("speed at which each turns round the link", "rad/s")
+    turn: tuple[float, ...] = parameter("speed at which each moves about the link", "rad/s")
     stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
     damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0)
     friction: tuple[float, ...] = parameter("coefficient of friction against the cover", low=0.0)
@@ -121,7 +119,7 @@ NO_PUSHERS = Pushers((), (), (), (), (), (), (), (), (), (), (), (), (), (), (),
 
 @dataclass(frozen=True)
 class World:
-    """Everything around the arm."""
+    """The surroundings of the arm."""
 
     obstacles: Obstacles
     springs: Springs

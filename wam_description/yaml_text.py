@@ -1,4 +1,4 @@
-"""YAML as people write it, with the slips that YAML lets pass in silence refused."""
+"""YAML with duplicate keys refused, which YAML itself accepts silently."""
 
 from collections.abc import Hashable
 from typing import Any
@@ -12,7 +12,7 @@ class _Strict(yaml.SafeLoader):
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"'{key.value}' is given twice; take one of the two away", key.start_mark
+                    None, None, f"'{key.value}' is given twice; remove one of the two", key.start_mark
                 )
             seen.add(key.value)
         return super().construct_mapping(node, deep)
@@ -24,6 +24,6 @@ def parse(text: str) -> Any:
     Raises
     ------
     yaml.YAMLError
-        where it is no YAML, or a key is given twice in one mapping; names the line.
+        if it is not YAML, or a key is given twice in one mapping; names the line.
     """
     return yaml.load(text, _Strict)  # a safe loader

@@ -1,1 +1,15 @@
-"""The motor side: MuJoCo plant, amplifier and motor limits, safety, and the driver node."""
+"""The motor side: the simulated arm and its driver.
+
+- driver: the driver without ROS: commands, watchdog, limits, states; its parameters
+- interface: what every driver of the arm takes and gives
+- driver_node: the driver as a ROS node
+- safety: braked, enabled, fault
+- amplifier: clipping, I2t, deadband, ripple and noise of the motor currents
+- sensors: resolution and noise of encoders and strain gauges
+- plant: the arm in MuJoCo, stepped with motor torques
+- friction: laws of dry friction at motors and joints
+- circuits: creep, slack, torque and tension of the cable circuits
+- surfaces: contact forces of obstacles and pushers
+- loads: pushes, and the load on each cover
+- pusher: hands that follow a moving link and press on it
+"""

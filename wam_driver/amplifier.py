@@ -1,4 +1,4 @@
-"""Motor amplifier: current asked for in, current that flows and torque that comes out."""
+"""Motor amplifier: from the commanded to the actual current and the torque of the motor."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,26 +12,32 @@ from wam_description.parameters import lengths, parameter
 
 @dataclass(frozen=True)
 class AmplifierParameters:
-    """What the amplifiers do to the currents asked for."""
+    """Imperfections of the amplifiers and the thermal time constant of the motors."""
 
-    thermal_time: float = parameter("time constant of the motors' windings", "s", low=0.1)
-    deadband: tuple[float, ...] = parameter("current asked for below which nothing flows", "A", low=0.0)
-    torque_ripple: tuple[float, ...] = parameter("ripple as a share of the torque (2.1.1)", low=0.0, high=1.0)
-    ripple_cycles: tuple[int, ...] = parameter("cycles of that ripple per turn of the motor", low=1)
-    current_noise: tuple[float, ...] = parameter("standard deviation of the current that flows", "A", low=0.0)
+    thermal_time: float = parameter("thermal time constant of the motors' windings", "s", low=0.1)
+    deadband: tuple[float, ...] = parameter("commanded current below which no current flows", "A", low=0.0)
+    torque_ripple: tuple[float, ...] = parameter("torque ripple as a fraction of the torque (2.1.1)", low=0.0, high=1.0)
+    ripple_cycles: tuple[int, ...] = parameter("cycles of the torque ripple per turn of the motor", low=1)
+    current_noise: tuple[float, ...] = parameter(
+        "standard deviation of the actual current, while it is not zero", "A", low=0.0
+    )
 
 
 class Amplifier:
-    """Clips each current to the motor's peak and, over time, to what the winding can stand.
+    """Clips each current to the motor's peak and, over time, to its thermal limit.
 
-    The winding's heat follows w' = ((i/i_continuous)^2 - w)/T; once w reaches 1 the current is
-    held at the continuous limit until w has fallen (I2t).
+    The winding's heat follows w' = ((i/i_continuous)^2 - w)/T.  While w is 1 or more, the current is clipped
+    to the continuous current (I2t).
 
     Parameters
     ----------
     motors : torque constants and limits.
-    parameters : deadband, ripple, noise, heat.
+    parameters : deadband, ripple, noise, thermal time constant.
     random : source of the noise.
+
+    Attributes
+    ----------
+    heat : w of each motor, 1 at the thermal limit.
     """
 
     def __init__(self, motors: Motors, parameters: AmplifierParameters, random: np.random.Generator) -> None:
@@ -46,35 +52,35 @@ class Amplifier:
         self._random = random
 
     def reset(self) -> None:
-        """Forget the heat."""
+        """Let the motors be cold."""
         self.heat = [0.0] * len(self.peak)
 
     def step(self, currents: Sequence[float], dt: float) -> list[float]:
-        """Currents that flow for `dt` seconds, A, (n,), for the currents asked for, A, (n,)."""
+        """Actual currents over `dt` seconds, A, (n,), for the commanded currents, A, (n,)."""
         parameters = self._parameters
         noise = self._random.standard_normal(len(self.peak)).tolist() if self._is_noisy else None
-        flowing = []
+        actual = []
         for i, current in enumerate(currents):
             limit = self.continuous[i] if self.heat[i] >= 1.0 else self.peak[i]
             if abs(current) < parameters.deadband[i]:
                 current = 0.0  # noqa: PLW2901
             if noise and current:
                 current += parameters.current_noise[i] * noise[i]  # noqa: PLW2901
-            flowing.append(min(max(current, -limit), limit))
-            ratio = flowing[i] / self.continuous[i]
+            actual.append(min(max(current, -limit), limit))
+            ratio = actual[i] / self.continuous[i]
             self.heat[i] += (ratio * ratio - self.heat[i]) * dt / parameters.thermal_time
-        return flowing
+        return actual
 
     def nominal_torque(self, currents: Sequence[float]) -> list[float]:
-        """Torque of the motors by their torque constants alone, N m, (n,): what is reported."""
+        """Torque of the motors from their torque constants, N m, (n,): the reported torque."""
         return [k * i for k, i in zip(self.torque_constant, currents, strict=True)]
 
     def torque(self, currents: Sequence[float], theta: Sequence[float]) -> list[float]:
         """Torque on the rotors at the angles theta, rad, with the ripple of the commutation, N m, (n,)."""
         torque = self.nominal_torque(currents)
-        for i, (share, cycles) in enumerate(
+        for i, (ripple, cycles) in enumerate(
             zip(self._parameters.torque_ripple, self._parameters.ripple_cycles, strict=True)
         ):
-            if share:
-                torque[i] *= 1.0 + share * sin(cycles * theta[i])
+            if ripple:
+                torque[i] *= 1.0 + ripple * sin(cycles * theta[i])
         return torque

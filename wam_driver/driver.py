@@ -1,24 +1,25 @@
-"""The hardware driver as a machine: plant, amplifier, safety and watchdog, without ROS and without a clock."""
+"""The simulated hardware driver: plant, amplifier, safety and watchdog, without ROS and without a clock."""
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_description.arm import Shared
-from wam_description.departure import Departure, built
 from wam_description.effects import Effects
+from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import lengths, parameter
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import NO_LOAD, Load, State
+from wam_description.signals import NO_LOAD, Answer, Load, State
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier, AmplifierParameters
+from wam_driver.friction import FrictionParameters
 from wam_driver.plant import Plant
-from wam_driver.safety import Answer, Mode, Safety
+from wam_driver.safety import Mode, Safety
 from wam_driver.sensors import SensorParameters, Sensors
 
 WARNING = 0.9  # of a limit
@@ -29,48 +30,68 @@ class DriverParameters:
     """The simulated hardware and its limits."""
 
     world: World
-    departure: Departure
+    mismatch: ModelMismatch
     effects: Effects
+    friction: FrictionParameters
     amplifier: AmplifierParameters
     sensors: SensorParameters
-    seed: int = parameter("of all noise", low=0)
-    watchdog: float = parameter("age of the last command at which the driver stops", "s", low=0.002, high=0.05)
-    elbow_speed_limit: float = parameter("speed of the last joint's origin that faults the driver", "m/s", low=0.0)
-    tip_speed_limit: float = parameter("speed of the tool that faults the driver", "m/s", low=0.0)
-    post_mortem_samples: int = parameter("samples kept for the time before a fault", low=1, high=100_000)
-    post_mortem_directory: str = parameter("where they are written on a fault, empty for nowhere")
+    seed: int = parameter("seed of the random numbers of all noise", low=0)
+    watchdog: float = parameter("age of the last command that is a fault", "s", low=0.002, high=0.05)
+    elbow_speed_limit: float = parameter(
+        "speed of the last joint's origin above which there is a fault", "m/s", low=0.0
+    )
+    tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0)
+    post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
+    post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
 
 
-class Sample(NamedTuple):
+class DriverSample(NamedTuple):
     """One period of the driver, kept for the post-mortem."""
 
     stamp: int
     theta: list[float]
     thetad: list[float]
-    asked: list[float]
-    flowing: list[float]
+    commanded: list[float]
+    actual: list[float]
+
+
+class WatchedLimit(NamedTuple):
+    """A quantity that is a fault above its limit and a warning near it."""
+
+    quantity: str
+    value: float
+    limit: float
+    unit: str
 
 
 class Driver:
-    """Steps the plant with the last good command, as long as it is safe to do so.
+    """Steps the plant with the last valid command, as long as it is safe to do so.
 
     Time is counted in periods from 1; `stamp` is the time of the present state in nanoseconds.
 
     Attributes
     ----------
     motor_state : angle, velocity and torque of each motor, as measured.
-    joint_sensors : joint-side encoder and strain torque, where they are mounted.
-    currents : what flows, A, (n,).
+    joint_sensors : joint-side encoder and strain torque, if they are mounted.
+    currents : actual currents, A, (n,).
+    recent : the last periods, up to the last fault.
+    warnings : quantities that are near their limit.
     """
 
     def __init__(self, shared: Shared, parameters: DriverParameters) -> None:
         arm, timing = shared.arm, shared.timing
         self.safety = Safety()
         random = np.random.Generator(np.random.PCG64(parameters.seed))
-        self.plant = Plant(built(arm, parameters.departure), parameters.world, parameters.effects, timing.substep)
+        self.plant = Plant(
+            true_arm(arm, parameters.mismatch),
+            parameters.world,
+            parameters.effects,
+            timing.substep,
+            parameters.friction,
+        )
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random)
         self._sensors = Sensors(arm, parameters.sensors, random)
-        self.recent: deque[Sample] = deque(maxlen=parameters.post_mortem_samples)
+        self.recent: deque[DriverSample] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str]
         self._arm, self._timing, self._parameters = arm, timing, parameters
         self._map = TransmissionMap.of(arm)
@@ -81,11 +102,13 @@ class Driver:
         self._measure()
 
     def _release(self) -> None:
-        """Discard every command; nothing flows until a new one comes."""
+        """Discard every command; all currents are zero until a new one arrives."""
         self._command = self._zero
         self._command_tick = self._tick
         self.currents = self._zero
-        self._tightest = self._zero  # N, of each cable since the limits were last looked at: a blow is soon over
+        self._tightest = (
+            self._zero
+        )  # N, of each cable since the last check of the limits, so that no short peak is missed
         self.warnings = []
 
     @property
@@ -95,14 +118,14 @@ class Driver:
 
     @property
     def is_outer(self) -> bool:
-        """True where the joint side works on the present state."""
+        """True if the joint side works on the present state."""
         return self._timing.is_outer(self.stamp)
 
     def command(self, stamp: int, currents: list[float]) -> None:
         """Take the currents, A (n,), that answer the state of time `stamp`, ns.
 
-        Ignored unless enabled, and where the state is older than the one last answered or than the
-        release of the brakes, or has not been yet.
+        The command is ignored unless the driver is enabled.  It is also ignored if its state is older than the
+        state that was last answered or than the release of the brakes, or lies in the future.
         """
         tick = stamp // self._timing.period_ns
         if self.safety.mode is Mode.ENABLED and self._command_tick <= tick <= self._tick:
@@ -114,7 +137,7 @@ class Driver:
 
         Parameters
         ----------
-        arrival_age : time since the last command came in, s, on the steady clock; 0 in lockstep.
+        arrival_age : time since the last command arrived, s, on the steady clock; 0 in lockstep.
         """
         enabled = self.safety.mode is Mode.ENABLED
         if enabled:
@@ -132,8 +155,9 @@ class Driver:
             self.plant.step(torque)
         self._tick += 1
         self._measure()
-        if self.safety.mode is not Mode.FAULT:  # what led to a fault is kept until its reset
-            self.recent.append(Sample(self.stamp, self.plant.theta, self.plant.thetad, self._command, self.currents))
+        if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
+            plant = self.plant
+            self.recent.append(DriverSample(self.stamp, plant.theta, plant.thetad, self._command, self.currents))
         if enabled:
             tight = [tension for tension, _ in self.plant.tensions]
             self._tightest = [max(pair) for pair in zip(self._tightest, tight, strict=True)]
@@ -141,53 +165,56 @@ class Driver:
                 self._watch_limits()
 
     def _watch_limits(self) -> None:
-        theta, thetad = self.plant.theta, self.plant.thetad
-        q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        elbow = self._body.point_jacobian(q, self._arm.covers.names[-1], (0.0, 0.0, 0.0)) @ qd
-        tip = self._body.tool_jacobian(q) @ qd
-        checks = [
-            ("speed of the elbow", math.hypot(*elbow), self._parameters.elbow_speed_limit, "m/s"),
-            ("speed of the tip", math.hypot(*tip), self._parameters.tip_speed_limit, "m/s"),
-        ]
-        checks += [
-            (f"cable tension of {name}", tight, circuit.breaking_strength, "N")
-            for name, tight, circuit in zip(self._arm.motors.names, self._tightest, self._arm.circuits, strict=True)
-        ]
+        """Trip on the first quantity above its limit; warn of those near it."""
+        watched = [*self._speeds(), *self._tensions()]
         self._tightest = self._zero
-        checks += [
-            (f"speed of {name}", abs(speed), limit, "rad/s")
-            for name, speed, limit in zip(self._arm.joints.names, qd, self._arm.joints.speed_limit, strict=True)
-        ]
         self.warnings = [
             f"{what} {value:.2f} {unit} is near its limit {limit:g}"
-            for what, value, limit, unit in checks
+            for what, value, limit, unit in watched
             if value > WARNING * limit
         ]
         self.warnings += [
-            f"{name} is hot: {heat:.0%} of what its winding stands"
+            f"{name} is hot: {heat:.0%} of its thermal (I2t) limit"
             for name, heat in zip(self._arm.motors.names, self.amplifier.heat, strict=True)
             if heat > WARNING
         ]
-        for what, value, limit, unit in checks:
+        for what, value, limit, unit in watched:
             if value > limit:
                 self._trip(f"{what} {value:.2f} {unit} is above its limit {limit:g}; command less")
                 return
+
+    def _speeds(self) -> Iterator[WatchedLimit]:
+        """Speeds of elbow, tip and joints, from the motors."""
+        parameters, joints = self._parameters, self._arm.joints
+        q = self._map.joint_positions(self.plant.theta)
+        qd = self._map.joint_velocities(self.plant.thetad)
+        elbow = self._body.point_jacobian(q, self._arm.covers.names[-1], (0.0, 0.0, 0.0)) @ qd
+        tip = self._body.tool_jacobian(q) @ qd
+        yield WatchedLimit("speed of the elbow", math.hypot(*elbow), parameters.elbow_speed_limit, "m/s")
+        yield WatchedLimit("speed of the tip", math.hypot(*tip), parameters.tip_speed_limit, "m/s")
+        for name, speed, limit in zip(joints.names, qd, joints.speed_limit, strict=True):
+            yield WatchedLimit(f"speed of {name}", abs(speed), limit, "rad/s")
+
+    def _tensions(self) -> Iterator[WatchedLimit]:
+        """Largest tension of each cable since the last check."""
+        for name, tension, circuit in zip(self._arm.motors.names, self._tightest, self._arm.circuits, strict=True):
+            yield WatchedLimit(f"cable tension of {name}", tension, circuit.breaking_strength, "N")
 
     def _trip(self, reason: str) -> None:
         self.safety.trip(reason)
         self._release()
 
     def fault(self, reason: str) -> None:
-        """Stop for a reason seen outside the machine; brakes on, latched."""
+        """Stop for a reason that is known outside the driver; brakes on, latched."""
         self._trip(reason)
 
-    def rub(self, friction: Sequence[float]) -> None:
-        """Let something rub on the joints, extra dry friction (n,), N m, like the Teflon rod of section 5.6."""
-        lengths("effects", self._arm.joints.names, {"rubbing_friction": tuple(friction)})
-        self.plant.rub(friction)
+    def set_added_friction(self, friction: Sequence[float]) -> None:
+        """Set the added Coulomb friction of the joints, (n,), N m, like the Teflon rod of section 5.6."""
+        lengths("effects", self._arm.joints.names, {"added_coulomb_friction": tuple(friction)})
+        self.plant.set_added_friction(friction)
 
     def enable(self, obstacle: str) -> Answer:
-        """Release the brakes; every command received before is discarded."""
+        """Release the brakes and discard every command received before, unless an `obstacle` is named."""
         answer = self.safety.enable(obstacle)
         if answer.success:
             self._release()
@@ -208,7 +235,7 @@ class Driver:
         return self.safety.reset_fault()
 
     def reset(self) -> Answer:
-        """Put the simulated arm back to power-up; braked, the time goes on."""
+        """Put the simulated arm back to power-up, braked; time continues."""
         self.disable()
         self.plant.reset()
         self.amplifier.reset()
@@ -224,10 +251,10 @@ class Driver:
 
     @property
     def true_joint_state(self) -> State:
-        """The simulator's joint state with the torque that comes through the cables."""
+        """The simulator's joint state, with the torque that the cables transmit."""
         return State(self.plant.q, self.plant.qd, self.plant.cable_torque)
 
     @property
     def true_contact(self) -> Load:
-        """The simulator's greatest load on a cover."""
+        """The simulator's largest load on a cover."""
         return max(self.plant.loads(), key=lambda load: sum(f * f for f in load.force), default=NO_LOAD)

@@ -8,34 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import WrenchStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from wam_description.signals import State
+from wam_description.interface import Interface, declared
+from wam_description.signals import BASE, Answer, Level, NodeStatus, Point, State, Wrench
 from wam_description.urdf import urdf
 from wam_driver.driver import Driver, DriverParameters
-from wam_driver.safety import Answer, Mode
-from wam_ros.messages import (
-    BASE,
-    Refused,
-    Wrench,
-    header,
-    point_stamped,
-    read_joint_state,
-    read_wrench,
-    stamp_of,
-    wrench_stamped,
-)
+from wam_driver.safety import Mode
+from wam_ros.messages import Refused
 from wam_ros.parameters import declare, follow
-from wam_ros.ports import ERROR, OK, WARN, Ports
-from wam_ros.run import raise_priority, run
-
-PARAMETERS = DriverParameters
+from wam_ros.ports import Ports
+from wam_ros.run import raise_priority
 
 
 class DriverNode(Node):
@@ -47,10 +32,10 @@ class DriverNode(Node):
 
     def __init__(self, **ros: Any) -> None:
         super().__init__("driver", **ros)
-        shared, own = declare(self, PARAMETERS)
+        shared, own = declare(self, DriverParameters)
         self.driver = Driver(shared, own)
-        follow(self, own, lambda new: self.driver.rub(new.effects.rubbing_friction))
-        self._ports = ports = Ports(self, shared)
+        follow(self, own, lambda new: self.driver.set_added_friction(new.effects.added_coulomb_friction))
+        self._ports = ports = Ports(self, declared("driver"), shared, Interface(shared))
         self._arm, self._timing = shared.arm, shared.timing
         self._directory = own.post_mortem_directory
         self._motors = list(shared.arm.motors.names)
@@ -58,12 +43,12 @@ class DriverNode(Node):
         self._currents: tuple[int, list[float]] = (0, [])
         self._push_stamp = 0
         self._paused = False
-        self._said = ("", False)
+        self._reported = ("", False)
         self._connected = False
         self._command_came = -math.inf
         self._watchdog = own.watchdog
-        ports.listen("motor_current_command", self._take_currents)
-        ports.listen("sim/disturbance", self._take_push)
+        ports.feed("motor_current_command", self._take_currents, "effort")
+        ports.feed("sim/disturbance", self._take_push)
         ports.watch_peers()
         for name, kind, answer in (
             ("enable", SetBool, self._enable),
@@ -74,8 +59,8 @@ class DriverNode(Node):
             ("step", Trigger, self._step_once),
         ):
             self.create_service(kind, f"~/{name}", self._served(answer))
-        ports.publish("robot_description", String(data=urdf(shared.arm)))
-        if shared.timing.mode == "realtime":  # in lockstep all that is said is said to everybody
+        ports.publish("robot_description", 0, urdf(shared.arm))
+        if shared.timing.mode == "realtime":  # in lockstep the first status goes to all peers
             self._announce()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._watching = self.create_timer(0.02, self._look_for_start, clock=steady)
@@ -100,17 +85,16 @@ class DriverNode(Node):
         """Put on the brakes and say so."""
         self.driver.disable()
         self._announce()
+        self._ports.wait_for_delivery()
         super().destroy_node()
 
     # what comes in
 
-    def _take_currents(self, message: JointState) -> None:
+    def _take_currents(self, stamp: int, command: State) -> None:
         if self._ports.publisher_count("motor_current_command") > 1:
             self._fault(TWO_PUBLISHERS)
             raise Refused(TWO_PUBLISHERS)
-        currents = read_joint_state(message, self._motors, "effort").effort
-        stamp = stamp_of(message)
-        now = self._now()
+        currents, now = command.effort, self._now()
         if self._timing.mode == "realtime":
             if not 0 < stamp <= self.driver.stamp:
                 raise Refused(
@@ -128,15 +112,14 @@ class DriverNode(Node):
         self._currents = (stamp, currents)
         self._go_on()
 
-    def _take_push(self, message: WrenchStamped) -> None:
-        wrench = read_wrench(message, self._frames)
+    def _take_push(self, stamp: int, wrench: Wrench) -> None:
         if wrench.frame == BASE:
             if any(wrench.force):
                 raise Refused(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
             self.driver.plant.release()
         else:
             self.driver.plant.push(wrench.frame, np.array(wrench.force), np.array(wrench.torque))
-        self._push_stamp = stamp_of(message)
+        self._push_stamp = stamp
         if self._timing.mode == "lockstep":
             self._go_on()
 
@@ -219,19 +202,19 @@ class DriverNode(Node):
         driver, ports = self.driver, self._ports
         stamp = driver.stamp
         if self._arm.joint_sensors:
-            ports.publish_joints("joint_sensors", stamp, driver.joint_sensors)
+            ports.publish("joint_sensors", stamp, driver.joint_sensors)
         if self._timing.mode == "realtime":
             self._published.append((stamp, self._now()))
-        ports.publish_motors("motor_states", stamp, driver.motor_state)
+        ports.publish("motor_states", stamp, driver.motor_state)
         ports.counts["steps"] += 1
         if driver.is_outer:
-            ports.publish("/clock", ClockMessage(clock=header(stamp).stamp))
-            ports.publish_motors("motor_currents", stamp, State([], [], driver.currents))
-            contact = driver.true_contact
-            frame = contact.cover or BASE
-            ports.publish_joints("sim/joint_states", stamp, driver.true_joint_state)
-            ports.publish("sim/contact/wrench", wrench_stamped(stamp, Wrench(frame, contact.force, contact.moment)))
-            ports.publish("sim/contact/point", point_stamped(stamp, frame, (contact.place, 0.0, 0.0)))
+            load = driver.true_contact
+            frame = load.cover or BASE
+            ports.publish("/clock", stamp, None)
+            ports.publish("motor_currents", stamp, State([], [], driver.currents))
+            ports.publish("sim/joint_states", stamp, driver.true_joint_state)
+            ports.publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
+            ports.publish("sim/contact/point", stamp, Point(frame, (load.place, 0.0, 0.0)))
         if self._timing.mode == "realtime" and ports.report_due(stamp):
             ports.facts = self._timing_facts()
         ports.report(stamp)
@@ -239,31 +222,35 @@ class DriverNode(Node):
     def _announce(self) -> None:
         """Publish the status where it has changed."""
         safety, warnings = self.driver.safety, self.driver.warnings
-        said = f"{safety.mode.value}: {safety.fault or '; '.join(warnings)}".removesuffix(": ")
-        if (said, self._connected) == self._said:
+        message = f"{safety.mode.value}: {safety.fault or '; '.join(warnings)}".removesuffix(": ")
+        if (message, self._connected) == self._reported:
             return
-        is_new_fault = bool(safety.fault) and said != self._said[0]
-        self._said = (said, self._connected)
-        level = ERROR if safety.fault else WARN if warnings else OK
-        self._ports.set_status(
-            level,
-            said,
-            mode=safety.mode.value,
-            fault=safety.fault,
-            stamp=str(self.driver.stamp),
-            peers="connected" if self._connected else "waiting",
+        is_new_fault = bool(safety.fault) and message != self._reported[0]
+        self._reported = (message, self._connected)
+        level = Level.ERROR if safety.fault else Level.WARN if warnings else Level.OK
+        self._ports.publish_status(
+            NodeStatus(
+                level,
+                message,
+                connected=self._connected,
+                mode=safety.mode.value,
+                fault=safety.fault,
+                stamp=self.driver.stamp,
+            )
         )
         if is_new_fault:
-            self.get_logger().error(said)
+            self.get_logger().error(message)
             self._write_post_mortem()
 
     def _write_post_mortem(self) -> None:
         if not self._directory:
             return
         path = Path(self._directory) / f"post_mortem_{self.driver.stamp}.csv"
-        names = [f"{what} {motor}" for what in ("theta", "thetad", "asked", "flowing") for motor in self._motors]
+        names = [f"{what} {motor}" for what in ("theta", "thetad", "commanded", "actual") for motor in self._motors]
         rows = [",".join(["stamp", *names])]
-        rows += [",".join(map(repr, (s.stamp, *s.theta, *s.thetad, *s.asked, *s.flowing))) for s in self.driver.recent]
+        rows += [
+            ",".join(map(repr, (s.stamp, *s.theta, *s.thetad, *s.commanded, *s.actual))) for s in self.driver.recent
+        ]
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("\n".join(rows) + "\n", encoding="utf-8")
         self.get_logger().error(f"the last {len(self.driver.recent)} samples are in {path}")
@@ -323,12 +310,3 @@ TWO_DRIVERS = (
 TWO_PUBLISHERS = (
     "two publishers send motor_current_command; stop all but one ('ros2 topic info -v' lists them), then reset_fault"
 )
-
-
-def main() -> None:
-    """Run the node as this process."""
-    run(DriverNode)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Pushers of the plant: bodies that the simulator leads so that they press on a link that moves."""
+"""Pushers of the plant: bodies that the simulator moves so that they press on a moving link."""
 
 import math
 from typing import Any
@@ -11,17 +11,17 @@ from wam_description.world import Pushers
 
 
 class Pusher:
-    """One hand.  It knows where the link is, as a hand does that rests on it, and so presses evenly.
+    """A hand that follows the link and so presses with a constant force.
 
-    Its pose is led, its surface is soft and has friction; the link's pose that it goes by is one step old
-    and carried on by the link's velocity.
+    Its pose is prescribed; its surface is soft and has friction.  The simulator knows the link's pose of the last
+    step and extrapolates it by the link's velocity.
 
     Parameters
     ----------
     model, data : of MuJoCo.
     arm : for the cover's shape.
-    given : all pushers.
-    i : which of them.
+    given : parameters of all pushers.
+    i : index of this one.
     step : of the plant, s.
 
     Attributes
@@ -42,20 +42,20 @@ class Pusher:
         cover = arm.covers.names.index(given.covers[i])
         rows = slice(3 * cover, 3 * cover + 3)
         start, end = np.array(arm.covers.start[rows]), np.array(arm.covers.end[rows])
-        self._slope = (end - start) / (end[0] - start[0])  # of the tube's axis, per place
+        self._slope = (end - start) / (end[0] - start[0])  # of the tube's axis, per position along x
         self._axis = self._slope / np.linalg.norm(self._slope)
         self._origin = start - start[0] * self._slope
         self._site = model.site(f"{given.covers[i]}_frame").id
         self._radius = arm.covers.radius[cover]
         self._height = given.sizes[3 * i] if given.shapes[i] == "sphere" else given.sizes[3 * i + 2]
-        self._place, self._angle = given.places[i], given.angles[i]
+        self._position, self._angle = given.positions[i], given.angles[i]
         self._slide, self._turn = given.slide[i], given.turn[i]
         self._depth, self._clearance = given.force[i] / given.stiffness[i], given.clearance[i]
         self._begin, self._end, self._rise = given.begin[i], given.end[i], given.rise[i]
         self._motion, self._quaternion = np.zeros(6), np.zeros(4)
 
     def lead(self, time: float) -> None:
-        """Go where the hand is at a time, s since power-up."""
+        """Move to the pose of the hand at a time, s since power-up."""
         data = self._data
         if not self._begin - self._rise <= time <= self._end + self._rise:
             if not self._is_away:
@@ -65,7 +65,7 @@ class Pusher:
         self._is_away = False
         depth, sinking = self.depth(time)
         force, across = self._directions(self._angle + self._turn * (time - self._begin))
-        at = self._origin + (self._place + self._slide * (time - self._begin)) * self._slope
+        at = self._origin + (self._position + self._slide * (time - self._begin)) * self._slope
         rotation = data.site_xmat[self._site].reshape(3, 3)
         mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_SITE, self._site, self._motion, 0)
         spin, drift = self._motion[:3], self._motion[3:]
@@ -80,7 +80,7 @@ class Pusher:
         data.mocap_quat[self._mocap] = self._quaternion
 
     def depth(self, time: float) -> tuple[float, float]:
-        """How deep the surface is pressed in, m, negative before it touches, and how fast it sinks, m/s."""
+        """Depth of the surface in the link, m, negative before they touch, and its rate, m/s."""
         coming, leaving = (time - self._begin) / self._rise, (self._end - time) / self._rise
         nearer, way = (coming, 1.0) if coming < leaving else (leaving, -1.0)
         if nearer >= 1.0:
@@ -91,7 +91,7 @@ class Pusher:
         return size * blend, way * abs(size) * speed
 
     def _directions(self, angle: float) -> tuple[np.ndarray, np.ndarray]:
-        """Of the force, across the tube, and across both, in the cover's frame."""
+        """Unit vectors of the force, at right angles to the tube, and of the normal of both, in the cover's frame."""
         force = np.array((0.0, math.cos(angle), math.sin(angle)))
         force -= self._axis * (self._axis @ force)
         force /= math.sqrt(force @ force)
@@ -99,7 +99,7 @@ class Pusher:
 
 
 def pushers(model: Any, data: Any, arm: Arm, given: Pushers, step: float) -> list[Pusher]:
-    """The pushers that press at all."""
+    """The pushers that have a force."""
     return [Pusher(model, data, arm, given, i, step) for i, force in enumerate(given.force) if force > 0.0]
 
 

@@ -1,31 +1,25 @@
-"""The driver's safety: braked, enabled, fault.  Stop always works; a fault stays until it is reset."""
+"""Safety states of the driver: braked, enabled, fault.  Stop always works; a fault is latched until its reset."""
 
 from enum import Enum
-from typing import NamedTuple
+
+from wam_description.signals import Answer
 
 
 class Mode(Enum):
-    """What the driver lets through."""
+    """State of the driver."""
 
     BRAKED = "braked"
     ENABLED = "enabled"
     FAULT = "fault"
 
 
-class Answer(NamedTuple):
-    """Answer to a request: whether it was done, and what to do where it was not."""
-
-    success: bool
-    message: str
-
-
 class Safety:
-    """State machine of design rules: starts braked; reset never enables; a fault is latched.
+    """State machine of the driver: it starts braked; a fault is latched; its reset never enables.
 
     Attributes
     ----------
     mode : present state.
-    fault : the first fault since the last reset, empty where there is none.
+    fault : the first fault since the last reset, empty if there is none.
     """
 
     def __init__(self) -> None:
@@ -33,7 +27,7 @@ class Safety:
         self.fault = ""
 
     def enable(self, obstacle: str) -> Answer:
-        """Release the brakes; `obstacle` names what speaks against it, empty where nothing does."""
+        """Release the brakes, unless `obstacle` names a reason against it."""
         if self.mode is Mode.FAULT:
             return Answer(False, f"refused: fault '{self.fault}' is latched; call reset_fault first, then enable")
         if obstacle:
@@ -48,7 +42,7 @@ class Safety:
         return Answer(True, f"{self.mode.value}: brakes on, currents zero")
 
     def trip(self, reason: str) -> None:
-        """Latch a fault; the first one is the one that is kept."""
+        """Latch a fault; the first reason is kept."""
         if self.mode is not Mode.FAULT:
             self.mode, self.fault = Mode.FAULT, reason
 

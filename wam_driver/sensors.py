@@ -1,4 +1,4 @@
-"""What the sensors make of the plant's true state: resolution and noise, seeded."""
+"""Sensors: the plant's true state with resolution and seeded noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,10 +12,12 @@ from wam_description.signals import State
 
 @dataclass(frozen=True)
 class SensorParameters:
-    """Imperfections of the sensors, all zero for true values."""
+    """Imperfections of the sensors; with all zero they read true values."""
 
     encoder_resolution: tuple[float, ...] = parameter(
-        "step of the motor angle; above zero the velocity is a difference over one period", "rad", low=0.0
+        "resolution of the motor angle; if it is not zero, the velocity is the difference over one period",
+        "rad",
+        low=0.0,
     )
     encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", low=0.0)
     joint_encoder_noise: tuple[float, ...] = parameter("standard deviation of the joint angle", "rad", low=0.0)
@@ -23,10 +25,10 @@ class SensorParameters:
 
 
 class Encoders:
-    """Angles and velocities of shafts, as read.
+    """Angles and velocities of shafts, as measured.
 
-    Where there is resolution or noise, the velocity is the difference of two readings over a
-    period, because that is all that a real counter offers; else it is true.
+    With resolution or noise, the velocity is the difference of two readings over a period, as from a real
+    counter; otherwise it is the true velocity.
     """
 
     def __init__(self, resolution: Sequence[float], noise: Sequence[float], random: np.random.Generator) -> None:
@@ -35,11 +37,11 @@ class Encoders:
         self._last: list[float] | None = None
 
     def reset(self) -> None:
-        """Forget the last reading: the next velocity is zero, whatever angle it comes from."""
+        """Discard the last reading, so that the next velocity is zero."""
         self._last = None
 
     def read(self, angle: list[float], velocity: list[float], dt: float) -> tuple[list[float], list[float]]:
-        """Angles, rad, and velocities, rad/s, read `dt` seconds after the last reading."""
+        """Angles, rad, and velocities, rad/s, `dt` seconds after the last reading."""
         if self._is_perfect:
             return angle, velocity
         draws = self._random.standard_normal(len(angle)).tolist()
@@ -63,12 +65,12 @@ class Sensors:
         self._random = random
 
     def reset(self) -> None:
-        """Forget the last readings."""
+        """Discard the last readings."""
         self._motors.reset()
         self._joints.reset()
 
     def motors(self, theta: list[float], thetad: list[float], torque: list[float], dt: float) -> State:
-        """Reading of the motor side, (n,) each: rad, rad/s, and the torque by the current, N m."""
+        """Reading of the motor side, (n,) each: rad, rad/s, and the torque from the current, N m."""
         angle, velocity = self._motors.read(theta, thetad, dt)
         return State(angle, velocity, torque)
 

@@ -1,1 +1,12 @@
-"""All ROS glue of the stack: parameters, messages, lockstep, run(), recorder, bring-up."""
+"""ROS around the nodes of the stack: the adapter, messages, parameters, recorder and bring-up.
+
+- node: the ROS node of a declared node (`wam_description.wiring`); the program that starts one
+- ports: publishers, subscriptions, status and diagnostics of a node; qos: quality of service
+- messages: ROS messages to values and back; header: stamps and frames; markers: what viewers draw
+- wire: the same from and to bytes, faster, for the types that carry numbers
+- parameters: declared, described, live; remote_parameters: those of other nodes
+- recorder, recorder_node, recorder_interface: every topic into a bag
+- bring_up: all nodes, in processes or in this one; run: context, executor and signals
+- program: ends a program quietly whose imports are interrupted
+- call: one request to a service
+"""

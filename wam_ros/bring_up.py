@@ -1,6 +1,5 @@
 """Starting the nodes together: each as its own process, or several in this one."""
 
-import importlib
 import os
 import signal
 import subprocess
@@ -11,34 +10,29 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
+from typing import Final
 
 from rclpy.node import Node
 
 from wam_description.configuration import Configuration
-from wam_description.parameters import ParameterError
+from wam_description.interface import declared
+from wam_ros.node import make_node
 from wam_ros.run import NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
-MODULES: Final = {
-    "driver": "wam_driver.driver_node",
-    "transform": "wam_control.transform_node",
-    "velocity_loop": "wam_control.velocity_loop_node",
-    "gravity": "wam_control.gravity_node",
-    "force_loop": "wam_control.force_loop_node",
-    "contact_estimator": "wam_control.contact_estimator_node",
-    "scenario": "wam_control.scenario_node",
-    "recorder": "wam_ros.recorder_node",
-}
 FIRST: Final = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST: Final = "recorder"  # to be stopped: it closes the bag
-PATIENCE: Final = 1.5  # s, for a node to end by itself
+PATIENCE: Final = 5.0  # s, for a node to end by itself on a busy machine; usually it takes a tenth of one
 
 
-def check_nodes(configuration: Configuration) -> None:
-    """Refuse a bring-up with nodes that do not exist."""
-    for name in configuration.shared.nodes:
-        if name not in MODULES:
-            raise ParameterError(f"parameter 'nodes' names '{name}'; nodes: {', '.join(MODULES)}")
+def node_names(configuration: Configuration) -> dict[str, str]:
+    """Names of the nodes of a bring-up by their entries in the parameter `nodes`.
+
+    Raises
+    ------
+    ParameterError
+        where there is no such node.
+    """
+    return {entry: declared(entry).name for entry in configuration.shared.nodes}
 
 
 @contextmanager
@@ -60,13 +54,13 @@ class Processes:
     """
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
-        check_nodes(configuration)
+        names = node_names(configuration)
         prepare_logging_directory()
         self._stack = ExitStack()
         parameters = self._stack.enter_context(parameter_file(configuration))
         self._processes = {
-            name: _start(name, ["--params-file", str(parameters), "-r", f"__ns:=/{namespace.strip('/')}"])
-            for name in configuration.shared.nodes
+            name: _start(entry, ["--params-file", str(parameters), "-r", f"__ns:=/{namespace.strip('/')}"])
+            for entry, name in names.items()
         }
 
     def __enter__(self) -> "Processes":
@@ -94,10 +88,10 @@ class Processes:
         self._stack.close()
 
 
-def _start(name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+def _start(entry: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
     # a session of its own: Ctrl-C reaches the parent alone, which stops the nodes in order
     return subprocess.Popen(
-        [sys.executable, "-m", MODULES[name], "--ros-args", *arguments],
+        [sys.executable, "-m", "wam_ros.program", entry, "--ros-args", *arguments],
         start_new_session=True,
         env={**os.environ, PARENT: str(os.getpid())},
     )
@@ -106,7 +100,7 @@ def _start(name: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
 def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
     for process in processes:
         if process.poll() is None:
-            process.terminate()  # SIGINT would make a node that is still being imported print a traceback
+            process.terminate()
     deadline = time.monotonic() + PATIENCE
     for process in processes:
         try:
@@ -128,24 +122,25 @@ class Composition:
     Attributes
     ----------
     nodes : the nodes by name.
-    context, executor : of this connection, for nodes beside these.
+    context, executor : of this connection, for further nodes.
     """
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, domain_id: int | None = None) -> None:
-        check_nodes(configuration)
+        names = node_names(configuration)
         self._connection = Connection(domain_id=domain_id)
         self.context, self.executor = self._connection.context, self._connection.executor
         self.nodes: dict[str, Node] = {}
         try:
             with parameter_file(configuration) as parameters:
-                for name in configuration.shared.nodes:
-                    self._make(name, namespace, parameters)
+                for entry, name in names.items():
+                    self._make(entry, name, namespace, parameters)
         except BaseException:
             self.close()
             raise
 
-    def _make(self, name: str, namespace: str, parameters: Path) -> None:
-        node = node_class(name)(
+    def _make(self, entry: str, name: str, namespace: str, parameters: Path) -> None:
+        node = make_node(
+            entry,
             context=self.context,
             namespace=namespace,
             cli_args=["--ros-args", "--params-file", str(parameters)],
@@ -169,9 +164,3 @@ class Composition:
         names = {node: name for name, node in self.nodes.items()}
         self._connection.close(lambda node: (names[node] == LAST) - (names[node] == FIRST))
         self.nodes.clear()
-
-
-def node_class(name: str) -> Any:
-    """The class of a node, from its module."""
-    module = importlib.import_module(MODULES[name])
-    return getattr(module, "".join(part.capitalize() for part in name.split("_")) + "Node")

@@ -12,7 +12,7 @@ ATTEMPTS = 20  # an answer can be lost while the service still discovers who ask
 
 
 class Reply(NamedTuple):
-    """What the service said."""
+    """The answer of the service."""
 
     success: bool
     message: str

@@ -1,14 +1,13 @@
 """The contact as RViz markers: an arrow for the force, a sphere for the place, a band where it is likely."""
 
-from collections.abc import Sequence
 from math import isnan
-from typing import NamedTuple
 
 from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from wam_ros.messages import header
+from wam_description.signals import BASE, ContactView
+from wam_ros.header import header
 
 METRES_PER_NEWTON = 0.02
 HALF = 0.5**0.5  # sine and cosine of 45 deg
@@ -17,31 +16,23 @@ RED, GREY = ColorRGBA(r=0.85, g=0.1, b=0.1, a=1.0), ColorRGBA(r=0.5, g=0.5, b=0.
 LIKELY = ColorRGBA(r=0.95, g=0.6, b=0.1, a=0.45)
 
 
-class Likely(NamedTuple):
-    """A part of a cover where the contact is likely, m along it."""
-
-    cover: str
-    low: float
-    high: float
-
-
-def contact_markers(
-    stamp: int, cover: str, place: float, force: Sequence[float], likely: Sequence[Likely]
-) -> MarkerArray:
+def contact_markers(stamp: int, view: ContactView) -> MarkerArray:
     """Markers of a contact, in the frames of the covers; each message replaces those before.
+
+    The tip of the arrow is at the contact.  Where its position is NaN, arrow and sphere are grey and in the
+    middle of the likely range.  Bands show the parts of covers that hold the position with 90 % probability in
+    all.  Without contact the markers are deleted.
 
     Parameters
     ----------
     stamp : time, ns.
-    cover : touched cover, empty without contact, which deletes the markers.
-    place : m along the cover; where it is NaN arrow and sphere are grey and stand in the middle of what is likely.
-    force : (3,), N, of the world on the link; the arrow's tip is at the place.
-    likely : parts of covers that hold the place with 90 % probability in all, drawn as bands.
+    view : what to draw.
     """
-    gone = Marker(header=header(stamp, "base"), action=Marker.DELETEALL)
+    cover, place, force = view.contact.cover, view.contact.place, view.contact.force
+    gone = Marker(header=header(stamp, BASE), action=Marker.DELETEALL)
     if not cover:
         return MarkerArray(markers=[gone])
-    mine = next((0.5 * (part.low + part.high) for part in likely if part.cover == cover), 0.0)
+    mine = next((0.5 * (part.low + part.high) for part in view.likely if part.cover == cover), 0.0)
     x = mine if isnan(place) else float(place)
     colour = GREY if isnan(place) else RED
     tip = Point(x=x, y=0.0, z=0.0)
@@ -51,12 +42,12 @@ def contact_markers(
     sphere = _marker(stamp, cover, "contact", 1, Marker.SPHERE, colour, (0.03, 0.03, 0.03))
     sphere.pose.position = tip
     bands = []
-    for i, part in enumerate(likely):
+    for i, part in enumerate(view.likely):
         band = _marker(
             stamp, part.cover, "likely", i, Marker.CYLINDER, LIKELY, (BAND, BAND, float(part.high - part.low))
         )
         band.pose.position.x = 0.5 * float(part.low + part.high)
-        band.pose.orientation.y, band.pose.orientation.w = HALF, HALF  # a cylinder stands along z
+        band.pose.orientation.y, band.pose.orientation.w = HALF, HALF  # a cylinder is along z
         bands.append(band)
     return MarkerArray(markers=[gone, arrow, sphere, *bands])
 

@@ -1,40 +1,29 @@
-"""Between ROS messages and plain values.  What is not whole and finite is refused whole."""
+"""Between ROS messages and plain values.  A message that is not complete and finite is refused."""
 
-from collections.abc import Sequence
-from math import isfinite, isnan
-from typing import Any, NamedTuple
+import importlib
+import struct
+from array import array
+from collections.abc import Callable, Sequence
+from functools import cache
+from math import isfinite, isinf
+from typing import Any
 
-from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped, WrenchStamped
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState, PointCloud2, PointField
+from std_msgs.msg import Bool, String
 
-from wam_description.signals import NO_CONTACT, Contact, State
-
-BASE = "base"  # frame id of the base, and of a contact that is none
+from wam_description.arm import Shared
+from wam_description.signals import BASE, NodeStatus, Point, State, Table, Wrench
+from wam_description.status import pairs, parse
+from wam_description.topics import JOINT_STATE, LINK, POINT, TABLE, WRENCH, Topic
+from wam_ros.header import header
+from wam_ros.markers import contact_markers
 
 
 class Refused(ValueError):
-    """A message that is not let in; the text names the value, what is allowed and what to do."""
-
-
-class Wrench(NamedTuple):
-    """Force (3,) N and torque (3,) N m in a named frame."""
-
-    frame: str
-    force: tuple[float, float, float]
-    torque: tuple[float, float, float]
-
-
-def header(stamp: int, frame: str = "") -> Header:
-    """Header with a stamp in nanoseconds."""
-    return Header(stamp=Time(sec=stamp // 1_000_000_000, nanosec=stamp % 1_000_000_000), frame_id=frame)
-
-
-def stamp_of(message: Any) -> int:
-    """Stamp of a message with a header, ns."""
-    time = message.header.stamp
-    return int(time.sec * 1_000_000_000 + time.nanosec)
+    """A message that is refused; the text names the value, what is allowed and what to do."""
 
 
 def joint_state(stamp: int, names: Sequence[str], state: State) -> JointState:
@@ -45,7 +34,7 @@ def joint_state(stamp: int, names: Sequence[str], state: State) -> JointState:
 
 
 def read_joint_state(message: JointState, names: list[str], fields: str) -> State:
-    """Values of a JointState in the order of `names`; arrays that were not asked for stay empty.
+    """Values of a JointState in the order of `names`; arrays that are not wanted stay empty.
 
     Parameters
     ----------
@@ -62,18 +51,18 @@ def read_joint_state(message: JointState, names: list[str], fields: str) -> Stat
     if message.name != names:
         order = _order(list(message.name), names)
     count = len(names)
-    asked = fields.split()
+    wanted = fields.split()
     arrays: list[list[float]] = []
     for name in State._fields:
-        array = getattr(message, name).tolist()
-        if len(array) != count and (array or name in asked):
-            raise Refused(f"{name} has {len(array)} values; send {count}, one for each of {', '.join(names)}")
-        for value, owner in zip(array, message.name, strict=False):
+        values = getattr(message, name).tolist()
+        if len(values) != count and (values or name in wanted):
+            raise Refused(f"{name} has {len(values)} values; send {count}, one for each of {', '.join(names)}")
+        for value, owner in zip(values, message.name, strict=False):
             if not isfinite(value):
                 raise Refused(f"{name} of {owner} is {value}; send finite numbers")
-        if not (name in asked or name + "?" in asked):
-            array = []
-        arrays.append([array[i] for i in order] if order and array else array)
+        if not (name in wanted or name + "?" in wanted):
+            values = []
+        arrays.append([values[i] for i in order] if order and values else values)
     return State(*arrays)
 
 
@@ -82,7 +71,7 @@ def _order(found: list[str], names: list[str]) -> list[int]:
         if name not in names:
             raise Refused(f"unknown name '{name}'; allowed are {', '.join(names)}")
         if found.count(name) > 1:
-            raise Refused(f"name '{name}' stands there twice; send each of {', '.join(names)} once")
+            raise Refused(f"name '{name}' is there twice; send each of {', '.join(names)} once")
     for name in names:
         if name not in found:
             raise Refused(f"name '{name}' is missing; send all of {', '.join(names)}")
@@ -114,47 +103,144 @@ def read_wrench(message: WrenchStamped, frames: Sequence[str]) -> Wrench:
     return result
 
 
-def point_stamped(stamp: int, frame: str, point: Sequence[float]) -> PointStamped:
+def point_stamped(stamp: int, point: Point) -> PointStamped:
     """PointStamped message, NaN where a coordinate is not known."""
-    message = PointStamped(header=header(stamp, frame))
-    message.point.x, message.point.y, message.point.z = map(float, point)
+    message = PointStamped(header=header(stamp, point.frame))
+    message.point.x, message.point.y, message.point.z = map(float, point.position)
     return message
 
 
-def read_contact(message: PointStamped, frames: Sequence[str]) -> float:
-    """Place of a contact along its cover, m; NaN where it is not known, nothing else may be.
+def read_point(message: PointStamped, frames: Sequence[str]) -> Point:
+    """Values of a PointStamped; NaN where a coordinate is not known, nothing else may be.
 
     Raises
     ------
     Refused
-        for a frame that is not one of `frames` or a place that is infinite.
+        for a frame that is not one of `frames` or a coordinate that is infinite.
     """
-    frame, place = message.header.frame_id, message.point.x
+    frame, point = message.header.frame_id, message.point
     if frame not in frames:
         raise Refused(f"frame_id is '{frame}'; allowed are {', '.join(frames)}")
-    if not (isfinite(place) or isnan(place)):
-        raise Refused(f"place is {place} m; send a finite number, or NaN where it is not known")
-    return float(place)
+    position = (float(point.x), float(point.y), float(point.z))
+    if any(isinf(value) for value in position):
+        raise Refused(f"position is {position} m; send finite numbers, or NaN where it is not known")
+    return Point(frame, position)
 
 
-def read_spread(message: PointStamped, frames: Sequence[str]) -> tuple[float, float]:
-    """How sure a contact is: standard deviation of its place, m, probability of its cover; NaN where not known.
+def table(stamp: int, columns: Sequence[str], value: Table) -> PointCloud2:
+    """PointCloud2 message with one float64 field for each column and one point for each row."""
+    return PointCloud2(
+        header=header(stamp, value.frame),
+        height=1,
+        width=len(value.rows),
+        fields=_fields(tuple(columns)),
+        is_bigendian=False,
+        point_step=8 * len(columns),
+        row_step=8 * len(columns) * len(value.rows),
+        data=array("B", b"".join(struct.pack(f"<{len(row)}d", *row) for row in value.rows)),
+        is_dense=False,
+    )
+
+
+@cache
+def _fields(columns: tuple[str, ...]) -> list[PointField]:
+    kind = PointField.FLOAT64
+    return [PointField(name=name, offset=8 * i, datatype=kind, count=1) for i, name in enumerate(columns)]
+
+
+def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[str]) -> Table:
+    """Rows of a PointCloud2 under these columns; NaN where a number is not known, nothing else may be.
 
     Raises
     ------
     Refused
-        for a frame that is not one of `frames`, a spread below 0 or a probability outside 0..1.
+        for a frame that is not one of `frames`, other columns, a wrong size or a number that is infinite.
     """
-    place_sd, probability = read_contact(message, frames), float(message.point.y)
-    if place_sd < 0.0:
-        raise Refused(f"standard deviation of the place is {place_sd} m; send 0 or more, or NaN where it is not known")
-    if not (isnan(probability) or 0.0 <= probability <= 1.0):
-        raise Refused(f"probability is {probability}; send 0 to 1, or NaN where it is not known")
-    return place_sd, probability
+    frame, step = message.header.frame_id, 8 * len(columns)
+    if frame not in frames:
+        raise Refused(f"frame_id is '{frame}'; allowed are {', '.join(frames)}")
+    if message.is_bigendian or message.fields != _fields(tuple(columns)):
+        given = ", ".join(field.name for field in message.fields[:40])
+        raise Refused(f"fields are {given or 'none'}; send little-endian float64 fields {', '.join(columns)}")
+    data = bytes(message.data)
+    if message.point_step != step or len(data) != step * message.width * message.height:
+        raise Refused(f"{len(data)} bytes of data; {message.width * message.height} rows need {step} bytes each")
+    rows = tuple(struct.iter_unpack(f"<{len(columns)}d", data))
+    if any(isinf(value) for row in rows for value in row):
+        raise Refused("a number is infinite; send finite numbers, or NaN where one is not known")
+    for link in (row[0] for row in rows if columns[0] == LINK):
+        if link not in range(len(frames) - 1):
+            raise Refused(f"link is {link}; send the index of one of {', '.join(frames[1:])}")
+    return Table(frame, rows)
 
 
-def contact_of(wrench: Wrench | None, place: float | None, spread: tuple[float, float] | None = None) -> Contact:
-    """The contact that a wrench, a place and a spread describe; none where they are missing or in the base frame."""
-    if wrench is None or place is None or wrench.frame == BASE:
-        return NO_CONTACT
-    return Contact(wrench.frame, place, wrench.force, *(spread or ()))
+def diagnostic_status(status: NodeStatus, hardware: str) -> DiagnosticStatus:
+    """DiagnosticStatus message of a node's status; `hardware` is the name of the arm."""
+    return DiagnosticStatus(
+        name=status.node,
+        level=bytes([status.level]),
+        message=status.message,
+        hardware_id=hardware,
+        values=[KeyValue(key=key, value=value) for key, value in pairs(status)],
+    )
+
+
+def read_status(message: DiagnosticStatus) -> NodeStatus:
+    """The status that a message describes."""
+    level = message.level[0] if isinstance(message.level, bytes) else int(message.level)
+    return parse(message.name, level, message.message, [(item.key, item.value) for item in message.values])
+
+
+Read = Callable[[Any], Any]
+Write = Callable[[int, Any], Any]
+
+
+def reader(topic: Topic, shared: Shared, arrays: str) -> Read:
+    """What turns messages of a topic into values, or refuses them.
+
+    Parameters
+    ----------
+    topic : row of the table of topics.
+    shared : names of motors, joints and covers.
+    arrays : of a JointState, the arrays that must be filled, as `read_joint_state` takes them.
+    """
+    frames = (BASE, *shared.arm.covers.names)
+    if topic.type == JOINT_STATE:
+        names = _names(topic, shared)
+        return lambda message: read_joint_state(message, names, arrays)
+    if topic.type == WRENCH:
+        return lambda message: read_wrench(message, frames)
+    if topic.type == POINT:
+        return lambda message: read_point(message, frames)
+    if topic.type == TABLE:
+        return lambda message: read_table(message, topic.columns, frames)
+    raise TypeError(f"topic '{topic.name}' of type {topic.type} cannot be the input of a step")
+
+
+def writer(topic: Topic, shared: Shared) -> Write:
+    """What turns a stamp in ns and a value into a message of a topic."""
+    if topic.type == JOINT_STATE:
+        names = _names(topic, shared)
+        return lambda stamp, value: joint_state(stamp, names, value)
+    by_type: dict[str, Write] = {
+        WRENCH: wrench_stamped,
+        POINT: point_stamped,
+        TABLE: lambda stamp, value: table(stamp, topic.columns, value),
+        "std_msgs/msg/Bool": lambda stamp, value: Bool(data=bool(value)),
+        "std_msgs/msg/String": lambda stamp, value: String(data=value),
+        "visualization_msgs/msg/MarkerArray": contact_markers,
+        "rosgraph_msgs/msg/Clock": lambda stamp, value: Clock(clock=header(stamp).stamp),
+    }
+    if topic.type not in by_type:
+        raise TypeError(f"topic '{topic.name}' of type {topic.type} cannot be the output of a step")
+    return by_type[topic.type]
+
+
+def message_type(topic: Topic) -> Any:
+    """Message class of a row of the table of topics."""
+    package, _, name = topic.type.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), name)
+
+
+def _names(topic: Topic, shared: Shared) -> list[str]:
+    return list(shared.arm.motors.names if topic.side == "motors" else shared.arm.joints.names)

@@ -1,10 +1,18 @@
 """ROS parameters from parameter classes: declared, described, checked as a set."""
 
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    ParameterEvent,
+    SetParametersResult,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_parameter_events
 
 from wam_description.arm import Shared
 from wam_description.parameters import Field, ParameterError, build, fields, values
@@ -13,8 +21,13 @@ T = TypeVar("T")
 OWN_NAMES = ("use_sim_time", "start_type_description_service")  # what rclpy itself declares
 
 
-def declare(node: Node, cls: type[T]) -> tuple[Shared, T]:
+def declare(node: Node, cls: type[T], live: str | None = None) -> tuple[Shared, T]:
     """Declare the shared parameters and those of `cls` with the values given to the node.
+
+    Parameters
+    ----------
+    live : beginning of the names of shared parameters that this node takes while it runs; the others are
+        read-only here, live or not.
 
     Returns
     -------
@@ -42,10 +55,11 @@ def declare(node: Node, cls: type[T]) -> tuple[Shared, T]:
         current = values(instance)
         for field in fields(part):
             value = current[field.name]
+            is_followed = part is cls or (live is not None and field.name.startswith(live))
             node.declare_parameter(
                 field.name,
                 Parameter(field.name, value=list(value) if isinstance(value, tuple) else value).value,
-                descriptor(field),
+                descriptor(field._replace(live=field.live and is_followed)),
                 ignore_override=True,
             )
     return shared, own
@@ -68,30 +82,67 @@ def descriptor(field: Field) -> ParameterDescriptor:
     return result
 
 
-def follow(node: Node, own: T, take: Any) -> None:
+def follow(node: Node, own: T, take: Any, prefix: str = "") -> None:
     """Let the live parameters change while the node runs, as a set.
 
     Parameters
     ----------
     own : the present parameter object.
     take : called with the new parameter object; it may raise ParameterError to refuse the set.
+    prefix : what the names of these parameters begin with.
     """
     state = {"own": own}
 
     def changed(parameters: list[Parameter]) -> SetParametersResult:
-        known = values(state["own"])
-        update = {p.name: _plain(p) for p in parameters if p.name in known}
-        if not update:
-            return SetParametersResult(successful=True)
+        given = {parameter.name: _plain(parameter) for parameter in parameters}
         try:
-            new = build(type(own), {**known, **update})
-            take(new)
+            state["own"] = _updated(state["own"], given, prefix, take)
         except ParameterError as error:
             return SetParametersResult(successful=False, reason=str(error))
-        state["own"] = new
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(changed)
+
+
+def follow_other(node: Node, other: str, group: T, take: Any, prefix: str, refuse: Callable[[str], None]) -> None:
+    """Take the live changes of shared parameters at another node of the same namespace.
+
+    Parameters
+    ----------
+    other : name of that node.
+    group : the present parameter object.
+    take : called with the new parameter object; it may raise ParameterError, though the other node uses it.
+    prefix : what the names of these parameters begin with.
+    refuse : called with the reason where `take` does not accept what the other node uses.
+    """
+    state = {"group": group}
+
+    def changed(event: ParameterEvent) -> None:
+        if event.node != f"{node.get_namespace().rstrip('/')}/{other}":
+            return
+        given = {found.name: _plain(Parameter.from_parameter_msg(found)) for found in event.changed_parameters}
+        present = _updated(state["group"], given, prefix, lambda new: None)
+        if present is state["group"]:
+            return
+        state["group"] = present
+        try:
+            take(present)
+        except ParameterError as error:
+            refuse(f"{other} uses {prefix}* that are not accepted here: {error}")
+
+    node.create_subscription(ParameterEvent, "/parameter_events", changed, qos_profile_parameter_events)
+
+
+def _updated(own: T, given: Mapping[str, Any], prefix: str, take: Any) -> T:
+    """The parameter object with new values that `take` has accepted; the same one where none of them is of it."""
+    known = values(own)
+    update = {name.removeprefix(prefix): value for name, value in given.items() if name.startswith(prefix)}
+    update = {name: value for name, value in update.items() if name in known}
+    if not update:
+        return own
+    new = build(type(own), {**known, **update})
+    take(new)
+    return new
 
 
 def _plain(parameter: Parameter) -> Any:

@@ -1,29 +1,34 @@
-"""A node's connections, made from the interface table: typed, counted, and ready when all are matched."""
+"""A node's connections, made from its interface: typed, counted, and ready when all are matched."""
 
-import importlib
 import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from wam_description.arm import Shared
-from wam_description.signals import State
-from wam_ros.lockstep import Gate
-from wam_ros.messages import Refused, header, joint_state, stamp_of
+from wam_description.interface import Interface
+from wam_description.signals import Level, NodeStatus
+from wam_description.topics import STATUS
+from wam_description.wiring import Declaration
+from wam_ros.header import header
+from wam_ros.messages import Refused, diagnostic_status, message_type, read_status
 from wam_ros.qos import DEPTH, qos
-from wam_ros.topics import BY_NAME, TOPICS, Topic
+from wam_ros.wire import decoder, encoder, stamp_of
 
-READY, WAITING = "ready", "waiting for its peers"
-CONNECTED = KeyValue(key="peers", value="connected")  # in the status of a node that has more to say than 'ready'
-LOG_PERIOD, MOST_REASONS = 1.0, 20  # s, a reason is logged at most so often; reasons kept in mind
+DIAGNOSTICS = "/diagnostics"
+READY = NodeStatus(Level.OK, "ready", connected=True)
+WAITING = NodeStatus(Level.WARN, "waiting for its peers")
+LOG_PERIOD, MOST_REASONS = 1.0, 20  # s, a reason is logged at most so often; reasons that are remembered
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+SECOND = 1_000_000_000
+LONGEST_DELIVERY = 0.5  # s
 
 
 class Ports:
@@ -31,46 +36,78 @@ class Ports:
 
     Parameters
     ----------
-    node : the node; its name is looked up in the interface table.
-    shared : the shared configuration; `nodes` says which peers to expect.
+    node : the ROS node.
+    declaration : of the node.
+    shared : the shared configuration.
+    interface : of the bring-up; says which peers to expect.
+
+    Attributes
+    ----------
+    counts : steps and whatever else the node counts, for the diagnostics.
+    refusals : refused messages by topic.
+    facts : further values for the diagnostics.
+    faults : present fault of each other node, '' where it has none.
     """
 
-    def __init__(self, node: Node, shared: Shared) -> None:
-        self.node, self.shared = node, shared
+    def __init__(self, node: Node, declaration: Declaration, shared: Shared, interface: Interface) -> None:
+        self.node, self.shared, self.interface = node, shared, interface
         self.counts: Counter[str] = Counter()
         self.refusals: Counter[str] = Counter()
         self.facts: dict[str, str] = {}
         self.faults: dict[str, str] = {}
-        self._name = node.get_name()
-        self._publishers: dict[str, Publisher] = {}
-        self._subscriptions: dict[str, Subscription] = {}
-        self._status = DiagnosticStatus(name=self._name, level=WARN, message=WAITING)
+        self._name = declaration.name
+        self._refusals_reported = 0
+        self._status = WAITING
+        self._wanted: NodeStatus | None = None
         self._next_report = 0
         self._absent: set[str] = set()
         self._logged: dict[tuple[str, str], float] = {}
-        for topic in TOPICS:
-            if self._name in topic.publisher:
-                self._publishers[topic.name] = node.create_publisher(message_type(topic), topic.name, qos(topic))
+        self._subscriptions: dict[str, Subscription] = {}
+        rows = [interface.topics[topic] for topic in declaration.outputs if topic in interface.topics]
+        own = [interface.topics[topic] for topic in (STATUS, DIAGNOSTICS)]
+        self._publishers: dict[str, Publisher] = {
+            row.name: node.create_publisher(message_type(row), row.name, qos(row)) for row in [*rows, *own]
+        }
+        self._encoders = {row.name: encoder(row, shared) for row in rows}
         self._readiness = node.create_timer(0.02, self._look_for_peers, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def publish(self, topic: str, message: Any) -> None:
-        """Publish a message on a topic of the table."""
-        self._publishers[topic].publish(message)
+    def publish(self, topic: str, stamp: int, value: Any) -> None:
+        """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
+        self._publishers[topic].publish(self._encoders[topic](stamp, value))
 
-    def publish_joints(self, topic: str, stamp: int, state: State) -> None:
-        """Publish a JointState about the joints."""
-        self._publishers[topic].publish(joint_state(stamp, self.shared.arm.joints.names, state))
+    def feed(
+        self,
+        topic: str,
+        take: Callable[[int, Any], None],
+        arrays: str = "",
+        accepts: Callable[[int], bool] | None = None,
+    ) -> None:
+        """Subscribe to values.
 
-    def publish_motors(self, topic: str, stamp: int, state: State) -> None:
-        """Publish a JointState about the motors."""
-        self._publishers[topic].publish(joint_state(stamp, self.shared.arm.motors.names, state))
+        Parameters
+        ----------
+        topic : name in the table of topics.
+        take : called with the stamp, ns, and the value; it may raise Refused.
+        arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
+        accepts : whether a message of a stamp is of interest; others are not decoded.
+        """
+        decode = decoder(self.interface.topics[topic], self.shared, arrays)
 
-    def streamed(self, *chain: str) -> bool:
-        """Whether all nodes of a chain belong to this bring-up, so that what comes out can be waited for."""
-        return set(chain) <= set(self.shared.nodes)
+        def receive(data: bytes) -> None:
+            stamp = stamp_of(data)
+            if accepts is None or accepts(stamp):
+                take(stamp, decode(data))
 
-    def listen(self, topic: str, take: Callable[[Any], None]) -> None:
-        """Subscribe; a message that `take` refuses is counted and reported, and the last good one stands."""
+        self.listen(topic, receive, raw=True)
+
+    def listen(self, topic: str, take: Callable[[Any], None], raw: bool = False) -> None:
+        """Subscribe; a message that `take` refuses is counted and reported, and the last good one is used.
+
+        Parameters
+        ----------
+        topic : name in the table of topics.
+        take : called with the message, or its bytes where `raw`; it may raise Refused.
+        """
 
         def receive(message: Any) -> None:
             try:
@@ -78,32 +115,21 @@ class Ports:
             except Refused as reason:
                 self.refuse(topic, str(reason))
 
-        row = BY_NAME[topic]
+        row = self.interface.topics[topic]
         profile = qos(row)
         if row.latched:
             profile.depth = DEPTH  # it may have many publishers, each with a message of its own
         elif self.shared.timing.mode == "realtime":
-            profile.depth = NEWEST  # who is late works on what is true now, not on what was
-        self._subscriptions[topic] = self.node.create_subscription(message_type(row), topic, receive, profile)
+            profile.depth = NEWEST  # a late node works on the newest state
+        kind = message_type(row)
+        self._subscriptions[topic] = self.node.create_subscription(kind, topic, receive, profile, raw=raw)
 
     def publisher_count(self, topic: str) -> int:
         """How many publishers feed a topic that this node listens to."""
         return int(self._subscriptions[topic].get_publisher_count())
 
-    def feed(
-        self, gate: Gate, topic: str, read: Callable[[Any], Any], work: Callable[[int, dict[str, Any]], None]
-    ) -> None:
-        """Subscribe, put what comes into a gate, and work on each step that is complete."""
-
-        def take(message: Any) -> None:
-            for stamp, inputs in gate.put(topic, stamp_of(message), read(message)):
-                self.counts["steps"] += 1
-                work(stamp, inputs)
-
-        self.listen(topic, take)
-
     def refuse(self, topic: str, reason: str) -> None:
-        """Count and report a message that was not let in."""
+        """Count and report a refused message."""
         self.refusals[topic] += 1
         now = time.monotonic()
         if now - self._logged.get((topic, reason), -LOG_PERIOD) >= LOG_PERIOD:
@@ -112,33 +138,43 @@ class Ports:
             self._logged[topic, reason] = now
             self.node.get_logger().warning(f"{topic}: refused: {reason}")
 
-    def set_status(self, level: bytes, message: str, **details: str) -> None:
-        """Publish the state of the node, latched; once the node is ready."""
-        status = DiagnosticStatus(
-            name=self._name,
-            level=level,
-            message=message,
-            hardware_id=self.shared.arm.name,
-            values=[KeyValue(key=key, value=value) for key, value in details.items()],
-        )
+    def set_status(self, status: NodeStatus) -> None:
+        """Publish the status of the node, latched; kept until the node is ready."""
+        if not self.ready:
+            self._wanted = status
+            return
+        self.publish_status(status._replace(connected=True))
+
+    def publish_status(self, status: NodeStatus) -> None:
+        """Publish the status of the node as it is, where it has changed."""
+        status = status._replace(node=self._name)
         if status != self._status:
             self._status = status
-            self._publishers["status"].publish(status)
+            self._publishers[STATUS].publish(diagnostic_status(status, self.shared.arm.name))
 
-    def watch_peers(self) -> None:
-        """Listen to the status of the other nodes, for `absent` and `faults`."""
-        self._absent = set(self.shared.nodes) - {self._name}
-        self.listen("status", self._peer_said)
+    def wait_for_delivery(self) -> None:
+        """Wait until the recorder and all others have the last status, at most `LONGEST_DELIVERY`."""
+        self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_DELIVERY))
+
+    def watch_peers(self, take: Callable[[NodeStatus], None] | None = None) -> None:
+        """Listen to the status of the other nodes, for `absent` and `faults`, and hand each to `take`."""
+        self._absent = set(self.interface.names) - {self._name}
+
+        def receive(message: Any) -> None:
+            status = read_status(message)
+            if status.connected:
+                self._absent.discard(status.node)
+            if status.node in self.interface.declarations:
+                self.faults[status.node] = status.fault
+                if take is not None and status.node != self._name:
+                    take(status)
+
+        self.listen(STATUS, receive)
 
     @property
     def absent(self) -> list[str]:
-        """Nodes of the bring-up that have not said that they are connected."""
+        """Nodes of the bring-up that have not reported that they are connected."""
         return sorted(self._absent)
-
-    def _peer_said(self, status: DiagnosticStatus) -> None:
-        if status.message == READY or CONNECTED in status.values:
-            self._absent.discard(status.name)
-        self.faults[status.name] = next((item.value for item in status.values if item.key == "fault"), "")
 
     @property
     def ready(self) -> bool:
@@ -146,40 +182,30 @@ class Ports:
         return self._readiness.is_canceled()
 
     def _look_for_peers(self) -> None:
-        nodes = self.shared.nodes
+        interface = self.interface
         for name, subscription in self._subscriptions.items():
-            if subscription.get_publisher_count() < sum(peer in nodes for peer in BY_NAME[name].publisher):
+            if subscription.get_publisher_count() < len(interface.publishers(name)):
                 return
         for name, publisher in self._publishers.items():
-            expected = sum(peer in nodes for peer in BY_NAME[name].subscribers) + ("recorder" in nodes)
-            if publisher.get_subscription_count() < expected:
+            if publisher.get_subscription_count() < len(interface.subscribers(name)):
                 return
         self._readiness.cancel()
-        if self._status.message == WAITING:
-            self.set_status(OK, READY)
+        self.set_status(self._wanted or READY)
 
     def report_due(self, stamp: int) -> bool:
         """Whether the next report will be published."""
         return stamp >= self._next_report
 
     def report(self, stamp: int) -> None:
-        """Publish the diagnostics once a second of the arm's time."""
+        """Publish the diagnostics once in a second of the arm's time: a warning while messages are refused."""
         if not self.report_due(stamp):
             return
-        self._next_report = stamp - stamp % 1_000_000_000 + 1_000_000_000
+        self._next_report = stamp - stamp % SECOND + SECOND
+        total = sum(self.refusals.values())
         refused = {f"refused on {topic}": str(count) for topic, count in sorted(self.refusals.items())}
+        level = max(self._status.level, Level.WARN if total > self._refusals_reported else Level.OK)
+        self._refusals_reported = total
         facts = {**{key: str(count) for key, count in sorted(self.counts.items())}, **refused, **self.facts}
-        status = DiagnosticStatus(
-            name=self._name,
-            level=WARN if refused else OK,
-            message=self._status.message,
-            hardware_id=self.shared.arm.name,
-            values=[KeyValue(key=key, value=value) for key, value in facts.items()],
-        )
-        self.publish("/diagnostics", DiagnosticArray(header=header(stamp), status=[status]))
-
-
-def message_type(topic: Topic) -> Any:
-    """Message class of a row of the interface table."""
-    package, _, name = topic.type.split("/")
-    return getattr(importlib.import_module(f"{package}.msg"), name)
+        status = NodeStatus(level, self._status.message, self._name, fault=self._status.fault, facts=facts)
+        message = diagnostic_status(status._replace(connected=self.ready), self.shared.arm.name)
+        self._publishers[DIAGNOSTICS].publish(DiagnosticArray(header=header(stamp), status=[message]))

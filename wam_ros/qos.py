@@ -2,7 +2,7 @@
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from wam_ros.topics import Topic
+from wam_description.topics import Topic
 
 DEPTH = 1000  # a second of the inner loop: a late reader loses nothing until then
 

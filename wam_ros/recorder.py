@@ -1,25 +1,26 @@
-"""The recorder without ROS: what is written at what time, and what was lost on the way."""
+"""The recorder without ROS: which messages are written with which time, and which were lost on the way."""
 
 import struct
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache, partial
 from typing import Final, NamedTuple
 
-from wam_ros.bag import BagWriter, RecordingError
-from wam_ros.message_layout import stamp_reader
-from wam_ros.topics import Topic
+from wam_bag.bag_writer import BagWriter, RecordingError
+from wam_bag.message_layout import stamp_reader
+from wam_description.topics import Topic
 
-_MOST_STREAMS: Final = 8  # numberings followed in one topic and publisher
-_MOST_PUBLISHERS: Final = 64  # publishers told apart in one topic
+_MOST_STREAMS: Final = 8  # numberings tracked for one topic and publisher
+_MOST_PUBLISHERS: Final = 64  # publishers counted separately in one topic
 _NODE_STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 _NODE_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 
 class Count(NamedTuple):
-    """What came from one publisher of a topic.
+    """Messages from one publisher of a topic.
 
-    `missed` are the messages it had numbered before the first that came: published before the
-    recorder was there, or before a late publisher's first message (latched topics).
+    `missed` are the messages it had numbered before the first one received: published before the
+    recorder started, or before the first message of a late publisher (latched topics).
     """
 
     topic: str
@@ -32,9 +33,8 @@ class Count(NamedTuple):
 class Numbering:
     """Gaps in the numbers that publishers give their messages, counted from 1 without holes.
 
-    A number that follows none of the known ones begins a publisher (restarted, or a second one of
-    the same name); else the message belongs to the nearest number before it, and what lies between
-    was lost.
+    A number that is above none of the known ones starts a new publisher (restarted, or a second one of the same name);
+    otherwise the message follows the nearest number before it, and the messages between the two were lost.
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class Numbering:
         self._last: list[int] = []
 
     def add(self, number: int) -> None:
-        """Count one message; 0 where its number is not known."""
+        """Count one message; 0 if its number is not known."""
         self.received += 1
         if not number:
             return
@@ -66,15 +66,15 @@ class Numbering:
 class _Channel:
     """One topic on its way into the bag."""
 
-    def __init__(self, topic: Topic, name: str) -> None:
+    def __init__(self, topic: Topic, name: str, sender: Callable[[str], str]) -> None:
         self.topic = topic
         self.name = name
-        self.publisher_of = _publisher_reader(topic)
+        self.publisher_of = _publisher_reader(topic, partial(sender, name))
         self.stamp_of = stamp_reader(topic.type)
         self.publishers: OrderedDict[str, Numbering] = OrderedDict()
 
     def numbering(self, publisher: str) -> Numbering:
-        """Counts of one publisher; the oldest make room where there are too many."""
+        """Counts of one publisher; if there are too many, the oldest is dropped."""
         found = self.publishers.get(publisher)
         if found is None:
             if len(self.publishers) >= _MOST_PUBLISHERS:
@@ -84,7 +84,7 @@ class _Channel:
 
 
 class Recorder:
-    """Puts every message into the bag and keeps count; its memory does not grow with the recording.
+    """Writes every message into the bag and counts it; its memory does not grow with the recording.
 
     Parameters
     ----------
@@ -96,7 +96,14 @@ class Recorder:
     qos : what each topic's publishers offer, by full name.
     """
 
-    def __init__(self, bag: BagWriter, topics: Mapping[str, Topic], mode: str, qos: Mapping[str, object]) -> None:
+    def __init__(
+        self,
+        bag: BagWriter,
+        topics: Mapping[str, Topic],
+        mode: str,
+        qos: Mapping[str, object],
+        sender: Callable[[str], str],
+    ) -> None:
         self.failure = ""
         self._received = 0
         self._bag = bag
@@ -105,15 +112,15 @@ class Recorder:
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, qos[name])
-            self._channels[name] = _Channel(topic, name)
+            self._channels[name] = _Channel(topic, name, sender)
 
     def receive(self, name: str, data: bytes, received: int, sent: int, number: int) -> None:
-        """Record one message; one of a topic that is not recorded is left out.
+        """Record one message; a message of a topic that is not recorded is ignored.
 
         Parameters
         ----------
         name : full topic name.
-        data : CDR as it came.
+        data : CDR as received.
         received, sent : system clock, ns.
         number : the publisher's sequence number.
         """
@@ -138,20 +145,20 @@ class Recorder:
             self._fail(error)
 
     def flush(self) -> None:
-        """Bring what came onto the disk; call it every few tenths of a second."""
+        """Write received messages to disk; call it every few tenths of a second."""
         self._try(self._bag.flush_when_due)
 
     def attach(self, name: str, media_type: str, data: bytes) -> bool:
-        """Put a file into the bag; False where the disk does not take it."""
+        """Add a file to the bag; False if it cannot be written."""
         return self._try(lambda: self._bag.attach(name, media_type, data))
 
     @property
     def lost_at_disk(self) -> int:
-        """Messages that came and are not in the bag, because it could not be written."""
+        """Messages that were received and are not in the bag, because it could not be written."""
         return self._received - self._bag.written if self.failure else 0
 
     def counts(self) -> list[Count]:
-        """What came and what was lost, per topic and publisher."""
+        """Received and lost messages by topic and publisher."""
         return [
             Count(channel.name, publisher, numbering.received, numbering.dropped, numbering.missed)
             for channel in self._channels.values()
@@ -163,7 +170,7 @@ class Recorder:
         return sum(count.dropped for count in self.counts())
 
     def finish(self) -> None:
-        """Write counts and drops into the bag and close it; `failure` says where that was not possible."""
+        """Write counts and drops into the bag and close it; `failure` gives the reason if that was not possible."""
         values = {"mode": "lockstep" if self._lockstep else "realtime"}
         for count in self.counts():
             key = f"{count.topic} {count.publisher}"
@@ -183,29 +190,32 @@ class Recorder:
 
     def _fail(self, error: RecordingError) -> None:
         self.failure = (
-            f"bag {self._bag.path} cannot be written any more: {error}; free some space and start a new recording"
+            f"bag {self._bag.path} can no longer be written: {error}; free some space and start a new recording"
         )
 
 
 def summary(counts: Iterable[Count]) -> str:
-    """One line for people: how many messages came and where some were lost."""
+    """One line for people: how many messages came and of which topics some were lost."""
     listed = list(counts)
     lost = [f"{c.dropped} of {c.topic} from {c.publisher}" for c in listed if c.dropped]
     total = sum(c.received for c in listed)
     return f"{total} messages, " + ("none lost" if not lost else "lost: " + ", ".join(lost))
 
 
-def _publisher_reader(topic: Topic) -> Callable[[bytes], str]:
-    """A function that tells who sent a message; rclpy does not say it.
+def _publisher_reader(topic: Topic, sender: Callable[[], str]) -> Callable[[bytes], str]:
+    """A function that finds the node that sent a message, which rclpy does not report.
 
-    A topic of several publishers carries the node's name in its message, up to a ':' or '/'.
+    Parameters
+    ----------
+    topic : row of the table of topics; one that every node publishes carries the node's name, up to a ':' or '/'.
+    sender : finds the only publisher of any other topic, once a message has come.
     """
     if topic.type == _NODE_STATUS:
         return lambda data: _node_name(data, 5)
-    if topic.type == _NODE_DIAGNOSTICS and len(topic.publisher) > 1:
+    if topic.type == _NODE_DIAGNOSTICS:
         return _first_status_name
-    sender = topic.publisher[0] if topic.publisher else ""  # a program of the user's
-    return lambda data: sender
+    found = cache(sender)
+    return lambda data: found()
 
 
 def _first_status_name(data: bytes) -> str:

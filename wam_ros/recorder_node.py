@@ -1,4 +1,4 @@
-"""Node `recorder`: every topic of the interface table into a bag, with the parameters of all nodes."""
+"""Node `recorder`: writes every topic of the interface table to a bag, with the parameters of all nodes."""
 
 import inspect
 import time
@@ -11,28 +11,30 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
+from wam_bag.bag_writer import BagWriter, RecordingError, Split
+from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, parameter, values
-from wam_ros.bag import BagWriter, RecordingError, Split
+from wam_description.topics import BY_NAME, Topic
+from wam_ros.messages import diagnostic_status, message_type
 from wam_ros.parameters import declare
-from wam_ros.ports import READY, message_type
+from wam_ros.ports import READY
 from wam_ros.qos import DEPTH, qos
 from wam_ros.recorder import Recorder, summary
+from wam_ros.recorder_interface import RecorderInterface
 from wam_ros.remote_parameters import RemoteParameters, as_yaml
-from wam_ros.run import run
-from wam_ros.topics import BY_NAME, TOPICS, Topic
 
 EVERY = "*"
 
 
 @dataclass(frozen=True)
 class RecorderParameters:
-    """Where the bag goes."""
+    """Place and contents of the bag."""
 
-    directory: str = parameter("directory in which the bag is made; made where it is missing")
-    name: str = parameter("name of the bag, a new directory; empty for arm, date and time of the start")
-    topics: tuple[str, ...] = parameter("topics that are recorded, as in docs/topics.md; '*' for every one")
-    split_size: int = parameter("size at which the bag goes on in another file; 0: never", "byte", 0)
-    split_time: float = parameter("time after which the bag goes on in another file; 0: never", "s", 0.0)
+    directory: str = parameter("directory of the bag; created if it is missing")
+    name: str = parameter("name of the bag, a new directory; empty: arm, date and time of the start")
+    topics: tuple[str, ...] = parameter("recorded topics, named as in docs/topics.md; '*' for all")
+    split_size: int = parameter("size at which the bag continues in another file; 0: never", "byte", 0)
+    split_time: float = parameter("time after which the bag continues in another file; 0: never", "s", 0.0)
 
     def __post_init__(self) -> None:
         for topic in self.topics:
@@ -40,9 +42,6 @@ class RecorderParameters:
                 raise ParameterError(f"parameter 'topics' names '{topic}'; allowed: {EVERY}, {', '.join(BY_NAME)}")
         if self.name != Path(self.name).name or self.name == "..":
             raise ParameterError(f"parameter 'name' is '{self.name}'; allowed: a name without directories")
-
-
-PARAMETERS = RecorderParameters
 
 
 class RecorderNode(Node):
@@ -58,17 +57,17 @@ class RecorderNode(Node):
             self.bag = BagWriter(Path(own.directory) / name, Split(own.split_size, own.split_time))
         except RecordingError as error:
             raise ParameterError(f"node 'recorder': {error} (parameters 'directory' and 'name')") from None
-        topics = {self.resolve_topic_name(topic.name): topic for topic in TOPICS}
+        interface = Interface(shared)
+        topics = {self.resolve_topic_name(topic.name): topic for topic in interface.topics.values()}
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
         offered = {full_name: qos(topic) for full_name, topic in chosen.items()}
-        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered)
-        # it listens to all, also to what it does not keep: every publisher waits for it before it begins
+        publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
+        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender)
+        # it subscribes to all topics, recorded or not: every publisher waits for its subscription
         self._inlets = {name: self._listen(name, topic) for name, topic in topics.items()}
-        others = [node for node in shared.nodes if node != self.get_name()]
-        self._expected = {
-            full_name: sum(node in topic.publisher for node in others) for full_name, topic in topics.items()
-        }
-        self.parameters_of_nodes = RemoteParameters(self, others)
+        own_name = RecorderInterface.name
+        self._expected = {name: len([one for one in found if one != own_name]) for name, found in publishers.items()}
+        self.parameters_of_nodes = RemoteParameters(self, [name for name in interface.names if name != own_name])
         self._status = self.create_publisher(DiagnosticStatus, "status", qos(BY_NAME["status"]))
         diagnostics = BY_NAME["/diagnostics"]
         self._diagnostics = self.create_publisher(DiagnosticArray, diagnostics.name, qos(diagnostics))
@@ -78,19 +77,19 @@ class RecorderNode(Node):
         self._failed = False
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(0.1, self.attend, clock=steady)
-        if shared.timing.mode == "realtime":  # in lockstep nothing is sent by the wall clock
+        if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
             self.create_timer(1.0, self._report, clock=steady)
         self.get_logger().info(f"recording to {self.bag.path}")
 
     def destroy_node(self) -> None:
-        """Take what has arrived, write parameters and counts, close the bag."""
+        """Record the messages that have arrived, write parameters and counts, close the bag."""
         self._drain()
         self._close()
         super().destroy_node()
 
     @property
     def failure(self) -> str:
-        """Why the bag is not complete, '' where it is or will be."""
+        """Why the bag is incomplete, '' if it is not."""
         return self.recorder.failure
 
     def _listen(self, name: str, topic: Topic) -> Any:
@@ -99,17 +98,22 @@ class RecorderNode(Node):
         receiver = _Receiver(self.recorder, name)
         return self.create_subscription(message_type(topic), name, receiver, profile, raw=True)
 
+    def _sender(self, name: str) -> str:
+        """The node that publishes a topic, '' where there are several."""
+        found = {info.node_name for info in self.get_publishers_info_by_topic(name)}
+        return found.pop() if len(found) == 1 else ""
+
     def attend(self) -> None:
-        """What is due ten times a second: flush, warn, ask for parameters, say when all is ready."""
+        """Ten times a second: flush, warn, request parameters, publish `ready` when all nodes are there."""
         self.recorder.flush()
         self._warn()
         self.parameters_of_nodes.ask()
         if self.ready or self.parameters_of_nodes.missing or self._unmatched():
             return
-        self._attach_parameters()  # now, so that a killed recorder has left them
+        self._attach_parameters()  # now, so that a killed recorder leaves them
         if not self.recorder.failure:  # a scenario starts when all are ready
             self.ready = True
-            self._status.publish(self._state(READY))
+            self._status.publish(diagnostic_status(READY._replace(node=self.get_name()), self._arm))
 
     def _unmatched(self) -> list[str]:
         return [
@@ -149,7 +153,7 @@ class RecorderNode(Node):
             name=self.get_name(),
             message=text,
             hardware_id=self._arm,
-            values=[] if text == READY else [KeyValue(key=key, value=value) for key, value in facts.items()],
+            values=[KeyValue(key=key, value=value) for key, value in facts.items()],
         )
 
     def _drain(self) -> None:
@@ -162,7 +166,7 @@ class RecorderNode(Node):
                     subscription.callback(*taken)
 
     def _attach_parameters(self) -> None:
-        """Attach what is known of the parameters, where that is more than was attached before."""
+        """Attach the known parameters, if these are more than were attached before."""
         found = self.parameters_of_nodes.found
         parameters = {self.resolve_service_name(node): given for node, given in found.items()}
         parameters[self.get_fully_qualified_name()] = self._own_parameters
@@ -175,7 +179,7 @@ class RecorderNode(Node):
         self.recorder.finish()
         counts = summary(self.recorder.counts())
         if self.recorder.failure:
-            lost = f"; {self.recorder.lost_at_disk} messages were lost at the disk"
+            lost = f"; {self.recorder.lost_at_disk} messages could not be written"
             self.get_logger().error(f"{self.recorder.failure}{lost}; {counts}")
         else:
             self.get_logger().info(f"{self.bag.path}: {counts}")
@@ -184,7 +188,7 @@ class RecorderNode(Node):
 class _Receiver:
     """Callback of one topic.
 
-    Its signature asks for the message info.  The events executor of rclpy 7.1 then passes message and
+    Its signature requests the message info.  The events executor of rclpy 7.1 then passes message and
     info as one tuple, the other executors as two arguments.
     """
 
@@ -203,12 +207,3 @@ class _Receiver:
             info["source_timestamp"],
             info["publication_sequence_number"] or 0,
         )
-
-
-def main() -> None:
-    """Run the recorder as this process."""
-    run(RecorderNode)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""The parameters of other nodes, asked for over the standard services."""
+"""The parameters of other nodes, read over the standard services."""
 
 import time
 from collections.abc import Iterable, Mapping

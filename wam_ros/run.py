@@ -70,7 +70,7 @@ class Stop:
 
 
 def spin(executor: Any, until: Callable[[], bool]) -> None:
-    """Spin until `until` is true, which is asked after each callback; then take what has arrived until then.
+    """Spin until `until` is true, which is evaluated after each callback; then handle what has arrived until then.
 
     The events executor's own spin() hangs in the wheels built against old C libraries, and its
     spin_until_future_complete() sees its time-out only when no message waits: that is what the end

@@ -1,4 +1,4 @@
-"""Arguments of the formulas as arrays, refused by name where they are out of range."""
+"""Arguments of the formulas as arrays, checked for their range."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ def above_zero(**arguments: ArrayLike) -> list[Array]:
     Raises
     ------
     ValueError
-        where one is not finite and above zero.
+        if one is not finite and above zero; the error names it.
     """
     return _checked(arguments, lambda a: a > 0.0, "above zero")
 
@@ -25,7 +25,7 @@ def zero_or_more(**arguments: ArrayLike) -> list[Array]:
     Raises
     ------
     ValueError
-        where one is not finite or below zero.
+        if one is not finite or below zero.
     """
     return _checked(arguments, lambda a: a >= 0.0, "zero or more")
 
@@ -36,7 +36,7 @@ def below_one(**arguments: ArrayLike) -> list[Array]:
     Raises
     ------
     ValueError
-        where one is not above zero and below one.
+        if one is not above zero and below one.
     """
     return _checked(arguments, lambda a: (a > 0.0) & (a < 1.0), "above zero and below one")
 
@@ -47,7 +47,7 @@ def finite(**arguments: ArrayLike) -> list[Array]:
     Raises
     ------
     ValueError
-        where one is not finite.
+        if one is not finite.
     """
     return _checked(arguments, np.isfinite, "a number")
 

@@ -1,6 +1,6 @@
-"""Cables as springs and as power lines: stiffness, slack, tension, loss and creep (4.1, chapter 6).
+"""Cable stages: stiffness, slack, tension, loss and creep (4.1, chapter 6).
 
-A circuit has two strands under a pretension T0; torque makes one tighter and the other looser.
+A circuit has two strands under a pretension T0; torque tightens one and loosens the other.
 """
 
 import numpy as np
@@ -14,13 +14,13 @@ def stage_compliance(
 ) -> Array:
     """Compliance of one pretensioned stage, seen at the motor, rad/(N m).
 
-    1/k = n^2 L/(2 EA r^2 c): both strands carry, so that the stage's own shaft feels 2 (EA/L) r^2 for
-    each of c parallel circuits, and the motor turns n times for one turn of that shaft (section 4.3.2).
+    1/k = n^2 L/(2 EA r^2 c): both strands carry load, so that the stiffness at the stage's own shaft is
+    2 (EA/L) r^2 for each of c parallel circuits, and the motor turns n times per turn of it (section 4.3.2).
 
     Parameters
     ----------
     ea : E A of one cable, N.
-    length : free length of a strand, m; zero for a stage that does not give.
+    length : free length of a strand, m; zero for a rigid stage.
     radius : of the stage's driving pulley, m.
     circuits : parallel circuits.
     ratio : motor turns per turn of the driving pulley.
@@ -31,10 +31,9 @@ def stage_compliance(
 
 
 def stiffness_with_reducer(ea: ArrayLike, length: ArrayLike, ratio: ArrayLike, distance: ArrayLike) -> Array:
-    """Stiffness seen at the joint of a line of constant stress with its reducer part of the way, (4.1).
+    """Stiffness at the joint of a line of constant stress with its reducer part of the way, (4.1).
 
-    k_eff = N^2 EA/(N L + C (1 - N)), per squared length unit of the pulley's radius; greatest for
-    C = L, the reducer at the joint.
+    k_eff = N^2 EA/(N L + C (1 - N)), for a pulley of unit radius; greatest for C = L, the reducer at the joint.
 
     Parameters
     ----------
@@ -53,12 +52,12 @@ def stiffness_with_reducer(ea: ArrayLike, length: ArrayLike, ratio: ArrayLike, d
 def circuit_torque(stretch: ArrayLike, stiffness: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> Array:
     """Torque of a circuit at its motor, N m, with the loose strand going slack.
 
-    Each strand is a spring of k/2 that cannot push, stretched by x0 = T0 r/(k/2) beforehand: the
+    Each strand is a spring of k/2 that cannot push, pre-stretched by x0 = T0 r/(k/2): the
     torque is k x up to |x| = x0 and (k/2)(|x| + x0) beyond.
 
     Parameters
     ----------
-    stretch : theta_m minus the angle that belongs to the joints, rad.
+    stretch : theta_m minus the joints' angle at the motor, rad.
     stiffness : k, both strands, N m/rad.
     pretension : T0, N.
     radius : of the pinion, m.
@@ -82,7 +81,7 @@ def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tup
     """Tension of the tight and of the loose strand, N, under a torque at the pinion, N m.
 
     T0 +- tau/(2 r), and tau/r and zero once the loose strand is slack (section 6.5: no strand goes
-    slack where T0 is half of the full-torque tension).
+    slack if T0 is half of the full-torque tension).
 
     Parameters
     ----------
@@ -101,11 +100,11 @@ def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tup
 
 
 def stage_loss(torque: ArrayLike, radius: ArrayLike, ea: ArrayLike, circuits: ArrayLike, ratio: ArrayLike) -> Array:
-    """Share of the speed, and of the power, that a stage loses, (T2 - T1)/EA of (6.4) and (6.14); strain far below 1.
+    """Relative loss of speed and of power of a stage, (T2 - T1)/EA of (6.4) and (6.14), for strain far below 1.
 
     Parameters
     ----------
-    torque : at the motor, N m; the stage's own driving shaft carries `ratio` times as much.
+    torque : at the motor, N m; at the stage's own driving shaft it is `ratio` times as much.
     radius, ea, circuits, ratio : of the stage as in `stage_compliance`.
     """
     radius, ea, circuits, ratio = above_zero(radius=radius, ea=ea, circuits=circuits, ratio=ratio)
@@ -126,10 +125,10 @@ def efficiency(losses: ArrayLike) -> float:
 
 
 def creep(travel: ArrayLike, torque: ArrayLike, radius: ArrayLike, ea: ArrayLike) -> Array:
-    """Angle that the driven pulley gives way to the torque on it, at the motor, rad, (6.19) corrected.
+    """Creep of the driven pulley under a torque, seen at the motor, rad, (6.19) corrected.
 
-    The integral of (T2 - T1)/EA over the absolute travel of the driving pulley: going out and back
-    under the same torque adds up.
+    The integral of (T2 - T1)/EA over the absolute travel of the driving pulley: travel out and back under
+    the same torque adds up.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The unstable limit cycle of domain II, by describing function and exactly (section 5.5.1).
 
-Above the Routh limit a small motion shrinks, because friction takes more from it than the loop gives,
-and a large one grows; in between lies a periodic motion from which all others part.  Symbols, shapes
+Above the Routh limit a small motion decays, because friction dissipates more than the loop adds, and a
+large one grows; in between lies an unstable periodic motion.  Symbols, shapes
 and units as in `linear_loop`; Coulomb friction, integral control, a continuous loop.
 """
 
@@ -17,7 +17,7 @@ from wam_theory.linear_loop import characteristic_polynomial, damping_ratio, gai
 
 
 class UnstableCycle(NamedTuple):
-    """A periodic motion about F_des that others part from.
+    """An unstable periodic motion about F_des.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ def friction_to_velocity(
 ) -> NDArray[np.complex128]:
     """G(s) of figure 5.6 and (5.16), from the friction force, against the motion, to the velocity of the node.
 
-    s^2 over the denominator of (5.14), rad/s/(N m); its crossing of -1/N(A) is what figure 5.7 shows.
+    s^2 over the denominator of (5.14), rad/s/(N m); figure 5.7 shows its intersection with -1/N(A).
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def predicted_unstable_cycle(
 ) -> UnstableCycle:
     """Solution of 1 + G(j omega) N(A) = 0, (5.16), as motion of F_c.
 
-    N(A) takes the place of damping that is missing: b + N(A) = gamma b at omega = sqrt(ks/J_l), so that
-    A = 4 F_friction/(pi b (gamma - 1)).  Against `unstable_cycle`, for zeta = 0.25, the force is 0.7 %
+    N(A) replaces the missing damping: b + N(A) = gamma b at omega = sqrt(ks/J_l), so that
+    A = 4 F_friction/(pi b (gamma - 1)).  Compared with `unstable_cycle`, for zeta = 0.25, the force is 0.7 %
     too large at gamma = 1.1, 5 % at 1.5, 18 % at 2.0 and 46 % at gamma_III = 2.19, and the frequency 0.03 %,
     1 %, 5 % and 13 %; in domain III a cycle is predicted where none exists.
 
@@ -108,12 +108,12 @@ def unstable_cycle(
     contact_stiffness: ArrayLike,
     friction: ArrayLike,
 ) -> UnstableCycle:
-    """The unstable cycle exactly, what (5.16) predicts with all harmonics; not in print.
+    """The exact unstable cycle, with all harmonics that (5.16) neglects; not in print.
 
     With the poles p of (5.14) and D its denominator, the velocity under a square wave of friction of
-    half period T is zero at its switches where sum p/D'(p) tanh(p T/2) = 0; the node stands at
+    half period T is zero at its switches where sum p/D'(p) tanh(p T/2) = 0; its position is
     F sum tanh(p T/2)/D'(p) there.  It reverses without sticking from gamma = 1, where it is infinite, to
-    gamma_III, where it has become the slip from stick to stick of Psi = 1.  The largest step from rest
+    gamma_III, where it becomes the slip from stick to stick of Psi = 1.  The largest step from rest
     that stays stable is larger, because the first slip loses more than the cycle does: 2.0, 1.4 and 1.1
     times this force for zeta = 0.25 and gamma = 1.1, 1.5 and 2.0 (`stick_slip.largest_stable_step`).
 
@@ -146,13 +146,13 @@ def _cycle(gamma: float, zeta: float) -> tuple[float, float]:
     slopes = (3.0 * poles + 4.0 * zeta) * poles + 1.0
 
     def sums(half_period: float) -> tuple[float, float, float]:
-        """Place, velocity and acceleration just after a switch to motion with positive velocity."""
+        """Position, velocity and acceleration just after a switch to motion with positive velocity."""
         modes = np.tanh(poles * half_period / 2.0) / slopes
         x, v, a = (float((modes * poles**k).sum().real) for k in range(3))
         return x, v, a - 1.0
 
-    # from the half period of the growing pair upwards the spring force at the switch falls; as long as it is above
-    # friction the node reverses without sticking, and the velocity vanishes there once or, in domain III, never
+    # above the half period of the growing pair the spring force at the switch falls with the half period; while it
+    # exceeds friction the node reverses without sticking, with one zero of the velocity, or none in domain III
     first = math.pi / float(np.abs(poles.imag).max())
     last = _bisect(lambda time: sums(time)[2], first, 2.0 * first)
     if sums(first)[1] * sums(last)[1] > 0.0:
@@ -162,7 +162,7 @@ def _cycle(gamma: float, zeta: float) -> tuple[float, float]:
 
 
 def _bisect(value: Callable[[float], float], low: float, high: float) -> float:
-    """Place between low and high where the value, which has two signs there, changes it."""
+    """Zero of a function between low and high, where it has different signs."""
     sign = value(low) > 0.0
     while True:
         middle = (low + high) / 2.0

@@ -1,7 +1,7 @@
-"""Every numbered equation of chapters 2 to 6: what it says, and what is wrong in its print.
+"""Every numbered equation of chapters 2 to 6: its content, and the correction of its misprint.
 
-A function that is an equation cites its number in the first line of its docstring; from that and
-from this table `docs/equations.md` is made.  Why each correction is one: `docs/errata.md`.
+A function that implements an equation cites its number in the first line of its docstring; `docs/equations.md`
+is generated from these citations and from this table.  Reasons of the corrections: `docs/errata.md`.
 """
 
 from typing import NamedTuple
@@ -13,22 +13,22 @@ class Equation(NamedTuple):
     Attributes
     ----------
     number : as printed.
-    section : where it stands.
-    says : what it is, in a few words.
-    correction : what has to be changed; empty where it is right as printed.
-    reason : why no function is made of it; empty where one is.
+    section : of the thesis.
+    content : in a few words.
+    correction : of the print; empty if it is right as printed.
+    reason : why it has no function; empty if it has one.
     """
 
     number: str
     section: str
-    says: str
+    content: str
     correction: str = ""
     reason: str = ""
 
 
 EQUATIONS: tuple[Equation, ...] = (
     Equation("2.1", "2.1.1", "contact force from two joint torques", "cos theta_2 is missing; straight arm only"),
-    Equation("2.2", "2.1.1", "place of the contact", "cos theta_2 is missing; straight arm only"),
+    Equation("2.2", "2.1.1", "position of the contact", "cos theta_2 is missing; straight arm only"),
     Equation("3.1", "3.2.2", "greatest force of an impact", "J is the effective mass at the contact"),
     Equation("3.2", "3.2.4", "useful length of a link in a grasp", "tan(theta/2) = mu, not tan(theta) = mu"),
     Equation("3.3", "3.2.4", "largest cylinder that two links hold", "tan(theta/2) = mu, not tan(theta) = mu"),
@@ -40,7 +40,7 @@ EQUATIONS: tuple[Equation, ...] = (
     ),
     Equation("4.2", "4.2", "position transfer with the reducer at the joint", "numerator N k_tr, not N^2 k_tr"),
     Equation("4.3", "4.3.1", "force transfer", "numerator N k_tr k_c"),
-    Equation("4.4", "4.3.1", "its two resonances", "right, but the lower root loses its digits; use 2c/(B + root)"),
+    Equation("4.4", "4.3.1", "its two resonances", "right, but the lower root loses digits; use 2c/(B + root)"),
     Equation("4.5", "4.3.1", "limit of the lower one for a soft contact"),
     Equation("4.6", "4.3.1", "limit for a hard contact"),
     Equation("4.7", "4.3.1", "limit for a small ratio", "the printed values are squares of omega_1"),
@@ -49,7 +49,7 @@ EQUATIONS: tuple[Equation, ...] = (
     Equation("4.10", "4.4", "best transmission stiffness", "J_t is J_l; the asymptote above it is sqrt(k_tr/J_m)"),
     Equation("5.1", "5.3", "steady error of proportional control"),
     Equation("5.2", "5.3", "time constant of integral control"),
-    Equation("5.3", "5.4", "delay by Coulomb friction", "first breakaway only; else less sgn(e) f, e in bars"),
+    Equation("5.3", "5.4", "delay by Coulomb friction", "first breakaway only; else minus sgn(e) f, and |e|"),
     Equation("5.4", "5.4", "when a node is nearly inertialess"),
     Equation("5.5", "5.4", "motion of the motor while the node sticks"),
     Equation("5.6", "5.4", "contact force during a slip", "without damping only"),
@@ -64,8 +64,8 @@ EQUATIONS: tuple[Equation, ...] = (
     Equation("5.15", "5.5", "Routh's criterion"),
     Equation("5.16", "5.5.1", "candidate limit cycle by describing function"),
     Equation("5.17", "5.5.2", "stability of a friction-dominated system"),
-    Equation("5.18", "5.5.2", "Psi, ratio of half cycles", "upside down: the later over the earlier"),
-    Equation("5.19", "5.5.3", "limit of the time stuck", "finite and constant where Psi is below 0"),
+    Equation("5.18", "5.5.2", "Psi, ratio of half cycles", "inverse ratio: the later over the earlier"),
+    Equation("5.19", "5.5.3", "limit of the sticking time", "finite and constant for Psi below 0"),
     Equation("5.20", "5.5.3", "size of the motor's limit cycle", "peak to peak; only for Psi between 0 and 1"),
     Equation("5.21", "5.5.3", "work of it per half cycle", "F^2/(2 k_tr)"),
     Equation("5.22", "5.5.3", "power of it"),
@@ -75,11 +75,11 @@ EQUATIONS: tuple[Equation, ...] = (
     Equation("6.3", "6.2.2", "ratio of their speeds"),
     Equation("6.4", "6.2.2", "the same to first order"),
     Equation("6.5", "6.2.3", "heat out of the control volume", "right to first order of the strain"),
-    Equation("6.6", "6.2.3", "when kinetic energy counts for nothing", "the share of the loss is twice that"),
-    Equation("6.7", "6.2.3", "when weight counts for nothing", "EA^2 is E A^2; ratio 1 is at 2535 in, not 275"),
+    Equation("6.6", "6.2.3", "when kinetic energy is negligible", "its ratio to the loss is twice that"),
+    Equation("6.7", "6.2.3", "when weight is negligible", "EA^2 is E A^2; ratio 1 is at 2535 in, not 275"),
     Equation("6.8", "6.2.4", "speed of a pulley that the cable sticks to at entry"),
     Equation("6.9", "6.2.4", "the same, at the exit", "does not happen on the driven pulley, by (6.10.b)"),
-    Equation("6.10", "6.2.4", "loss for either place", "the last term is an artefact of (6.5)"),
+    Equation("6.10", "6.2.4", "loss for either sticking point", "the last term is an artefact of (6.5)"),
     Equation("6.11", "6.2.4", "loss at the driven pulley"),
     Equation("6.12", "6.2.4", "loss at the drive pulley"),
     Equation("6.13", "6.2.4", "power out"),

@@ -22,13 +22,13 @@ class FrictionNode:
     transmission_stiffness : k_tr at the node, N m/rad, above zero.
     contact_stiffness : k_c at the node, N m/rad, above zero.
     dynamic_friction : F_dynamic, N m, zero or more.
-    static_friction : F_static, N m, at least F_dynamic; equal to it is Coulomb friction.
+    static_friction : F_static, N m, at least F_dynamic; Coulomb friction if both are equal.
     unilateral : whether the contact only pushes, F_c = k_c max(x, 0).
 
     Raises
     ------
     ValueError
-        where a value is out of its range.
+        if a value is out of its range.
     """
 
     inertia: float
@@ -40,7 +40,7 @@ class FrictionNode:
     unilateral: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse values out of range; keep the others as Python floats, which are faster than numpy's."""
+        """Refuse values out of range; store the others as Python floats, which are faster than numpy's."""
         _as_floats(self, "inertia", "damping", "transmission_stiffness", "contact_stiffness")
         _as_floats(self, "dynamic_friction", "static_friction")
         for name in ("inertia", "transmission_stiffness", "contact_stiffness"):
@@ -51,11 +51,11 @@ class FrictionNode:
 
 
 @dataclass(frozen=True, slots=True)
-class ForceLoop:
+class IntegralLoop:
     """Integral force control through a velocity-controlled motor (5.5).
 
-    F_error is saturated at `error_limit`; at the input of G_I a dead zone then takes `deadband` from
-    its magnitude (5.7), so that the motor's speed is continuous in the error.
+    F_error is saturated at `error_limit`; the deadband at the input of G_I then reduces its magnitude by
+    `deadband` (5.7), so that the motor's speed is continuous in the error.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ class ForceLoop:
     error_limit : N m, above the deadband; infinite for none.
     deadband : N m, zero or more.
     sample_period : s, of the zero-order hold; zero for a continuous loop.
-    delay_samples : whole periods between a sample and its command; zero answers in the same period.
+    delay_samples : whole periods between a sample and its command; with zero the command follows in the same period.
 
     Raises
     ------
     ValueError
-        where a value is out of its range.
+        if a value is out of its range.
     """
 
     gain: float
@@ -78,7 +78,7 @@ class ForceLoop:
     delay_samples: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse values out of range; keep the others as Python floats, which are faster than numpy's."""
+        """Refuse values out of range; store the others as Python floats, which are faster than numpy's."""
         _as_floats(self, "gain", "error_limit", "deadband", "sample_period")
         require("gain", self.gain, above=0.0)
         require("deadband", self.deadband, at_least=0.0)
@@ -96,7 +96,7 @@ class ForceLoop:
 
 
 def _as_floats(instance: object, *names: str) -> None:
-    """Turn fields of a frozen instance into floats."""
+    """Convert fields of a frozen instance to floats."""
     for name in names:
         object.__setattr__(instance, name, float(getattr(instance, name)))
 

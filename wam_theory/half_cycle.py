@@ -1,4 +1,4 @@
-"""One slip with Coulomb friction, from breakaway to standstill: what psi (5.18) is made of."""
+"""One slip with Coulomb friction, from breakaway to standstill, from which psi (5.18) follows."""
 
 import math
 from typing import NamedTuple
@@ -12,7 +12,7 @@ _INF = math.inf
 class HalfCycle(NamedTuple):
     """One slip from breakaway to the next standstill, error 1 at breakaway, time in sqrt(J/(k_tr + k_c)).
 
-    Where the node only creeps towards F_des, `duration` is infinite and the rest is 0.
+    If the node only creeps towards F_des, `duration` is infinite and the other values are 0.
     """
 
     error: float

@@ -2,8 +2,8 @@
 
 Symbols: k_tr, k_c the stiffnesses on both sides of the node, ks = k_tr + k_c, K = k_tr k_c/ks,
 gamma = J_l G_I K/b, zeta = b/(2 sqrt(J_l ks)).  All arguments broadcast and all results have the
-shape they broadcast to; SI with radians, or any consistent units.  Where the print is in error the
-corrected form stands here and the docstring says so (docs/errata.md).
+shape they broadcast to; SI with radians, or any consistent units.  Misprints are corrected and named in
+the docstring (docs/errata.md).
 """
 
 import math
@@ -14,17 +14,18 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from wam_theory.arguments import Array, above_zero, zero_or_more
+from wam_theory.zero_order_hold import zero_order_hold
 
 
 class SampledMargin(NamedTuple):
-    """Smallest gain at which a sampled loop oscillates, and the frequency, rad/s, at which it does."""
+    """Smallest gain at which a sampled loop oscillates, and its frequency, rad/s."""
 
     gain: float
     frequency: float
 
 
 def series_stiffness(transmission_stiffness: ArrayLike, contact_stiffness: ArrayLike) -> Array:
-    """K = k_tr k_c/(k_tr + k_c), N m/rad, of transmission and contact one after the other.
+    """K = k_tr k_c/(k_tr + k_c), N m/rad, of transmission and contact in series.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def proportional_error(force: ArrayLike, proportional_gain: ArrayLike, stiffness
 def integral_time_constant(gain: ArrayLike, stiffness: ArrayLike) -> Array:
     """Time constant of integral control, s, (5.2): 1/(G_I K).
 
-    F_c = F_des (1 - exp(-t/tau)) after a step.  No friction; inertia small as (5.4) says.
+    F_c = F_des (1 - exp(-t/tau)) after a step.  No friction; inertia small by (5.4).
 
     Parameters
     ----------
@@ -196,10 +197,10 @@ def sampled_margin(
 ) -> SampledMargin:
     """Largest linearly stable G_I with a zero-order hold, exactly; not in print.  No friction.
 
-    The motor's speed is held for a sample period and answers the sample taken `delay_samples` periods
-    before it.  With P(z) z^d + g Q(z) the characteristic polynomial of the exactly discretised loop,
+    The motor's speed is held for a sample period and follows from the sample `delay_samples` periods
+    earlier.  With P(z) z^d + g Q(z) the characteristic polynomial of the exactly discretised loop,
     the loop oscillates where Q/(P z^d) is real and negative on the unit circle; its imaginary part is
-    sin(theta) times a polynomial in cos(theta), whose roots are all the candidates besides theta = pi.
+    sin(theta) times a polynomial in cos(theta), whose roots are all candidates apart from theta = pi.
 
     Parameters
     ----------
@@ -207,7 +208,7 @@ def sampled_margin(
     damping : b, N m s/rad, above zero.
     transmission_stiffness, contact_stiffness : N m/rad, above zero.
     sample_period : s, above zero.
-    delay_samples : zero answers within the period.
+    delay_samples : with zero the command follows within the period.
     """
     j, b, ktr, kc, period = (
         float(a)
@@ -242,18 +243,11 @@ def sampled_margin(
 def _held_loop(j: float, b: float, ktr: float, kc: float, period: float) -> tuple[Array, Array]:
     """Denominator and numerator in ascending powers of z of F_c over the held speed of x_m."""
     ks = ktr + kc
-    step = np.array([[0.0, 1.0, 0.0, 0.0], [-ks / j, -b / j, ktr / j, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0] * 4]) * period
-    halvings = max(0, math.ceil(math.log2(max(1.0, float(np.abs(step).sum(axis=1).max())))) + 4)
-    term = total = np.eye(4)
-    for n in range(1, 16):
-        term = term @ step / (n * 2.0**halvings)
-        total = total + term
-    for _ in range(halvings):
-        total = total @ total
-    a, inlet = total[:3, :3], total[:3, 3]
+    rate = np.array([[0.0, 1.0, 0.0], [-ks / j, -b / j, ktr / j], [0.0, 0.0, 0.0]])
+    a, inlet = zero_order_hold(rate, np.array([[0.0], [0.0], [1.0]]), period)
     p = np.asarray(np.poly(a), dtype=float)
     # c adj(zI - A) b = det(zI - A + b c) - det(zI - A)
-    q = np.asarray(np.poly(a - np.outer(inlet, [kc, 0.0, 0.0])), dtype=float) - p
+    q = np.asarray(np.poly(a - inlet @ np.array([[kc, 0.0, 0.0]])), dtype=float) - p
     return p[::-1].copy(), q[::-1].copy()
 
 

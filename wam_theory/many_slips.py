@@ -1,8 +1,8 @@
-"""Slips of many friction nodes at once: `slip_arc` over arrays, for loops beyond the Routh limit.
+"""Slips of many friction nodes at once: `slip_arc` for arrays, beyond the Routh limit.
 
 In the units of (5.14): time in sqrt(J_l/(k_tr + k_c)), force in F_dynamic k_c/(k_tr + k_c) of F_c.
 Then a slip in the direction + obeys xi''' + 2 zeta xi'' + xi' + 2 zeta gamma xi = 0 for
-xi = F_c - F_des, and the spring force less friction is its xi''.  Beyond gamma = 1 the pair of roots is
+xi = F_c - F_des, and the spring force minus friction is xi''.  Beyond gamma = 1 the pair of roots is
 always complex and grows, so that every slip ends.
 """
 
@@ -34,7 +34,7 @@ class Modes(NamedTuple):
         return self.alpha**2 + self.width**2
 
     def of(self, which: NDArray[np.generic]) -> "Modes":
-        """Those nodes alone."""
+        """A selection of the nodes."""
         return Modes(self.real[which], self.alpha[which], self.width[which])
 
 
@@ -42,7 +42,7 @@ class Standstill(NamedTuple):
     """End of each slip, arrays (n,).
 
     `error` is xi, `acceleration` xi'' (zero or less); `pair` and `real` are the sizes of the growing
-    and of the real mode when the slip began.
+    and of the real mode at the start of the slip.
     """
 
     error: Array
@@ -76,8 +76,8 @@ def slip(nodes: Modes, error: Array, acceleration: Array) -> Standstill:
     Parameters
     ----------
     nodes : n nodes.
-    error : (n,), xi at its beginning.
-    acceleration : (n,), xi'' at its beginning, zero or more.
+    error : (n,), xi at the start.
+    acceleration : (n,), xi'' at the start, zero or more.
     """
     lam, alpha, w = nodes.real, nodes.alpha, nodes.width
     real = (acceleration + nodes.square * error) / nodes.apart
@@ -99,9 +99,9 @@ def slip(nodes: Modes, error: Array, acceleration: Array) -> Standstill:
 def _stops(beta: Array, width: Array, p: Array, q: Array) -> Array:
     """First time above zero at which h = -p e^(-beta t) + p cos(w t) + q sin(w t), v e^(-alpha t), is zero.
 
-    h e^(beta t) has its minima one turn apart, each deeper than the one before.  The one before the
-    beginning is not above zero, since v rises from there to zero: the next one is negative, and the zero
-    lies between it and the maximum before.
+    The minima of h e^(beta t) are one turn apart, each deeper than the last.  The one before the start is not
+    above zero, since v rises from there to zero: the next one is negative, and the zero lies between it and
+    the preceding maximum.
     """
     size = np.hypot(p, q)
     lag = np.arctan(beta / width)
@@ -116,7 +116,7 @@ def _stops(beta: Array, width: Array, p: Array, q: Array) -> Array:
 
 
 def _falling_zero(wave: tuple[Array, Array, Array, Array, Array], t: Array, low: Array, high: Array) -> Array:
-    """Zero of a e^(-beta t) + A cos(w t - phi) that falls from low to high: Newton kept in the bracket."""
+    """Zero of a e^(-beta t) + A cos(w t - phi), which falls from low to high, by Newton within the bracket."""
     for _ in range(80):
         a, size, beta, width, phase = wave
         e = a * np.exp(-beta * t)

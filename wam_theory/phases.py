@@ -1,7 +1,7 @@
-"""Phases of stick and slip one after the other, each from the closed form of the one before.
+"""Successive phases of stick and slip, each from the closed form of the last one.
 
 The motor is velocity-controlled; friction is F_dynamic against the motion and up to F_static at rest.
-While the sign of the velocity stands, or the node sticks, the model is linear.
+While the sign of the velocity is constant, or the node sticks, the model is linear.
 """
 
 import math
@@ -12,14 +12,14 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
-from wam_theory.friction_model import ForceLoop, FrictionNode, require
+from wam_theory.friction_model import FrictionNode, IntegralLoop, require
 from wam_theory.slip_arc import Arc, Zone, arc_from, crossing, cubic_roots, first_stop, quadratic_roots, state_after
 
 _INF = math.inf
 
 
 class Kind(StrEnum):
-    """What happens at an event."""
+    """Kind of an event."""
 
     START = "start"
     SLIP = "slip"
@@ -30,14 +30,14 @@ class Kind(StrEnum):
 
 
 class Model(NamedTuple):
-    """Node and loop prepared for one desired force."""
+    """Node and loop for one desired force."""
 
     node: FrictionNode
-    loop: ForceLoop
+    loop: IntegralLoop
     force: float
     breaks: tuple[float, ...]  # positions where the zone changes, between -inf and inf
     zones: tuple[Zone, ...]  # zones[i] lies between breaks[i] and breaks[i + 1]
-    self_similar: float  # largest error within which a stuck Coulomb response only scales, N m
+    self_similar: float  # largest error up to which a stuck Coulomb response scales with the error, N m
 
     def contact_force(self, x: float) -> float:
         """F_c at x, N m."""
@@ -51,12 +51,12 @@ class Model(NamedTuple):
         return x + balance / node.transmission_stiffness
 
 
-def prepared(node: FrictionNode, loop: ForceLoop, force: float) -> Model:
+def prepared(node: FrictionNode, loop: IntegralLoop, force: float) -> Model:
     """Node and loop for one desired force: zones of x, with the roots of each.
 
     Parameters
     ----------
-    node, loop : what is simulated.
+    node, loop : to simulate.
     force : F_des, N m.
     """
     require("force", force, at_least=-1e300)
@@ -93,11 +93,11 @@ def prepared(node: FrictionNode, loop: ForceLoop, force: float) -> Model:
 
 
 class _Hold:
-    """Sampled law: what the motor is told from one sample instant to the next."""
+    """Sampled law: the motor command, constant between two samples."""
 
     __slots__ = ("loop", "number", "pipeline", "rate")
 
-    def __init__(self, loop: ForceLoop, error: float) -> None:
+    def __init__(self, loop: IntegralLoop, error: float) -> None:
         self.loop = loop
         self.pipeline = deque([0.0] * loop.delay_samples)
         self.number = -1
@@ -114,7 +114,7 @@ class _Hold:
         return (self.number + 1) * self.loop.sample_period
 
     def steady(self, error: float) -> bool:
-        """Whether the samples to come change nothing while the error stays."""
+        """Whether further samples change nothing at this error."""
         effective = self.loop.effective_error(error)
         return self.rate == self.loop.gain * effective and all(e == effective for e in self.pipeline)
 
@@ -127,7 +127,7 @@ Phase = tuple[float, Kind, int, int, float, float, float, float, float]
 
 
 def phases_of(model: Model, start: tuple[float, float, float]) -> Iterator[Phase]:
-    """Phases one after the other, until one lasts for ever.
+    """Successive phases, until one lasts indefinitely.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def _wait(node: FrictionNode, rate: float, spring: float) -> float:
 
 
 def _slip_end(arc: Arc, sign: int, from_rest: bool, edge: float, sample: float) -> tuple[Kind, float]:
-    """What ends a slip (STICK stands for a standstill), and after what time; infinite if nothing does."""
+    """Event that ends a slip (STICK for any standstill), and its time, s; infinite without one."""
     cause, end = Kind.STICK, first_stop(arc, sign, from_rest, sample)
     if sample < end:
         cause, end = Kind.SAMPLE, sample

@@ -1,4 +1,4 @@
-"""What an inertial node with Coulomb friction does under integral force control, by gamma and zeta (section 5.5).
+"""Behaviour of an inertial node with Coulomb friction under integral force control, by gamma and zeta (section 5.5).
 
 Symbols, shapes and units as in `linear_loop`.  With integral control alone, a bilateral contact and
 a continuous loop the behaviour after a slip from stick depends on gamma and zeta only:
@@ -6,13 +6,13 @@ a continuous loop the behaviour after a slip from stick depends on gamma and zet
 | gamma | Psi | behaviour |
 |---|---|---|
 | below gamma_a | 0 | the slip creeps to F_des and never stops; no cycle of x_m |
-| gamma_a to gamma_b | below 0 | stairs from one side, equal in time and geometric in height; no cycle of x_m |
-| gamma_b to gamma_III | 0 to 1 | overshoots, each half cycle Psi times the one before; x_m cycles (5.20) |
+| gamma_a to gamma_b | below 0 | stairs from one side, equal times, geometric heights; no cycle of x_m |
+| gamma_b to gamma_III | 0 to 1 | overshoots, each half cycle Psi times the last; x_m cycles (5.20) |
 | above gamma_III | above 1 | every step diverges (domain III) |
 
 Independently of that, the linear loop is stable below gamma = 1 (domain I: every step is stable), and
 between 1 and gamma_III (domain II) a step is stable only if it is small.  The order
-gamma_a < gamma_b < 1 < gamma_III holds for zeta above 0.1372 alone: for a lighter damped node gamma_b
+gamma_a < gamma_b < 1 < gamma_III holds for zeta above 0.1372 only: for a less damped node gamma_b
 lies in domain II (zeta = 0.05: gamma_b = 2.51, gamma_III = 7.85), and the whole of domain I has no
 cycle of x_m.  From zeta = sqrt(3)/2 on gamma_b is gamma_a.
 """
@@ -29,10 +29,9 @@ from wam_theory.half_cycle import half_cycle
 def psi(gamma: ArrayLike, zeta: ArrayLike) -> Array:
     """Psi of (5.18), the LATER half-cycle amplitude over the EARLIER one, exactly; below 1 is stable, (5.17).
 
-    Errors of F_c at the standstill after a slip and at its breakaway, with the sign turned: negative
-    where the slip stops short of F_des, 0 where it creeps there for ever (below gamma_a).  Holds with
-    Coulomb friction for every slip that begins from stick, whatever the error.  The print has the
-    ratio upside down.
+    Negative ratio of the errors of F_c at the standstill after a slip and at its breakaway: below 0 if the
+    slip stops short of F_des, 0 if it creeps there without end (below gamma_a).  Holds with Coulomb friction
+    for every slip from stick and every error.  The print has the inverse ratio.
 
     Parameters
     ----------
@@ -48,7 +47,7 @@ def gamma_a(zeta: ArrayLike) -> Array:
     """Value of gamma below which a slip creeps to F_des and never stops; not in print.
 
     Exact for every zeta: 1/3 - 8 zeta^2/27, where the real mode of (5.14) is as fast as the pair; above
-    zeta = sqrt(3)/2, where the pair first has to become complex, with ((4 zeta^2/3 - 1)/3)^(3/2)/zeta more.
+    zeta = sqrt(3)/2, where the pair is real at first, plus ((4 zeta^2/3 - 1)/3)^(3/2)/zeta.
 
     Parameters
     ----------
@@ -85,7 +84,7 @@ def gamma_3(zeta: ArrayLike) -> Array:
 
 
 def _gamma_at(ratio: float, zeta: ArrayLike) -> Array:
-    """Value of gamma where Psi has a value; Psi rises with gamma above gamma_a."""
+    """Value of gamma at which Psi is `ratio`; Psi rises with gamma above gamma_a."""
     (z,) = above_zero(zeta=zeta)
     starts = gamma_a(z)
     found = [_root(ratio, a, b) for a, b in zip(starts.ravel().tolist(), z.ravel().tolist(), strict=True)]
@@ -117,12 +116,12 @@ def point_b(zeta: ArrayLike, transmission_stiffness: ArrayLike = 1.0, contact_st
     """F_friction/F_error of point B of figure 5.8: above it a step is friction-dominated up to gamma_III.
 
     At gamma_III the first slip just ends in stick: J_l |x''| = 2 F_friction there.  Not in print;
-    1.356 for zeta = 0.25 and equal stiffnesses, in proportion to (k_tr + k_c)/(2 k_c) for others.
+    1.356 for zeta = 0.25 and equal stiffnesses, proportional to (k_tr + k_c)/(2 k_c).
 
     Parameters
     ----------
     zeta : (5.12), above zero.
-    transmission_stiffness, contact_stiffness : N m/rad, above zero; their ratio counts.
+    transmission_stiffness, contact_stiffness : N m/rad, above zero; only their ratio matters.
     """
     ktr, kc = above_zero(transmission_stiffness=transmission_stiffness, contact_stiffness=contact_stiffness)
     z, share = np.broadcast_arrays(np.asarray(zeta, dtype=float), (ktr + kc) / (2.0 * kc))
@@ -140,20 +139,20 @@ def spin_up_time(
     gamma: ArrayLike,
     zeta: ArrayLike,
 ) -> Array:
-    """Time that the node sticks after a slip, tau_spinup, s: its limit for small errors is (5.19).
+    """Time for which the node sticks after a slip, tau_spinup, s: its limit for small errors is (5.19).
 
-    (5.3) from the spring force in which the slip ends.  For Psi above 0 that is
+    (5.3) from the spring force at the end of the slip.  For Psi above 0 that is
     (2 F - u |e|)/(G_I k_tr Psi |e|), u the deceleration at the end of the slip, in units of the error,
-    times ks/k_c: it grows as 1/|e| and has no bound, as (5.19) says.  For Psi below 0, of which the print
-    says nothing, it is u/(G_I k_tr |Psi|), the same for every step of the stairs.  Coulomb friction;
-    exact.  Zero where the node does not stick, |e| u above 2 F; infinite where the slip creeps for ever.
+    times ks/k_c: it grows as 1/|e| without bound, as in (5.19).  For Psi below 0, which the print does not
+    treat, it is u/(G_I k_tr |Psi|), the same for every step of the stairs.  Coulomb friction;
+    exact.  Zero if the node does not stick, |e| u above 2 F; infinite if the slip creeps without end.
 
     Parameters
     ----------
     gain : G_I, rad/s/(N m), above zero.
     transmission_stiffness, contact_stiffness : N m/rad, above zero.
     friction : F_friction, N m, above zero.
-    error : F_error when the slip began, N m, not zero.
+    error : F_error at the start of the slip, N m, not zero.
     gamma, zeta : (5.15), (5.12), above zero.
     """
     g, ktr, kc, f = above_zero(
@@ -175,9 +174,9 @@ def spin_up_time(
 def actuator_cycle(friction: ArrayLike, transmission_stiffness: ArrayLike, gamma: ArrayLike, zeta: ArrayLike) -> Array:
     """Limit cycle of x_m, PEAK TO PEAK, rad, (5.20): 2 F_friction/k_tr, once F_c has settled.
 
-    Coulomb friction.  The print calls it amplitude and gives no range: it exists where a slip
-    overshoots and shrinks, 0 < Psi < 1, gamma_b to gamma_III (from gamma = 1 on only for steps that
-    are stable).  Elsewhere the result is 0 (below: one-sided, no cycle) or infinite (above: diverges).
+    Coulomb friction.  The print calls it amplitude and gives no range: it exists if a slip overshoots with a
+    smaller error, 0 < Psi < 1, gamma_b to gamma_III (above gamma = 1 only for stable steps).  Below this
+    range the result is 0 (one-sided, no cycle), above it infinite (diverges).
 
     Parameters
     ----------
@@ -194,7 +193,7 @@ def actuator_cycle(friction: ArrayLike, transmission_stiffness: ArrayLike, gamma
 def actuator_cycle_work(friction: ArrayLike, transmission_stiffness: ArrayLike) -> Array:
     """Work that the actuator cycle dissipates per half cycle, N m, (5.21) corrected: F^2/(2 k_tr).
 
-    What the spring holds at breakaway; twice that is printed, which (5.22) contradicts.
+    The energy of the spring at breakaway; the print has twice that, which contradicts (5.22).
 
     Parameters
     ----------
@@ -209,8 +208,8 @@ def actuator_cycle_work(friction: ArrayLike, transmission_stiffness: ArrayLike) 
 def actuator_cycle_power(gain: ArrayLike, error: ArrayLike, friction: ArrayLike) -> Array:
     """Power of the actuator cycle averaged over a half cycle, W, (5.22): G_I |e| F_friction/4.
 
-    Work (5.21) over the time 2 F_friction/(G_I k_tr |e|) from one breakaway to the other; the slip's
-    own time is neglected, which holds once e is small.
+    Work (5.21) over the time 2 F_friction/(G_I k_tr |e|) from one breakaway to the other; the time
+    of the slip itself is neglected, which holds for small e.
 
     Parameters
     ----------

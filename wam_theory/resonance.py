@@ -1,4 +1,4 @@
-"""Open-loop bandwidth of a transmission, of position and of force, and the stiffness that is best for it (chapter 4).
+"""Open-loop bandwidth of position and force of a transmission, and the best stiffness for it (chapter 4).
 
 Motor J_m, cable k_tr seen at the motor, reducer N at the joint, link J_l, contact k_c at the joint; no
 damping.  All arguments broadcast, results have the shape they broadcast to; SI with radians, or any
@@ -35,7 +35,7 @@ def position_transfer(
 ) -> Complex:
     """Transfer function x_l/x_m of a position-controlled motor, (4.2), and for N = 1 the second (4.1).
 
-    N k_tr/(J_l s^2 + N^2 k_tr), 1/N for slow motion; the print has N^2 k_tr above, which is x_l N/x_m.
+    N k_tr/(J_l s^2 + N^2 k_tr), 1/N for slow motion; the print has N^2 k_tr in the numerator, which is x_l N/x_m.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ def position_transfer(
 def position_bandwidth(link_inertia: ArrayLike, transmission_stiffness: ArrayLike, ratio: ArrayLike) -> Array:
     """Resonance of (4.2), rad/s: N sqrt(k_tr/J_l); with the reducer at the motor it is that of N = 1.
 
-    So a reducer at the joint gives N times the bandwidth for equal k_tr; for equal stress in the lines
-    it is less, `bandwidth_by_place`.
+    A reducer at the joint gives N times the bandwidth for equal k_tr; for equal stress in the lines the factor
+    is smaller, `bandwidth_by_reducer_position`.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ def position_bandwidth(link_inertia: ArrayLike, transmission_stiffness: ArrayLik
     return n * np.sqrt(ktr / jl)
 
 
-def bandwidth_by_place(ratio: ArrayLike, length: ArrayLike, distance: ArrayLike) -> Array:
+def bandwidth_by_reducer_position(ratio: ArrayLike, length: ArrayLike, distance: ArrayLike) -> Array:
     """Position bandwidth with the reducer part of the way over that with it at the motor, at constant stress.
 
     Square root of the stiffnesses `cable.stiffness_with_reducer`: sqrt(N L/(N L + C (1 - N))), which is
-    sqrt(N) for a reducer at the joint; the factor N of section 4.2 supposes that both lines have one
-    k_tr.  Not in print.
+    sqrt(N) for a reducer at the joint; the factor N of section 4.2 assumes the same k_tr for both lines.
+    Not in print.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def force_transfer(
     """Transfer function F_c/F_m from motor torque to contact force, (4.3).
 
     N k_tr k_c/(J_m J_l s^4 + (J_m k_c + J_l k_tr + N^2 J_m k_tr) s^2 + k_tr k_c); the print has no N
-    above, without which a motor at rest would not be boosted.
+    in the numerator, which is the torque amplification at rest.
 
     Parameters
     ----------
@@ -116,8 +116,8 @@ def force_resonances(
 ) -> Resonances:
     """Resonances of motor, cable, link and contact, undamped, (4.4).
 
-    Roots of the denominator of `force_transfer`.  The lower root is taken as 2c/(B + sqrt(B^2 - 4c)):
-    the printed form loses its digits to cancellation.
+    Roots of the denominator of `force_transfer`.  The lower root is computed as 2c/(B + sqrt(B^2 - 4c)),
+    without the cancellation of the printed form.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def force_resonances(
     Raises
     ------
     ValueError
-        where an argument is not above zero.
+        if an argument is not above zero.
     """
     jm, jl, ktr, kc, n = _parts(motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio)
     b = kc / jl + ktr / jm + n * n * ktr / jl
@@ -142,10 +142,10 @@ def force_resonances(
 def soft_contact_bandwidth(
     motor_inertia: ArrayLike, link_inertia: ArrayLike, contact_stiffness: ArrayLike, ratio: ArrayLike
 ) -> Array:
-    """Lower resonance as the contact gets soft, rad/s, (4.5): sqrt(k_c/(J_l + N^2 J_m)), which goes to 0.
+    """Lower resonance for a soft contact, rad/s, (4.5): sqrt(k_c/(J_l + N^2 J_m)), which goes to 0.
 
     Link and reflected rotor on the contact, which is also the limit of a stiff transmission and an upper
-    bound of omega_1 for every k_tr.  The print states the limit 0 alone.
+    bound of omega_1 for every k_tr.  The print has the limit 0 only.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def soft_contact_bandwidth(
 
 
 def hard_contact_bandwidth(motor_inertia: ArrayLike, transmission_stiffness: ArrayLike) -> Array:
-    """Lower resonance as the contact gets hard, rad/s, (4.6): sqrt(k_tr/J_m), the rotor on its cable.
+    """Lower resonance for a hard contact, rad/s, (4.6): sqrt(k_tr/J_m), the rotor on its cable.
 
     Upper bound of omega_1 for every k_c and N; the asymptote of section 4.4, where J_t is printed for J_m.
 
@@ -176,9 +176,9 @@ def small_ratio_resonances(
     transmission_stiffness: ArrayLike,
     contact_stiffness: ArrayLike,
 ) -> SmallRatioResonances:
-    """Resonances as N vanishes, rad/s, (4.7), the curves of figure 4.9.b; omega_1 is the lower of the two.
+    """Resonances for small N, rad/s, (4.7), the curves of figure 4.9.b; omega_1 is the lower of the two.
 
-    The print gives their squares.  N far below N_m.
+    The print has their squares.  N far below N_m.
 
     Parameters
     ----------
@@ -195,9 +195,9 @@ def small_ratio_resonances(
 
 
 def large_ratio_bandwidth(motor_inertia: ArrayLike, contact_stiffness: ArrayLike, ratio: ArrayLike) -> Array:
-    """Lower resonance as N grows, rad/s, (4.8): sqrt(k_c/J_m)/N, which goes to 0.  N far above N_m.
+    """Lower resonance for large N, rad/s, (4.8): sqrt(k_c/J_m)/N, which goes to 0.  N far above N_m.
 
-    The print states the limit 0 alone.
+    The print has the limit 0 only.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def best_contact_stiffness(
 ) -> Array:
     """Contact stiffness where the curves of (4.7) cross, N m/rad, (4.9): k_tr J_l/J_m.  N far below N_m.
 
-    What it gives for any other N: `fraction_at_crossover`.
+    Its effect for any other N: `fraction_at_crossover`.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def best_contact_stiffness(
 
 
 def fraction_at_crossover(ratio: ArrayLike, matched: ArrayLike) -> Array:
-    """Share of the asymptote (4.6) that omega_1 has with the contact stiffness (4.9), for any N; not in print.
+    """omega_1 over its asymptote (4.6) at the contact stiffness (4.9), for any N; not in print.
 
     sqrt(1 - u), u = (v sqrt(v^2 + 4) - v^2)/2, v = N/N_m: 1 for small N, 0.62 for N = N_m.
 
@@ -257,9 +257,9 @@ def contact_stiffness_for(
     transmission_stiffness: ArrayLike,
     ratio: ArrayLike,
 ) -> Array:
-    """Contact stiffness that gives a share f of the asymptote (4.6), N m/rad, for any N.
+    """Contact stiffness for a fraction f of the asymptote (4.6), N m/rad, for any N.
 
-    f^2 k_tr (J_l/J_m + N^2/(1 - f^2)), what section 4.3.2 leaves to numerical solution; for N = 0 and
+    f^2 k_tr (J_l/J_m + N^2/(1 - f^2)), which section 4.3.2 leaves to numerical solution; for N = 0 and
     f = 1 it is (4.9).  Not in print.
 
     Parameters
@@ -295,7 +295,7 @@ def transmission_stiffness_for(
     contact_stiffness: ArrayLike,
     ratio: ArrayLike,
 ) -> Array:
-    """Transmission stiffness that gives a share f of what a rigid one would, N m/rad, for any N.
+    """Transmission stiffness for a fraction f of the bandwidth of a rigid one, N m/rad, for any N.
 
     omega_1 is then f sqrt(k_c/M), M = J_l + N^2 J_m, for k_tr = k_c f^2 J_m (M - f^2 J_l)/((1 - f^2) M^2);
     for N = 0 and f = 1 it is (4.10).  Not in print.

@@ -1,9 +1,9 @@
-"""A slip in closed form, and the exact time of what ends it.
+"""A slip in closed form, and the exact time of its end.
 
-While the sign of the velocity stands the model of `friction_model` is linear: x(t) comes from the roots
-of the cubic (5.14), or of the quadratic where x_m moves at a constant rate.  No event can be missed:
-extremes of the velocity, divided by its real mode, are known, so its first zero is bracketed between
-two of them, and until then x is monotone, which brackets every switch at a position.
+While the sign of the velocity is constant the model of `friction_model` is linear: x(t) follows from the
+roots of the cubic (5.14), or of the quadratic if x_m moves at a constant rate.  No event can be missed:
+the extremes of the velocity divided by its real mode are known and bracket its first zero; until then x is
+monotone, which brackets every switch at a position.
 """
 
 import math
@@ -24,9 +24,9 @@ class Roots(NamedTuple):
 
 
 def cubic_roots(c2: float, c1: float, c0: float) -> Roots:
-    """Roots of s^3 + c2 s^2 + c1 s + c0, c0 > 0; of three real ones the one that stands apart is `real`.
+    """Roots of s^3 + c2 s^2 + c1 s + c0, c0 > 0; of three real ones `real` is the outlying one.
 
-    At a triple root c0 is moved by 1e-12 of itself: the modal form needs distinct roots.
+    At a triple root c0 is changed by a factor 1 + 1e-12: the modal form needs distinct roots.
 
     Parameters
     ----------
@@ -91,14 +91,14 @@ class Arc(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """A range of x where contact and law keep their form."""
+    """A range of x with one contact and one control law."""
 
     roots: Roots
     linear: bool  # x_m' = gain k_c (target - x), else x_m' = rate
     target: float
     rate: float
     contact: float  # k_c, 0 out of contact
-    ramp: float  # v of the node for x_m' = 1, once it follows
+    ramp: float  # steady v of the node for x_m' = 1
 
 
 def arc_from(zone: Zone, rate: float, x: float, v: float, acceleration: float) -> Arc:
@@ -106,9 +106,9 @@ def arc_from(zone: Zone, rate: float, x: float, v: float, acceleration: float) -
 
     Parameters
     ----------
-    zone : where it begins.
+    zone : of the start.
     rate : of x_m, unless the zone is linear.
-    x, v, acceleration : at its beginning.
+    x, v, acceleration : at the start.
     """
     lam, alpha, square, width, apart = zone.roots
     if zone.linear:
@@ -152,21 +152,21 @@ def state_after(arc: Arc, t: float) -> tuple[float, float, float]:
 
 
 def first_stop(arc: Arc, sign: int, from_rest: bool, horizon: float = _INF) -> float:
-    """First time at which v, of this sign at first, is zero; infinite where it never is.
+    """First zero of v, which has this sign at the start, s; infinite without one.
 
-    Beyond the horizon any time beyond it will do.
+    Beyond the horizon the result is only known to be beyond it.
 
     Parameters
     ----------
     arc : of the slip.
     sign : of the motion.
-    from_rest : whether v is zero at first.
+    from_rest : whether v is zero at the start.
     horizon : s.
 
     Notes
     -----
-    g = sign v e^(-lam t) = sign a + e^(beta t) R cos(w t - phi) has its minima one turn apart, and
-    the least or the first negative one is known: the zero lies between it and the maximum before.
+    The minima of g = sign v e^(-lam t) = sign a + e^(beta t) R cos(w t - phi) are one turn apart, and the
+    least or the first negative one is known: the zero lies between it and the preceding maximum.
     """
     if arc.square >= 0.0:
         return _first_stop_overdamped(arc, sign, from_rest, horizon)
@@ -181,7 +181,7 @@ def first_stop(arc: Arc, sign: int, from_rest: bool, horizon: float = _INF) -> f
     phase = math.atan2(q, p)
     since = (-phase - lag - (math.pi if sign > 0 else 0.0)) % _TURN  # phase since the last minimum
     if from_rest and since > 0.75 * _TURN:
-        since -= _TURN  # at rest it can only rise: this is the minimum itself
+        since -= _TURN  # from rest v can only rise: this is the minimum itself
     high = (_TURN - since) / width
     if since < math.pi:
         low = (math.pi - since) / width
@@ -204,7 +204,7 @@ def first_stop(arc: Arc, sign: int, from_rest: bool, horizon: float = _INF) -> f
 
 
 def _falling_zero(wave: tuple[float, float, float, float, float], t: float, low: float, high: float) -> float:
-    """Zero of a + e^(beta t) A cos(w t - phi) that falls from low to high: Newton kept in the bracket."""
+    """Zero of a + e^(beta t) A cos(w t - phi), which falls from low to high, by Newton within the bracket."""
     a, amplitude, beta, width, phase = wave
     exp, cos, sin = math.exp, math.cos, math.sin
     close = 1e-13 * high
@@ -268,7 +268,7 @@ def crossing(arc: Arc, sign: int, position: float, end: float) -> float:
     ----------
     arc : of the slip.
     sign : of the motion.
-    position : x that is waited for.
+    position : x at the crossing.
     end : of the slip, s.
     """
     if end == _INF:

@@ -1,10 +1,10 @@
 """Stability map of figure 5.8: the largest stable step of many force loops at once, by exact events.
 
-What a stuck node does next depends on its error alone, so that a response is a chain of maps from the
-error at one breakaway to that at the next, with one slip between them or, where friction cannot hold
-the node, several reversals.  The boundary is the unstable fixed point of that map, or the error from
-which the node never sticks again.  The exact slips are those of `many_slips`; `largest_stable_step` finds
-the same for one node by following its response to the end.
+The motion after a stick depends on its error only, so a response is a sequence of maps from the error at
+one breakaway to that at the next, with one slip between them or, if friction cannot hold the node, several
+reversals.  The boundary is the unstable fixed point of that map, or the error from which the node never
+sticks again.  The exact slips are those of `many_slips`; `largest_stable_step` computes the same for one
+node by simulation of its response.
 """
 
 import math
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wam_theory.many_slips import Array, Modes, modes, slip
 
-_FIRST = 1e-3  # step from which a stiction cycle is looked for, of the friction
+_FIRST = 1e-3  # of the friction, first step in the search for a stiction cycle
 _ROUNDS = 200  # slips within which a cycle is found or the response diverges, with stiction
 
 
@@ -24,28 +24,28 @@ def largest_stable_steps(
 ) -> Array:
     """F_error/F_dynamic of the largest step from unstressed rest that does not diverge (figure 5.8).
 
-    One over it is the ordinate of the figure, where k_tr = k_c.  Up to the Routh limit it is infinite:
+    The ordinate of the figure, for k_tr = k_c, is its inverse.  Up to the Routh limit it is infinite:
     friction is bounded, and a bounded input cannot make a stable loop diverge.  With stiction the steps
-    below it end in a limit cycle (section 5.5.4).  Bisection of the response of all nodes at once, which
-    supposes that every smaller step is stable too.
+    below it end in a limit cycle (section 5.5.4).  By bisection for all nodes at once, on
+    the assumption that every smaller step is stable, too.
 
     Parameters
     ----------
     gamma : J_l G_I K/b of (5.15), above zero.
     zeta : (5.12), above zero.
-    stiffness_ratio : k_tr/k_c, above zero; the result goes with k_c/(k_tr + k_c).
+    stiffness_ratio : k_tr/k_c, above zero; the result is proportional to k_c/(k_tr + k_c).
     stiction : F_static/F_dynamic, at least 1, which is Coulomb friction.
     rtol : relative, of the result.
 
     Returns
     -------
     Array
-        of the shape they broadcast to; 0 where every step diverges (domain III).
+        of the shape the arguments broadcast to; 0 if every step diverges (domain III).
 
     Raises
     ------
     ValueError
-        where an argument is out of its range.
+        if an argument is out of its range.
     """
     given = {"gamma": gamma, "zeta": zeta, "stiffness_ratio": stiffness_ratio, "stiction": stiction, "rtol": rtol}
     for name, value in given.items():
@@ -68,12 +68,12 @@ class _Nodes(NamedTuple):
 
     modes: Modes
     stiction: Array
-    runaway: Array  # size of the growing mode above which it outgrows whatever friction can take
+    runaway: Array  # size of the growing mode above which friction cannot stop its growth
     guess: Array  # largest stable step by the describing function (5.16)
 
     @classmethod
     def of(cls, gamma: Array, zeta: Array, stiction: Array) -> "_Nodes":
-        """Nodes with their thresholds; that of `runaway` is the one of `verdicts`."""
+        """Nodes with their thresholds; `runaway` as in `verdicts`."""
         m = modes(gamma, zeta)
         kick = 2.0 / m.apart
         kick_pair = kick * np.hypot(1.0, (m.alpha - m.real) / m.width)
@@ -85,17 +85,17 @@ class _Nodes(NamedTuple):
         return cls(m, stiction, np.maximum(runaway, 3.0 * stiction / m.square), sine / pair)
 
     def take(self, which: NDArray[np.generic]) -> "_Nodes":
-        """Those nodes alone."""
+        """A selection of the nodes."""
         return _Nodes(self.modes.of(which), self.stiction[which], self.runaway[which], self.guess[which])
 
 
 def _next_errors(nodes: _Nodes, errors: Array) -> Array:
     """Error at the next stick after a breakaway with this one, (n,); infinite where the response diverges.
 
-    It diverges once the growing mode outgrows friction, or has grown by more at each of two slips; where
-    it has shrunk by more at each of two, the error is given as 0.  For near a cycle of reversals the
-    changes of its size are a mu^n + b nu^n with mu > 1 > |nu|, nu from the real mode: two of one sign, the
-    later one greater, have the sign of a.
+    It diverges once friction cannot stop the growing mode, or if the growth of the mode increases over two
+    slips; if its decrease increases over two slips, the error is 0.  Reason: near a cycle of reversals the
+    changes of its size are a mu^n + b nu^n with mu > 1 > |nu|, nu from the real mode; two of the same sign,
+    the later one greater, have the sign of a.
     """
     found = np.full(errors.size, math.inf)
     index = np.arange(errors.size)
@@ -136,7 +136,7 @@ def _boundaries(nodes: _Nodes, rtol: float) -> Array:
 
 
 def _sticking_edge(nodes: _Nodes) -> Array:
-    """Greatest error, nearly, (n,), from which the node still sticks once more before the response diverges."""
+    """Approximately the greatest error, (n,), from which the node sticks again before the response diverges."""
     unit = slip(nodes.modes, -np.ones(nodes.stiction.size), np.zeros(nodes.stiction.size))
     low = np.full(nodes.stiction.size, _FIRST)
     high = 2.0 * np.maximum(nodes.guess, (1.0 + nodes.stiction) / np.abs(unit.acceleration))
@@ -148,18 +148,18 @@ def _sticking_edge(nodes: _Nodes) -> Array:
 
 
 def _stable_steps(nodes: _Nodes) -> Array:
-    """A step of each node that is followed by no greater error, (n,); 0 where there is none.
+    """A step of each node that is not followed by a greater error, (n,); 0 without one.
 
-    With Coulomb friction the smallest tells: within stick the map is a factor.  With stiction small
-    errors grow up to those of the limit cycle, and the step must be above it: a few below the greatest that
-    still sticks are tried, then the errors are followed to where they seem to converge.
+    With Coulomb friction the smallest step decides, because the map is linear while the node sticks.  With
+    stiction small errors grow to those of the limit cycle, and the step must exceed them: first some steps
+    below the greatest that still sticks are tried, then the limit of the growing errors is extrapolated.
     """
     first = np.full(nodes.stiction.size, _FIRST)
     steps = np.where(_next_errors(nodes, first) <= first, first, 0.0)
     left = np.flatnonzero((steps == 0.0) & (nodes.stiction > 1.0))
     edge = _sticking_edge(nodes.take(left))
-    for share in (0.9999, 0.98, 0.93, 0.8, 0.6, 0.3, 0.1):
-        tried = share * edge
+    for fraction in (0.9999, 0.98, 0.93, 0.8, 0.6, 0.3, 0.1):
+        tried = fraction * edge
         held = _next_errors(nodes.take(left), tried) <= tried
         steps[left[held]] = tried[held]
         left, edge = left[~held], edge[~held]
@@ -172,8 +172,8 @@ def _stable_steps(nodes: _Nodes) -> Array:
         with np.errstate(invalid="ignore", divide="ignore"):
             limit = 1.001 * (after + rise * rise / (rises - rise))
         limit = np.where(rise <= 0.0, errors, np.where(rise < rises, limit, math.nan))
-        hope = np.flatnonzero(np.isfinite(limit))
-        settles = hope[_next_errors(nodes.take(hope), limit[hope]) <= limit[hope]]
+        candidates = np.flatnonzero(np.isfinite(limit))
+        settles = candidates[_next_errors(nodes.take(candidates), limit[candidates]) <= limit[candidates]]
         steps[index[settles]] = limit[settles]
         on = np.flatnonzero((steps[index] == 0.0) & np.isfinite(after))
         if not on.size:

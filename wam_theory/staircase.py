@@ -22,27 +22,27 @@ class Staircase(NamedTuple):
 def inertialess_staircase(node: FrictionNode, gain: float, force: float, jumps: int) -> Staircase:
     """Response of a node whose slip is a jump, the limit of (5.11): a staircase, then the cycle of (5.8), (5.9).
 
-    In a jump the motor stands still and F_c moves by Omega dF k_c/(k_tr + k_c); the node then sticks
-    until (5.3) has passed.  From unstressed rest.  The cycle keeps the asymmetry with which it
-    begins; only the motor's motion during a slip makes it symmetric.
+    During a jump the motor is at rest and F_c changes by Omega dF k_c/(k_tr + k_c); the node then sticks
+    for (5.3).  From unstressed rest.  The cycle keeps its initial asymmetry; only motion of the motor
+    during a slip makes it symmetric.
 
     Parameters
     ----------
-    node : with F_static above F_dynamic; inertia and damping count through zeta (5.12) alone.
+    node : with F_static above F_dynamic; inertia and damping enter through zeta (5.12) only.
     gain : G_I.
     force : F_des, N m.
-    jumps : how many; fewer are returned where F_c meets F_des exactly.
+    jumps : number; fewer are returned if F_c meets F_des exactly.
 
     Raises
     ------
     ValueError
-        with Coulomb friction, where nothing jumps: the response is (5.2) after the delay (5.3).
+        with Coulomb friction, which has no jumps: the response is (5.2) after the delay (5.3).
     """
     require("gain", gain, above=0.0)
     difference = node.static_friction - node.dynamic_friction
     if not difference > 0.0:
         raise ValueError(
-            f"static_friction is {node.static_friction}, not above dynamic_friction: nothing jumps; "
+            f"static_friction is {node.static_friction}, not above dynamic_friction: there are no jumps; "
             "the response is (5.2) after the delay (5.3)"
         )
     ks = node.transmission_stiffness + node.contact_stiffness

@@ -2,8 +2,8 @@
 
     J x'' = k_tr (x_m - x) - F_c - b x' - friction,    F_c = k_c x,    x_m' = G_I F_error
 
-Parameters are in `friction_model`, closed forms in `slip_arc`, events in `phases`, judgement in
-`verdicts`, many steps at once in `stability_map`; what simulates one response is imported from here.
+Parameters are in `friction_model`, closed forms in `slip_arc`, events in `phases`, verdicts in
+`verdicts`, many steps at once in `stability_map`; the functions for one response are imported from here.
 Units are free but consistent (N, m, s or N m, rad, s).
 """
 
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wam_theory.friction_model import ForceLoop, FrictionNode, require
+from wam_theory.friction_model import FrictionNode, IntegralLoop, require
 from wam_theory.half_cycle import HalfCycle, half_cycle
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
 from wam_theory.slip_arc import arc_from, state_after
@@ -24,9 +24,9 @@ from wam_theory.verdicts import Outcome, Verdict, assess, largest_stable_step
 
 __all__ = [
     "Event",
-    "ForceLoop",
     "FrictionNode",
     "HalfCycle",
+    "IntegralLoop",
     "Kind",
     "Motion",
     "Outcome",
@@ -40,11 +40,11 @@ __all__ = [
     "simulate",
 ]
 
-_HUGE = 1e100  # a response beyond it is not followed further
+_HUGE = 1e100  # rad; the simulation ends beyond it
 
 
 class Event(NamedTuple):
-    """State at the beginning of a phase.
+    """State at the start of a phase.
 
     `sign` is the direction of motion in the phase, 0 while stuck; `contact_force` is F_c, N m.
     """
@@ -69,7 +69,7 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """Exact trajectory up to a time: its events, and the state at any time in between."""
+    """Exact trajectory up to a time: events, and the state at any time in between."""
 
     until: float
     ended: bool
@@ -94,15 +94,15 @@ class Trajectory:
         Raises
         ------
         ValueError
-            where a time is outside.
+            if a time is outside.
         """
-        asked = np.asarray(times, dtype=float)
-        if not np.all((asked >= 0.0) & (asked <= self.until)):
-            raise ValueError(f"times go from {asked.min()} to {asked.max()}; they must lie in 0 to {self.until}")
+        wanted = np.asarray(times, dtype=float)
+        if not np.all((wanted >= 0.0) & (wanted <= self.until)):
+            raise ValueError(f"times go from {wanted.min()} to {wanted.max()}; they must lie in 0 to {self.until}")
         starts = [phase[0] for phase in self._phases]
-        states = [self._at(bisect_right(starts, t) - 1, t) for t in asked.ravel().tolist()]
+        states = [self._at(bisect_right(starts, t) - 1, t) for t in wanted.ravel().tolist()]
         x, v, m, force = np.array(states, dtype=float).reshape(-1, 4).T
-        shape = asked.shape
+        shape = wanted.shape
         return Motion(x.reshape(shape), v.reshape(shape), m.reshape(shape), force.reshape(shape))
 
     def _at(self, index: int, time: float) -> tuple[float, float, float, float]:
@@ -118,7 +118,7 @@ class Trajectory:
 
 def simulate(
     node: FrictionNode,
-    loop: ForceLoop,
+    loop: IntegralLoop,
     force: float,
     until: float,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -128,21 +128,21 @@ def simulate(
 
     Parameters
     ----------
-    node, loop : what is simulated.
+    node, loop : to simulate.
     force : F_des, N m.
     until : s, above zero.
     start : x, v, x_m at time 0; by default at rest with unstressed springs.
-    max_events : after so many, or once x is beyond 1e100, `until` is where they got to.
+    max_events : after this number, or once x is beyond 1e100, the trajectory ends early, at its `until`.
 
     Returns
     -------
     Trajectory
-        `ended` says that the last phase lasts for ever (it rests, or creeps to its target).
+        `ended` : whether the last phase lasts indefinitely (the node rests, or creeps to its target).
 
     Raises
     ------
     ValueError
-        where `until`, `start` or `force` is out of range.
+        if `until`, `start` or `force` is out of range.
     """
     require("until", until, above=0.0)
     if not all(map(math.isfinite, start)):

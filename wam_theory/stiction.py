@@ -1,7 +1,7 @@
-"""A friction node with little inertia: its delay, its steps and its limit cycle (section 5.4).
+"""A friction node with little inertia: delay, steps and limit cycle (section 5.4).
 
-Symbols, shapes and units as in `linear_loop`.  The node is stuck, or jumps while the motor stands
-still, which holds where (5.4), with stiction (5.11), is far below 1.
+Symbols, shapes and units as in `linear_loop`.  The node is stuck, or jumps while the motor is at rest,
+which holds if (5.4), with stiction (5.11), is far below 1.
 """
 
 import math
@@ -20,9 +20,9 @@ def breakaway_delay(
     error: ArrayLike,
     spring_force: ArrayLike = 0.0,
 ) -> Array:
-    """Time that a stuck node waits before it slips, s, (5.3) in general: (F_s - sgn(e) f)/(G_I k_tr |e|).
+    """Time until a stuck node slips, s, (5.3) in general: (F_s - sgn(e) f)/(G_I k_tr |e|).
 
-    The print has f = 0, the first breakaway of an unstressed node.  Exact; infinite for no error.
+    The print has f = 0, the first breakaway of an unstressed node.  Exact; infinite without error.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def breakaway_delay(
 def stuck_motor_speed(gain: ArrayLike, error: ArrayLike) -> Array:
     """Speed of the motor while the node is stuck, rad/s, (5.5): G_I F_error.
 
-    F_c and with it the error stand still; the spring force grows by k_tr times this speed until the
-    node slips, `breakaway_delay`.
+    F_c and the error are constant; the spring force grows by k_tr times this speed until the node slips,
+    `breakaway_delay`.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def stuck_motor_speed(gain: ArrayLike, error: ArrayLike) -> Array:
 
 
 def friction_drop(static_friction: ArrayLike, dynamic_friction: ArrayLike) -> Array:
-    """Static less dynamic friction, dF of (5.7), N m; zero for Coulomb friction.
+    """Static minus dynamic friction, dF of (5.7), N m; zero for Coulomb friction.
 
     Parameters
     ----------
@@ -82,9 +82,8 @@ def slip_force(
 ) -> Array:
     """Change of F_c since a breakaway, N m, (5.6) with damping: dF k_c/ks times a damped swing from 0 to Omega.
 
-    The print has b = 0: dF k_c/ks (1 - cos(sqrt(ks/J_l) t)).  The motor stands still, (5.11) far below
-    1.  From the standstill at pi sqrt(J_l/ks)/sqrt(1 - zeta^2) on the node sticks and F_c stays, which
-    the result does.
+    The print has b = 0: dF k_c/ks (1 - cos(sqrt(ks/J_l) t)).  The motor is at rest, (5.11) far below 1.
+    After the standstill at pi sqrt(J_l/ks)/sqrt(1 - zeta^2) the node sticks, and the result is constant.
 
     Parameters
     ----------
@@ -98,7 +97,7 @@ def slip_force(
     (force,) = finite(drop=drop)
     zeta = damping_ratio(inertia, damping, transmission_stiffness, contact_stiffness)
     if not np.all(zeta < 1.0):
-        raise ValueError(f"damping is {damping!r}; zeta must be below 1 for a slip to swing, and is {zeta.tolist()}")
+        raise ValueError(f"damping is {damping!r}; zeta is {zeta.tolist()}; it must be below 1 for an oscillating slip")
     ktr, kc = np.asarray(transmission_stiffness, dtype=float), np.asarray(contact_stiffness, dtype=float)
     below = np.sqrt(1.0 - zeta * zeta)
     angle = np.minimum(below * np.sqrt((ktr + kc) / np.asarray(inertia, dtype=float)) * t, math.pi)
@@ -109,9 +108,9 @@ def slip_force(
 def inertia_number(
     gain: ArrayLike, inertia: ArrayLike, transmission_stiffness: ArrayLike, contact_stiffness: ArrayLike
 ) -> Array:
-    """Left side of (5.4), G_I K sqrt(J_l/ks): speed of the actuator against that of the node.
+    """Left side of (5.4), G_I K sqrt(J_l/ks): speed of the actuator over that of the node.
 
-    Where it is far below 1 the node is nearly inertialess and (5.2), (5.3) describe Coulomb friction.
+    If it is far below 1, the node is nearly inertialess and (5.2), (5.3) describe Coulomb friction.
 
     Parameters
     ----------
@@ -133,8 +132,8 @@ def stiction_cycle_number(
 ) -> Array:
     """Left side of (5.11): `inertia_number` over sqrt(1 - zeta^2), infinite from zeta = 1 on.
 
-    Far below 1 the cycle of (5.8), (5.9) is certain and has their size.  Its period takes about 0.2 over
-    this number of cycles to get there.
+    Far below 1 the cycle of (5.8), (5.9) occurs with their size.  Its period converges within about 0.2 over
+    this number of cycles.
 
     Parameters
     ----------
@@ -171,7 +170,7 @@ def stiction_cycle_force(
 ) -> Array:
     """Stiction limit cycle of F_c, PEAK TO PEAK, N m, (5.8): Omega dF k_c/(k_tr + k_c).
 
-    The print calls it amplitude.  Where (5.11) is far below 1.
+    The print calls it amplitude.  For (5.11) far below 1.
 
     Parameters
     ----------
@@ -193,8 +192,8 @@ def stiction_cycle_period(
 ) -> Array:
     """Period of the stiction limit cycle, s, (5.9) corrected: 4/(G_I k_tr) ks/k_c (2 F_s/(Omega dF) - 1).
 
-    The print has Omega in front and none inside, which is right for Omega = 1 alone.  Where (5.11) is
-    far below 1 and after the cycle has become symmetric.  Infinite with Coulomb friction.
+    The print has Omega in front and none inside, which is right for Omega = 1 only.  For (5.11)
+    far below 1, once the cycle is symmetric.  Infinite with Coulomb friction.
 
     Parameters
     ----------
@@ -221,9 +220,9 @@ def staircase_number(
     contact_stiffness: ArrayLike,
     drop: ArrayLike,
 ) -> Array:
-    """Left side of (5.13), pi G_I |F_error| sqrt(ks J_l)/(dF sqrt(1 - zeta^2)): travel of motor over that of a slip.
+    """Left side of (5.13), pi G_I |F_error| sqrt(ks J_l)/(dF sqrt(1 - zeta^2)): motor travel over that of a slip.
 
-    Far below 1, and with an error above the size of (5.8), F_c nears F_des in steps of that size whose
+    Far below 1, and with an error above the size of (5.8), F_c approaches F_des in steps of that size whose
     envelope is (5.2).  Infinite from zeta = 1 on, and with Coulomb friction.
 
     Parameters
@@ -247,8 +246,8 @@ def staircase_number(
 def deadband_against_stiction(peak_to_peak: ArrayLike) -> Array:
     """Least deadband at the input of G_I that ends the stiction cycle, N m: half of its size (5.8); not in print.
 
-    Section 5.7 asks for one "large enough": a cycle lies symmetrically about F_des, so that both its
-    standstills fall into the deadband once that reaches half of the peak to peak on each side.
+    Section 5.7 requires one "large enough": the cycle is symmetric about F_des, so that both standstills lie
+    in the deadband if it is at least half of the peak to peak.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""Power, speed and place across pulleys that a stretching cable drives (chapter 6).
+"""Power, speed and angle of pulleys driven by an elastic cable (chapter 6).
 
 A cable of stiffness per length EA enters and leaves each pulley at one radius, sticks where it
 enters and slips before it leaves.  T1, V1 belong to the loose strand, T2, V2 to the tight one.
 Arguments broadcast, results have the shape they broadcast to; SI with radians, or any consistent
-units.  Cables as springs, and what a stage loses as a share: `cable`.
+units.  Cables as springs, and the relative loss of a stage: `cable`.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def speed_ratio(loose: ArrayLike, tight: ArrayLike, ea: ArrayLike) -> Array:
     """V2/V1, speed of the tight over that of the loose strand, (6.3): (1 + T2/EA)/(1 + T1/EA).
 
     Exact by conservation of mass; 1 + (T2 - T1)/EA of (6.4) is its first order, `cable.stage_loss`.
-    Its inverse is the exact efficiency, of which (6.14) is the first order.
+    Its inverse is the exact efficiency, with (6.14) as its first order.
 
     Parameters
     ----------
@@ -53,18 +53,18 @@ def control_volume_loss(
 ) -> Array:
     """Heat that leaves a control volume around the driven pulley, W, (6.5).
 
-    Power of the strands less that of the shaft and less strain, kinetic and gravity energy carried
+    Power of the strands minus that of the shaft and minus strain, kinetic and gravity energy carried
     away.  Steady state; as printed it is right to the first order of the strain, because the strain
     energy is counted per stretched length.
 
     Parameters
     ----------
-    shaft_power : tau_b theta_b' given to the load, W.
-    loose, tight : T1 of the strand that enters, T2 of the one that leaves, N, zero or more.
+    shaft_power : tau_b theta_b' of the load, W.
+    loose, tight : T1 of the entering, T2 of the leaving strand, N, zero or more.
     loose_speed, tight_speed : V1, V2, m/s.
     ea : E A, N, above zero.
     line_density : rho A, kg/m, zero or more.
-    rise : z2 - z1, of the leaving over the entering strand, m.
+    rise : z2 - z1, leaving minus entering strand, m.
     gravity : g, m/s^2, zero or more.
     """
     t1, t2 = _strands(loose, tight)
@@ -77,7 +77,7 @@ def control_volume_loss(
 
 
 def kinetic_number(line_density: ArrayLike, speed: ArrayLike, difference: ArrayLike) -> Array:
-    """Left side of (6.6), rho A V^2/(T2 - T1): far below 1 the cable's kinetic energy counts for nothing.
+    """Left side of (6.6), rho A V^2/(T2 - T1): far below 1 the cable's kinetic energy is negligible.
 
     Twice this number is the kinetic term of (6.5) over the loss (6.11).
 
@@ -96,7 +96,7 @@ def kinetic_number(line_density: ArrayLike, speed: ArrayLike, difference: ArrayL
 def gravity_number(
     line_density: ArrayLike, gravity: ArrayLike, ea: ArrayLike, radius: ArrayLike, difference: ArrayLike
 ) -> Array:
-    """Left side of (6.7), 4 rho A g EA r_b/(T2 - T1)^2: far below 1 the cable's weight counts for nothing.
+    """Left side of (6.7), 4 rho A g EA r_b/(T2 - T1)^2: far below 1 the cable's weight is negligible.
 
     The print's "EA^2" means E A^2, one A of which belongs to rho.  The number is the gravity term of
     (6.5) for the height 2 r_b over the loss (6.11).
@@ -115,10 +115,10 @@ def gravity_number(
 
 
 def driven_pulley_speed(loose_speed: ArrayLike, radius: ArrayLike) -> Array:
-    """Speed of the driven pulley, rad/s, (6.8): V1/r_b, that of the strand that enters it.
+    """Speed of the driven pulley, rad/s, (6.8): V1/r_b, that of the entering strand.
 
     The drive pulley turns at V2/r_a, which enters there.  (6.9), V2/r_b for the driven pulley, would
-    make heat flow in, `loss_by_place`.
+    mean that heat flows in, `loss_by_sticking_point`.
 
     Parameters
     ----------
@@ -130,11 +130,13 @@ def driven_pulley_speed(loose_speed: ArrayLike, radius: ArrayLike) -> Array:
     return v / r
 
 
-def loss_by_place(speed: ArrayLike, loose: ArrayLike, tight: ArrayLike, ea: ArrayLike, sticks_at_entry: bool) -> Array:
+def loss_by_sticking_point(
+    speed: ArrayLike, loose: ArrayLike, tight: ArrayLike, ea: ArrayLike, sticks_at_entry: bool
+) -> Array:
     """Loss at the driven pulley, W, if the cable sticks where it enters, (6.10.a), (6.8), or leaves, (6.10.b), (6.9).
 
     V (T2 - T1)/EA times T - (T1 + T2)/2 - T^2/(2 EA), T the tension of the other end.  The second is
-    negative for every load, which the second law forbids: the cable sticks at its entry.  The last term
+    negative for every load, contrary to the second law: the cable sticks at its entry.  The last term
     is an artefact of (6.5), second order; without it the first is (6.11).
 
     Parameters
@@ -154,8 +156,8 @@ def loss_by_place(speed: ArrayLike, loose: ArrayLike, tight: ArrayLike, ea: Arra
 def pulley_loss(shaft_power: ArrayLike, difference: ArrayLike, ea: ArrayLike) -> Array:
     """Power lost at the driven, (6.11), or at the drive pulley, (6.12), W: P (T2 - T1)/(2 EA).
 
-    First order of the strain.  Exact is V (T2 - T1)^2/(2 EA), V the speed of the unstretched cable,
-    for each of the two.
+    First order of the strain.  Exact: V (T2 - T1)^2/(2 EA) for each pulley, V the speed of the unstretched
+    cable.
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ def pulley_loss(shaft_power: ArrayLike, difference: ArrayLike, ea: ArrayLike) ->
 
 
 def output_power(input_power: ArrayLike, difference: ArrayLike, ea: ArrayLike) -> Array:
-    """Greatest power that a stage gives to its load, W, (6.13): P_in (1 - (T2 - T1)/EA).  First order of the strain.
+    """Greatest output power of a stage, W, (6.13): P_in (1 - (T2 - T1)/EA).  First order of the strain.
 
     Parameters
     ----------
@@ -201,10 +203,10 @@ def equal_stages_efficiency(difference: ArrayLike, ea: ArrayLike, stages: ArrayL
 
 
 def slip_arc(loose: ArrayLike, tight: ArrayLike, friction_coefficient: ArrayLike) -> Array:
-    """Arc over which the cable slips before it leaves a pulley, beta, rad, (6.16): ln(T2/T1)/mu.
+    """Arc of slip before the cable leaves a pulley, beta, rad, (6.16): ln(T2/T1)/mu.
 
-    Coulomb friction, speed low enough for no centrifugal force.  Where it is above the arc of contact
-    the cable slips as a whole.
+    Coulomb friction, speed low enough for no centrifugal force.  If it exceeds the arc of contact,
+    the whole cable slips.
 
     Parameters
     ----------
@@ -220,13 +222,13 @@ def slip_arc(loose: ArrayLike, tight: ArrayLike, friction_coefficient: ArrayLike
 def driven_angle(
     drive_angle: ArrayLike, drive_radius: ArrayLike, driven_radius: ArrayLike, creep: ArrayLike = 0.0
 ) -> Array:
-    """Angle of the driven pulley, rad, (6.17), with what it crept (6.18): r_a/r_b theta_a + theta_b,error.
+    """Angle of the driven pulley, rad, (6.17), with its creep (6.18): r_a/r_b theta_a + theta_b,error.
 
     Parameters
     ----------
     drive_angle : theta_a, rad.
     drive_radius, driven_radius : r_a, r_b, m, above zero.
-    creep : theta_b,error of `creep_along`, rad; zero for a cable that does not stretch.
+    creep : theta_b,error of `creep_along`, rad; zero for a rigid cable.
     """
     ra, rb = above_zero(drive_radius=drive_radius, driven_radius=driven_radius)
     angle, error = finite(drive_angle=drive_angle, creep=creep)
@@ -242,9 +244,9 @@ def creep_along(
 ) -> Array:
     """Creep of the driven pulley along a path of the drive, rad, (6.19) corrected; never undone, (6.20).
 
-    Integral of sgn(tau_b) (T2 - T1)/EA r_a/r_b |d theta_a|, T2 - T1 = |tau_b|/r_b; the print lacks the
-    bars, with which alone its example of a radian out and back has an error.  Under a torque of one
-    sign the error grows for ever.  First order of the strain; `cable.creep` is the same for one
+    Integral of sgn(tau_b) (T2 - T1)/EA r_a/r_b |d theta_a|, T2 - T1 = |tau_b|/r_b; the print has the
+    signed d theta_a, for which its example of a radian out and back has no error.  Under a torque of one
+    sign the error grows without bound.  First order of the strain; `cable.creep` is the same for one
     travel, seen at the motor.
 
     Parameters
@@ -268,10 +270,10 @@ def creep_along(
 
 
 def coulomb_like_torque(torque: ArrayLike, radius: ArrayLike, ea: ArrayLike) -> Array:
-    """Friction torque that the loss (6.12) of ONE pulley looks like, N m, (6.22): tau_a^2/(2 r_a EA).
+    """Friction torque equivalent to the loss (6.12) of ONE pulley, N m, (6.22): tau_a^2/(2 r_a EA).
 
-    Drive and driven pulley, referred to the motor, make twice that.  It is half of the loss that
-    creep (6.19) dissipates, told again: a model that creeps must not have this friction on top.
+    Drive and driven pulley together, referred to the motor, have twice that.  It is half of the loss that
+    creep (6.19) dissipates: a model with creep must not have this friction in addition.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What becomes of a step response: settled, limit cycle or diverged, and the largest step that does not diverge."""
+"""Whether a step response settles, ends in a limit cycle or diverges, and the largest step that does not diverge."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
-from wam_theory.friction_model import ForceLoop, FrictionNode, require
+from wam_theory.friction_model import FrictionNode, IntegralLoop, require
 from wam_theory.phases import Kind, Model, Phase, phases_of, prepared
 from wam_theory.slip_arc import arc_from
 
@@ -14,7 +14,7 @@ _INF = math.inf
 
 
 class Verdict(StrEnum):
-    """What becomes of a step response."""
+    """Long-term behaviour of a step response."""
 
     SETTLED = "settled"
     LIMIT_CYCLE = "limit cycle"
@@ -25,8 +25,8 @@ class Verdict(StrEnum):
 class Outcome(NamedTuple):
     """Verdict on a step response, and the settled cycle of F_c.
 
-    `peak_to_peak` (N m) and `period` (s) are NaN unless it is a limit cycle; `time` is that of the
-    last of the `events` looked at.
+    `peak_to_peak` (N m) and `period` (s) are NaN without a limit cycle; `time` is that of the last of the
+    `events` that were needed.
     """
 
     verdict: Verdict
@@ -37,12 +37,12 @@ class Outcome(NamedTuple):
 
 
 def _runaway_size(model: Model) -> float:
-    """Size of the growing pair of modes above which it outgrows every kick that friction can give it.
+    """Size of the growing pair of modes above which friction can no longer stop its growth.
 
-    Reversing friction by 2 F_dynamic kicks the real mode by `kick` and the pair by `kick_pair`; over
-    a half cycle, while the real mode is a tenth of the pair never shorter than 2.8/w, the pair grows
-    by more than that, sticks no more, and the real mode stays small.  Infinite where the law is not
-    linear throughout or the loop is linearly stable.
+    A reversal changes friction by 2 F_dynamic, the real mode by `kick` and the pair by `kick_pair`.  A half
+    cycle lasts at least 2.8/w as long as the real mode is below a tenth of the pair; above this size the
+    pair grows by more than `kick_pair` in it, the node no longer sticks, and the real mode stays small.
+    Infinite if the law is not linear throughout or the loop is linearly stable.
     """
     lam, alpha, square, width, apart = model.zones[0].roots
     if len(model.zones) > 1 or not model.zones[0].linear or alpha <= 0.0 or square >= 0.0:
@@ -56,7 +56,7 @@ def _runaway_size(model: Model) -> float:
 
 
 def _runs_away(model: Model, phase: Phase, size: float) -> bool:
-    """Whether the phase, which begins with a reversal, is the beginning of the end."""
+    """Whether the response diverges from this phase on, which starts with a reversal."""
     _, _, _, i, rate, x, v, _, a = phase
     arc = arc_from(model.zones[i], rate, x, v, a)
     pair = math.hypot(arc.b, arc.c / arc.width)
@@ -65,29 +65,29 @@ def _runs_away(model: Model, phase: Phase, size: float) -> bool:
 
 def assess(
     node: FrictionNode,
-    loop: ForceLoop,
+    loop: IntegralLoop,
     force: float,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     tolerance: float = 1e-9,
     max_events: int = 200_000,
 ) -> Outcome:
-    """What becomes of a step response.
+    """Verdict on a step response.
 
-    Settled: it rests or creeps to its target for ever; or, with Coulomb friction alone, a slip from
-    stick to stick has reduced the error, after which the response only repeats itself smaller
-    ((5.17): exact, because a slip from breakaway is proportional to its error); or eight standstills
-    in a row stayed within 1e-7 of the step.  Limit cycle: twelve standstills or fewer repeat in place
-    and time to `tolerance`.  Diverged: above 1e4 times the step and the friction, or, in a loop
-    without limit, deadband or hold, once the growing modes outgrow whatever friction can take.
+    Settled: the node rests or creeps to its target; or, with Coulomb friction only, a slip from stick to
+    stick reduced the error, after which the response repeats on a smaller scale ((5.17): exact, because a
+    slip from breakaway is proportional to its error); or eight successive standstills lie within 1e-7 of
+    the step.  Limit cycle: up to twelve standstills repeat in force and time to `tolerance`.  Diverged:
+    above 1e4 times the step and the friction, or, in a loop without limit, deadband or hold, once friction
+    can no longer stop the growing modes.
 
     Parameters
     ----------
-    node, loop : what is simulated.
+    node, loop : to simulate.
     force : F_des, N m.
     start : x, v, x_m at time 0.
     tolerance : relative, of the repetition.
-    max_events : looked at; if nothing is clear by then and the standstills of the last quarter span
-        what those of the quarter before did, to 2 %, it is a (not strictly periodic) limit cycle.
+    max_events : at most; without another verdict by then, it is a limit cycle (not strictly periodic) if the
+        standstills of the last two quarters span the same force to 2 %, else undecided.
     """
     model = prepared(node, loop, force)
     stiffness = node.contact_stiffness
@@ -130,7 +130,7 @@ def assess(
 
 
 def _cycle(turns: Sequence[tuple[float, float]], tolerance: float, scale: float) -> tuple[Verdict, float, float] | None:
-    """Verdict, peak to peak and period, if the last standstills repeat or have become one place."""
+    """Verdict, peak to peak and period, if the last standstills repeat or coincide."""
     last = [force for _, force in turns[-8:]]
     if max(last) - min(last) < 1e-7 * scale:
         return Verdict.SETTLED, math.nan, math.nan
@@ -164,33 +164,33 @@ def _irregular_cycle(turns: Sequence[tuple[float, float]], force: float) -> tupl
     return Verdict.LIMIT_CYCLE, spans[1], period
 
 
-def largest_stable_step(node: FrictionNode, loop: ForceLoop, rtol: float = 1e-6, largest: float = 1e4) -> float:
+def largest_stable_step(node: FrictionNode, loop: IntegralLoop, rtol: float = 1e-6, largest: float = 1e4) -> float:
     """Largest step of F_des from unstressed rest that does not diverge (domain II of figure 5.8).
 
-    Bisection, which supposes that every smaller step is stable too.
+    By bisection, on the assumption that every smaller step is stable, too.
 
     Parameters
     ----------
-    node, loop : what is simulated; the node has friction.
+    node, loop : to simulate; the node has friction.
     rtol : relative, of the result.
     largest : steps above this many times F_static are not tried.
 
     Returns
     -------
     float
-        N m; 0 where a step of 1e-3 F_static diverges (domain III), infinite where one of `largest` does not.
+        N m; 0 if a step of 1e-3 F_static diverges (domain III), infinite if a step of `largest` does not.
 
     Raises
     ------
     ValueError
-        where there is no friction to compare with, or a response stays undecided.
+        if there is no friction, or a response is undecided.
     """
     require("static_friction", node.static_friction, above=0.0)
 
     def stable(step: float) -> bool:
         verdict = assess(node, loop, step).verdict
         if verdict is Verdict.UNDECIDED:
-            raise ValueError(f"the response to a step of {step} stays undecided; move the gain, {loop.gain}, a little")
+            raise ValueError(f"the response to a step of {step} is undecided; change the gain, {loop.gain}, a little")
         return verdict is not Verdict.DIVERGED
 
     low, high = 1e-3 * node.static_friction, largest * node.static_friction

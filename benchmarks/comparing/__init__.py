@@ -1,7 +1,7 @@
-"""What the benchmarks share: rounds, medians with their range, one table, one line of JSON.
+"""Shared by all benchmarks: options, medians with quartiles, the table, the line of JSON.
 
-Speeds of machines differ, and those of one machine change from hour to hour; what stays is the
-ratio of two things measured in turns in the same run.  Only ratios are to be compared.
+Speeds differ between computers, and on one computer from hour to hour; the ratio of two quantities measured in turns
+in the same run is stable.  Compare ratios only.
 """
 
 import argparse
@@ -15,11 +15,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from wam_analysis.table import plain
+
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 
 
 class Spread(NamedTuple):
-    """Median of some rounds, and the two values between which the middle half of them lies."""
+    """Median and quartiles of some rounds."""
 
     median: float
     low: float
@@ -30,38 +32,33 @@ class Spread(NamedTuple):
 
 
 def spread(values: Sequence[float]) -> Spread:
-    """Median and middle half of the rounds."""
+    """Median and quartiles of the rounds."""
     low, median, high = statistics.quantiles(values, n=4, method="inclusive") if len(values) > 1 else [values[0]] * 3
     return Spread(median, low, high)
 
 
 def ratios(values: Sequence[float], references: Sequence[float]) -> Spread:
-    """Each round against the reference of the same round."""
+    """Ratio of each round to the reference of the same round."""
     return spread([value / reference for value, reference in zip(values, references, strict=True)])
 
 
 def arguments(text: str, rounds: int, quick_rounds: int) -> argparse.Namespace:
     """The options of every benchmark: `rounds`, `quick`."""
     parser = argparse.ArgumentParser(description=text)
-    parser.add_argument("--rounds", type=int, help=f"how often each is measured; default: {rounds}")
-    parser.add_argument("--quick", action="store_true", help="short, to see that it works; nothing is written")
+    parser.add_argument("--rounds", type=int, help=f"number of measurements; default: {rounds}")
+    parser.add_argument("--quick", action="store_true", help="short test run; nothing is written")
     given = parser.parse_args()
     given.rounds = given.rounds or (quick_rounds if given.quick else rounds)
     return given
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns as wide as they need, the first one to the left, the others to the right."""
-    lines = [list(head), *map(list, rows)]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
-    return "\n".join(
-        "  ".join([line[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(line[1:], widths[1:], strict=True))])
-        for line in lines
-    )
+    """A table as text, first column left-aligned, the others right-aligned."""
+    return "\n".join(plain([head], rows))
 
 
 def machine() -> str:
-    """Kind of this machine, in a line."""
+    """Description of this computer, in one line."""
     cpu = ""
     info = Path("/proc/cpuinfo")
     if info.is_file():

@@ -1,8 +1,8 @@
 """The largest stable step by scipy's solve_ivp with events: slow, and without a formula of ours.
 
 The node of figure 5.4 as it stands, (x, x', x_m) with friction of a given sign, each slip ended by an
-event at x' = 0; breakaway after a stick as in (5.3).  What a response becomes is judged as early as
-`wam_theory.stability_map` judges it, so that the comparison is one of integrators.
+event at x' = 0; breakaway after a stick as in (5.3).  What a response becomes is assessed as early as
+`wam_theory.stability_map` assesses it, so that the comparison is one of integrators.
 """
 
 import math

@@ -1,1 +1,15 @@
-"""What `wam analyse` finds in a recording, in words, numbers and pictures."""
+"""The analysis of any recording, as `wam analyse` prints it.
+
+analysis               reads a bag and makes all sections
+analysed_run           a bag prepared for analysis, with the forces that were held
+finding                one number with its prediction; a section
+held_force             each commanded force: measures and predictions
+force                  sections about force, stability and contact
+prediction             the friction node at the contact and what chapter 5 predicts for it
+guarded                the stability guard on a recorded press
+transmission_signals   motors, cables and joints on one time base
+motion                 sections about stick and slip, friction, ripple and power
+frequency              section about the velocity loops
+timing                 section about the loop, and provenance
+text, page, plots      the analysis as text and JSON, as HTML, and its pictures
+"""

@@ -1,42 +1,48 @@
-"""What a bag shows, in words and numbers, measured beside predicted."""
+"""The analysis of a bag: sections of sentences and numbers, measured and predicted."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from wam_analysis.bag import Bag, JointColumns, WrenchColumns, read
+from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
 from wam_analysis.findings.finding import Section, shown, times
 from wam_analysis.findings.force import contact_section, cycle_section, force_section
 from wam_analysis.findings.held_force import HeldForce, held_forces
-from wam_analysis.findings.motion import Motion, motion_sections
-from wam_analysis.findings.recording import Recording, recording_of
+from wam_analysis.findings.motion import MotionFindings, motion_sections
 from wam_analysis.findings.timing import extent, provenance, timing_section
+from wam_bag.bag import Bag, JointColumns, WrenchColumns, read
 
 Progress = Callable[[str], None]
 
-# what the analyses look at; everything else would cost time for nothing
+# the topics that are analysed; reading others would only cost time
 TOPICS_READ = (
     "motor_states", "motor_current_command", "motor_velocity_command", "joint_states", "joint_sensors",
     "gravity_effort", "force_command", "force_measured", "contact/wrench", "contact/point", "contact/hypotheses",
     "sim/contact/wrench", "sim/contact/point", "sim/disturbance", "sim/joint_states", "status", "/diagnostics",
 )  # fmt: skip
-OWN = ("motor_states", "force_command", "contact/wrench", "sim/joint_states", "status")  # nobody else has these
+OWN = (
+    "motor_states",
+    "force_command",
+    "contact/wrench",
+    "sim/joint_states",
+    "status",
+)  # only bags of this stack have these
 
 
 class Analysis(NamedTuple):
-    """All that is said about a bag.
+    """The analysis of a bag.
 
     Attributes
     ----------
-    recording, held, motion : what the sections rest on, for the pictures.
+    recording, held, motion : what the sections are made from, for the pictures.
     duration : s.
-    provenance : where it comes from, in the order in which people ask.
-    sections : one for each side of it; "happened" is the first.
+    provenance : origin of the bag and of the numbers.
+    sections : one for each subject; "happened" is the first.
     """
 
-    recording: Recording
+    recording: AnalysedRun
     held: tuple[HeldForce, ...]
-    motion: Motion
+    motion: MotionFindings
     duration: float
     provenance: dict[str, str]
     sections: tuple[Section, ...]
@@ -47,18 +53,18 @@ def analyse(path: str | Path, progress: Progress) -> Analysis:
 
     Parameters
     ----------
-    path : bag directory or .mcap file, of this stack or of another that has JointState or WrenchStamped.
-    progress : is told what is being done.
+    path : bag directory or .mcap file, of this stack or of another robot with JointState or WrenchStamped.
+    progress : called with each stage of the work.
 
     Raises
     ------
     BagError
-        where the bag cannot be read.
+        if the bag cannot be read.
     """
     progress(f"reading {path}")
     bag = read(path, TOPICS_READ, may_lack=True)
     if not any(len(columns.log_time_ns) for columns in bag.topics.values()):
-        progress("none of the stack's topics is in it; reading all")
+        progress("it has none of the stack's topics; reading all")
         bag = read(path)
     return analyse_bag(bag, progress)
 
@@ -66,7 +72,7 @@ def analyse(path: str | Path, progress: Progress) -> Analysis:
 def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
     """Analyse a bag that has been read, see `analyse`."""
     progress("forces and contacts")
-    recording = recording_of(bag)
+    recording = analysed_run(bag)
     held = held_forces(recording)
     forces = force_section(recording, held), cycle_section(recording, held), contact_section(recording)
     progress("friction, ripple, power and frequency")
@@ -78,41 +84,46 @@ def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
     return Analysis(recording, held, motion, duration, provenance(recording), sections)
 
 
-def _happened(recording: Recording, duration: float) -> Section:
+def _happened(recording: AnalysedRun, duration: float) -> Section:
     """What happened, in a few sentences."""
     summary, bag = recording.summary, recording.bag
-    said = [f"INCOMPLETE: {line}" for line in summary.lost]
-    said.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {recording.mode}.")
+    sentences = [f"INCOMPLETE: {line}" for line in summary.lost]
+    sentences.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {recording.mode}.")
     if summary.steps:
-        ended = "to its end" if summary.outcome == "done" else f"and ended so: {summary.outcome}"
-        said.append(f"A scenario of {len(summary.steps)} steps was played {ended}.")
+        ended = " to its end" if summary.outcome == "done" else f"; {summary.outcome}"
+        sentences.append(f"A scenario of {_count(len(summary.steps), 'step')} was played{ended}.")
     touches = [touch for touch in summary.touches if touch.link_true]
     if recording.holds:
-        forces = ", ".join(f"{hold.asked:.3g} N" for hold in recording.holds)
-        said.append(f"The arm was asked to press {times(len(recording.holds))} ({forces}).")
+        forces = ", ".join(f"{hold.commanded:.3g} N" for hold in recording.holds)
+        sentences.append(f"The arm was commanded to press {times(len(recording.holds))} ({forces}).")
     if touches:
-        said.append(f"It touched something in {len(touches)} step{'s' * (len(touches) > 1)}.")
+        sentences.append(f"It touched something in {_count(len(touches), 'step')}.")
     faults = [note for note in summary.notes if note.startswith("driver fault")]
-    said += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
+    sentences += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
     foreign = _foreign(bag)
     if foreign:
-        said += foreign
+        sentences += foreign
     if recording.parameters.note:
-        said.append(f"Predictions are missing in part: {recording.parameters.note}.")
+        sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
+    sentences += [f"{note[0].upper()}{note[1:]}." for note in recording.run.parameters.notes]
     lacking = recording.lacking("motor_states", "joint_states", "force_command", "contact/wrench", "status")
-    return Section("happened", "What happened", tuple(said), (), lacking)
+    return Section("happened", "What happened", tuple(sentences), (), lacking)
+
+
+def _count(number: int, name: str) -> str:
+    return f"{number} {name}{'s' * (number != 1)}"
 
 
 def _foreign(bag: Bag) -> list[str]:
-    """Ranges of JointState and WrenchStamped where none of the stack's own topics is in the bag."""
+    """Messages of JointState and WrenchStamped, if the bag has none of the stack's own topics."""
     own = tuple(f"/{name}" for name in OWN)
     if any(name.endswith(own) and len(columns.log_time_ns) for name, columns in bag.topics.items()):
         return []
-    said = ["It is not a recording of this stack."]
+    sentences = ["This is not a recording of this stack."]
     for name, columns in sorted(bag.topics.items()):
         if isinstance(columns, JointColumns) and len(columns.stamp_ns):
-            said.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")
+            sentences.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")
         elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
             largest = float((columns.force**2).sum(axis=1).max()) ** 0.5
-            said.append(f"{name}: {len(columns.stamp_ns)} forces, up to {shown(largest, 'N')}.")
-    return said
+            sentences.append(f"{name}: {len(columns.stamp_ns)} forces, up to {shown(largest, 'N')}.")
+    return sentences

@@ -1,4 +1,4 @@
-"""What an analysis says: numbers with what was predicted for them, and sentences."""
+"""Results of an analysis: numbers with their predictions, and sentences."""
 
 import math
 from typing import NamedTuple
@@ -11,9 +11,9 @@ class Finding(NamedTuple):
     ----------
     name : what it is, with the part of the arm.
     unit : '' for a pure number.
-    measured : from the recording; NaN where it was not to be seen.
-    predicted : by the theory for the recorded parameters; NaN where there is no prediction.
-    note : what limits either, '' where nothing.
+    measured : from the recording; NaN if it could not be measured.
+    predicted : by the theory for the recorded parameters; NaN if there is no prediction.
+    note : qualification of either, '' if there is none.
     """
 
     name: str
@@ -24,26 +24,26 @@ class Finding(NamedTuple):
 
 
 class Section(NamedTuple):
-    """One side of a recording.
+    """One subject of an analysis.
 
     Attributes
     ----------
     key : short name, the same in every version of the JSON.
     title : for people.
-    said : sentences, the most important first.
+    sentences : sentences, the most important first.
     findings : numbers.
-    lacking : topics that would have said more and are not in the bag.
+    lacking : topics that are not in the bag and would add to the section.
     """
 
     key: str
     title: str
-    said: tuple[str, ...]
+    sentences: tuple[str, ...]
     findings: tuple[Finding, ...]
     lacking: tuple[str, ...] = ()
 
 
 def shown(value: float, unit: str = "") -> str:
-    """A number with its unit as people read it; '-' where it is not known."""
+    """A number with its unit, to three digits; '-' if it is not known."""
     if math.isnan(value):
         return "-"
     if math.isinf(value):

@@ -1,32 +1,32 @@
-"""What a recording says of the velocity loops: how fast a command they follow."""
+"""Section about the velocity loops: their bandwidth."""
 
 import math
 
 import numpy as np
 
+from wam_analysis.findings.analysed_run import AnalysedRun, at_stamps, by_names
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.findings.recording import Recording, at_stamps, by_names
 from wam_analysis.measures.frequency import bandwidth, believable, frequency_response
 from wam_description.arm import Arm
 
-COHERENT = 0.8  # coherence from which a response is believed
+COHERENT = 0.8  # coherence from which a response is taken
 EXCITED = 1e-4  # of the strongest part of the input
 SEGMENT = 2.0  # s
 
 
-def frequency_section(recording: Recording, arm: Arm) -> Section:
-    """How far the motors follow the velocities that they are asked for."""
-    said, findings = [], []
-    commands, states = recording.joints("motor_velocity_command"), recording.joints("motor_states")
+def frequency_section(recording: AnalysedRun, arm: Arm) -> Section:
+    """Up to which frequency the motors follow their velocity commands."""
+    sentences, findings = [], []
+    commands, states = recording.run.joints("motor_velocity_command"), recording.run.joints("motor_states")
     lacking = recording.lacking("motor_velocity_command")
-    asked = None if commands is None else by_names(commands, "velocity", arm.motors.names)
+    commanded = None if commands is None else by_names(commands, "velocity", arm.motors.names)
     got = None if states is None else by_names(states, "velocity", arm.motors.names)
-    if commands is not None and states is not None and asked is not None and got is not None:
+    if commands is not None and states is not None and commanded is not None and got is not None:
         there, row = at_stamps(states, commands.stamp_ns)
         rate = 1e9 / max(float(np.median(np.diff(commands.stamp_ns))), 1.0) if len(commands.stamp_ns) > 1 else 0.0
         for i, name in enumerate(arm.motors.names):
-            good = there & np.isfinite(asked[:, i])
-            put, out = asked[good, i], got[row[good], i]
+            good = there & np.isfinite(commanded[:, i])
+            put, out = commanded[good, i], got[row[good], i]
             try:
                 found = frequency_response(rate, put, out, max(8, round(SEGMENT * rate)))
             except ValueError:
@@ -36,18 +36,18 @@ def frequency_section(recording: Recording, arm: Arm) -> Section:
             trusted = found.frequency[believed]
             top = float(trusted[-1]) if len(trusted) else math.nan
             findings += [
-                Finding(f"{name}: bandwidth of the velocity loop", "Hz", width, note="-3 dB, where coherent"),
+                Finding(f"{name}: bandwidth of the velocity loop", "Hz", width, note="-3 dB, of the coherent part"),
                 Finding(f"{name}: highest coherent frequency", "Hz", top, note=f"coherence at least {COHERENT:g}"),
             ]
-            said.append(_bandwidth_sentence(name, width, top))
-    if not said:
-        said.append("No motor was commanded long enough for a frequency response.")
-    return Section("frequency", "Frequency response of the velocity loops", tuple(said), tuple(findings), lacking)
+            sentences.append(_bandwidth_sentence(name, width, top))
+    if not sentences:
+        sentences.append("The velocity commands are too short for a frequency response.")
+    return Section("frequency", "Frequency response of the velocity loops", tuple(sentences), tuple(findings), lacking)
 
 
 def _bandwidth_sentence(name: str, width: float, top: float) -> str:
     if math.isnan(width):
-        return f"{name}: what it was asked says nothing of its response (coherence below {COHERENT:g})."
+        return f"{name}: bandwidth not identifiable (coherence below {COHERENT:g})."
     if math.isinf(width):
-        return f"{name} followed its velocity command as far as it was excited, {shown(top, 'Hz')}."
+        return f"{name} followed its velocity command up to {shown(top, 'Hz')}, the highest frequency that was excited."
     return f"{name} followed its velocity command up to {shown(width, 'Hz')} (-3 dB)."

@@ -1,4 +1,4 @@
-"""What the stability guard says of a press that was recorded, at the pose and against the surface that it met."""
+"""The stability guard on a recorded press, at its pose and against its surface."""
 
 import math
 from collections.abc import Sequence
@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.findings.finding import shown
-from wam_analysis.recorded import RecordedParameters
+from wam_analysis.recorded import PredictionParameters
 from wam_control.force_loop_parameters import force_law, task_of
 from wam_control.friction_verdict import Domain
-from wam_control.stability_guard import LARGEST, Judgement, StabilityGuard, Touch
+from wam_control.stability_guard import LARGEST, GuardAssessment, GuardedContact, StabilityGuard
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 
@@ -20,75 +20,73 @@ Numbers = NDArray[np.float64]
 
 
 class Guarded(NamedTuple):
-    """The sampled loop with its speed loops, `wam_control.sampled_loop`, as the guard judges it.
+    """The guard's result for the sampled loop with its velocity loops, see `wam_control.sampled_loop`.
 
     Attributes
     ----------
-    judgement : at this touch.
-    surface : stiffness that it is for, N/m.
-    gain : G_I along the force, m/s/N, that the judgement is for.
-    share : part of the largest linearly stable gain that the guard accepts.
+    assessment : at this contact.
+    surface : its stiffness, N/m.
+    gain : G_I along the force, m/s/N.
+    fraction : of the largest linearly stable gain, up to which the guard accepts gains.
     """
 
-    judgement: Judgement
+    assessment: GuardAssessment
     surface: float
     gain: float
-    share: float
+    fraction: float
 
 
 def guarded(
-    recorded: RecordedParameters, q: Sequence[float], cover: str, place: float, direction: Numbers, surface: float
+    recorded: PredictionParameters, q: Sequence[float], cover: str, position: float, direction: Numbers, surface: float
 ) -> Guarded | None:
-    """Judge the recorded set of the force loop; None where the bag does not say enough.
+    """Evaluate the recorded gains of the force loop; None if the bag has too few parameters.
 
     Parameters
     ----------
-    recorded : arm, timing and gains; those of the velocity loop count before what the guard takes for them.
+    recorded : arm, timing and gains.
     q : (n,), rad.
-    cover, place : where it presses, m.
+    cover, position : where it presses, m.
     direction : (3,), of the force, in the cover's frame.
-    surface : stiffness of what is pressed, N/m; NaN takes the stiffest one that the guard was told of.
+    surface : stiffness of what is pressed, N/m; NaN takes that of the guard's parameters.
     """
-    arm, loop, timing, speed = recorded.arm, recorded.force_loop, recorded.timing, recorded.velocity_loop
-    if arm is None or loop is None or timing is None or loop.mode != "hybrid":
+    arm, loop, timing, servo = recorded.arm, recorded.force_loop, recorded.timing, recorded.servo
+    if arm is None or loop is None or timing is None or servo is None or loop.mode != "hybrid":
         return None
     parameters = loop.guard
     if math.isfinite(surface):
         parameters = replace(parameters, contact_stiffness=surface)
-    if speed is not None:
-        parameters = replace(parameters, servo_proportional=speed.proportional_gain, servo_integral=speed.integral_gain)
     axis = RigidBody(arm).cover_pose(q, cover).rotation @ (direction / float(np.linalg.norm(direction)))
     x, y, z = axis.tolist()
     law = force_law(loop)
     try:
-        guard = StabilityGuard(arm, timing, parameters)
+        guard = StabilityGuard(arm, servo, timing, parameters)
     except ParameterError:
         return None
-    touches = guard.touching(Touch(tuple(q), cover, place, (x, y, z)))
+    touches = guard.with_lever(GuardedContact(tuple(q), cover, position, (x, y, z)))
     if not touches or not any((*law.gain, *law.proportional_gain)):
         return None
-    found = guard.judge(task_of(loop, law), touches)
-    return Guarded(found, parameters.contact_stiffness, max(law.gain), parameters.share)
+    found = guard.assess(task_of(loop, law), touches)
+    return Guarded(found, parameters.contact_stiffness, max(law.gain), parameters.stability_fraction)
 
 
 def sentence(found: Guarded) -> str:
-    """Its verdict, and the loop that it is for."""
-    judged = found.judgement
-    text = f"The sampled loop with its speed loops, as the stability guard takes it, against {shown(found.surface)} N/m"
-    over = f"{shown(1.0 / judged.scale)} times the largest linearly stable ones" if judged.scale else ""
-    if judged.domain is Domain.I:
-        more = f"more than {LARGEST:g}" if judged.scale >= LARGEST else shown(judged.scale)
+    """The result as a sentence."""
+    assessment = found.assessment
+    text = f"Stability guard (sampled loop with its velocity loops, contact of {shown(found.surface)} N/m)"
+    over = f"{shown(1.0 / assessment.scale)} times the largest linearly stable ones" if assessment.scale else ""
+    if assessment.domain is Domain.I:
+        more = f"more than {LARGEST:g}" if assessment.scale >= LARGEST else shown(assessment.scale)
         return f"{text}: domain I; the gains may be {more} times as large."
-    if judged.scale >= 1.0:
+    if assessment.scale >= 1.0:
         return (
-            f"{text}: stable, but with gains that may be only {shown(judged.scale)} times as large, less than the "
-            f"guard asks for ({shown(1.0 / found.share)})."
+            f"{text}: stable, but the gains may be only {shown(assessment.scale)} times as large; "
+            f"the guard requires {shown(1.0 / found.fraction)}."
         )
     if not over:
-        return f"{text}: NOT stable, and neither is a hundredth of the gains."
-    if judged.stable_error > 0.0:
+        return f"{text}: NOT stable, not even with a hundredth of the gains."
+    if assessment.stable_error > 0.0:
         return (
-            f"{text}: domain {judged.domain}; the gains are {over}, friction holds the loop together for errors up to "
-            f"{shown(judged.stable_error, 'N')}."
+            f"{text}: domain {assessment.domain}; the gains are {over}; friction keeps it stable for errors up to "
+            f"{shown(assessment.stable_error, 'N')}."
         )
-    return f"{text}: NOT stable, domain {judged.domain}; the gains are {over}."
+    return f"{text}: NOT stable, domain {assessment.domain}; the gains are {over}."

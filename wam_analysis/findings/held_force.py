@@ -1,4 +1,4 @@
-"""Each force that was asked for: how it was reached and held, and what the theory says of it."""
+"""Each commanded force: how it was reached and held, and its predictions."""
 
 import math
 from collections import Counter
@@ -8,114 +8,112 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import Signal
+from wam_analysis.demo_traces import ForceSignal
+from wam_analysis.findings.analysed_run import AnalysedRun, Hold, by_names
 from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
-from wam_analysis.findings.recording import Hold, Recording, by_names
 from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
-from wam_analysis.measures.limit_cycle import NO_CYCLE, Cycle, limit_cycle
+from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
-from wam_analysis.measures.stability import Stability, Verdict, stability
+from wam_analysis.measures.stability import Stability, StabilityVerdict, stability
 
 Numbers = NDArray[np.float64]
 
-STEADY = 0.4  # part of a hold, at its end, that counts as steady
-CYCLING = 0.7  # part of it in which a limit cycle is looked for
+STEADY = 0.4  # fraction of a hold, at its end, taken as steady
+CYCLING = 0.7  # fraction of it, at its end, searched for a limit cycle
 BAND = 0.05  # of the step: settled within it
 LOUD = 0.1  # of the force: an error that stays within it has settled
-LEAST_STEP = 0.1  # of the force; less is no step
-FRESH = 0.2  # s; a contact that is younger is still an impact
-FEW = 20  # samples below which a signal is not looked at
-UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
+LEAST_STEP = 0.1  # of the force; a smaller change is not evaluated as a step
+FRESH = 0.2  # s; the force of a more recent contact is that of the impact
+FEW = 20  # samples below which a signal is not evaluated
+UNDECIDED = Stability(StabilityVerdict.UNDECIDED, math.nan, 0.0, np.empty(0))
 
 
 class HeldForce(NamedTuple):
-    """A hold with its signals along the force, N, and what they show.
+    """A hold with its signals along the force, N, their measures and predictions.
 
     Attributes
     ----------
-    time, measured : (n,), s from the begin, and the force that the loop measured.
-    time_true, applied : (m,), the same of the simulator's truth; empty where it was not recorded.
-    response : of the measured force; None where there is no step.
-    touched : when the contact began, s from the begin, FRESH before it at most; NaN where it was there already or is
-        not known.  Rise and overshoot are then those of the impact, and settling counts from there.
-    measured_accuracy, applied_accuracy : in the steady part.
-    cycle : of the applied force in its last 70 %, else of the measured one.
+    time, measured : (n,), s from the start, and the force that the loop measured.
+    time_true, true : (m,), the same of the true force; empty if it was not recorded.
+    response : of the measured force; None if there is no step.
+    touched : start of the contact, s from the start, at most FRESH before it; NaN if the contact began earlier or is
+        not known.  If it is known, rise and overshoot are those of the impact, and settling is timed from there.
+    measured_accuracy, true_accuracy : in the steady part.
+    cycle : of the true force in its last 70 %, else of the measured one.
     stability : of the error.
-    node, predicted, largest : of the theory; None where the bag does not say enough.
-    guarded : the loop as the stability guard judges it; None likewise.
-    place : where it pressed, m.
+    node, predicted, largest : by theory; None if the bag has too few parameters.
+    guarded : by the stability guard; None likewise.
+    position : of the contact, m.
     """
 
     hold: Hold
     time: Numbers
     measured: Numbers
     time_true: Numbers
-    applied: Numbers
+    true: Numbers
     response: StepResponse | None
     touched: float
     measured_accuracy: ForceAccuracy
-    applied_accuracy: ForceAccuracy
-    cycle: Cycle
+    true_accuracy: ForceAccuracy
+    cycle: LimitCycle
     stability: Stability
     node: Node | None
     predicted: Predicted | None
     largest: LargestForce | None
     guarded: Guarded | None
-    place: float
+    position: float
 
 
-def held_forces(recording: Recording) -> tuple[HeldForce, ...]:
-    """Look at every hold of a recording."""
+def held_forces(recording: AnalysedRun) -> tuple[HeldForce, ...]:
+    """Evaluate every hold of a recording."""
     return tuple(_held(recording, hold) for hold in recording.holds)
 
 
-def _held(recording: Recording, hold: Hold) -> HeldForce:
+def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
     time, measured = _measured(recording, hold)
     traces = recording.summary.traces
-    rows = traces.during(hold.begin, hold.end) & traces.asked.acts
+    rows = traces.during(hold.begin, hold.end) & traces.commanded.acts
     time_true = (traces.stamp[rows] - hold.begin) / 1e9
-    applied = traces.along(traces.true, -1.0)[rows]
-    if not np.any(np.isfinite(applied)):
-        time_true, applied = np.empty(0), np.empty(0)
+    true = traces.along(traces.true, -1.0)[rows]
+    if not np.any(np.isfinite(true)):
+        time_true, true = np.empty(0), np.empty(0)
     duration = (hold.end - hold.begin) / 1e9
     late, late_true = time >= (1.0 - STEADY) * duration, time_true >= (1.0 - STEADY) * duration
     swings, swings_true = time >= (1.0 - CYCLING) * duration, time_true >= (1.0 - CYCLING) * duration
-    cover, place = _touched(recording, hold)
+    cover, position = _touched(recording, hold)
     touched = _touch_down(recording, hold)
     response = _response(hold, time, measured, STEADY * duration)
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
-    theory = _theory(recording, hold, cover, place)
+    theory = _theory(recording, hold, cover, position)
     return HeldForce(
         hold=hold,
         time=time,
         measured=measured,
         time_true=time_true,
-        applied=applied,
+        true=true,
         response=response,
         touched=touched,
-        measured_accuracy=force_accuracy(np.full(int(np.sum(late)), hold.asked), measured[late]),
-        applied_accuracy=force_accuracy(np.full(int(np.sum(late_true)), hold.asked), applied[late_true]),
-        cycle=_cycle(time_true[swings_true], applied[swings_true])
-        or _cycle(time[swings], measured[swings])
-        or NO_CYCLE,
+        measured_accuracy=force_accuracy(np.full(int(np.sum(late)), hold.commanded), measured[late]),
+        true_accuracy=force_accuracy(np.full(int(np.sum(late_true)), hold.commanded), true[late_true]),
+        cycle=_cycle(time_true[swings_true], true[swings_true]) or _cycle(time[swings], measured[swings]) or NO_CYCLE,
         stability=_stability(hold, measured),
         node=theory.node,
         predicted=theory.predicted,
         largest=theory.largest,
         guarded=theory.guarded,
-        place=place,
+        position=position,
     )
 
 
-def _measured(recording: Recording, hold: Hold) -> tuple[Numbers, Numbers]:
-    columns = recording.wrench("force_measured")
+def _measured(recording: AnalysedRun, hold: Hold) -> tuple[Numbers, Numbers]:
+    columns = recording.run.wrench("force_measured")
     if columns is None:
         return np.empty(0), np.empty(0)
     a, b = np.searchsorted(columns.stamp_ns, [hold.begin, hold.end])
-    along: Numbers = columns.force[a:b] @ (hold.force / hold.asked)
+    along: Numbers = columns.force[a:b] @ (hold.force / hold.commanded)
     good = np.isfinite(along)
     return (columns.stamp_ns[a:b][good] - hold.begin) / 1e9, along[good]
 
@@ -124,7 +122,7 @@ def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> St
     if len(time) < FEW:
         return None
     begin = float(measured[0])
-    if abs(hold.asked - begin) < max(4.0 * noise(measured), LEAST_STEP * hold.asked):
+    if abs(hold.commanded - begin) < max(4.0 * noise(measured), LEAST_STEP * hold.commanded):
         return None
     try:
         return step_response(time, measured, begin, steady, BAND)
@@ -132,13 +130,13 @@ def _response(hold: Hold, time: Numbers, measured: Numbers, steady: float) -> St
         return None
 
 
-def _touch_down(recording: Recording, hold: Hold) -> float:
-    """When the contact of a hold began, by the truth, else by the estimate; see `HeldForce`."""
+def _touch_down(recording: AnalysedRun, hold: Hold) -> float:
+    """Start of the contact of a hold, by the simulator, else by the estimate; see `HeldForce`."""
     traces = recording.summary.traces
     if any(stiffness > 0.0 for stiffness in recording.parameters.springs.stiffness):
-        return math.nan  # a spring under the joint is always there
+        return math.nan  # a spring under the joint is always in contact
     first, last = (int(row) for row in np.searchsorted(traces.stamp, [hold.begin, hold.end]))
-    for signal in (traces.true, traces.felt):
+    for signal in (traces.true, traces.estimated):
         if first >= last or not np.any(signal.is_known[first:last]):
             continue
         acts = signal.acts & ((signal.frame == hold.frame) | (hold.frame not in signal.frame))
@@ -150,7 +148,7 @@ def _touch_down(recording: Recording, hold: Hold) -> float:
     return math.nan
 
 
-def _cycle(time: Numbers, value: Numbers) -> Cycle | None:
+def _cycle(time: Numbers, value: Numbers) -> LimitCycle | None:
     good = np.isfinite(value)
     return limit_cycle(time[good], value[good]) if int(np.sum(good)) >= FEW and np.mean(good) > 0.95 else None
 
@@ -158,27 +156,27 @@ def _cycle(time: Numbers, value: Numbers) -> Cycle | None:
 def _stability(hold: Hold, measured: Numbers) -> Stability:
     if len(measured) < FEW:
         return UNDECIDED
-    return stability(hold.asked - measured, max(LOUD * hold.asked, 4.0 * noise(measured)))
+    return stability(hold.commanded - measured, max(LOUD * hold.commanded, 4.0 * noise(measured)))
 
 
-def _touched(recording: Recording, hold: Hold) -> tuple[str, float]:
-    """Cover and place of the contact by the truth, else by the estimate, else as the force loop takes it."""
+def _touched(recording: AnalysedRun, hold: Hold) -> tuple[str, float]:
+    """Cover and position of the contact, by the simulator, else estimated, else as configured in the force loop."""
     traces, loop = recording.summary.traces, recording.parameters.force_loop
     rows = traces.during(hold.begin, hold.end)
-    for signal in (traces.true, traces.felt):
-        found = _median_place(signal, rows & signal.acts)
+    for signal in (traces.true, traces.estimated):
+        found = _median_position(signal, rows & signal.acts)
         if found[0]:
             return found
-    return (loop.contact_cover, loop.contact_place) if loop is not None else ("", math.nan)
+    return (loop.contact_cover, loop.contact_position) if loop is not None else ("", math.nan)
 
 
-def _median_place(signal: Signal, rows: NDArray[np.bool_]) -> tuple[str, float]:
+def _median_position(signal: ForceSignal, rows: NDArray[np.bool_]) -> tuple[str, float]:
     if not np.any(rows):
         return "", math.nan
     cover = Counter(signal.frame[rows].tolist()).most_common(1)[0][0]
-    places = signal.place[rows & (signal.frame == cover)]
-    places = places[np.isfinite(places)]
-    return (str(cover), float(np.median(places))) if len(places) else ("", math.nan)
+    positions = signal.position[rows & (signal.frame == cover)]
+    positions = positions[np.isfinite(positions)]
+    return (str(cover), float(np.median(positions))) if len(positions) else ("", math.nan)
 
 
 class _Theory(NamedTuple):
@@ -191,15 +189,12 @@ class _Theory(NamedTuple):
 NO_THEORY = _Theory(None, None, None, None)
 
 
-def _theory(recording: Recording, hold: Hold, cover: str, place: float) -> _Theory:
+def _theory(recording: AnalysedRun, hold: Hold, cover: str, position: float) -> _Theory:
     parameters = recording.parameters
     arm = parameters.arm
     if arm is None or cover not in arm.covers.names:
         return NO_THEORY
-    joints = next(
-        (columns for name in ("sim/joint_states", "joint_states") if (columns := recording.joints(name)) is not None),
-        None,
-    )
+    joints = recording.run.joints("sim/joint_states") or recording.run.joints("joint_states")
     positions = None if joints is None else by_names(joints, "position", arm.joints.names)
     if joints is None or positions is None:
         return NO_THEORY
@@ -209,15 +204,15 @@ def _theory(recording: Recording, hold: Hold, cover: str, place: float) -> _Theo
     direction = hold.force
     if hold.frame not in arm.covers.names or not np.all(np.isfinite(q)):
         return NO_THEORY
-    node = node_at(parameters, arm, q, hold.frame, place, direction) if hold.frame == cover else None
-    largest = largest_force(arm, q, hold.frame, place, direction)
+    node = node_at(parameters, arm, q, hold.frame, position, direction) if hold.frame == cover else None
+    largest = largest_force(arm, q, hold.frame, position, direction)
     loop, timing = parameters.force_loop, parameters.timing
     predicted = None
     if node is not None and loop is not None and timing is not None and loop.mode == "hybrid":
         delay = math.ceil(timing.outer_delay / timing.outer_divisor)
         gain, proportional = (_along(g, hold.force) for g in (loop.force_gain, loop.force_proportional_gain))
         predicted = predict(node, gain, proportional, timing.outer_period_ns / 1e9, delay)
-    found = None if node is None else guarded(parameters, q, cover, place, direction, node.contact_stiffness)
+    found = None if node is None else guarded(parameters, q, cover, position, direction, node.contact_stiffness)
     return _Theory(node, predicted, largest, found)
 
 

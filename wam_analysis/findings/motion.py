@@ -1,4 +1,4 @@
-"""What a recording says of the transmission: stick and slip, friction, ripple, power."""
+"""Sections about the transmission: stick and slip, friction, ripple, power."""
 
 import math
 from typing import NamedTuple
@@ -6,33 +6,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.findings.frequency import frequency_section
-from wam_analysis.findings.recording import Recording
 from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals, transmission_signals
 from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
-from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases
 from wam_description.arm import Arm
 from wam_description.effects import Effects
 
 Numbers = NDArray[np.float64]
 
-MOTOR_REST = 0.05  # rad/s; a motor that is slower stands
+MOTOR_REST = 0.05  # rad/s; a slower motor is at rest
 JOINT_REST = 0.002  # rad/s
 SHORTEST = 0.01  # s; a shorter stick or slip is chatter
 WINDOW = 0.03  # s over which friction is averaged
-ORDERS = 48  # of the ripple, cycles a turn
-FAINT = 3.0  # ripple below so many times the median order is not named
-SLIGHT = 0.05  # of the dry friction: less ripple is not named either
-UNSURE = 0.25  # of a friction: a standard error that is larger says that the recording does not tell it
-NOT_TOLD = "not told by this recording"
+ORDERS = 48  # of the ripple, cycles per turn
+FAINT = 3.0  # times the median order; smaller ripple is not reported
+SLIGHT = 0.05  # of the dry friction; smaller ripple is not reported either
+UNSURE = 0.25  # of a friction; with a larger standard error it is not identifiable
+NOT_IDENTIFIABLE = "not identifiable"
 LEAST_WORK = 1e-3  # J below which no efficiency is given
 
 
-class Motion(NamedTuple):
-    """Sections on the transmission and what their pictures need."""
+class MotionFindings(NamedTuple):
+    """Sections about the transmission, and what their pictures need."""
 
     sections: tuple[Section, ...]
     signals: TransmissionSignals | None
@@ -40,16 +40,16 @@ class Motion(NamedTuple):
     ripple: dict[str, Ripple]
 
 
-def motion_sections(recording: Recording) -> Motion:
-    """All sections that take motors and joints together."""
+def motion_sections(recording: AnalysedRun) -> MotionFindings:
+    """All sections about motors and joints."""
     arm = recording.parameters.arm
     lacking = recording.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
     signals = None if arm is None else transmission_signals(recording, arm)
     stick = _stick_section(recording)
     if arm is None or signals is None or len(signals.time) < 100:
-        why = "the parameters of the arm" if arm is None else "motor_states with a load beside it"
-        said = (f"Friction, ripple and power cannot be judged: {why} is not in this bag.",)
-        return Motion((stick, Section("friction", "Friction", said, (), lacking)), None, {}, {})
+        why = "no parameters of the arm" if arm is None else "no motor_states with a load"
+        sentences = (f"Friction, ripple and power cannot be evaluated: {why} in this bag.",)
+        return MotionFindings((stick, Section("friction", "Friction", sentences, (), lacking)), None, {}, {})
     friction = _friction_of_motors(signals, arm)
     joints = _friction_of_joints(signals, arm)
     ripple = _ripples(signals, arm, friction)
@@ -60,19 +60,19 @@ def motion_sections(recording: Recording) -> Motion:
         _power_section(arm, signals, friction, joints),
         frequency_section(recording, arm),
     )
-    return Motion(sections, signals, friction, ripple)
+    return MotionFindings(sections, signals, friction, ripple)
 
 
 # stick and slip
 
 
-def _stick_section(recording: Recording) -> Section:
-    said, findings = [], []
+def _stick_section(recording: AnalysedRun) -> Section:
+    sentences, findings = [], []
     for topic, rest in (("motor_states", MOTOR_REST), ("joint_sensors", JOINT_REST), ("joint_states", JOINT_REST)):
-        columns = recording.joints(topic)
+        columns = recording.run.joints(topic)
         if columns is None or not columns.velocity.shape[1] or len(columns.stamp_ns) < 10:
             continue
-        if topic == "joint_states" and recording.joints("joint_sensors") is not None:
+        if topic == "joint_states" and recording.run.joints("joint_sensors") is not None:
             continue
         period = float(np.median(np.diff(columns.stamp_ns))) / 1e9
         for i, name in enumerate(columns.names):
@@ -83,13 +83,22 @@ def _stick_section(recording: Recording) -> Section:
             phases = stick_slip_phases(velocity, rest, max(1, round(SHORTEST / period)))
             findings += [
                 Finding(f"{name}: at rest", "%", 100.0 * phases.stuck, note=f"slower than {rest:g} rad/s"),
-                Finding(f"{name}: slips", "", float(len(phases.slips)), note=f"{phases.reversals} against the last"),
+                Finding(
+                    f"{name}: slips",
+                    "",
+                    float(len(phases.slips)),
+                    note=f"{phases.reversals} of them reverse the direction",
+                ),
             ]
-            said.append(
-                f"{name} stood {100.0 * phases.stuck:.0f} % of the time and slipped {times(len(phases.slips))}."
-            )
-    text = tuple(said) or ("No velocity was recorded.",)
+            sentences.append(_stick_sentence(name, phases))
+    text = tuple(sentences) or ("No velocity was recorded.",)
     return Section("stick_slip", "Stick and slip", text, tuple(findings), recording.lacking("motor_states"))
+
+
+def _stick_sentence(name: str, phases: Phases) -> str:
+    if not len(phases.slips):
+        return f"{name}: never moved."
+    return f"{name}: at rest for {100.0 * phases.stuck:.0f} % of the time, slipped {times(len(phases.slips))}."
 
 
 # friction
@@ -104,7 +113,7 @@ def _friction_of_motors(signals: TransmissionSignals, arm: Arm) -> dict[str, Fri
 
 
 def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
-    """Of the joints: what the cables give less what reaches the links; needs both."""
+    """Of the joints: torque of the cables less that on the links; needs both."""
     free = signals.cable_torque - signals.strain
     if signals.load_from != CABLE or not np.any(np.isfinite(free)):
         return {}
@@ -115,7 +124,7 @@ def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Fri
 
 
 def _friction_section(
-    recording: Recording,
+    recording: AnalysedRun,
     arm: Arm,
     signals: TransmissionSignals,
     friction: dict[str, Friction],
@@ -123,17 +132,19 @@ def _friction_section(
 ) -> Section:
     alone = signals.load_from == CABLE
     note = (
-        f"load from the {signals.load_from}" if alone else f"with the joint's part; load from the {signals.load_from}"
+        f"load from the {signals.load_from}"
+        if alone
+        else f"with the joint's friction; load from the {signals.load_from}"
     )
     findings = []
     for i, (name, found) in enumerate(friction.items()):
         findings += _friction_findings(name, found, _of_motor(arm, i, alone), note)
     for i, (name, found) in enumerate(joints.items()):
         bearing = arm.joints
-        truth = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
-        findings += _friction_findings(name, found, truth, "cable torque less strain")
+        configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
+        findings += _friction_findings(name, found, configured, "cable torque less strain")
     seen = [name for name, found in {**friction, **joints}.items() if math.isfinite(found.dynamic)]
-    said = [
+    sentences = [
         f"{name}: dry friction {_known(found.dynamic, found.dynamic_error, 'N m')}, {_breakaway(found)}, "
         f"viscous {_known(found.viscous, found.viscous_error, 'N m s/rad')}."
         for name, found in {**friction, **joints}.items()
@@ -141,32 +152,32 @@ def _friction_section(
     ]
     still = [name for name in {**friction, **joints} if name not in seen]
     if still:
-        said.append(f"Too little motion to tell the friction of {', '.join(still)}.")
+        sentences.append(f"Too little motion to identify the friction of {', '.join(still)}.")
     lacking = recording.lacking("joint_sensors", "sim/joint_states")
-    return Section("friction", "Friction", tuple(said), tuple(findings), lacking)
+    return Section("friction", "Friction", tuple(sentences), tuple(findings), lacking)
 
 
 def _breakaway(found: Friction) -> str:
     if not math.isfinite(found.static):
-        return "no breakaway seen"
+        return "no breakaway"
     return f"breakaway {_known(found.static, found.static_error if found.breakaways > 1 else math.nan, 'N m')}"
 
 
 def _known(value: float, error: float, unit: str) -> str:
-    """A value with its standard error, or that the recording does not tell it."""
+    """A value with its standard error, or that it is not identifiable."""
     if not math.isfinite(error):
         return shown(value, unit)
-    if not _is_told(value, error):
-        return f"{NOT_TOLD} ({shown(value)} +- {shown(error, unit)})"
+    if not _is_identified(value, error):
+        return f"{NOT_IDENTIFIABLE} ({shown(value)} +- {shown(error, unit)})"
     return f"{shown(value)} +- {shown(error, unit)}"
 
 
-def _is_told(value: float, error: float) -> bool:
+def _is_identified(value: float, error: float) -> bool:
     return not error > UNSURE * abs(value)
 
 
 def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
-    """Static, dynamic and viscous friction that are configured, with the joint's where it is in them."""
+    """Configured static, dynamic and viscous friction, with the joint's if it is part of the measured one."""
     motors, joints = arm.motors, arm.joints
     own = [motors.static_friction[i], motors.dynamic_friction[i], motors.viscous_friction[i]]
     column = np.reshape(arm.joint_from_motor, (len(joints.names), len(motors.names)))[:, i]
@@ -183,12 +194,12 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
     static, dynamic, viscous = configured
 
     def one(kind: str, unit: str, value: float, error: float, predicted: float, first: str = "") -> Finding:
-        told = _is_told(value, error)
-        spread = f"+-{shown(error)}" if math.isfinite(error) and told else ""
-        if not told:
-            spread = f"{NOT_TOLD}: {shown(value)} +-{shown(error)}"
-        text = "; ".join(filter(None, (first, spread, note)))
-        return Finding(f"{name}: {kind} friction", unit, value if told else math.nan, predicted, text)
+        identified = _is_identified(value, error)
+        deviation = f"+-{shown(error)}" if math.isfinite(error) and identified else ""
+        if not identified:
+            deviation = f"{NOT_IDENTIFIABLE}: {shown(value)} +-{shown(error)}"
+        text = "; ".join(filter(None, (first, deviation, note)))
+        return Finding(f"{name}: {kind} friction", unit, value if identified else math.nan, predicted, text)
 
     several = found.static_error if found.breakaways > 1 else math.nan
     return [
@@ -202,7 +213,7 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
 
 
 def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Friction]) -> dict[str, Ripple]:
-    """Ripple of each motor over its own angle, its friction and inertia taken off."""
+    """Ripple of each motor over its own angle, without friction and inertia."""
     found = {}
     for i, name in enumerate(arm.motors.names):
         known = friction[name]
@@ -219,10 +230,10 @@ def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Frictio
 
 
 def _ripple_section(ripple: dict[str, Ripple], friction: dict[str, Friction], effects: Effects | None) -> Section:
-    said, findings = [], []
+    sentences, findings = [], []
     for name, found in ripple.items():
         if not len(found.order):
-            said.append(f"{name} made {found.turns:.2f} turns, too few to tell its ripple.")
+            sentences.append(f"{name} made {found.turns:.2f} turns, too few to identify its ripple.")
             continue
         top = int(np.argmax(found.amplitude))
         order, amplitude = int(found.order[top]), float(found.amplitude[top])
@@ -233,18 +244,18 @@ def _ripple_section(ripple: dict[str, Ripple], friction: dict[str, Friction], ef
                 "N m",
                 amplitude,
                 configured,
-                f"{order} cycles a turn, {found.turns:.1f} turns",
+                f"{order} cycles per turn, {found.turns:.1f} turns",
             )
         )
         clear = amplitude > FAINT * float(np.median(found.amplitude)) and amplitude > SLIGHT * friction[name].dynamic
-        said.append(
-            f"{name}: {shown(amplitude, 'N m')} at {order} cycles a turn."
+        sentences.append(
+            f"{name}: {shown(amplitude, 'N m')} at {order} cycles per turn."
             if clear
-            else f"{name}: no ripple to speak of; the largest order has {shown(amplitude, 'N m')}."
+            else f"{name}: no significant ripple; the largest order has {shown(amplitude, 'N m')}."
         )
     if not ripple:
-        said.append("No motor turned enough to tell its ripple.")
-    return Section("ripple", "Torque ripple by pulley angle", tuple(said), tuple(findings))
+        sentences.append("No motor turned enough to identify its ripple.")
+    return Section("ripple", "Torque ripple by pulley angle", tuple(sentences), tuple(findings))
 
 
 def _configured_ripple(effects: Effects | None, shaft: str, order: int) -> float:
@@ -272,7 +283,7 @@ def _power_section(
     at_links = signals.strain if np.any(np.isfinite(signals.strain)) else signals.cable_torque
     joint = np.sum(at_links * signals.joint_velocity, axis=1)
     known = np.isfinite(joint) & np.isfinite(motor)
-    said, findings = [], []
+    sentences, findings = [], []
     if np.any(known):
         found = efficiency(signals.time[known], motor[known], joint[known])
         if found.forward_put > LEAST_WORK:
@@ -281,23 +292,23 @@ def _power_section(
             expected = max(expected, 0.0)
             note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
             findings.append(Finding("efficiency, motors to links", "%", 100.0 * found.forward, 100.0 * expected, note))
-            said.append(
-                f"The motors gave {shown(found.forward_put, 'J')} to the transmission while they drove, "
-                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %; the friction and "
-                f"creep that are configured leave {100.0 * expected:.0f} % at the speeds and loads of this recording, "
-                "which the prediction takes from it."
+            sentences.append(
+                f"While driving, the motors put {shown(found.forward_put, 'J')} into the transmission; "
+                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %. With the "
+                f"configured friction and creep {100.0 * expected:.0f} % are predicted at the speeds and loads of this "
+                "recording."
             )
         if found.back_put > LEAST_WORK:
-            findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="driven backwards"))
-            said.append(f"Driven backwards, {100.0 * found.back:.0f} % of {shown(found.back_put, 'J')} came back.")
+            findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="backdriven"))
+            sentences.append(f"Backdriven: {100.0 * found.back:.0f} % of {shown(found.back_put, 'J')} came back.")
     findings += _backdrive(arm, friction, joints)
-    if not said:
-        said.append("Too little work was done to tell the efficiency.")
-    return Section("power", "Efficiency and backdrivability", tuple(said), tuple(findings))
+    if not sentences:
+        sentences.append("Too little work was done to measure the efficiency.")
+    return Section("power", "Efficiency and backdrivability", tuple(sentences), tuple(findings))
 
 
 def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
-    """Power that friction and creep take by the configured parameters, (k,), W."""
+    """Power lost to friction and creep by the configured parameters, (k,), W."""
     speed, joint = np.abs(signals.velocity), np.abs(np.nan_to_num(signals.joint_velocity))
     motors, joints = arm.motors, arm.joints
     loss = speed @ np.array(motors.dynamic_friction) + speed**2 @ np.array(motors.viscous_friction)
@@ -308,7 +319,7 @@ def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
 
 
 def _backdrive(arm: Arm, friction: dict[str, Friction], joints: dict[str, Friction]) -> list[Finding]:
-    """Torque at each joint, alone, that its own and its motors' dry friction hold against a hand."""
+    """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
     matrix = np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names)))
     motor_per_joint = np.abs(np.linalg.inv(matrix))
     measured = np.array([friction[name].dynamic for name in arm.motors.names])
@@ -319,7 +330,7 @@ def _backdrive(arm: Arm, friction: dict[str, Friction], joints: dict[str, Fricti
         turns = motor_per_joint[:, i]
         needed = turns > 1e-9
         by_motors = float(turns[needed] @ measured[needed])
-        note = "dry friction of the joint and of its motors, felt by a hand that drives it"
+        note = "dry friction of the joint and of its motors"
         expected = float(turns @ configured) + arm.joints.dynamic_friction[i]
-        found.append(Finding(f"{name}: torque to drive it backwards", "N m", by_motors + float(own[i]), expected, note))
+        found.append(Finding(f"{name}: backdriving torque", "N m", by_motors + float(own[i]), expected, note))
     return found

@@ -1,4 +1,4 @@
-"""An analysis as one page of HTML that needs nothing but itself."""
+"""An analysis as one self-contained page of HTML."""
 
 import base64
 import html
@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.plots import Plot, plots
-from wam_ros.bag_losses import PARAMETERS
+from wam_bag.losses import PARAMETERS
 
-NARROW = 640  # px, up to which the narrow pictures are shown
+NARROW = 640  # px; up to this width the narrow pictures are shown
 
-# nothing may be asked of a network, whatever stands in the bag
+# no network access, whatever is in the bag
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 CSS = """
 :root { color-scheme: light; }
@@ -63,7 +63,7 @@ def page(analysis: Analysis) -> str:
     Returns
     -------
     str
-        HTML with its styles and its pictures inside; it has no script and asks for nothing.
+        HTML with its styles and pictures; it has no script and makes no request.
     """
     pictures = list(plots(analysis))
     name = analysis.recording.bag.path.name
@@ -77,7 +77,7 @@ def page(analysis: Analysis) -> str:
         '<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{html.escape(name)}: what it shows</title><style>{CSS}</style></head><body>"
+        f"<title>{html.escape(name)}: analysis</title><style>{CSS}</style></head><body>"
         f"<header><div><h1>{html.escape(name)}</h1><p>{html.escape(_lead(analysis))}</p></div></header>"
         f"<main><nav>{links}</nav>{sections}{_provenance(analysis)}{_parameters(analysis)}</main></body></html>\n"
     )
@@ -88,7 +88,7 @@ def _lead(analysis: Analysis) -> str:
 
 
 def _section(section: Section, pictures: Iterable[Plot]) -> str:
-    sentences = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in section.said)
+    sentences = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in section.sentences)
     figures = "".join(_figure(picture) for picture in pictures if picture.section == section.key)
     lacking = ""
     if section.lacking:
@@ -120,9 +120,8 @@ def _table(findings: Sequence[Finding]) -> str:
         f'<td class="number">{html.escape(shown(finding.predicted, finding.unit))}</td></tr>'
         for finding in findings
     )
-    return (
-        f"<table><thead><tr><th>What</th><th>Measured</th><th>Predicted</th></tr></thead><tbody>{rows}</tbody></table>"
-    )
+    head = "".join(f"<th>{title}</th>" for title in ("Quantity", "Measured", "Predicted"))
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
 
 
 def _note(finding: Finding) -> str:
@@ -138,16 +137,16 @@ def _provenance(analysis: Analysis) -> str:
     notes = "".join(f"<li>{html.escape(note)}</li>" for note in analysis.recording.summary.notes)
     return (
         f'<section id="provenance"><h2>Provenance</h2><dl>{rows}</dl><ul>{notes}</ul>'
-        f"<details><summary>Messages of each topic that was looked at</summary><dl>{topics}</dl></details></section>"
+        f"<details><summary>Messages of each topic that was read</summary><dl>{topics}</dl></details></section>"
     )
 
 
 def _parameters(analysis: Analysis) -> str:
     attached = analysis.recording.bag.attachments.get(PARAMETERS)
     if attached is None:
-        return '<section id="parameters"><h2>Parameters</h2><p>The bag has none.</p></section>'
+        return '<section id="parameters"><h2>Parameters</h2><p>No parameters in the bag.</p></section>'
     text = attached.decode("utf-8", "replace")
     return (
-        '<section id="parameters"><h2>Parameters</h2><p>As they were recorded, of every node.</p>'
+        '<section id="parameters"><h2>Parameters</h2><p>As recorded, of every node.</p>'
         f"<details><summary>Show all</summary><pre>{html.escape(text)}</pre></details></section>"
     )

@@ -13,18 +13,27 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from wam_analysis import arm_picture
-from wam_analysis.bag import JointColumns, WrenchColumns
-from wam_analysis.demo_figure import ASKED, FELT, MEASURED, TRUE, draw_arm, draw_forces, draw_places, seconds_at
+from wam_analysis.demo_figure import (
+    COMMANDED,
+    ESTIMATED,
+    MEASURED,
+    TRUE,
+    draw_arm,
+    draw_forces,
+    draw_positions,
+    seconds_at,
+)
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.measures.loop_timing import latency
 from wam_analysis.recorded import recorded_arm
+from wam_bag.bag import JointColumns, WrenchColumns
 
 Numbers = NDArray[np.float64]
 
 WIDE, NARROW = 9.6, 4.1  # inches
 MOST = {WIDE: 3000, NARROW: 1200}  # points of a line
 PNG_DPI = 130
-SHAFTS = (TRUE, FELT, MEASURED, "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#222222")
+SHAFTS = (TRUE, ESTIMATED, MEASURED, "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#222222")
 STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
@@ -49,7 +58,7 @@ class Plot(NamedTuple):
     Attributes
     ----------
     section : key of the section to which it belongs.
-    title : below it, says what is seen.
+    title : caption.
     kind : 'svg+xml' or 'png'.
     wide, narrow : its bytes.
     """
@@ -65,12 +74,12 @@ Draw = Callable[[Figure, float], None]
 
 
 def plots(analysis: Analysis) -> Iterator[Plot]:
-    """Every picture that the recording has something for."""
+    """Every picture for which the recording has data."""
     summary, recording = analysis.recording.summary, analysis.recording
     if summary.moment is not None:
         yield _arm(analysis)
     if len(summary.traces.stamp):
-        title = "Forces over the whole recording, and where on its link the arm was touched."
+        title = "Forces and contact position over the whole recording."
         yield _svg("happened", title, lambda figure, width: _story(figure, width, analysis), 4.6, 5.4)
     joints = [(name, c) for name, c in recording.bag.topics.items() if isinstance(c, JointColumns) and c.position.size]
     chosen = _motion_topic(recording.namespace, joints)
@@ -82,19 +91,17 @@ def plots(analysis: Analysis) -> Iterator[Plot]:
         name, columns = wrenches[0]
         yield _svg("happened", f"Forces on {name}.", lambda figure, width: _wrench(figure, width, columns), 2.8, 3.2)
     if any(len(one.time) for one in analysis.held):
-        title = "Each force that was asked for, from the moment it was: measured by the loop and applied."
+        title = "Each commanded force from its start: measured by the force loop, and true."
         rows = sum(len(one.time) > 0 for one in analysis.held[:6])
         wide, narrow = 2.6 * math.ceil(rows / 3), 2.1 * rows
         yield _svg("force", title, lambda figure, width: _holds(figure, width, analysis), wide, narrow)
     if analysis.motion.signals is not None:
-        title = (
-            "Torque that each motor does not pass on, over its speed; lines: identified (full), configured (dashed)."
-        )
+        title = "Friction torque of each motor over its velocity; lines: identified (solid), configured (dashed)."
         n = analysis.motion.signals.torque.shape[1]
         wide, narrow = 2.5 * math.ceil(n / 2), 2.2 * n
         yield _svg("friction", title, lambda figure, width: _friction(figure, width, analysis), wide, narrow)
     if any(len(found.order) for found in analysis.motion.ripple.values()):
-        title = "Ripple of each motor's torque by the order of its own angle."
+        title = "Torque ripple of each motor by the order of its angle."
         yield _svg("ripple", title, lambda figure, width: _ripple(figure, analysis), 2.6, 3.0)
     yield from timing_plots(analysis)
 
@@ -117,9 +124,9 @@ def _svg(section: str, title: str, draw: Draw, wide: float, narrow: float) -> Pl
 
 
 def _arm(analysis: Analysis) -> Plot:
-    """The arm as MuJoCo renders it, or drawn, once for both widths."""
+    """The arm, rendered by MuJoCo or drawn, the same for both widths."""
     recording = analysis.recording
-    recorded = recorded_arm(recording.bag, recording.namespace)
+    recorded = recorded_arm(recording.run.parameters)
     figure = Figure(figsize=(5.6, 4.2), dpi=PNG_DPI)
     FigureCanvasAgg(figure)
     stream = io.BytesIO()
@@ -129,18 +136,18 @@ def _arm(analysis: Analysis) -> Plot:
         figure.savefig(stream, format="png", metadata={"Software": None})
     moment = recording.summary.moment
     seconds = seconds_at(recording.summary, moment.stamp) if moment is not None else 0.0
-    title = f"The arm after {seconds:.1f} s, with the force on it as it was and as it was felt."
+    title = f"The arm after {seconds:.1f} s, with the true and the estimated contact force."
     title += f" ({recorded.note})" if recorded.note else ""
     return Plot("happened", title, "png", stream.getvalue(), stream.getvalue())
 
 
 def _story(figure: Figure, width: float, analysis: Analysis) -> None:
     summary = analysis.recording.summary
-    arm = analysis.recording.parameters.arm or recorded_arm(analysis.recording.bag, summary.namespace).arm
+    arm = analysis.recording.parameters.arm or recorded_arm(analysis.recording.run.parameters).arm
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0))
     is_wide = width > NARROW
     draw_forces(above, summary, letter="", room=105 if is_wide else 0, most=MOST[width])
-    draw_places(below, summary, arm, letter="", most=MOST[width])
+    draw_positions(below, summary, arm, letter="", most=MOST[width])
 
 
 def _motion_topic(namespace: str, joints: list[tuple[str, JointColumns]]) -> tuple[str, JointColumns] | None:
@@ -150,7 +157,7 @@ def _motion_topic(namespace: str, joints: list[tuple[str, JointColumns]]) -> tup
 
 
 def envelope(time: Numbers, value: Numbers, most: int) -> tuple[Numbers, Numbers]:
-    """A line with at most so many points that looks the same: lowest and highest of each stretch.
+    """A line with at most so many points that looks the same: minimum and maximum of each interval.
 
     Parameters
     ----------
@@ -197,10 +204,10 @@ def _holds(figure: Figure, width: float, analysis: Analysis) -> None:
     grid = figure.subplots(math.ceil(len(held) / across), across, squeeze=False)
     for axes, one in zip(grid.flat, held, strict=False):
         most = MOST[width] // across
-        if len(one.applied):
-            axes.plot(*envelope(one.time_true, one.applied, most), color=TRUE, lw=1.6, label="applied")
+        if len(one.true):
+            axes.plot(*envelope(one.time_true, one.true, most), color=TRUE, lw=1.6, label="true")
         axes.plot(*envelope(one.time, one.measured, most), color=MEASURED, lw=1.0, ls=(0, (4, 2)), label="measured")
-        axes.axhline(one.hold.asked, color=ASKED, lw=0.9, ls=(0, (1.2, 1.2)), label="asked")
+        axes.axhline(one.hold.commanded, color=COMMANDED, lw=0.9, ls=(0, (1.2, 1.2)), label="commanded")
         axes.set_title(one.hold.name if len(one.hold.name) < 34 else f"{one.hold.name[:32]}…")
         axes.set_xlabel("time [s]")
     for row in grid:
@@ -225,8 +232,8 @@ def _friction(figure: Figure, width: float, analysis: Analysis) -> None:
         found, motors = analysis.motion.friction[name], arm.motors
         end = max(float(np.max(np.abs(speed), initial=0.0)), 1e-3)
         for dry, viscous, style, colour in (
-            (found.dynamic, found.viscous, "-", FELT),
-            (motors.dynamic_friction[i], motors.viscous_friction[i], "--", ASKED),
+            (found.dynamic, found.viscous, "-", ESTIMATED),
+            (motors.dynamic_friction[i], motors.viscous_friction[i], "--", COMMANDED),
         ):
             for sign in (-1.0, 1.0):
                 ends = np.array([0.0, sign * end])
@@ -246,14 +253,14 @@ def _ripple(figure: Figure, analysis: Analysis) -> None:
     for i, (name, found) in enumerate(analysis.motion.ripple.items()):
         if len(found.order):
             axes.plot(found.order, 1e3 * found.amplitude, "o-", color=SHAFTS[i], ms=3.0, lw=0.8, label=name)
-    axes.set(xlabel="cycles a turn of the motor", ylabel="amplitude [mN m]", ylim=(0.0, None))
+    axes.set(xlabel="cycles per turn of the motor", ylabel="amplitude [mN m]", ylim=(0.0, None))
     axes.legend()
 
 
 def timing_plots(analysis: Analysis) -> Iterator[Plot]:
-    """Intervals of reception and latencies, where a clock was recorded."""
+    """Reception intervals and latencies of a recording in realtime."""
     recording = analysis.recording
-    states, answers = recording.joints("motor_states"), recording.joints("motor_current_command")
+    states, answers = recording.run.joints("motor_states"), recording.run.joints("motor_current_command")
     if recording.mode != "realtime" or states is None or len(states.stamp_ns) < 3:
         return
     intervals = np.diff(np.sort(states.log_time_ns)) / 1e6

@@ -1,8 +1,8 @@
-"""What the theory says of a press with the recorded parameters: the friction node at the contact.
+"""Predictions for a press from the recorded parameters: the friction node at the contact.
 
-The arm is reduced to the node of figure 5.4 along the force that is asked for: joints move as the
-force loop moves them, dq/dx = J^T d/|J^T d|^2, which carries friction and damping over by power;
-stiffness and inertia are those that a force along d feels.
+The arm is reduced to the node of figure 5.4 along the commanded force.  Joints move as the force loop moves
+them, dq/dx = J^T d/|J^T d|^2, which gives friction and damping by conservation of power; stiffness and inertia
+are the apparent ones along d.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.recorded import RecordedParameters
+from wam_analysis.recorded import PredictionParameters
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
@@ -20,7 +20,7 @@ from wam_theory import linear_loop, regimes, stiction
 
 Numbers = NDArray[np.float64]
 
-CERTAIN = 0.1  # left side of (5.11) up to which (5.8) and (5.9) are exact enough to be compared
+CERTAIN = 0.1  # left side of (5.11) up to which (5.8) and (5.9) are exact enough for a comparison
 
 
 class Node(NamedTuple):
@@ -28,11 +28,11 @@ class Node(NamedTuple):
 
     Attributes
     ----------
-    transmission_stiffness, contact_stiffness : k_tr, k_c, N/m; k_c NaN where the surface is not known.
-    driven_stiffness : k_tr in series with what the speed loops give way, N/m; NaN where they are not
-        known.  The integral of a speed loop is a spring about the path that it is asked to follow.
+    transmission_stiffness, contact_stiffness : k_tr, k_c, N/m; k_c NaN if the surface is not known.
+    driven_stiffness : k_tr in series with the velocity loops, N/m; NaN if they are not known.  The integral term
+        of a velocity loop acts as a spring about the commanded path.
     inertia : J_l, kg, of the joint side.
-    damping : b, N s/m, of joints, cables and surface together: the motor's own speed counts as slow.
+    damping : b, N s/m, of joints, cables and surface together; the motor is taken as slow.
     static_friction, dynamic_friction : N.
     joint_per_metre : (n,), dq/dx, rad/m.
     """
@@ -48,7 +48,7 @@ class Node(NamedTuple):
 
 
 class Predicted(NamedTuple):
-    """Chapter 5 for a node under integral force control; NaN where it does not say.
+    """Predictions of chapter 5 for a node under integral force control; NaN where it has none.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Predicted(NamedTuple):
     force_peak_to_peak, period : stiction cycle of F_c, N and s, (5.8), (5.9) corrected.
     actuator_peak_to_peak : Coulomb cycle of the motor, m at the contact, (5.20).
     is_certain : whether (5.11) is small enough for (5.8), (5.9).
-    driven_peak_to_peak, driven_period : (5.8), (5.9) with the speed loops in series with the cables.
+    driven_peak_to_peak, driven_period : (5.8), (5.9) with the velocity loops in series with the cables.
     """
 
     gamma: float
@@ -78,22 +78,22 @@ class Predicted(NamedTuple):
 
 
 def node_at(
-    recorded: RecordedParameters, arm: Arm, q: Sequence[float], cover: str, place: float, direction: Numbers
+    recorded: PredictionParameters, arm: Arm, q: Sequence[float], cover: str, position: float, direction: Numbers
 ) -> Node | None:
-    """The node that a force meets; None where the place cannot press that way.
+    """The node at a contact; None if the arm cannot press there in this direction.
 
     Parameters
     ----------
-    recorded : for what the arm touches.
+    recorded : for the surface and the velocity loops.
     arm : the arm.
     q : (n,), rad.
-    cover, place : where it touches, m.
+    cover, position : of the contact, m.
     direction : (3,), of the force, in the cover's frame.
     """
     body = RigidBody(arm)
     size = float(np.linalg.norm(direction))
     axis = body.cover_pose(q, cover).rotation @ (direction / size)
-    along = axis @ body.point_jacobian(q, cover, (place, 0.0, 0.0))
+    along = axis @ body.point_jacobian(q, cover, (position, 0.0, 0.0))
     square = float(along @ along)
     if square <= 1e-6:
         return None
@@ -103,7 +103,7 @@ def node_at(
     gives = float(along @ np.linalg.solve(stiffness, along))
     moves = along / square
     cables = np.array([circuit.damping for circuit in arm.circuits])
-    surface = _surface(recorded, arm, cover, place)
+    surface = _surface(recorded, arm, cover, position)
     return Node(
         transmission_stiffness=1.0 / gives,
         driven_stiffness=1.0 / (gives + _servo_compliance(recorded, ratio, along)),
@@ -117,12 +117,12 @@ def node_at(
     )
 
 
-def _servo_compliance(recorded: RecordedParameters, ratio: Numbers, along: Numbers) -> float:
-    """What the speed loops give way along the force, m/N."""
-    loop = recorded.velocity_loop
-    if loop is None or not all(gain > 0.0 for gain in loop.integral_gain):
+def _servo_compliance(recorded: PredictionParameters, ratio: Numbers, along: Numbers) -> float:
+    """Compliance of the velocity loops along the force, m/N."""
+    servo = recorded.servo
+    if servo is None or not all(gain > 0.0 for gain in servo.integral_gain):
         return math.nan
-    return float(along @ np.linalg.solve(ratio.T @ np.diag(loop.integral_gain) @ ratio, along))
+    return float(along @ np.linalg.solve(ratio.T @ np.diag(servo.integral_gain) @ ratio, along))
 
 
 class _Surface(NamedTuple):
@@ -130,26 +130,26 @@ class _Surface(NamedTuple):
     damping: float
 
 
-def _surface(recorded: RecordedParameters, arm: Arm, cover: str, place: float) -> _Surface:
-    """What is touched, N/m and N s/m: the spring under the joint, else the obstacles if all are alike."""
+def _surface(recorded: PredictionParameters, arm: Arm, cover: str, position: float) -> _Surface:
+    """Stiffness, N/m, and damping, N s/m: of the spring under the joint, else of the obstacles if all have the same."""
     link = arm.covers.links[arm.covers.names.index(cover)]
     joint = arm.joints.names[arm.links.names.index(link)]
     springs = recorded.springs
     for name, stiffness, lever in zip(springs.joints, springs.stiffness, springs.lever, strict=True):
-        if name == joint and stiffness > 0.0 and place > 0.0:
-            return _Surface(stiffness * (lever / place) ** 2, 0.0)
+        if name == joint and stiffness > 0.0 and position > 0.0:
+            return _Surface(stiffness * (lever / position) ** 2, 0.0)
     obstacles = recorded.obstacles
     found = set(zip(obstacles.stiffness, obstacles.damping, strict=True)) if obstacles is not None else set()
     return _Surface(*found.pop()) if len(found) == 1 else _Surface(math.nan, 0.0)
 
 
 def predict(node: Node, gain: float, proportional_gain: float, sample_period: float, delay_samples: int) -> Predicted:
-    """Chapter 5 for a node.
+    """Predictions of chapter 5 for a node.
 
     Parameters
     ----------
     node : with all numbers known.
-    gain, proportional_gain : G_I, m/s/N, and G_P, m/N, which counts in Routh's criterion alone, (5.23).
+    gain, proportional_gain : G_I, m/s/N, and G_P, m/N, used in Routh's criterion only, (5.23).
     sample_period : of the force loop, s.
     delay_samples : of the force loop, rounded up.
     """
@@ -187,37 +187,37 @@ def predict(node: Node, gain: float, proportional_gain: float, sample_period: fl
 
 
 def _regime(gamma: float, zeta: float, has_stiction: bool) -> str:
-    """The regime in words (docs of `wam_theory.regimes`)."""
+    """The regime in words, see `wam_theory.regimes`."""
     if gamma >= float(regimes.gamma_3(zeta)):
         return "unstable for every step (domain III)"
     if gamma >= 1.0:
         return "stable for small steps only (domain II)"
     if has_stiction:
-        return "stable, with a stiction limit cycle where it comes to a standstill"
+        return "stable, with a stiction limit cycle at rest"
     if gamma >= float(regimes.gamma_b(zeta)):
-        return "stable, the motor cycles about the force (domain I)"
+        return "stable, with a limit cycle of the motor (domain I)"
     if gamma >= float(regimes.gamma_a(zeta)):
-        return "stable, approaches in a staircase from one side"
-    return "stable, slides straight to the force"
+        return "stable, approaches the force in steps from one side"
+    return "stable, approaches the force without sticking"
 
 
 class LargestForce(NamedTuple):
-    """Largest force that the arm can press with, N, and what gives out first."""
+    """Largest force that the arm can press with, N, and its limit."""
 
     force: float
     limited_by: str
 
 
-def largest_force(arm: Arm, q: Sequence[float], cover: str, place: float, direction: Numbers) -> LargestForce:
+def largest_force(arm: Arm, q: Sequence[float], cover: str, position: float, direction: Numbers) -> LargestForce:
     """Largest controllable force by 3.2.1: peak torques of the motors and strength of the cables.
 
     Parameters
     ----------
-    arm, q, cover, place, direction : as in `node_at`; gravity is carried beside it.
+    arm, q, cover, position, direction : as in `node_at`; the weight of the arm is carried as well.
     """
     body = RigidBody(arm)
     axis = body.cover_pose(q, cover).rotation @ (direction / float(np.linalg.norm(direction)))
-    torque = axis @ body.point_jacobian(q, cover, (place, 0.0, 0.0))
+    torque = axis @ body.point_jacobian(q, cover, (position, 0.0, 0.0))
     transmission = TransmissionMap.of(arm)
     motor = np.array(transmission.motor_torques(torque.tolist()))  # per newton
     carried = np.array(transmission.motor_torques(body.gravity_torque(q).tolist()))

@@ -7,18 +7,19 @@ from typing import Any
 
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.table import plain
 
 WIDTH = 100
-COLUMN = 18  # of the table at least, with two blanks between a number and the next
-SCHEMA = 1  # of the JSON; a number that changes when a key changes its meaning
+NAME, COLUMN = 60, 16  # widths in the table: of a name at most, of a number at least
+SCHEMA = 2  # of the JSON; incremented when a key changes its name or meaning
 
 
 def text(analysis: Analysis) -> str:
-    """What happened, section by section: sentences, then numbers measured and predicted."""
+    """The analysis, section by section: sentences, then measured and predicted numbers."""
     lines: list[str] = []
     for section in analysis.sections:
         lines += ["", section.title, "─" * len(section.title)]
-        for sentence in section.said:
+        for sentence in section.sentences:
             lines += textwrap.wrap(sentence, WIDTH, initial_indent="  ", subsequent_indent="    ")
         lines += _table(section)
         if section.lacking:
@@ -33,22 +34,15 @@ def _wrapped(line: str) -> list[str]:
 
 
 def _table(section: Section) -> list[str]:
-    """Numbers in columns; a section without any has no table."""
+    """Lines of the table of a section; none without numbers."""
     if not section.findings:
         return []
-    numbers = [[shown(value, one.unit) for value in (one.measured, one.predicted)] for one in section.findings]
-    column = max(COLUMN, 2 + max(len(number) for pair in numbers for number in pair))
-    left = WIDTH - 2 - 2 * column
-    lines = ["", f"  {'':<{left}}{'measured':>{column}}{'predicted':>{column}}"]
-    for finding, (measured, predicted) in zip(section.findings, numbers, strict=True):
-        name = textwrap.wrap(finding.name, left - 2) or [""]
-        lines.append(f"  {name[0]:<{left}}{measured:>{column}}{predicted:>{column}}")
-        lines += [f"    {more}" for more in name[1:]]
-    return lines
+    rows = [(one.name, shown(one.measured, one.unit), shown(one.predicted, one.unit)) for one in section.findings]
+    return ["", *(f"  {line}" for line in plain([("", "measured", "predicted")], rows, first=NAME, least=COLUMN))]
 
 
 def document(analysis: Analysis) -> dict[str, Any]:
-    """The analysis as plain values, see docs/analysis.md; a number that is not known is None."""
+    """The analysis as plain values, see docs/analysis.md; an unknown number is None."""
     return {
         "schema": SCHEMA,
         "provenance": analysis.provenance,
@@ -57,7 +51,7 @@ def document(analysis: Analysis) -> dict[str, Any]:
             {
                 "key": section.key,
                 "title": section.title,
-                "said": list(section.said),
+                "sentences": list(section.sentences),
                 "findings": [_finding(finding) for finding in section.findings],
                 "lacking": list(section.lacking),
             }

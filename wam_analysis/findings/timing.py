@@ -1,4 +1,4 @@
-"""What a recording says of the clockwork, and where it comes from."""
+"""Section about the timing of the loop, and the provenance of the recording."""
 
 import math
 from collections.abc import Mapping
@@ -6,18 +6,19 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from wam_analysis.bag import Columns, JointColumns, PointColumns, WrenchColumns
+from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.findings.recording import Recording
 from wam_analysis.measures.loop_timing import latency, stamp_timing
+from wam_bag.bag import Columns, JointColumns, PointColumns, WrenchColumns
+from wam_bag.losses import RECORDING
 
 STAMPED = (JointColumns, WrenchColumns, PointColumns)
 TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measured", "contact/wrench")
 
 
-def timing_section(recording: Recording) -> Section:
-    """Periods, jitter, latency and what was missed, from stamps and times of reception."""
-    said, findings = [], []
+def timing_section(recording: AnalysedRun) -> Section:
+    """Periods, jitter, latency and missed periods, from stamps and reception times."""
+    sentences, findings = [], []
     real = recording.mode == "realtime"
     timing = recording.parameters.timing
     for name in TIMED:
@@ -33,29 +34,29 @@ def timing_section(recording: Recording) -> Section:
             Finding(f"{name}: missed periods", "", float(found.missed), 0.0),
         ]
         if found.backwards:
-            findings.append(Finding(f"{name}: stamps that do not rise", "", float(found.backwards), 0.0))
+            findings.append(Finding(f"{name}: stamps that do not increase", "", float(found.backwards), 0.0))
         if real:
             findings += [
-                Finding(f"{name}: jitter of the reception", "ms", 1e3 * found.jitter, note="standard deviation"),
+                Finding(f"{name}: reception jitter", "ms", 1e3 * found.jitter, note="standard deviation"),
                 Finding(f"{name}: longest wait", "ms", 1e3 * found.worst),
             ]
         if found.missed:
-            said.append(
+            sentences.append(
                 f"{name}: {found.missed} periods without a message, the longest gap {shown(found.longest_gap, 's')}."
             )
-    states, answers = recording.joints("motor_states"), recording.joints("motor_current_command")
+    states, answers = recording.run.joints("motor_states"), recording.run.joints("motor_current_command")
     if real and states is not None and answers is not None:
         answer = latency(states.stamp_ns, states.log_time_ns, answers.stamp_ns, answers.log_time_ns)
         findings += [
             Finding("latency, state to current at the recorder: median", "us", 1e6 * answer.p50),
             Finding("latency, state to current at the recorder: 99 %", "us", 1e6 * answer.p99),
             Finding("latency, state to current at the recorder: worst", "us", 1e6 * answer.worst),
-            Finding("states that were not answered", "", float(answer.unanswered), 0.0),
+            Finding("states without a command", "", float(answer.unanswered), 0.0),
         ]
-        said.append(
-            f"A state was answered after {shown(1e6 * answer.p50, 'us')} in the median and "
-            f"{shown(1e6 * answer.worst, 'us')} at worst, as the recorder saw it; "
-            f"{answer.unanswered} of {answer.answered + answer.unanswered} were not."
+        sentences.append(
+            f"Latency from state to current command, at the recorder: median {shown(1e6 * answer.p50, 'us')}, "
+            f"worst {shown(1e6 * answer.worst, 'us')}; "
+            f"{answer.unanswered} of {answer.answered + answer.unanswered} states got no command."
         )
     loop = recording.summary.loop
     if not math.isnan(loop.rate):
@@ -66,16 +67,18 @@ def timing_section(recording: Recording) -> Section:
             Finding("driver: missed periods", "", float(loop.missed), 0.0, f"of {loop.periods}"),
         ]
     if recording.mode == "lockstep":
-        said.append("Recorded in lockstep: the arm waited for every answer, so that times of reception say nothing.")
+        sentences.append(
+            "Recorded in lockstep: the driver waited for every command, so reception times have no meaning."
+        )
     if not findings:
-        said.append("No stamped topic was recorded that shows the loop.")
-    return Section("timing", "Timing of the loop", tuple(said), tuple(findings), recording.lacking(*TIMED[:2]))
+        sentences.append("No stamped topic of the loop was recorded.")
+    return Section("timing", "Timing of the loop", tuple(sentences), tuple(findings), recording.lacking(*TIMED[:2]))
 
 
-def provenance(recording: Recording) -> dict[str, str]:
-    """Where the recording and its numbers come from."""
+def provenance(recording: AnalysedRun) -> dict[str, str]:
+    """Origin of the recording and of its numbers."""
     bag, summary = recording.bag, recording.summary
-    said = dict(bag.metadata.get("recording", {}))
+    metadata = dict(bag.metadata.get(RECORDING, {}))
     counts = {name: len(columns.log_time_ns) for name, columns in bag.topics.items()}
     whole = bag.counts or counts
     try:
@@ -88,20 +91,20 @@ def provenance(recording: Recording) -> dict[str, str]:
         "mode": recording.mode,
         "topics": _part_of(sum(count > 0 for count in counts.values()), sum(count > 0 for count in whole.values())),
         "messages": _part_of(sum(counts.values()), sum(whole.values())),
-        "received": "not said" if summary.received < 0 else str(summary.received),
-        "dropped": "not said" if summary.dropped < 0 else str(summary.dropped),
-        "lost": " ".join(summary.lost) or "nothing that is known of",
-        "parameters, SHA-256": recording.parameters.hash or "not in the bag",
+        "received": "no counts in the bag" if summary.received < 0 else str(summary.received),
+        "dropped": "no counts in the bag" if summary.dropped < 0 else str(summary.dropped),
+        "lost": " ".join(summary.lost) or "none known",
+        "parameters, SHA-256": recording.run.parameters.sha256 or "not in the bag",
         "analysed with": f"wam_stack {here}",
     }
-    told = {key: value for key, value in said.items() if not key.startswith("/") and key != "mode"}
-    return {**facts, **{f"recorded: {key}": value for key, value in told.items()}}
+    recorder = {key: value for key, value in metadata.items() if not key.startswith("/") and key != "mode"}
+    return {**facts, **{f"recorded: {key}": value for key, value in recorder.items()}}
 
 
 def _part_of(read: int, all_of_them: int) -> str:
     if read == all_of_them:
         return str(read)
-    return f"{read} of {all_of_them}; in the others is nothing that is analysed, so they are not read"
+    return f"{read} of {all_of_them}; the others are not needed and were not read"
 
 
 def extent(columns: Mapping[str, Columns]) -> float:

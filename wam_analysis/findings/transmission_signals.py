@@ -1,12 +1,11 @@
-"""Torques and speeds of motors and joints on one time base, and what lies between them."""
+"""Torques and velocities of motors, cables and joints on one time base."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import messages_of, node_of, values_of
-from wam_analysis.findings.recording import Recording, at_stamps, by_names
+from wam_analysis.findings.analysed_run import AnalysedRun, at_stamps, by_names
 from wam_description.arm import Arm
 from wam_description.transmission_map import TransmissionMap
 
@@ -15,7 +14,7 @@ Numbers = NDArray[np.float64]
 CABLE = "cable torque of the simulator"
 STRAIN = "strain gauges"
 RELEASE = 200_000_000  # ns after the brakes were released
-SLOWEST = 0.006  # s; cable torques that come less often do not show what a resonance does between
+SLOWEST = 0.006  # s; with a longer period, cable torques miss what a resonance does between samples
 GRAVITY = "gravity alone, while nothing touches"
 SOURCES = {CABLE: "sim/joint_states", STRAIN: "joint_sensors", GRAVITY: "gravity_effort"}
 
@@ -28,12 +27,12 @@ class TransmissionSignals(NamedTuple):
     time : (k,), s.
     angle, velocity, torque : (k, n), of the motors, rad, rad/s, N m.
     load : (k, n), torque that each motor passes on, N m.
-    load_from : where the load comes from: `CABLE`, `STRAIN` or `GRAVITY`.
+    load_from : source of the load: `CABLE`, `STRAIN` or `GRAVITY`.
     use : (k,), instants at which the load is known.
-    sampled : (k,), instants at which it was recorded; between them it lies on a line.
-    joint_velocity : (k, n), rad/s; NaN where not recorded.
-    cable_torque : (k, n), of the cables on the joints, N m; NaN where not recorded.
-    strain : (k, n), torque on the link side of the joints' friction, N m; NaN where not recorded.
+    sampled : (k,), instants at which it was recorded; between them it is interpolated.
+    joint_velocity : (k, n), rad/s; NaN if not recorded.
+    cable_torque : (k, n), of the cables on the joints, N m; NaN if not recorded.
+    strain : (k, n), torque on the link side of the joints' friction, N m; NaN if not recorded.
     """
 
     time: Numbers
@@ -49,9 +48,9 @@ class TransmissionSignals(NamedTuple):
     strain: Numbers
 
 
-def transmission_signals(recording: Recording, arm: Arm) -> TransmissionSignals | None:
-    """Bring motors, cables and joints together; None where the bag has no motors or no load."""
-    motors = recording.joints("motor_states")
+def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignals | None:
+    """The signals of a recording; None if it has no motor states or no load."""
+    motors = recording.run.joints("motor_states")
     if motors is None:
         return None
     names, joints = arm.motors.names, arm.joints.names
@@ -81,10 +80,10 @@ def transmission_signals(recording: Recording, arm: Arm) -> TransmissionSignals 
     matrix = TransmissionMap.of(arm).joint_from_motor
     use = ~_braked(recording, stamps[rows])
     if load_from == GRAVITY:
-        felt = recording.wrench("contact/wrench")
-        if felt is not None:
-            row = np.maximum(np.searchsorted(felt.stamp_ns, stamps[rows], side="right") - 1, 0)
-            use &= ~np.any(felt.force[row] != 0.0, axis=1)
+        estimated = recording.run.wrench("contact/wrench")
+        if estimated is not None:
+            row = np.maximum(np.searchsorted(estimated.stamp_ns, stamps[rows], side="right") - 1, 0)
+            use &= ~np.any(estimated.force[row] != 0.0, axis=1)
     return TransmissionSignals(
         time=stamps[rows] / 1e9,
         angle=angle[rows],
@@ -100,38 +99,36 @@ def transmission_signals(recording: Recording, arm: Arm) -> TransmissionSignals 
     )
 
 
-def _braked(recording: Recording, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether the brakes held, which is not friction; a little longer, until the cables have taken the load."""
+def _braked(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether the brakes held, which is not friction; extended until the cables have taken the load."""
     braked = np.zeros(len(stamps), dtype=np.bool_)
     since: int | None = None
-    for status in messages_of(recording.bag, f"{recording.namespace}/status"):
-        facts = values_of(status)
-        if node_of(status) != "driver" or "mode" not in facts or "stamp" not in facts:
+    for status in recording.run.statuses:
+        if status.node != "driver" or not status.mode or not status.stamp:
             continue
-        stamp = int(facts["stamp"])
-        if facts["mode"] == "enabled" and since is not None:
-            braked |= (stamps >= since) & (stamps < stamp + RELEASE)
+        if status.mode == "enabled" and since is not None:
+            braked |= (stamps >= since) & (stamps < status.stamp + RELEASE)
             since = None
-        elif facts["mode"] != "enabled" and since is None:
-            since = stamp
+        elif status.mode != "enabled" and since is None:
+            since = status.stamp
     return braked if since is None else braked | (stamps >= since)
 
 
-def _period(recording: Recording) -> float:
-    """Between two messages of the simulator's truth, s."""
-    columns = recording.joints("sim/joint_states")
+def _period(recording: AnalysedRun) -> float:
+    """Period of the simulator's joint states, s."""
+    columns = recording.run.joints("sim/joint_states")
     return float(np.median(np.diff(columns.stamp_ns))) / 1e9 if columns is not None else 0.0
 
 
-def _recorded_at(recording: Recording, topic: str, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
-    columns = recording.joints(topic)
+def _recorded_at(recording: AnalysedRun, topic: str, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    columns = recording.run.joints(topic)
     return np.zeros(len(stamps), dtype=np.bool_) if columns is None else at_stamps(columns, stamps)[0]
 
 
-def _of(recording: Recording, topic: str, field: str, names: tuple[str, ...], stamps: NDArray[np.int64]) -> Numbers:
-    """A field of another topic at some stamps, (k, n), on the line between its messages; NaN outside of them."""
+def _of(recording: AnalysedRun, topic: str, field: str, names: tuple[str, ...], stamps: NDArray[np.int64]) -> Numbers:
+    """A field of another topic at some stamps, (k, n), interpolated; NaN outside of its messages."""
     result = np.full((len(stamps), len(names)), np.nan)
-    columns = recording.joints(topic)
+    columns = recording.run.joints(topic)
     values = None if columns is None else by_names(columns, field, names)
     if columns is not None and values is not None and len(columns.stamp_ns) > 1:
         inside = (stamps >= columns.stamp_ns[0]) & (stamps <= columns.stamp_ns[-1])

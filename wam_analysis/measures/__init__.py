@@ -1,1 +1,14 @@
-"""What can be measured in signals: pure functions of arrays, no bag and no ROS."""
+"""Measures of recorded signals: pure functions of arrays, without bags and ROS.
+
+response            rise, settling and overshoot of a step
+force_accuracy      accuracy of a held force, dynamic range
+limit_cycle         amplitude, period and confidence of a limit cycle
+stability           whether a response settles, cycles or diverges
+stick_slip_phases   phases of rest and of motion
+friction            static, dynamic and viscous friction
+frequency           frequency response, coherence, bandwidth, poles
+efficiency          efficiency and backdrivability
+ripple              torque ripple by the angle of a pulley
+loop_timing         periods, jitter and latency from stamps
+runs                intervals of a condition, noise, smoothing
+"""

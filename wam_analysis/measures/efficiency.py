@@ -1,4 +1,4 @@
-"""Power through the transmission, and what it takes to drive it backwards (3.2.4, 3.2.5)."""
+"""Efficiency and backdrivability of a transmission (3.2.4, 3.2.5)."""
 
 import math
 from typing import NamedTuple
@@ -12,7 +12,7 @@ Numbers = NDArray[np.float64]
 
 
 class Efficiency(NamedTuple):
-    """Work put in and got out while power flows one way, J, and their ratio; NaN where none flowed.
+    """Work in and out while power flows one way, J, and their ratio; NaN if none flowed.
 
     `forward` is from the motor to the joint, `back` from the joint to the motor.
     """
@@ -31,12 +31,12 @@ def efficiency(time: Numbers, motor_power: Numbers, joint_power: Numbers) -> Eff
     Parameters
     ----------
     time : (n,), s.
-    motor_power : (n,), power of the motor on the transmission, W, less what accelerates the rotor.
+    motor_power : (n,), power of the motor on the transmission, W, less that which accelerates the rotor.
     joint_power : (n,), power of the transmission on the joint, W.
 
     Notes
     -----
-    A sample counts as forward where both are above zero, as backward where both are below.
+    A sample is forward if both powers are positive, backward if both are negative.
     """
     dt = np.diff(time, append=2.0 * time[-1] - time[-2]) if len(time) > 1 else np.zeros(len(time))
 
@@ -58,11 +58,11 @@ def efficiency(time: Numbers, motor_power: Numbers, joint_power: Numbers) -> Eff
 
 
 class Backdrivability(NamedTuple):
-    """What a hand feels that moves the arm, NaN where it was not to be seen.
+    """Resistance of the arm to external motion; NaN if it could not be measured.
 
     Attributes
     ----------
-    breakaway : force at which it gives way, N.
+    breakaway : force at which it begins to move, N.
     friction : force of dry friction in motion, N.
     damping : force per velocity, N s/m.
     mass : force per acceleration, kg.
@@ -75,13 +75,13 @@ class Backdrivability(NamedTuple):
 
 
 def backdrivability(time: Numbers, velocity: Numbers, force: Numbers, rest: float, window: float) -> Backdrivability:
-    """Friction, damping and mass felt at a point that is driven from outside (3.2.5).
+    """Friction, damping and mass at a point that is moved from outside (3.2.5).
 
     Parameters
     ----------
     time : (n,), s, at a constant rate.
     velocity : (n,), of the point along the force, m/s.
-    force : (n,), of the hand on the point, N.
+    force : (n,), on the point from outside, N.
     rest : speed up to which the point is at rest, m/s.
     window : of the average, s, as in `identify_friction`.
     """

@@ -1,4 +1,4 @@
-"""How accurately a force was held, and the dynamic range of force control (3.2.1)."""
+"""Accuracy of a held force, and the dynamic range of force control (3.2.1)."""
 
 import math
 from typing import NamedTuple
@@ -10,14 +10,14 @@ Numbers = NDArray[np.float64]
 
 
 class ForceAccuracy(NamedTuple):
-    """Deviation of a held force from the one asked for, N.
+    """Deviation of a held force from the one commanded, N.
 
     Attributes
     ----------
     bias : mean deviation.
     ripple : half of the range of the force, from its 0.5th to its 99.5th percentile.
     deviation : root mean square deviation.
-    smallest : smallest controllable force: what the deviation can hide, |bias| + ripple.
+    smallest : smallest controllable force: |bias| + ripple.
     """
 
     bias: float
@@ -26,14 +26,14 @@ class ForceAccuracy(NamedTuple):
     smallest: float
 
 
-def force_accuracy(asked: Numbers, held: Numbers) -> ForceAccuracy:
+def force_accuracy(commanded: Numbers, held: Numbers) -> ForceAccuracy:
     """Accuracy of a force in its steady state.
 
     Parameters
     ----------
-    asked, held : (n,), N, along the same direction; NaN where not known.
+    commanded, held : (n,), N, along the same direction; NaN if not known.
     """
-    error = (held - asked)[np.isfinite(held) & np.isfinite(asked)]
+    error = (held - commanded)[np.isfinite(held) & np.isfinite(commanded)]
     if not len(error):
         return ForceAccuracy(math.nan, math.nan, math.nan, math.nan)
     bias = float(np.mean(error))
@@ -48,9 +48,9 @@ class DynamicRange(NamedTuple):
     Attributes
     ----------
     largest : N, by the limits of motors and cables.
-    limited_by : what gives out first.
-    smallest : N, worst of what was held.
-    ratio : NaN where either is unknown.
+    limited_by : the limit.
+    smallest : N, worst of the held forces.
+    ratio : NaN if either is unknown.
     """
 
     largest: float
@@ -60,12 +60,12 @@ class DynamicRange(NamedTuple):
 
 
 def dynamic_range(largest: float, limited_by: str, held: list[ForceAccuracy]) -> DynamicRange:
-    """Dynamic range from the limits and the accuracy of every force that was held.
+    """Dynamic range from the limits and the accuracy of every held force.
 
     Parameters
     ----------
-    largest : N; NaN where the limits are not known.
-    limited_by : what gives out first.
+    largest : N; NaN if the limits are not known.
+    limited_by : the limit.
     held : at least one, else the ratio is NaN.
     """
     known = [one.smallest for one in held if math.isfinite(one.smallest)]

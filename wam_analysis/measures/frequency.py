@@ -1,4 +1,4 @@
-"""Frequency response of what was recorded, how far it can be believed, and its poles."""
+"""Frequency response of recorded signals, its coherence, bandwidth and poles."""
 
 from typing import NamedTuple
 
@@ -19,9 +19,9 @@ class FrequencyResponse(NamedTuple):
     ----------
     frequency : (k,), Hz, without zero.
     response : (k,), complex, output per input.
-    coherence : (k,), 0 to 1: the part of the output that the input explains linearly.
-    excitation : (k,), power of the input over that where it is strongest.
-    segments : how many were averaged; with one only the coherence is 1 whatever was recorded.
+    coherence : (k,), 0 to 1: the fraction of the output that the input explains linearly.
+    excitation : (k,), power of the input over its largest one.
+    segments : number averaged; with a single one the coherence is always 1.
     """
 
     frequency: Numbers
@@ -43,7 +43,7 @@ def frequency_response(rate: float, put: Numbers, got: Numbers, segment: int) ->
     Raises
     ------
     ValueError
-        where the recording is shorter than two segments or the input does not move.
+        if the recording is shorter than two segments or the input is constant.
     """
     n = len(put)
     if segment < 8 or n < 2 * segment or len(got) != n:
@@ -60,7 +60,7 @@ def frequency_response(rate: float, put: Numbers, got: Numbers, segment: int) ->
         gg += np.abs(b) ** 2
         gp += b * np.conj(a)
     if not np.any(pp[1:] > 0.0):
-        raise ValueError("the input does not move; there is no response to it")
+        raise ValueError("the input is constant; there is no response to it")
     floor = 1e-30 * float(np.max(pp)), 1e-30 * float(np.max(gg))
     response = gp / np.maximum(pp, floor[0])
     coherence = np.abs(gp) ** 2 / np.maximum(pp * gg, max(floor[0] * floor[1], 1e-300))
@@ -80,17 +80,17 @@ def believable(found: FrequencyResponse, least_coherence: float, least_excitatio
 
 
 def bandwidth(found: FrequencyResponse, believed: Mask) -> float:
-    """Frequency at which the response falls 3 dB below that at the lowest frequency that is believed, Hz.
+    """Frequency at which the response falls 3 dB below that at the lowest accepted frequency, Hz.
 
     Parameters
     ----------
     found : the response.
-    believed : (k,), the frequencies that are looked at, as `believable` finds them.
+    believed : (k,), the accepted frequencies, as `believable` finds them.
 
     Returns
     -------
     float
-        NaN where nothing can be believed, infinite where it does not fall as far as can be seen.
+        NaN if no frequency is accepted, infinite if the response does not fall that far.
     """
     rows = np.flatnonzero(believed)
     if not len(rows):
@@ -121,7 +121,7 @@ def fit_poles(frequency: Numbers, response: Complex, weight: Numbers, zeros: int
     Raises
     ------
     ValueError
-        where there are too few frequencies for the unknowns.
+        if there are too few frequencies for the unknowns.
     """
     unknowns = zeros + 1 + poles
     if not 0 <= zeros <= poles or poles < 1 or 2 * int(np.sum(weight > 0.0)) < unknowns:

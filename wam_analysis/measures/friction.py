@@ -12,14 +12,14 @@ from wam_analysis.measures.stick_slip_phases import stick_slip_phases
 Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FEWEST = 20  # samples in motion below which nothing is said
+FEWEST = 20  # samples in motion that are needed
 STILL = 0.01  # of the speed of rest: below it the shaft has not begun to move
 PRECISE = 0.01  # of the torque: noise at a breakaway after the line
 JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
 
 
 class Friction(NamedTuple):
-    """What turns against a shaft, N m (or N), with standard errors; NaN where it was not to be seen.
+    """Friction of a shaft, N m (or N), with standard errors; NaN if it is not identifiable.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Friction(NamedTuple):
     inertia : torque per acceleration.
     offset : torque that does not change its sign.
     static_error, dynamic_error, viscous_error, inertia_error : standard errors of the first four.
-    breakaways : how many were seen.
+    breakaways : their number.
     """
 
     static: float
@@ -48,13 +48,12 @@ class Friction(NamedTuple):
 def identify_friction(
     time: Numbers, velocity: Numbers, torque: Numbers, rest: float, window: float, use: Mask | None = None
 ) -> Friction:
-    """Identify torque = F_dynamic sgn(v) + b v + J a + c in motion, and F_static where motion begins.
+    """Identify torque = F_dynamic sgn(v) + b v + J a + c in motion, and F_static at the start of motion.
 
     All columns are averaged by the same triangle of `window` seconds before the fit, so that the
-    acceleration is not drowned in noise and none is favoured; samples whose window holds a change
-    of direction are left out, and then those that the fit explains badly.  At a breakaway the
-    torque is that of a line through the end of the rest, from a quarter of
-    the window where there is no noise to all of it.
+    acceleration is not lost in noise and all have the same delay.  Samples whose window holds a change
+    of direction are left out, and then outliers of the fit.  At a breakaway the torque is that of a line
+    through the end of the rest, over a quarter of the window without noise, up to all of it with noise.
 
     Parameters
     ----------
@@ -121,11 +120,11 @@ def _in_motion(
 def _robust(
     columns: Numbers, wanted: Numbers, width: int, half: NDArray[np.int64]
 ) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
-    """Least squares without the samples that fit badly; a column that says nothing gives NaN.
+    """Least squares without outliers; a column without information gives NaN.
 
-    `width` samples overlap in the averaging, so that the errors count one in so many.  What the law leaves out, as
-    creep of the cables, is alike within a motion and no noise: where the halves of motions, numbered by `half`,
-    disagree by more than that, their disagreement is the error (jackknife).
+    The averages of `width` samples overlap, so the errors count one sample in `width`.  What the law leaves out, such
+    as creep of the cables, is similar within a motion and not noise: if the halves of motions, numbered by `half`,
+    differ by more than the noise explains, their difference is the error (jackknife).
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     both = bool(np.ptp(columns[:, 0]) > 0.0)  # one direction only: dry friction and offset look the same

@@ -1,4 +1,4 @@
-"""Limit cycles in a recording: how large, how long, and how sure."""
+"""Limit cycles in a recording: amplitude, period and confidence."""
 
 import math
 from statistics import NormalDist
@@ -11,22 +11,22 @@ from wam_analysis.measures.runs import noise
 
 Numbers = NDArray[np.float64]
 
-PHASES = 192  # of a cycle that are told apart, where there are samples enough
+PHASES = 192  # of a cycle that are resolved, if there are enough samples
 LEAST = 8  # samples for each of them
-FEWEST = 3  # cycles that make one
-ALIKE = 0.9  # of the highest correlation: the shortest lag that is as good is the period, not a multiple of it
+FEWEST = 3  # cycles that are needed
+ALIKE = 0.9  # of the highest correlation; the shortest lag that reaches it is the period, not a multiple
 
 
-class Cycle(NamedTuple):
+class LimitCycle(NamedTuple):
     """A periodic motion.
 
     Attributes
     ----------
-    peak_to_peak : of the mean cycle, in the unit of the signal; NaN where none was found.
-    period : s; NaN where none was found.
-    cycles : how many of them the recording holds.
-    confidence : 0 to 1: the part of the motion that the mean cycle explains, less what its size
-        changes from the first half to the second.  Noise and single transients are near 0.
+    peak_to_peak : of the mean cycle, in the unit of the signal; NaN if none was found.
+    period : s; NaN if none was found.
+    cycles : how many the recording holds.
+    confidence : 0 to 1: the fraction of the motion that the mean cycle explains, less the relative change of
+        its size from the first half to the second.  It is near 0 for noise and single transients.
     growth : size of the second half over that of the first; 1 for a limit cycle.
     shape : (phases,), the mean cycle from its lowest phase on.
     """
@@ -39,15 +39,14 @@ class Cycle(NamedTuple):
     shape: Numbers
 
 
-NO_CYCLE = Cycle(math.nan, math.nan, 0.0, 0.0, math.nan, np.empty(0))
+NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, math.nan, np.empty(0))
 
 
-def limit_cycle(time: Numbers, value: Numbers) -> Cycle:
+def limit_cycle(time: Numbers, value: Numbers) -> LimitCycle:
     """Find the cycle that repeats in a signal.
 
-    The period is the lag at which the signal is most like itself, refined over as many cycles as
-    there are; the signal is then folded on it, so that noise averages out and a sawtooth or a jump
-    keeps its height.  A linear drift does not count.
+    The period is the lag with the highest autocorrelation, refined over all cycles.  The signal is then
+    folded on it, which averages noise and keeps the height of a sawtooth or a jump.  A linear drift is removed.
 
     Parameters
     ----------
@@ -56,8 +55,8 @@ def limit_cycle(time: Numbers, value: Numbers) -> Cycle:
 
     Returns
     -------
-    Cycle
-        with confidence 0 where nothing repeats at least three times.
+    LimitCycle
+        with confidence 0 if nothing repeats at least three times.
     """
     n = len(value)
     if n < 4 * FEWEST or float(np.ptp(value)) == 0.0:
@@ -76,7 +75,7 @@ def limit_cycle(time: Numbers, value: Numbers) -> Cycle:
     first, second = (_fold(flat[rows], phase[rows], phases).size for rows in (slice(half), slice(half, n)))
     growth = second / first if first > 0.0 else math.inf
     change = abs(second - first) / max(first, second, 1e-300)
-    return Cycle(
+    return LimitCycle(
         peak_to_peak=folded.size,
         period=lag * seconds,
         cycles=n / lag,
@@ -84,6 +83,48 @@ def limit_cycle(time: Numbers, value: Numbers) -> Cycle:
         growth=growth,
         shape=np.roll(folded.shape, -int(np.argmin(folded.shape))) + float(np.mean(value)),
     )
+
+
+class CycleExtent(NamedTuple):
+    """Peak to peak, in the unit of the signal, and period, s, of a cycle; NaN if there is none."""
+
+    peak_to_peak: float
+    period: float
+
+
+def mean_cycle(time: Numbers, value: Numbers) -> CycleExtent:
+    """The cycle in the second half of a signal that is known to cycle: its extremes and its mean period.
+
+    Unlike `limit_cycle` it takes every rising crossing of the middle for a cycle: the signal must have no noise.
+
+    Parameters
+    ----------
+    time : (n,), s, at a constant rate.
+    value : (n,), the signal.
+    """
+    late = value[len(value) // 2 :]
+    rises = _rises(late, late)
+    if len(rises) < 2:
+        return CycleExtent(math.nan, math.nan)
+    return CycleExtent(float(np.ptp(late)), float(np.diff(rises).mean() * (time[1] - time[0])))
+
+
+def last_cycle(time: Numbers, value: Numbers) -> CycleExtent:
+    """The last whole cycle of a signal that is known to cycle, from one rising crossing to the next.
+
+    The one to take if the cycle still converges, or if there are few; otherwise as `mean_cycle`.
+    """
+    rises = _rises(value, value[len(value) // 2 :])
+    if len(rises) < 2:
+        return CycleExtent(math.nan, math.nan)
+    begin, end = rises[-2], rises[-1]
+    return CycleExtent(float(np.ptp(value[begin : end + 1])), float(time[end] - time[begin]))
+
+
+def _rises(value: Numbers, late: Numbers) -> NDArray[np.intp]:
+    """Samples before each rising crossing of the middle between the extremes of the late part of a signal."""
+    above = value > 0.5 * (late.max() + late.min())
+    return np.flatnonzero(above[1:] & ~above[:-1])
 
 
 def _period(flat: Numbers) -> float:
@@ -150,6 +191,6 @@ def _fold(flat: Numbers, phase: Numbers, phases: int) -> _Folded:
 
 
 def _luck(below: Numbers, scatter: float) -> float:
-    """How much the highest of the phases on a plateau owes to noise: the expected largest of so many draws."""
+    """Part of the highest of the phases on a plateau that is due to noise: the expected largest of so many draws."""
     rivals = int(np.sum(below <= 4.0 * scatter))
     return scatter * NormalDist().inv_cdf((rivals - 0.375) / (rivals + 0.25)) if rivals > 1 else 0.0

@@ -1,4 +1,4 @@
-"""Timing of the loop from stamps and times of reception."""
+"""Timing of the loop from stamps and reception times."""
 
 import math
 from typing import NamedTuple
@@ -11,7 +11,7 @@ Numbers = NDArray[np.float64]
 
 
 class StampTiming(NamedTuple):
-    """How regularly a topic came.
+    """Regularity of a topic.
 
     Attributes
     ----------
@@ -20,7 +20,7 @@ class StampTiming(NamedTuple):
     missed : periods without a message.
     longest_gap : between two stamps, s.
     backwards : stamps that are not later than the one before.
-    interval : between two receptions, mean, s; NaN where they were not recorded.
+    interval : between two receptions, mean, s; NaN if they were not recorded.
     jitter : standard deviation of it, s.
     jitter_p99 : 99th percentile of |interval - period|, s.
     worst : longest interval between two receptions, s.
@@ -38,7 +38,7 @@ class StampTiming(NamedTuple):
 
 
 class Latency(NamedTuple):
-    """Time from the reception of a message to that of its answer, which bears the same stamp, s.
+    """Time from the reception of a message to that of the command with the same stamp, s.
 
     Attributes
     ----------
@@ -60,8 +60,8 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
     Parameters
     ----------
     stamp : (n,), ns, as the messages bear it.
-    received : (n,), ns, when each came by the clock of the recorder; None where that says nothing,
-        as in lockstep bags, where it is the stamp.
+    received : (n,), ns, reception times by the clock of the recorder; None if they have no meaning,
+        as in lockstep bags, whose log times are the stamps.
     """
     if len(stamp) < 2:
         return StampTiming(len(stamp), math.nan, 0, math.nan, 0, math.nan, math.nan, math.nan, math.nan)
@@ -89,7 +89,7 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
 
 
 def latency(stamp: Times, received: Times, answer_stamp: Times, answer_received: Times) -> Latency:
-    """Time from a state to the command that bears its stamp.
+    """Time from a state to the command with its stamp.
 
     Parameters
     ----------
@@ -101,8 +101,8 @@ def latency(stamp: Times, received: Times, answer_stamp: Times, answer_received:
     common, at_state, at_answer = np.intersect1d(stamp[first_state], known, assume_unique=True, return_indices=True)
     if not len(common):
         return Latency(0, 0, math.nan, math.nan, math.nan)
-    asked, given = received[first_state[at_state]], answer_received[first[at_answer]]
-    seconds = (given - asked).astype(np.float64) / 1e9
+    commanded, given = received[first_state[at_state]], answer_received[first[at_answer]]
+    seconds = (given - commanded).astype(np.float64) / 1e9
     between = (stamp[first_state] >= common[0]) & (stamp[first_state] <= common[-1])
     p50, p99 = (float(p) for p in np.percentile(seconds, [50.0, 99.0]))
     return Latency(len(common), int(np.sum(between)) - len(common), p50, p99, float(np.max(seconds)))

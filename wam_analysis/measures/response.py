@@ -15,16 +15,16 @@ TOP = 0.75  # of the overshoot; what is higher belongs to the parabola through t
 
 
 class StepResponse(NamedTuple):
-    """Answer to a step, in the unit of the signal and in seconds from the step.
+    """Response to a step, in the unit of the signal and in seconds from the step.
 
     Attributes
     ----------
     final : mean of the steady end.
-    rise : from 10 % to 90 % of the way to `final`, s; NaN where it does not get there.
-    settling : until the signal stays within the band about `final`, s; infinite where it never does.
-    overshoot : largest excess over `final` as a part of the step, 0 where there is none.
-    peak_time : of the largest excess, s; NaN where there is none.
-    spread : half of the range in the steady end.
+    rise : from 10 % to 90 % of the way to `final`, s; NaN if it does not get there.
+    settling : until the signal stays within the band about `final`, s; infinite if it never does.
+    overshoot : largest excess over `final` as a fraction of the step, 0 if there is none.
+    peak_time : of the largest excess, s; NaN if there is none.
+    ripple : half of the range in the steady end.
     """
 
     final: float
@@ -32,7 +32,7 @@ class StepResponse(NamedTuple):
     settling: float
     overshoot: float
     peak_time: float
-    spread: float
+    ripple: float
 
 
 def step_response(time: Numbers, value: Numbers, begin: float, steady: float, band: float) -> StepResponse:
@@ -52,7 +52,7 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
     Raises
     ------
     ValueError
-        where there are fewer than eight samples or the signal does not move.
+        if there are fewer than eight samples or the signal ends where it began.
     """
     if len(time) != len(value) or len(time) < 8:
         raise ValueError(f"a step response of {len(value)} samples at {len(time)} times; at least 8 of both are needed")
@@ -60,7 +60,7 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
     final = float(np.mean(tail))
     step = final - begin
     if step == 0.0 or not math.isfinite(step):
-        raise ValueError(f"the signal ends at {final:g}, where it began; there is no step to judge")
+        raise ValueError(f"the signal ends at {final:g}, where it began; there is no step to evaluate")
     sd = noise(value) / abs(step)
     width = min(math.ceil((4.0 * sd / (QUIET * band)) ** 2), max(len(value) // 50, 1))
     part = (smoothed(value, width) - begin) / step  # 0 before, 1 at the end
@@ -79,12 +79,12 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
         settling=settling,
         overshoot=peak,
         peak_time=at,
-        spread=float(np.ptp(tail)) / 2.0,
+        ripple=float(np.ptp(tail)) / 2.0,
     )
 
 
 def _crossing(time: Numbers, part: Numbers, level: float) -> float:
-    """When the signal first reaches a level, between two samples; NaN where it does not."""
+    """When the signal first reaches a level, between two samples; NaN if it does not."""
     above = np.flatnonzero(part >= level)
     if not len(above):
         return math.nan

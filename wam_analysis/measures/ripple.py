@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
 
-CELLS = 4  # a turn and order: how finely angles are told apart
+CELLS = 4  # per turn and order, into which angles are binned
 
 
 class Ripple(NamedTuple):
@@ -16,11 +16,11 @@ class Ripple(NamedTuple):
 
     Attributes
     ----------
-    order : (k,), cycles a turn, 1 to k.
+    order : (k,), cycles per turn, 1 to k.
     amplitude : (k,), N m (half of the peak to peak of each).
     phase : (k,), rad: torque = amplitude sin(order angle + phase).
-    turns : range of the angle in turns; orders are told apart where it is at least 1.
-    rest : standard deviation of what is left, N m.
+    turns : range of the angle in turns; at least 1 is needed.
+    rest : standard deviation of the residual, N m.
     """
 
     order: NDArray[np.int64]
@@ -36,20 +36,19 @@ NO_RIPPLE = Ripple(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0), 0.0, m
 def ripple_spectrum(angle: Numbers, torque: Numbers, orders: int) -> Ripple:
     """Amplitude of each order of the angle, by least squares over all orders at once.
 
-    Samples may lie anywhere: the shaft may stand, turn back or turn at any speed, since nothing is
-    resampled; equal angles are averaged first.  A slow drift over the range, up to the third power,
-    is fitted beside the orders.
+    The shaft may rest, reverse or turn at any speed, because nothing is resampled; equal angles are
+    averaged first.  A slow drift over the range, up to the third power, is fitted together with the orders.
 
     Parameters
     ----------
     angle : (n,), of the pulley, rad.
-    torque : (n,), N m, in one direction of motion, or less the friction.
-    orders : highest order asked for.
+    torque : (n,), N m, in one direction of motion, or without friction.
+    orders : highest order.
 
     Returns
     -------
     Ripple
-        without any order where the pulley made less than one turn or too few angles were seen.
+        without any order if the pulley made less than one turn or there are too few angles.
     """
     if not len(angle):
         return NO_RIPPLE

@@ -1,4 +1,4 @@
-"""Stretches of a recording: where a condition holds without a break."""
+"""Intervals in which a condition holds, and the noise of a signal."""
 
 import heapq
 
@@ -11,7 +11,7 @@ Rows = NDArray[np.int64]
 
 
 def runs(mask: Mask) -> Rows:
-    """Rows [begin, end) of each stretch that is true, (k, 2).
+    """Rows [begin, end) of each interval that is true, (k, 2).
 
     Parameters
     ----------
@@ -22,10 +22,10 @@ def runs(mask: Mask) -> Rows:
 
 
 def without_short(mask: Mask, shortest: int) -> Mask:
-    """The mask with every stretch, true or false, of fewer samples than `shortest` taken into its neighbours.
+    """The mask with every interval, true or false, of fewer samples than `shortest` merged into its neighbours.
 
-    The shortest goes first, so that a burst of bounces does not swallow what lies beside it.  The
-    first and the last stretch have one neighbour only and are kept.
+    The shortest is merged first, so that a burst of bounces does not absorb its neighbours.  The first and
+    the last interval have one neighbour only and are kept.
 
     Parameters
     ----------
@@ -35,17 +35,17 @@ def without_short(mask: Mask, shortest: int) -> Mask:
     kept = mask.copy()
     edges = np.flatnonzero(np.diff(mask.astype(np.int8))) + 1
     bounds = np.concatenate(([0], edges, [len(mask)])).tolist()
-    before, after = list(range(-1, len(bounds) - 1)), list(range(1, len(bounds) + 1))  # bounds that still stand
+    before, after = list(range(-1, len(bounds) - 1)), list(range(1, len(bounds) + 1))  # remaining bounds
     queue = [(bounds[i + 1] - bounds[i], i) for i in range(1, len(bounds) - 2) if bounds[i + 1] - bounds[i] < shortest]
     heapq.heapify(queue)
-    stands = [True] * len(bounds)
+    remains = [True] * len(bounds)
     while queue:
         length, i = heapq.heappop(queue)
         j = after[i]
-        if not stands[i] or i == 0 or j >= len(bounds) - 1 or bounds[j] - bounds[i] != length:
+        if not remains[i] or i == 0 or j >= len(bounds) - 1 or bounds[j] - bounds[i] != length:
             continue
         kept[bounds[i] : bounds[j]] = ~kept[bounds[i]]
-        stands[i] = stands[j] = False
+        remains[i] = remains[j] = False
         left, right = before[i], after[j]
         after[left], before[right] = right, left
         longer = bounds[right] - bounds[left]
@@ -55,10 +55,9 @@ def without_short(mask: Mask, shortest: int) -> Mask:
 
 
 def noise(value: Numbers) -> float:
-    """Standard deviation of what changes from sample to sample, from second differences.
+    """Standard deviation of the noise of a signal, from second differences.
 
-    Robust against jumps: the median of the absolute second difference.  What moves smoothly does
-    not count.
+    Robust against jumps, since it is the median of the absolute second difference; smooth motion adds nothing.
 
     Parameters
     ----------

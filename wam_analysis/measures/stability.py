@@ -1,4 +1,4 @@
-"""Whether a recorded response settles, cycles or diverges, judged late and not by its first peaks."""
+"""Whether a recorded response settles, cycles or diverges, from its late peaks."""
 
 import math
 from enum import StrEnum
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
 
-TRANSIENT = 2  # first peaks that say nothing: gamma 1.5 gives 4.00, 2.70, 2.94, 3.06, 3.24 ... and diverges
-FEWEST = 3  # peaks after these that a trend needs
-STEADY = 0.01  # growth per half cycle below which a size counts as constant
-FLATTENED = 0.3  # of the decay before: where it has come down to this, the response goes to a cycle, not to rest
+TRANSIENT = 2  # first peaks, which are not conclusive: gamma 1.5 gives 4.00, 2.70, 2.94, 3.06, 3.24 ... and diverges
+FEWEST = 3  # further peaks that a trend needs
+STEADY = 0.01  # growth per half cycle below which the amplitude is constant
+FLATTENED = 0.3  # of the earlier decay; a response whose decay is slower goes to a cycle, not to rest
 
 
-class Verdict(StrEnum):
-    """What becomes of the response."""
+class StabilityVerdict(StrEnum):
+    """Fate of a response."""
 
     SETTLES = "settles"
     CYCLES = "limit cycle"
@@ -25,25 +25,25 @@ class Verdict(StrEnum):
 
 
 class Stability(NamedTuple):
-    """The verdict and what it rests on.
+    """The verdict and its basis.
 
     Attributes
     ----------
-    verdict : see `Verdict`.
-    growth : factor from one half cycle to the next at the end; NaN where there are too few.
-    confidence : 0 to 1, from the scatter about the trend and the number of peaks; 1 where the error
+    verdict : see `StabilityVerdict`.
+    growth : factor from one half cycle to the next at the end; NaN if there are too few.
+    confidence : 0 to 1, from the scatter about the trend and the number of peaks; 1 if the error
         has come to rest within the tolerance.
     peaks : (k,), largest |error| of each half cycle, whole ones only.
     """
 
-    verdict: Verdict
+    verdict: StabilityVerdict
     growth: float
     confidence: float
     peaks: Numbers
 
 
 def stability(error: Numbers, tolerance: float) -> Stability:
-    """Judge the error of a response.
+    """Evaluate the error of a response.
 
     The first half cycles are the transient of the step; the verdict is the trend of the last half of
     those that follow, in the logarithm of the peaks.
@@ -51,12 +51,12 @@ def stability(error: Numbers, tolerance: float) -> Stability:
     Parameters
     ----------
     error : (n,), of the response, at a constant rate, from the step on.
-    tolerance : size of the error that counts as settled, above the noise.
+    tolerance : error that is settled, above the noise.
 
     Raises
     ------
     ValueError
-        where `tolerance` is not above zero or the error is not finite.
+        if `tolerance` is not above zero or the error is not finite.
     """
     if not tolerance > 0.0:
         raise ValueError(f"tolerance is {tolerance!r}; it must be above zero, above the noise of the error")
@@ -65,21 +65,21 @@ def stability(error: Numbers, tolerance: float) -> Stability:
     peaks = half_cycle_peaks(error, tolerance)
     quiet = len(error) > 4 and bool(np.all(np.abs(error[-max(len(error) // 5, 2) :]) <= tolerance))
     if quiet:
-        return Stability(Verdict.SETTLES, math.nan, 1.0, peaks)
+        return Stability(StabilityVerdict.SETTLES, math.nan, 1.0, peaks)
     late = peaks[TRANSIENT:]
     if len(late) < FEWEST:
-        return Stability(Verdict.UNDECIDED, math.nan, 0.0, peaks)
+        return Stability(StabilityVerdict.UNDECIDED, math.nan, 0.0, peaks)
     late = late[-max(len(late) // 2 + 1, FEWEST) :]
     slope, error_of_slope = _trend(np.log(late))
     sure = abs(slope) / error_of_slope if error_of_slope > 0.0 else math.inf
     last = _trend(np.log(late[-max(len(late) // 2, FEWEST) :]))[0]
     if slope > STEADY and sure > 2.0:
-        verdict = Verdict.DIVERGES
+        verdict = StabilityVerdict.DIVERGES
     elif abs(last) <= STEADY or sure <= 2.0 or (slope < 0.0 and last > FLATTENED * slope):
-        verdict = Verdict.CYCLES
+        verdict = StabilityVerdict.CYCLES
         sure = STEADY / error_of_slope if error_of_slope > 0.0 else math.inf
     else:
-        verdict = Verdict.SETTLES
+        verdict = StabilityVerdict.SETTLES
     confidence = (1.0 - math.exp(-sure / 2.0)) * min(1.0, (len(peaks) - TRANSIENT) / 5.0)
     return Stability(verdict, math.exp(slope), confidence, peaks)
 

@@ -12,14 +12,14 @@ Rows = NDArray[np.int64]
 
 
 class Phases(NamedTuple):
-    """Phases of rest and of motion in turn.
+    """Alternating phases of rest and of motion.
 
     Attributes
     ----------
     sticks, slips : (k, 2), rows [begin, end) of each.
     directions : (slips,), sign of the mean velocity of each slip.
-    stuck : part of the time at rest.
-    reversals : slips that go against the one before.
+    stuck : fraction of the time at rest.
+    reversals : slips in the opposite direction of the one before.
     """
 
     sticks: Rows
@@ -36,12 +36,12 @@ def stick_slip_phases(velocity: Numbers, rest: float, shortest: int) -> Phases:
     ----------
     velocity : (n,), rad/s or m/s, at a constant rate.
     rest : speed up to which it is at rest, above the sensor's noise.
-    shortest : samples that a phase lasts at least; shorter ones belong to their neighbours.
+    shortest : samples that a phase lasts at least; shorter ones are merged into their neighbours.
 
     Raises
     ------
     ValueError
-        where `rest` is not above zero or the velocity is not finite.
+        if `rest` is not above zero or the velocity is not finite.
     """
     if not rest > 0.0:
         raise ValueError(f"rest is {rest!r}; it must be above zero, above the noise of the velocity")

@@ -1,0 +1,100 @@
+"""Two bags against each other, field by field: what 'the same run' means."""
+
+import math
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wam_bag.bag import Raw, raw
+
+
+def compare(a: str | Path, b: str | Path, log_times: bool = False, without: tuple[str, ...] = ()) -> list[str]:
+    """Differences of two bags, field by field and bit for bit; NaN equals NaN.
+
+    Messages of a topic are compared in the order in which each publisher sent them; padding bytes
+    do not count.  Topics of several publishers (status, diagnostics) are compared per node.
+
+    Parameters
+    ----------
+    a, b : bag directories or .mcap files.
+    log_times : whether log times must be equal too, as they are in lockstep bags.
+    without : topics that are left out.
+
+    Returns
+    -------
+    list
+        a line for each topic that differs, with its first difference; empty where the bags are equal.
+    """
+    left, right = (_series(Path(path), without) for path in (a, b))
+    differences = [f"{name}: only in {a}" for name in left if name not in right]
+    differences += [f"{name}: only in {b}" for name in right if name not in left]
+    for name in left:
+        if name in right:
+            difference = _first_difference(left[name], right[name], log_times)
+            if difference:
+                differences.append(f"{name}: {difference}")
+    return differences
+
+
+class _Message(NamedTuple):
+    series: Raw
+    log_time: int
+    data: bytes
+
+
+def _series(path: Path, without: tuple[str, ...]) -> dict[str, list[_Message]]:
+    """Messages by topic, those of several publishers by topic and node."""
+    found: dict[str, list[_Message]] = {}
+    for topic, series in raw(path).items():
+        if topic in without:
+            continue
+        found[topic] = []
+        for time, data in zip(series.log_time_ns.tolist(), series.data, strict=True):
+            found.setdefault(topic + _node(series, data), []).append(_Message(series, time, data))
+    return found
+
+
+def _node(series: Raw, data: bytes) -> str:
+    if not series.type.startswith("diagnostic_msgs/msg/Diagnostic"):
+        return ""
+    decoded = series.decode(data)
+    statuses = getattr(decoded, "status", [decoded])
+    return f" from {statuses[0].name}" if statuses else ""
+
+
+def _first_difference(left: list[_Message], right: list[_Message], log_times: bool) -> str:
+    for number, (a, b) in enumerate(zip(left, right, strict=False)):
+        if a.series.type != b.series.type:
+            return f"type {a.series.type} and {b.series.type}"
+        if log_times and a.log_time != b.log_time:
+            return f"message {number}: log time {a.log_time} and {b.log_time} ns"
+        if a.data != b.data:  # may still be equal: padding is not initialised
+            difference = next(_fields(a.series.decode(a.data), b.series.decode(b.data), ""), "")
+            if difference:
+                return f"message {number}: {difference}"
+    if len(left) != len(right):
+        return f"{len(left)} and {len(right)} messages"
+    return ""
+
+
+def _fields(a: Any, b: Any, name: str) -> Iterator[str]:
+    if isinstance(a, float) and isinstance(b, float):
+        if struct.pack("d", a) != struct.pack("d", b) and not (math.isnan(a) and math.isnan(b)):
+            yield f"{name} {a!r} and {b!r}"
+    elif hasattr(a, "_fields"):
+        for field in a._fields:
+            yield from _fields(getattr(a, field), getattr(b, field), f"{name}.{field}" if name else field)
+    elif isinstance(a, list | np.ndarray):
+        if len(a) != len(b):
+            yield f"{name} has {len(a)} and {len(b)} elements"
+        for i, (x, y) in enumerate(zip(_plain(a), _plain(b), strict=False)):
+            yield from _fields(x, y, f"{name}[{i}]")
+    elif a != b:
+        yield f"{name} {a!r} and {b!r}"
+
+
+def _plain(values: Any) -> list[Any]:
+    return values.tolist() if isinstance(values, np.ndarray) else list(values)

@@ -1,0 +1,63 @@
+"""Tests test the tree, in ROS domains of their own, and disturb nobody."""
+
+import importlib
+import socket
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import DOMAINS, PORTS, ROOT, is_inhabited, locked_domain
+
+LINUX_GIVES = range(32768, 61000)  # ports, to any program; /proc/sys/net/ipv4/ip_local_port_range
+
+
+@pytest.mark.parametrize("package", sorted(path.name for path in ROOT.glob("wam_*") if path.is_dir()))
+def test_the_tree_is_tested_and_not_an_installed_copy(package: str) -> None:
+    assert importlib.import_module(package).__path__ == [str(ROOT / package)]
+
+
+def test_the_tree_comes_before_what_is_installed() -> None:
+    paths = [Path(path) for path in sys.path]
+    assert ROOT in paths
+    assert not any("site-packages" in path.parts for path in paths[: paths.index(ROOT)])
+
+
+def test_domains_of_the_tests_are_none_that_a_user_takes() -> None:
+    assert min(DOMAINS) > 101  # the most that ROS recommends to users
+    for domain in (DOMAINS[0], DOMAINS[-1]):
+        ports = range(7400 + PORTS * domain, min(7400 + PORTS * (domain + 1), 65536))
+        assert ports[0] not in LINUX_GIVES
+        assert ports[-1] not in LINUX_GIVES
+        assert len(ports) > 2 * 32  # two for each participant
+
+
+def test_a_domain_with_a_participant_is_seen() -> None:
+    with locked_domain() as number, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
+        assert not is_inhabited(number)
+        participant.bind(("127.0.0.1", 7400 + PORTS * number + 11))
+        assert is_inhabited(number)
+
+
+def test_every_port_of_a_domain_is_looked_at_and_no_other() -> None:
+    for port, inhabited in ((61149, False), (61150, True), (61399, True), (61400, False)):
+        table = f"  sl  local_address rem_address\n 1: 0100007F:{port:04X} 00000000:0000 07"
+        assert is_inhabited(215, table) == inhabited
+
+
+def test_two_tests_never_share_a_domain() -> None:
+    with locked_domain() as first, locked_domain() as second:
+        assert first != second
+
+
+def test_a_node_is_seen_as_a_participant(ros) -> None:
+    assert not is_inhabited(ros.domain_id)
+    ros.node("here")
+    assert is_inhabited(ros.domain_id)
+
+
+def test_a_test_without_a_domain_cannot_reach_anybody() -> None:
+    import rclpy
+
+    context = rclpy.Context()
+    with pytest.raises(RuntimeError, match="ROS_DOMAIN_ID"):
+        rclpy.init(args=[], context=context)

@@ -1,0 +1,203 @@
+"""A user's own controller, named in the configuration, runs in the simulation, over topics and in a replay."""
+
+import dataclasses
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from wam_bag.bag import JointColumns, read
+from wam_control.scenario import load
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration
+from wam_description.interface import Interface, declared
+from wam_description.parameters import Nothing, ParameterError
+from wam_description.signals import State
+from wam_description.synchroniser import Inputs
+from wam_description.topics import JOINT_STATE, Topic
+from wam_description.wiring import Input, Outputs, declaration, reaction
+from wam_sim.replay import replay
+from wam_sim.simulation import Simulation
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+STEPS = {
+    "steps": [
+        {"name": "release", "seconds": 0.1, "request": "enable"},
+        {
+            "name": "push",
+            "seconds": 0.3,
+            "push": {"cover": "outer_link", "place": 0.4, "newtons": [0.0, 20.0, 0.0], "begin": 0.05, "end": 0.25},
+        },
+    ]
+}
+
+
+@pytest.fixture
+def configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Configuration:
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    (tmp_path / "script.yaml").write_text(yaml.safe_dump(STEPS))
+    configuration = Configuration.load(EXAMPLES / "impedance.yaml")
+    return configuration.with_values(
+        {
+            "nodes": [*configuration.shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.timeout": 60.0,
+            "scenario:script": str(tmp_path / "script.yaml"),
+            "recorder:directory": str(tmp_path),
+            "recorder:name": "bag",
+        }
+    )
+
+
+@pytest.mark.slow
+def test_the_example_prints_how_far_the_tip_yields() -> None:
+    done = subprocess.run(
+        [sys.executable, "impedance.py"], cwd=EXAMPLES, capture_output=True, text=True, check=True, timeout=300
+    )
+    words = done.stdout.split()
+    assert float(words[6]) == pytest.approx(float(words[-2]), rel=0.15), done.stdout
+
+
+def test_an_own_controller_is_the_same_in_simulation_topics_and_replay(
+    configured: Configuration, tmp_path: Path, domain_id: int
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    with Composition(configured, domain_id=domain_id) as composition:
+        scenario: Any = composition.nodes["scenario"]
+        composition.spin(lambda: scenario.done)
+        assert scenario.failure == ""
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm))
+    assert run.play() == ""
+    recorded = read(tmp_path / "bag").topics["/wam/joint_effort_command"]
+    assert isinstance(recorded, JointColumns)
+    simulated = np.array([row.values for row in run.rows["joint_effort_command"]])
+    assert np.abs(simulated).max() > 1.0, "zeros would show nothing"
+    assert simulated.tobytes() == np.ascontiguousarray(recorded.effort).tobytes()
+    assert replay(tmp_path / "bag", "impedance:Impedance").is_same
+
+
+class Echo:
+    """Publishes the torques of gravity on a topic of its own."""
+
+    name, parameters = "echo", Nothing
+    topics = (Topic("echo", JOINT_STATE, "outer", "the torques of gravity, N m", "joints"),)
+
+    def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+    @reaction(Input("gravity_effort", "effort"), outputs=("echo",))
+    def step(self, inputs: Inputs) -> Outputs:
+        return {"echo": inputs["gravity_effort"]}
+
+
+def test_a_node_class_comes_on_top_of_a_configuration_with_a_topic_of_its_own(
+    configured: Configuration, tmp_path: Path
+) -> None:
+    steps = load(tmp_path / "script.yaml", configured.shared.arm)
+    run = Simulation(configured, steps, controllers={"echo": Echo})
+    assert run.play() == ""
+    assert [row.values for row in run.rows["echo"]] == [row.values for row in run.rows["gravity_effort"]]
+
+
+def test_lockstep_waits_for_a_topic_only_where_the_configured_nodes_stream_it(configured: Configuration) -> None:
+    interface = Interface(configured.shared)
+    assert interface.publishers("joint_effort_command") == ["impedance"]
+    assert interface.is_streamed("motor_velocity_command")
+    without = dataclasses.replace(configured.shared, nodes=("driver", "transform", "velocity_loop", "gravity"))
+    assert not Interface(without).is_streamed("motor_velocity_command")
+    assert Interface(without).is_streamed("motor_effort_command")
+
+
+@pytest.mark.parametrize(
+    ("entry", "text"),
+    [
+        ("gravitation", "no node is named 'gravitation'; nodes: driver, transform"),
+        ("no_such_package:Class", "check that 'no_such_package' is installed or on PYTHONPATH"),
+        ("impedance:ImpedanceParameters", "is no node: name and parameters"),
+    ],
+)
+def test_a_node_that_is_none_is_refused_by_name(entry: str, text: str, configured: Configuration) -> None:
+    with pytest.raises(ParameterError, match=text):
+        declared(entry)
+
+
+def test_a_topic_that_is_in_no_table_is_refused(configured: Configuration) -> None:
+    class Lost(Echo):
+        name, topics = "lost", ()
+
+        @reaction(Input("gravity_effort", "effort"), outputs=("nowhere",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    assert declaration(Lost).outputs == ("nowhere",)
+    with pytest.raises(ParameterError, match="node 'lost' names the topic 'nowhere'"):
+        Interface(configured.shared, {"lost": Lost})
+
+
+def test_a_fault_of_the_driver_ends_the_task_in_the_simulation_too(configured: Configuration, tmp_path: Path) -> None:
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm))
+    while run.driver.stamp < 150_000_000:
+        assert not run.step()
+    run.driver.estop()
+    assert run.play() == "the driver stopped in step 'push': emergency stop"
+
+
+def test_two_nodes_that_publish_one_command_are_refused(configured: Configuration) -> None:
+    both = dataclasses.replace(configured.shared, nodes=(*configured.shared.nodes, "force_loop"))
+    with pytest.raises(ParameterError, match="'joint_velocity_command' has 2 publishers, impedance, force_loop"):
+        Interface(both)
+    twice = dataclasses.replace(configured.shared, nodes=("driver", "gravity", "wam_control.gravity_node:GravityNode"))
+    with pytest.raises(ParameterError, match="two nodes of the configuration are named 'gravity'"):
+        Interface(twice)
+
+
+def test_a_subclass_keeps_the_reactions_of_its_parent() -> None:
+    class Louder(Echo):
+        name = "louder"
+
+    assert declaration(Louder).reactions == declaration(Echo).reactions
+
+
+def test_an_output_that_is_not_declared_is_refused_by_node_and_topic(configured: Configuration, tmp_path: Path) -> None:
+    class Typing(Echo):
+        @reaction(Input("gravity_effort", "effort"), outputs=("echo",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {"ecko": inputs["gravity_effort"]}
+
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"echo": Typing})
+    with pytest.raises(ValueError, match="node 'echo' returned the topic 'ecko'; its reactions declare echo"):
+        run.play()
+
+
+def test_a_reaction_sees_the_arrays_that_it_takes_and_no_others(configured: Configuration, tmp_path: Path) -> None:
+    seen = []
+
+    class Watching(Echo):
+        @reaction(Input("joint_states", "position"), outputs=("echo",))
+        def step(self, inputs: Inputs) -> Outputs:
+            seen.append(inputs["joint_states"])
+            return {}
+
+    Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"echo": Watching}).step()
+    assert [len(array) for array in seen[0]] == [4, 0, 0]
+
+
+def test_currents_that_are_not_finite_are_refused_by_name(configured: Configuration, tmp_path: Path) -> None:
+    class Broken:
+        name, parameters = "velocity_loop", Nothing
+
+        def __init__(self, shared: Shared, own: Nothing) -> None: ...
+
+        @reaction(Input("motor_states"), outputs=("motor_current_command",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {"motor_current_command": State([], [], [float("nan")] * 4)}
+
+    steps = load(tmp_path / "script.yaml", configured.shared.arm)
+    own = {name: value for name, value in configured.sections.items() if name != "velocity_loop"}
+    run = Simulation(configured._replace(sections=own), steps, {"velocity_loop": Broken})
+    with pytest.raises(ValueError, match=r"motor_current_command of 1000000 ns is .*nan.* 4 finite numbers"):
+        run.play()

@@ -1,0 +1,125 @@
+"""Texts for users are written in the field's terms: the dictionary of what not to write, and what instead."""
+
+import ast
+import re
+import tokenize
+from collections.abc import Iterator
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+# what is not written, as a regular expression between word boundaries -> what to write
+TERMS = {
+    r"feel|feels|felt|feeling": "detect, estimate; detected, estimated; 'felt after' is the detection latency",
+    r"told": "reported, known, identified",
+    r"said": "reported, published, printed",
+    r"asked|asks for": "commanded, desired, requested",
+    r"anew": "again",
+    r"for ever": "indefinitely",
+    r"to and fro": "back and forth",
+    r"whoever": "the subject: which program, which node, who",
+    r"dead zones?": "deadband",
+    r"clockwork": "timing",
+    r"does not mind|do not mind|minds": "is not affected",
+    r"say again|do not say": "print again; no output",
+    r"forsaken": "stale (command_stale)",
+    r"doubtful": "rejected, uncertain (contact_rejected)",
+    r"departures?|departs?": "model mismatch; the true plant differs by",
+    r"rub|rubs|rubbed|rubbing": "added Coulomb friction",
+    r"battery|batteries": "benchmark",
+    r"judges?|judged|judging": "evaluate, assess",
+    r"map of the house": "repository layout, architecture",
+    r"counts? as endless|endless": "infinite",
+    r"(?:gives?|giving) no way(?: at all)?": "zero compliance",
+    r"(?:thin|its|node's|of the|nobody imports a) shells?": "node, ROS adapter (what wraps a controller)",
+    r"the same machines?|machines that step": "controller, estimator, plant: what it is",
+    r"beside": "next to, compared with, with",
+    r"one YAML a \w+|(?:one|a) \w+ a configuration": "one YAML per configuration",
+    r"stood|stands(?! for)|stand still|stands still": "was, is; at rest",
+    r"(?:a|the|its|each) begin": "start",
+    r"spreads?": "uncertainty, standard deviation, covariance",
+    r"goes over from": "bumpless transfer",
+    r"nobody knows of": "unmodelled payload",
+    r"held against|hold .{0,20}verdicts against": "validated by, compared with",
+    r"counts as told": "identified",
+    r"force leans|leans": "tangential component",
+}
+PATTERNS = {re.compile(rf"\b(?:{words})\b", re.IGNORECASE): instead for words, instead in TERMS.items()}
+PAGES = ("*.md", "docs/*.md", "bags/*.md", "benchmarks/*.md")
+NOT_OURS = {"CHANGELOG.md", "parameter_history.py"}  # they name the old terms
+CODE = re.compile(r"^```.*?^```|`[^`\n]*`|\]\([^)]*\)", re.DOTALL | re.MULTILINE)
+
+
+def texts_of_a_page(page: str) -> Iterator[tuple[int, str]]:
+    """Line and text of a page without what is code or a link's target."""
+    kept = CODE.sub(lambda found: "\n" * found[0].count("\n"), page)
+    yield from enumerate(kept.splitlines(), start=1)
+
+
+def texts_of_a_module(source: str) -> Iterator[tuple[int, str]]:
+    """Line and text of every string in a module, docstrings among them; keys of one word and code are left out."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
+            for number, line in enumerate(CODE.sub("", node.value).splitlines()):
+                yield node.lineno + number, line
+
+
+def texts_of_comments(source: str) -> Iterator[tuple[int, str]]:
+    """Line and text of every comment in a module."""
+    for token in tokenize.generate_tokens(StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            yield token.start[0], token.string
+
+
+def found_in(texts: Iterator[tuple[int, str]], where: object) -> Iterator[str]:
+    """A line for each term that is not the field's."""
+    for number, text in texts:
+        for pattern, instead in PATTERNS.items():
+            for found in pattern.finditer(text):
+                yield f"{where}:{number}: '{found[0]}', write: {instead}"
+
+
+def complaints(root: Path) -> list[str]:
+    """Every wrong term in the texts under root."""
+    found: list[str] = []
+    for path in sorted(path for pattern in PAGES for path in root.glob(pattern)):
+        if path.name not in NOT_OURS:
+            found += found_in(texts_of_a_page(path.read_text(encoding="utf-8")), path.relative_to(root))
+    for path in sorted(root.glob("config/**/*.yaml")):
+        found += found_in(enumerate(path.read_text(encoding="utf-8").splitlines(), start=1), path.relative_to(root))
+    for path in sorted([*root.glob("wam_*/**/*.py"), *root.glob("launch/*.py"), *root.glob("examples/*.py")]):
+        if path.name in NOT_OURS:
+            continue
+        source = path.read_text(encoding="utf-8")
+        found += found_in(texts_of_a_module(source), path.relative_to(root))
+        found += found_in(texts_of_comments(source), path.relative_to(root))
+    found += found_in(enumerate((root / "Makefile").read_text(encoding="utf-8").splitlines(), start=1), "Makefile")
+    return found
+
+
+def test_texts_are_in_the_terms_of_the_field() -> None:
+    found = complaints(ROOT)
+    assert not found, f"{len(found)} terms:\n" + "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["The push is felt.", "held for ever", "Departures of the arm", "one YAML a configuration", "a dead zone of 2 N"],
+)
+def test_a_wrong_term_is_found_where_a_user_reads_it(text: str) -> None:
+    assert list(found_in(texts_of_a_page(text), "page"))
+    assert list(found_in(texts_of_a_module(f'def f():\n    """{text}"""'), "docstring"))
+    assert list(found_in(texts_of_a_module(f'raise ValueError(f"{{1}} {text}")'), "message"))
+    assert list(found_in(texts_of_comments(f"x = 1  # {text}"), "comment"))
+
+
+def test_names_in_a_module_are_not_text() -> None:
+    assert not list(found_in(texts_of_a_module('FORMER = {"departure.mass": "mismatch.mass"}'), "key"))
+
+
+@pytest.mark.parametrize("text", ["The deadband is 2 N; besides, it is known.", "`felt`", "```\nfelt\n```"])
+def test_right_terms_and_code_are_not(text: str) -> None:
+    assert not list(found_in(texts_of_a_page(text), "page"))

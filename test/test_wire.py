@@ -1,0 +1,105 @@
+"""The fast path between bytes and values is the reference path through message objects, only faster."""
+
+import math
+import random
+import struct
+from typing import Any
+
+import pytest
+from rclpy.serialization import deserialize_message, serialize_message
+
+from wam_description.configuration import Configuration, packaged
+from wam_description.signals import Point, State, Table, Wrench
+from wam_description.topics import BY_NAME, JOINT_STATE, POINT, TABLE, WRENCH, Topic
+from wam_ros.messages import Refused, message_type, reader, writer
+from wam_ros.wire import decoder, encoder, stamp_of
+
+SHARED = Configuration.load(packaged("wam")).shared
+NUMBERS = [topic for topic in BY_NAME.values() if topic.is_numbers]
+STAMP = 12_345_678_901
+SEED = 20261120
+
+
+def value_of(topic: Topic, rng: random.Random) -> Any:
+    """A value with numbers of every size, and arrays that may be empty."""
+
+    def number() -> float:
+        return rng.choice([0.0, -0.0, 1e-308, rng.uniform(-1e3, 1e3), rng.uniform(-1e300, 1e300)])
+
+    if topic.type == JOINT_STATE:
+        arrays = [[number() for _ in range(4)] if rng.random() < 0.7 else [] for _ in range(3)]
+        return State(*arrays)
+    frame = rng.choice(["base", *SHARED.arm.covers.names])
+    x, y, z, a, b, c = (number() for _ in range(6))
+    if topic.type == WRENCH:
+        return Wrench(frame, (x, y, z), (a, b, c))
+    if topic.type == POINT:
+        return Point(frame, (rng.choice([x, math.nan]), y, z))
+    rows = tuple((float(rng.randrange(2)), *(number() for _ in topic.columns[1:])) for _ in range(rng.randrange(4)))
+    return Table(frame, rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("topic", NUMBERS, ids=lambda topic: topic.name)
+def test_a_value_is_the_same_to_the_bit_by_either_way(topic: Topic) -> None:
+    rng = random.Random(SEED)
+    encode, decode = encoder(topic, SHARED), decoder(topic, SHARED, "position? velocity? effort?")
+    write, read = writer(topic, SHARED), reader(topic, SHARED, "position? velocity? effort?")
+    kind = message_type(topic)
+    for _ in range(200):
+        value = value_of(topic, rng)
+        data, reference = encode(STAMP, value), bytes(serialize_message(write(STAMP, value)))
+        assert stamp_of(data) == stamp_of(reference) == STAMP
+        assert deserialize_message(data, kind) == deserialize_message(reference, kind) or "nan" in repr(value)
+        for received in (data, reference, data + bytes(16)):
+            assert repr(decode(received)) == repr(value)
+        assert repr(read(deserialize_message(data, kind))) == repr(value)
+
+
+def refusal(take: Any, argument: Any) -> str:
+    try:
+        return f"taken: {take(argument)!r}"
+    except Refused as reason:
+        return str(reason)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [JOINT_STATE, WRENCH, POINT, TABLE])
+def test_a_message_with_one_changed_byte_is_taken_or_refused_alike(kind: str) -> None:
+    """Names, frames, counts, sizes, columns, byte order, numbers that are not finite: every byte is one of these."""
+    rng = random.Random(SEED)
+    topic = next(topic for topic in NUMBERS if topic.type == kind)
+    arrays = "position velocity effort?"
+    encode, decode, read = encoder(topic, SHARED), decoder(topic, SHARED, arrays), reader(topic, SHARED, arrays)
+    refused = 0
+    for _ in range(1500):
+        value = value_of(topic, rng)
+        data = bytearray(encode(STAMP, value))
+        data[rng.randrange(12, len(data))] = rng.choice([0, 1, 0x7F, 0x80, 0xF0, 0xFF, rng.randrange(256)])
+        try:
+            message = deserialize_message(bytes(data), message_type(topic))
+        except Exception:  # the middleware would not have delivered it
+            assert "send one of that type" in refusal(decode, bytes(data))
+            refused += 1
+            continue
+        fast = refusal(decode, bytes(data))
+        assert fast == refusal(read, message)
+        refused += not fast.startswith("taken")
+    assert refused > 100
+
+
+def test_numbers_that_are_not_finite_are_refused_by_name() -> None:
+    topic = BY_NAME["motor_states"]
+    decode = decoder(topic, SHARED, "position velocity effort")
+    data = encoder(topic, SHARED)(STAMP, State([1.0] * 4, [2.0] * 4, [3.0] * 4))
+    wrong = data.replace(struct.pack("<d", 2.0), struct.pack("<d", math.nan), 1)
+    with pytest.raises(Refused, match="velocity of motor1 is nan"):
+        decode(wrong)
+
+
+@pytest.mark.parametrize("data", [b"", b"\0", b"\0\1\0\0", b"\0\1\0\0" + b"\xff" * 40])
+def test_what_is_no_message_is_refused(data: bytes) -> None:
+    for topic in NUMBERS:
+        with pytest.raises(Refused):
+            decoder(topic, SHARED, "effort")(data)
+        assert isinstance(stamp_of(data), int)

@@ -1,1 +1,0 @@
-"""The judge of whole-arm contact estimation: scenes, how they are played, how they are scored."""

@@ -1,0 +1,126 @@
+"""A bag prepared for analysis: its run, parameters, signals and the constant forces that were commanded."""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.demo_summary import DemoSummary, summary_of
+from wam_analysis.recorded import PredictionParameters, prediction_parameters
+from wam_bag.bag import Bag, JointColumns
+from wam_sim.recording import RecordedRun, recorded_run
+
+Numbers = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+SHORTEST_HOLD = 0.3  # s; a shorter one is part of a ramp
+SMALL = 0.01  # N; commanded forces that differ by less are equal
+FOREIGN = ("sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped")
+
+
+class Hold(NamedTuple):
+    """A constant commanded force.
+
+    Attributes
+    ----------
+    name : of the scenario's step, or the force.
+    begin, end : ns.
+    frame : of the force.
+    force : (3,), N, of the arm on the world, in that frame.
+    commanded : its magnitude, N.
+    before : force commanded before, along the same direction, N.
+    disturbed : whether the scenario pushed the arm meanwhile.
+    """
+
+    name: str
+    begin: int
+    end: int
+    frame: str
+    force: Numbers
+    commanded: float
+    before: float
+    disturbed: bool
+
+
+class AnalysedRun(NamedTuple):
+    """What the analyses take from a bag: its run, forces and contacts over time, parameters, and held forces."""
+
+    run: RecordedRun
+    summary: DemoSummary
+    parameters: PredictionParameters
+    holds: tuple[Hold, ...]
+
+    @property
+    def bag(self) -> Bag:
+        """The bag of the run."""
+        return self.run.bag
+
+    @property
+    def namespace(self) -> str:
+        """Of the arm."""
+        return self.run.namespace
+
+    def lacking(self, *names: str) -> tuple[str, ...]:
+        """Those of some topics that were not recorded."""
+        return tuple(
+            name
+            for name in names
+            if not ((columns := self.bag.topics.get(f"{self.namespace}/{name}")) and len(columns.log_time_ns))
+        )
+
+    @property
+    def mode(self) -> str:
+        """'lockstep', 'realtime' or 'unknown'."""
+        return self.summary.loop.mode
+
+
+def analysed_run(bag: Bag) -> AnalysedRun:
+    """Prepare a bag for the analyses, whatever is in it."""
+    run = recorded_run(bag)
+    summary = summary_of(run)
+    return AnalysedRun(run, summary, prediction_parameters(run.parameters), _holds(run, summary))
+
+
+def _holds(run: RecordedRun, summary: DemoSummary) -> tuple[Hold, ...]:
+    """Intervals with one commanded force, within one step of the scenario."""
+    commands = run.wrench("force_command")
+    if commands is None:
+        return ()
+    frames = np.array(commands.frames)
+    changed = np.any(np.abs(np.diff(commands.force, axis=0)) > SMALL, axis=1) | (frames[1:] != frames[:-1])
+    steps = np.searchsorted(commands.stamp_ns, [step.begin for step in summary.steps])
+    inner = {*(np.flatnonzero(changed) + 1).tolist(), *steps.tolist()} - {0, len(frames)}
+    bounds = [0, *sorted(inner), len(frames)]
+    period = int(np.median(np.diff(commands.stamp_ns))) if len(frames) > 1 else 0
+    holds: list[Hold] = []
+    before = np.zeros(3)
+    for a, b in itertools.pairwise(bounds):
+        force = commands.force[a]
+        commanded = float(np.linalg.norm(force))
+        begin, end = int(commands.stamp_ns[a]), int(commands.stamp_ns[b - 1]) + period
+        if commanded > SMALL and end - begin >= SHORTEST_HOLD * 1e9:
+            name = next((step.name for step in summary.steps if step.begin <= (begin + end) // 2 < step.end), "")
+            taken = [hold.name for hold in holds]
+            name = name or f"{commanded:.3g} N"
+            name = name if name not in taken else f"{name} ({begin / 1e9:.1f} s)"
+            pushed = summary.traces.during(begin, end) & summary.traces.push.acts
+            along = float(before @ force) / commanded
+            holds.append(Hold(name, begin, end, str(frames[a]), force, commanded, along, bool(np.any(pushed))))
+        before = force
+    return tuple(holds)
+
+
+def at_stamps(columns: JointColumns, stamps: Times) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """Whether there is a message with each of some stamps, and its row; columns must be sorted by stamp."""
+    row = np.minimum(np.searchsorted(columns.stamp_ns, stamps), len(columns.stamp_ns) - 1)
+    return columns.stamp_ns[row] == stamps, row
+
+
+def by_names(columns: JointColumns, field: str, names: tuple[str, ...]) -> Numbers | None:
+    """Columns of a field in the order of some names, (k, n); None if a name is missing."""
+    values: Numbers = getattr(columns, field)
+    if not values.shape[1] or any(name not in columns.names for name in names):
+        return None
+    order = [columns.names.index(name) for name in names]
+    return values if order == list(range(values.shape[1])) else values[:, order]

@@ -1,0 +1,26 @@
+"""Bags of ROS 2 (MCAP) written, read as numpy columns, cut and repaired; usable alone, without ROS.
+
+For users:
+
+- `bag`: `read` makes numpy columns of a bag, `raw` returns its serialized messages; `Bag`, `BagError`.
+- `contents`: `contents` lists topics, times and attachments without reading messages; `mode_of`.
+- `losses`: `losses` is what a bag lacks, from the records of the recorder and of repairs.
+- `bag_writer`: `BagWriter` writes a bag directory, in one file or several, and closes it on a full disk.
+- `cut`: `cut` writes a part of a bag as a new bag.
+- `repair`: `repair` writes files that are broken or were not closed again from what can be read.
+- `errors`: `BagError`, `RecordingError`, and what is raised within the package.
+
+Messages:
+
+- `columns`: the columns of each message type. `point_clouds`: points of PointCloud2 as a table.
+- `message_groups`: messages of equal layout decoded together. `cdr`: layouts, and messages decoded one by one.
+- `message_layout`: exact length and stamp of a serialized message, for the recorder.
+- `message_text`: fields of a type from its definition. `definitions`: definitions as ROS installs them.
+
+Files:
+
+- `bag_file`: the files of a bag found and opened, messages selected by topic and time.
+- `mcap_file`: an MCAP file opened for reading. `message_search`: messages found in a chunk.
+- `mcap_writer`: an MCAP file written. `mcap_records`: records by the `mcap` library, with bounds and limits.
+- `metadata`: metadata.yaml. `safe_yaml`: YAML with bounded effort.
+"""

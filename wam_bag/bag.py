@@ -1,0 +1,177 @@
+"""Bags as named numpy columns, without ROS.
+
+Reads what `wam_bag.bag_writer` and rosbag2 write, whole or in parts: MCAP of profile ros2 with messages in
+CDR, a directory of one or several files or a single file, in chunks or not, with indexes or without.
+
+Guaranteed: a value that differs from what was written is returned only if no checksum in the file covers it.
+The checksums of chunks, attachments and the summary are checked in what is read, the one over all data if
+everything is read.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from mcap.records import Channel
+
+from wam_bag.bag_file import files, is_selected, opened, parts, type_of
+from wam_bag.cdr import Decoder
+from wam_bag.columns import (
+    BoolColumns,
+    ClockColumns,
+    Collector,
+    Columns,
+    JointColumns,
+    Messages,
+    PointColumns,
+    TableColumns,
+    WrenchColumns,
+)
+from wam_bag.contents import merge
+from wam_bag.errors import BagError, Damage
+from wam_bag.mcap_file import McapFile
+from wam_bag.message_groups import Times
+from wam_bag.message_search import NEVER, log_times, messages
+
+__all__ = [
+    "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns", "Raw",
+    "TableColumns", "WrenchColumns", "raw", "read",
+]  # fmt: skip
+
+
+class Bag(NamedTuple):
+    """A bag in memory: columns and type by topic, attachments and metadata records by name.
+
+    `counts` are the messages of every topic in its files, also of topics that were not selected; empty
+    in a bag that did not come from files.
+    """
+
+    path: Path
+    topics: dict[str, Columns]
+    types: dict[str, str]
+    attachments: dict[str, bytes]
+    metadata: dict[str, dict[str, str]]
+    counts: Mapping[str, int] = MappingProxyType({})
+
+    @property
+    def first_ns(self) -> int:
+        """Log time of the first message that was read, 0 if none was."""
+        found = (columns.log_time_ns for columns in self.topics.values())
+        return min((int(times.min()) for times in found if len(times)), default=0)
+
+
+class Raw(NamedTuple):
+    """Messages of a topic as they were serialized, in the order of the files."""
+
+    type: str
+    log_time_ns: Times
+    data: list[bytes]
+    decode: Callable[[bytes], Any]
+
+
+def read(
+    path: str | Path,
+    topics: Collection[str] | None = None,
+    begin_ns: int = 0,
+    end_ns: int = NEVER,
+    *,
+    may_lack: bool = False,
+) -> Bag:
+    """Read a bag: all of it, or some topics, or some time.
+
+    Chunks of the file without any selected message are not read.
+
+    Parameters
+    ----------
+    path : bag directory or .mcap file.
+    topics : names of the topics to read, one without a leading '/' in every namespace; None reads all.
+    begin_ns, end_ns : log times to read, begin_ns <= t < end_ns.
+    may_lack : whether selected topics may be missing in the bag.
+
+    Raises
+    ------
+    BagError
+        if it is missing, empty, cut off, damaged or not a ROS 2 bag, or lacks a selected topic.
+    ValueError
+        if the end is before the start.
+    """
+    if begin_ns > end_ns:
+        raise ValueError(
+            f"{path} is to be read from {begin_ns} ns to {end_ns} ns; the end must not be before the start"
+        )
+    collectors: dict[str, Collector] = {}
+    counts: Counter[str] = Counter()
+    attachments: dict[str, bytes] = {}
+    metadata: dict[str, dict[str, str]] = {}
+    for file in files(Path(path)):
+        with opened(file) as mcap:
+            if topics is None and begin_ns <= 0 and end_ns >= NEVER:
+                mcap.check_all()
+            for part in parts(mcap, topics, begin_ns, end_ns):
+                collector = _collector(collectors, mcap, part.channel, (begin_ns, end_ns))
+                try:
+                    collector.add(part.buffer, part.found)
+                except Damage as error:
+                    raise Damage(f"topic {part.channel.topic}: {error}") from None
+            counts.update({channel.topic: 0 for channel in mcap.channels.values()})
+            for number, count in (mcap.counts or mcap.count()).by_channel.items():
+                counts[mcap.channels[number].topic] += count
+            for channel in mcap.channels.values():
+                if is_selected(channel.topic, topics):
+                    _collector(collectors, mcap, channel, (begin_ns, end_ns))
+            attachments.update({item.name: item.data for item in mcap.attachments()})
+            merge(metadata, mcap.metadata())
+    if not may_lack:
+        _check_has(path, topics, counts)
+    columns = {topic: found.columns(f"{path}, topic {topic}") for topic, found in sorted(collectors.items())}
+    types = {topic: found.type for topic, found in collectors.items()}
+    return Bag(Path(path), columns, types, attachments, metadata, dict(counts))
+
+
+def _collector(collectors: dict[str, Collector], mcap: McapFile, channel: Channel, times: tuple[int, int]) -> Collector:
+    """The collector of a topic, made for its first channel."""
+    kind, definitions = type_of(mcap, channel)
+    collector = collectors.setdefault(channel.topic, Collector(kind, definitions, *times))
+    if not collector.takes(kind, definitions):
+        raise Damage(f"topic {channel.topic} is of type {collector.type} and of another one")
+    return collector
+
+
+def raw(path: str | Path, topics: Collection[str] | None = None) -> dict[str, Raw]:
+    """Serialized messages of a bag by topic; parameters and errors as those of `read`."""
+    present: set[str] = set()
+    found: dict[str, Raw] = {}
+    times: dict[str, list[Times]] = {}
+
+    def entry(mcap: McapFile, channel: Channel) -> Raw:
+        kind, definitions = type_of(mcap, channel)
+        known = found.setdefault(channel.topic, Raw(kind, np.empty(0, np.int64), [], Decoder(kind, definitions)))
+        if known.type != kind:
+            raise Damage(f"topic {channel.topic} is of type {known.type} and of {kind}")
+        return known
+
+    for file in files(Path(path)):
+        with opened(file) as mcap:
+            for part in parts(mcap, topics):
+                entry(mcap, part.channel).data.extend(messages(part.buffer, part.found))
+                times.setdefault(part.channel.topic, []).append(log_times(part.buffer, part.found))
+            for channel in mcap.channels.values():
+                present.add(channel.topic)
+                if is_selected(channel.topic, topics):
+                    entry(mcap, channel)
+    _check_has(path, topics, present)
+    for topic, some in times.items():
+        found[topic] = found[topic]._replace(log_time_ns=np.concatenate(some))
+    return found
+
+
+def _check_has(path: str | Path, selected: Collection[str] | None, present: Collection[str]) -> None:
+    for name in selected or ():
+        if not any(is_selected(topic, [name]) for topic in present):
+            raise BagError(
+                f"{path} has no topic '{name}'; its topics: {', '.join(sorted(present)) or 'none'}. "
+                "Names may omit the namespace; may_lack=True reads the topics that are there"
+            )

@@ -1,0 +1,187 @@
+"""Bags on disk: their files found and opened, their messages selected, and errors in the user's words."""
+
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import yaml
+from mcap.records import Channel
+
+from wam_bag import safe_yaml
+from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError
+from wam_bag.mcap_file import McapFile
+from wam_bag.mcap_records import MAGIC, Bytes
+from wam_bag.message_search import NEVER, Found, together
+from wam_bag.message_text import Fields, definitions
+
+PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
+_FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
+
+
+def files(path: Path) -> list[Path]:
+    """The MCAP files of a bag directory in the order of recording, or the one file."""
+    if path.is_file():
+        return [path]
+    if not path.exists():
+        raise BagError(f"{path} does not exist; give a bag directory or an .mcap file")
+    found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
+    named = _listed_files(path)
+    for name in named:
+        if not (path / name).is_file():
+            raise BagError(
+                f"{path} lacks its file {name}; copy the whole directory, or read its .mcap files one by one"
+            )
+    if forgotten := sorted({file.name for file in found} - set(named)) if named else []:
+        raise BagError(
+            f"{path} has the file {forgotten[0]}, which its metadata.yaml does not list; "
+            f"'wam bag repair {path}' writes it again, or give the file by itself"
+        )
+    if named:
+        return [path / name for name in named]
+    if not found:
+        raise BagError(f"{path} has no .mcap file; give a bag directory recorded with storage 'mcap'")
+    return found
+
+
+def _listed_files(path: Path) -> list[str]:
+    """Files that metadata.yaml lists, none if it is missing."""
+    file = path / "metadata.yaml"
+    if not file.is_file():
+        return []
+    try:
+        text = file.read_text(encoding="utf-8")
+        part = _FILE_NAMES.search(text)  # the only lines that are needed of a long file
+        listed = [str(name) for name in safe_yaml.load(part[0] if part else text)["relative_file_paths"]]
+    except (yaml.YAMLError, ValueError, KeyError, TypeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise BagError(f"{file} is damaged ({reason}); 'wam bag repair {path}' writes it again") from None
+    for name in listed:
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            raise BagError(
+                f"{file} lists {name}, which is outside the bag; 'wam bag repair {path}' writes metadata.yaml again "
+                "from the files in the directory"
+            )
+        if not name.endswith(".mcap"):
+            raise BagError(f"{path} is recorded as {name}; only storage 'mcap' without compressed files is read")
+    if len(set(listed)) < len(listed):
+        raise BagError(f"{file} lists a file twice; 'wam bag repair {path}' writes it again")
+    return listed
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[McapFile]:
+    """An open file of a bag; errors of it in the context become a BagError."""
+    try:
+        with McapFile(path) as file:
+            file.open()
+            if file.profile not in PROFILES:
+                raise BagError(f"{path} has MCAP profile '{file.profile}'; only bags of ROS 2 ('ros2') are read")
+            yield file
+    except BagError:
+        raise
+    except OSError as error:
+        raise BagError(f"{path} cannot be read: {error.strerror or error}") from error
+    except BROKEN as error:
+        raise BagError(_explain(path, error)) from error
+
+
+def _explain(path: Path, error: Exception) -> str:
+    with path.open("rb") as stream:
+        start = stream.read(len(MAGIC))
+    if not start:
+        return f"{path} is empty, nothing was recorded; record again"
+    if start != MAGIC:
+        return f"{path} is not MCAP; give a bag recorded with storage 'mcap'"
+    if isinstance(error, NotClosedError):
+        return (
+            f"{path} was not closed, the recorder was killed or the copy is incomplete; "
+            "'wam bag repair' makes it readable up to the break"
+        )
+    if isinstance(error, TooLargeError):
+        return f"{path} is not read: {error}; more would take too much memory. Record in smaller chunks"
+    reason = str(error) if isinstance(error, Damage) else f"{type(error).__name__}: {error}"
+    return f"{path} is damaged ({reason}); copy it again, or let 'wam bag repair' save what can be read"
+
+
+def is_selected(topic: str, topics: Collection[str] | None) -> bool:
+    """Whether a topic is among the names of a selection; a name without a leading '/' holds in every namespace."""
+    if topics is None or topic in topics:
+        return True
+    return any(topic.endswith(f"/{name}") for name in topics if not name.startswith("/"))
+
+
+class TopicPart(NamedTuple):
+    """Some messages of a topic in memory, valid until the next part is taken."""
+
+    channel: Channel
+    buffer: Bytes
+    found: Found
+
+
+def parts(
+    mcap: McapFile, topics: Collection[str] | None = None, begin: int = 0, end: int = NEVER
+) -> Iterator[TopicPart]:
+    """Messages of each selected topic, some megabytes at a time; at the end the file's own counts are checked.
+
+    Parameters
+    ----------
+    topics : names as for `is_selected`.
+    begin, end : log times that are needed, ns, begin <= t < end.  Others may come as well.
+    """
+    numbers, times = None, (0, NEVER)
+    if mcap.has_all_definitions():  # else any chunk may contain one that is needed
+        times = begin, end
+        if topics is not None:
+            numbers = frozenset(n for n, channel in mcap.channels.items() if is_selected(channel.topic, topics))
+    counts: Counter[int] = Counter()
+    for batch in mcap.batches(numbers, *times):
+        by_topic: dict[str, list[int]] = {}
+        for number, found in batch.found.items():
+            if number not in mcap.channels:
+                raise Damage(f"a message is on channel {number}, which is not defined")
+            counts[number] += len(found.offsets)
+            by_topic.setdefault(mcap.channels[number].topic, []).append(number)
+        for topic, members in by_topic.items():
+            if not is_selected(topic, topics):
+                continue
+            found = together([batch.found[number] for number in members])
+            if len(members) > 1:
+                order = np.argsort(found.offsets)
+                found = Found(found.offsets[order], found.sizes[order])
+            yield TopicPart(mcap.channels[members[0]], batch.buffer, found)
+    if mcap.counts is None or begin > 0 or end < NEVER:
+        return
+    for number, channel in mcap.channels.items():
+        expected = mcap.counts.by_channel.get(number, 0)
+        if is_selected(channel.topic, topics) and counts[number] != expected:
+            raise Damage(f"topic {channel.topic} has {counts[number]} messages instead of {expected}")
+
+
+def type_of(file: McapFile, channel: Channel) -> tuple[str, dict[str, Fields]]:
+    """Type of the messages of a channel, and the fields of it and of the types it consists of.
+
+    Raises
+    ------
+    BagError
+        if it is not CDR with a ros2msg schema.
+    """
+    instead = "name the topics to be read, without this one"
+    encoding = channel.message_encoding
+    if encoding != "cdr":
+        raise BagError(f"{file.path} has topic {channel.topic} in encoding '{encoding}'; only 'cdr' is read; {instead}")
+    schema = file.schemas.get(channel.schema_id)
+    if schema is None:
+        raise BagError(f"{file.path} has topic {channel.topic} without a schema; {instead}")
+    if schema.encoding != "ros2msg":
+        raise BagError(
+            f"{file.path} has the schema of topic {channel.topic} in '{schema.encoding}'; "
+            f"only 'ros2msg' is read; {instead}"
+        )
+    try:
+        return schema.name, definitions(schema.name, schema.data)
+    except ValueError as error:
+        raise BagError(f"{file.path} has topic {channel.topic} with a schema that cannot be read: {error}") from None

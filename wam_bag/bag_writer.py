@@ -1,0 +1,371 @@
+"""A bag written as rosbag2 writes it: MCAP of profile ros2, and metadata.yaml next to it.
+
+No node and no clock of its own: the recorder decides what is written and at what time.
+"""
+
+import contextlib
+import fcntl
+import os
+import shutil
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Final, NamedTuple, Self
+
+from mcap.records import Attachment
+
+from wam_bag import safe_yaml
+from wam_bag.definitions import schema, type_hash
+from wam_bag.errors import RecordingError
+from wam_bag.mcap_writer import McapWriter
+from wam_bag.message_layout import ExactLength
+from wam_bag.metadata import INFINITE, LIBRARY, FileSummary, bag_information, write_metadata
+
+__all__ = ["WHOLE", "BagWriter", "RecordingError", "Split", "exact_cdr", "policies", "release"]
+
+CHUNK_SIZE: Final = 1024 * 1024  # bytes; the arm fills half of it in half a second, and it compresses to a tenth
+FLUSH_PERIOD: Final = 0.5  # s; a killed recorder loses at most this and one timer period
+RESERVE: Final = ".reserved"  # file that keeps space for the end of the bag
+RESERVED: Final = 8 * 2**20  # bytes of it; an hour of the arm needs two for its indexes
+POLICIES: Final = (
+    "history", "depth", "reliability", "durability", "deadline", "lifespan", "liveliness",
+    "liveliness_lease_duration", "avoid_ros_namespace_conventions",
+)  # fmt: skip
+
+Policies = Mapping[str, Any]
+
+
+def policies(qos: Any) -> Policies:
+    """The nine QoS policies as rosbag2 (version 9) writes them.
+
+    Parameters
+    ----------
+    qos : an rclpy QoSProfile, or a mapping with exactly the nine policies, which is used unchanged.
+    """
+    if isinstance(qos, Mapping):
+        if set(qos) != set(POLICIES):
+            raise ValueError(f"QoS has the policies {sorted(qos)}; it needs exactly {sorted(POLICIES)}")
+        return qos
+
+    def duration(value: Any) -> dict[str, int]:
+        sec, nsec = divmod(value.nanoseconds, 10**9)
+        return {"sec": sec, "nsec": nsec} if value.nanoseconds else dict(INFINITE)
+
+    liveliness = qos.liveliness.name.lower()
+    return {
+        "history": qos.history.name.lower(),
+        "depth": qos.depth,
+        "reliability": qos.reliability.name.lower(),
+        "durability": qos.durability.name.lower(),
+        "deadline": duration(qos.deadline),
+        "lifespan": duration(qos.lifespan),
+        "liveliness": "automatic" if liveliness == "system_default" else liveliness,
+        "liveliness_lease_duration": duration(qos.liveliness_lease_duration),
+        "avoid_ros_namespace_conventions": qos.avoid_ros_namespace_conventions,
+    }
+
+
+def exact_cdr(name: str, data: bytes) -> bytes:
+    """A serialized message without the extra bytes that its publisher left at its end.
+
+    Parameters
+    ----------
+    name : type, ``package/msg/Type``.
+    data : CDR with encapsulation header; returned unchanged if it does not fit the type.
+    """
+    return data[: ExactLength(name)(data)]
+
+
+class Split(NamedTuple):
+    """When a bag continues in another file; 0 means never.
+
+    Attributes
+    ----------
+    size : bytes of a file.
+    seconds : of log time in a file.
+    """
+
+    size: int
+    seconds: float
+
+
+WHOLE: Final = Split(0, 0.0)  # one file
+
+
+class BagWriter:
+    """Writes a new bag directory ``<path>/`` with ``<name>_0.mcap`` and so on and, on closing, ``metadata.yaml``.
+
+    Space for the end of the bag is reserved while it is open: a full disk is reported before anything is
+    recorded, and a disk that fills up leaves a bag that is closed and can be read.
+
+    Parameters
+    ----------
+    path : directory of the bag; refused if it exists.  Missing parents are created.
+    split : when it continues in another file.
+
+    Attributes
+    ----------
+    closed : True if nothing can be written any more.
+
+    Raises
+    ------
+    RecordingError
+        if the bag cannot be created, before anything is recorded.
+    """
+
+    def __init__(self, path: Path, split: Split = WHOLE) -> None:
+        self.path = path
+        self.closed = False
+        self._split = split
+        self._files: list[FileSummary] = []
+        self._topics: list[dict[str, Any]] = []
+        self._channels: dict[str, int] = {}
+        self._lengths: list[ExactLength] = []
+        self._counts: Counter[int] = Counter()  # by channel id, of the files that are finished
+        self._schemas: dict[str, int] = {}
+        self._definitions: list[tuple[str, str, Mapping[str, str]]] = []
+        self._next_flush = 0.0
+        self._file_begin: int | None = None
+        _make(path)
+        try:
+            self._reserve = _reserve(path / RESERVE)
+            self._open()
+        except OSError as error:
+            shutil.rmtree(path, ignore_errors=True)
+            raise RecordingError(
+                f"bag {path} cannot be created: {error.strerror}; "
+                f"free {RESERVED >> 20} MiB or more, or give another directory"
+            ) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def add_topic(self, name: str, kind: str, qos: Any) -> None:
+        """Define a topic; once, before its first message.
+
+        Parameters
+        ----------
+        name : full topic name, with its namespace.
+        kind : type, ``package/msg/Type``; its definition must be installed.
+        qos : what the publishers offer, as `policies` takes it.
+        """
+        offered = [policies(qos)]
+        digest = type_hash(kind)
+        self._define(name, kind, {"offered_qos_profiles": safe_yaml.dump(offered).strip(), "topic_type_hash": digest})
+        self._lengths.append(ExactLength(kind))
+        self._topics.append(
+            {
+                "name": name,
+                "type": kind,
+                "serialization_format": "cdr",
+                "offered_qos_profiles": offered,
+                "type_description_hash": digest,
+            }
+        )
+
+    def write(self, topic: str, data: bytes, log_time: int, publish_time: int, sequence: int) -> None:
+        """Write one message.
+
+        Parameters
+        ----------
+        topic : name given to `add_topic`.
+        data : CDR as received; cut to its exact length.
+        log_time, publish_time : ns.
+        sequence : number that the publisher gave the message.
+
+        Raises
+        ------
+        RecordingError
+            if it cannot be written to disk; the bag is closed then and can be read.
+        """
+        channel = self._channels[topic]
+        length = self._lengths[channel - 1](data)
+        if length < len(data):
+            data = data[:length]
+        if self._file_begin is None:
+            self._file_begin = log_time
+        try:  # not the context manager, which would take as long as all the rest
+            if self._is_full(log_time):
+                self._next_file(log_time)
+            self._writer.add(channel, log_time, publish_time, sequence, data)
+            if time.monotonic() >= self._next_flush:
+                self._flush()
+        except OSError as error:
+            self._give_up(error)
+
+    def flush_when_due(self) -> None:
+        """Finish the chunk every half second of wall time; call it also while no message arrives."""
+        if time.monotonic() >= self._next_flush and not self.closed:
+            with self._closing_on_failure():
+                self._flush()
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Add a file to the bag, without a time, so that equal runs give equal bags."""
+        with self._closing_on_failure():
+            self._writer.flush()
+            self._writer.attach(Attachment(0, 0, name, media_type, data))
+
+    def metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Add a metadata record."""
+        with self._closing_on_failure():
+            self._writer.flush()
+            self._writer.metadata(name, values)
+
+    @property
+    def written(self) -> int:
+        """Messages on disk."""
+        return sum(self._counts.values()) + sum(self._writer.counts.values())
+
+    def close(self) -> None:
+        """Finish the bag and write ``metadata.yaml``; nothing happens the second time.
+
+        Raises
+        ------
+        RecordingError
+            if the last messages cannot be written to disk; the bag is closed and can be read.
+        """
+        if self.closed:
+            return
+        with self._closing_on_failure():
+            self._writer.flush()
+        self._finish_bag()
+
+    def _open(self) -> None:
+        path = self.path / self._file_name()
+        stream = path.open("xb", buffering=0)
+        try:
+            self._writer = McapWriter(stream, LIBRARY, CHUNK_SIZE)
+        except OSError:
+            stream.close()
+            path.unlink()
+            raise
+        self._stream = stream
+        self._schemas = {}
+        for definition in self._definitions:
+            self._define_in_file(*definition)
+
+    def _file_name(self) -> str:
+        return f"{self.path.name}_{len(self._files)}.mcap"
+
+    def _define(self, name: str, kind: str, metadata: Mapping[str, str]) -> None:
+        self._definitions.append((name, kind, metadata))
+        self._define_in_file(name, kind, metadata)
+
+    def _define_in_file(self, name: str, kind: str, metadata: Mapping[str, str]) -> None:
+        if kind not in self._schemas:
+            self._schemas[kind] = self._writer.schema(kind, "ros2msg", schema(kind))
+        self._channels[name] = self._writer.channel(name, "cdr", self._schemas[kind], metadata)
+
+    def _flush(self) -> None:
+        self._next_flush = time.monotonic() + FLUSH_PERIOD
+        self._writer.flush()
+
+    def _is_full(self, log_time: int) -> bool:
+        size, seconds = self._split
+        if size and self._writer.position >= size:
+            return True
+        begin = log_time if self._file_begin is None else self._file_begin
+        return bool(seconds) and log_time - begin >= round(seconds * 1e9)
+
+    def _next_file(self, log_time: int) -> None:
+        self._writer.flush()
+        self._finish_file()
+        self._file_begin = log_time
+        self._open()
+
+    def _finish_file(self) -> None:
+        writer = self._writer
+        file = FileSummary(self._file_name(), writer.first, writer.last, sum(writer.counts.values()))
+        counts = self._counts + Counter(writer.counts)
+        information = self._information([*self._files, file], counts)
+        writer.metadata("rosbag2", {"serialized_metadata": safe_yaml.dump(information).strip()})
+        writer.finish()
+        self._stream.close()
+        self._files.append(file)
+        self._counts = counts
+        writer.counts = {}
+
+    @contextlib.contextmanager
+    def _closing_on_failure(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        """Close the bag with what is on disk, in the space that was reserved for it."""
+        reason = error.strerror or str(error)
+        try:
+            self._finish_bag()
+        except OSError as second:
+            raise RecordingError(
+                f"{reason}, and there was no space to close it ({second.strerror}); "
+                f"'wam bag repair {self.path}' closes it"
+            ) from None
+        raise RecordingError(f"{reason}; it was closed with what was recorded before") from None
+
+    def _finish_bag(self) -> None:
+        self.closed = True
+        self._reserve.close()
+        release(self.path)
+        try:
+            if not self._stream.closed:
+                self._finish_file()
+        finally:
+            self._stream.close()
+        write_metadata(self.path, self._information(self._files, self._counts))
+
+    def _information(self, files: Sequence[FileSummary], counts: Counter[int]) -> dict[str, Any]:
+        return bag_information(files, self._topics, [counts[channel] for channel in self._channels.values()])
+
+
+def _reserve(path: Path) -> BinaryIO:
+    """Reserve the space, and take the lock that marks the bag as being recorded."""
+    stream = path.open("xb")
+    try:
+        os.posix_fallocate(stream.fileno(), 0, RESERVED)
+        fcntl.flock(stream, fcntl.LOCK_EX)
+    except OSError:
+        stream.close()
+        raise
+    return stream
+
+
+def release(path: Path) -> None:
+    """Release the space reserved for the end of a bag.
+
+    Raises
+    ------
+    RecordingError
+        if the bag is being recorded at this moment.
+    """
+    with contextlib.suppress(FileNotFoundError), (path / RESERVE).open("rb") as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise RecordingError(f"bag {path} is being recorded; stop the recorder first") from None
+        (path / RESERVE).unlink()
+
+
+def _make(path: Path) -> None:
+    try:
+        path.mkdir(parents=True)
+    except FileExistsError:
+        if path.parent.is_dir():
+            raise RecordingError(
+                f"bag {path} exists already; nothing was written. Give another name or move it away"
+            ) from None
+        raise RecordingError(f"{path.parent} is a file; give a directory for bag {path.name}") from None
+    except NotADirectoryError:
+        raise RecordingError(f"a parent of bag {path} is a file; give another directory") from None
+    except OSError as error:
+        raise RecordingError(
+            f"bag {path} cannot be created: {error.strerror}; give a directory that can be written"
+        ) from None

@@ -1,0 +1,251 @@
+"""Messages of a topic as columns: what each type becomes, decoded in bulk.
+
+Messages of a topic mostly have the same counts and strings.  Then every number is at the same place in each
+of them, and a column is a view of many records at once.
+"""
+
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_bag.cdr import Decoder, Definitions
+from wam_bag.errors import BagError, Damage
+from wam_bag.mcap_records import Bytes
+from wam_bag.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
+from wam_bag.message_search import DATA, Found, log_times, messages
+from wam_bag.point_clouds import table_columns, tables
+
+Texts = NDArray[np.object_]
+
+
+class JointColumns(NamedTuple):
+    """sensor_msgs/JointState, k messages of n joints, matched by name.
+
+    `names` are in the order of their first appearance; values that a message leaves out are NaN.  A field
+    that every message leaves empty has shape (k, 0).
+    """
+
+    log_time_ns: Times
+    stamp_ns: Times
+    frames: Texts
+    names: tuple[str, ...]
+    position: Numbers
+    velocity: Numbers
+    effort: Numbers
+
+
+class WrenchColumns(NamedTuple):
+    """geometry_msgs/WrenchStamped, k messages: force (k, 3) N, torque (k, 3) N m."""
+
+    log_time_ns: Times
+    stamp_ns: Times
+    frames: Texts
+    force: Numbers
+    torque: Numbers
+
+
+class PointColumns(NamedTuple):
+    """geometry_msgs/PointStamped, k messages: point (k, 3) m."""
+
+    log_time_ns: Times
+    stamp_ns: Times
+    frames: Texts
+    point: Numbers
+
+
+class TableColumns(NamedTuple):
+    """sensor_msgs/PointCloud2, k messages with p points together: a table with a row for each point.
+
+    `message` (p,) is the index of the message of each row; a message may have no points.  `columns` are the
+    fields of the points by name, (p,), or (p, n) for a field of n numbers, in the type of the field.
+    """
+
+    log_time_ns: Times
+    stamp_ns: Times
+    frames: Texts
+    message: Index
+    columns: dict[str, NDArray[Any]]
+
+    @property
+    def row_stamp_ns(self) -> Times:
+        """Stamp of the message of each row, ns, (p,)."""
+        return self.stamp_ns[self.message]
+
+
+class BoolColumns(NamedTuple):
+    """std_msgs/Bool, k messages."""
+
+    log_time_ns: Times
+    data: NDArray[np.bool_]
+
+
+class ClockColumns(NamedTuple):
+    """rosgraph_msgs/Clock, k messages."""
+
+    log_time_ns: Times
+    stamp_ns: Times
+
+
+class Messages(NamedTuple):
+    """Messages of any other type; fields are attributes, arrays of numbers numpy arrays."""
+
+    log_time_ns: Times
+    messages: Sequence[Any]
+
+    def column(self, path: str) -> NDArray[Any]:
+        """One field of every message, for example 'header.stamp.sec'; shape (k,), or (k, n) of equal arrays."""
+        values = list(map(attrgetter(path), self.messages))
+        return np.array(values, object if values and isinstance(values[0], str) else None)
+
+
+Columns = JointColumns | WrenchColumns | PointColumns | TableColumns | BoolColumns | ClockColumns | Messages
+
+
+class Collector:
+    """Takes the messages of one topic batch by batch and makes columns of them.
+
+    Parameters
+    ----------
+    kind : type, ``package/msg/Type``.
+    definitions : fields of it and of the types it consists of.
+    begin, end : log times that are taken, ns, begin <= t < end.
+
+    Attributes
+    ----------
+    type : the type.
+    """
+
+    def __init__(self, kind: str, definitions: Definitions, begin: int, end: int) -> None:
+        self.type = kind
+        self._definitions = definitions
+        self._begin, self._end = begin, end
+        self._times: list[Times] = []
+        self._groups_of = Grouping(kind, definitions)
+        self._groups: list[tuple[Index, Any]] = []
+        self._data: list[bytes] = []
+        self._number = 0
+
+    def takes(self, kind: str, definitions: Definitions) -> bool:
+        """Whether messages of a type belong in these columns."""
+        return kind == self.type and definitions == self._definitions
+
+    def add(self, buffer: Bytes, found: Found) -> None:
+        """Take these messages of a buffer."""
+        times = log_times(buffer, found)
+        taken = (times >= self._begin) & (times < self._end)
+        if not taken.all():
+            found, times = Found(found.offsets[taken], found.sizes[taken]), times[taken]
+        self._times.append(times)
+        if self.type in _TYPES:
+            extract, _ = _TYPES[self.type]
+            for group in self._groups_of(buffer, found.offsets + DATA, found.sizes):
+                self._groups.append((group.rows + self._number, extract(group)))
+        else:
+            self._data += messages(buffer, found)
+        self._number += len(times)
+
+    def columns(self, label: str) -> Columns:
+        """All messages in the order of log times; the label names bag and topic in later errors."""
+        times = np.concatenate(self._times) if self._times else np.empty(0, np.int64)
+        order = None if (np.diff(times) >= 0).all() else np.argsort(times, kind="stable")
+        groups, data = self._groups, self._data
+        if order is not None:
+            times, rank = times[order], np.argsort(order)
+            groups = [(rank[rows], values) for rows, values in groups]
+            data = [data[i] for i in order] if data else data
+        if self.type not in _TYPES:
+            return Messages(times, Decoded(data, Decoder(self.type, self._definitions), label))
+        _, assemble = _TYPES[self.type]
+        groups.sort(key=lambda group: int(group[0].min()))
+        try:
+            return assemble(times, [(_where(rows), values) for rows, values in groups])
+        except Damage as error:
+            raise BagError(f"{label}: {error}; read the others of its topics") from None
+
+
+def _joints(group: Group) -> tuple[Any, ...]:
+    fields = [group.numbers(name).astype(np.float64) for name in ("position", "velocity", "effort")]
+    return *_header(group), group.text("name"), fields
+
+
+def _header(group: Group) -> tuple[Times, str]:
+    return group.time("header.stamp"), group.text("header.frame_id")[0]
+
+
+def _where(rows: Index) -> slice | Index:
+    """Rows as a slice if they follow each other, which is faster."""
+    first, number = int(rows[0]), len(rows)
+    follow = rows[-1] - first == number - 1 and (np.diff(rows) == 1).all()
+    return slice(first, first + number) if follow else rows
+
+
+def _filled(groups: list[Any], place: int, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    """A column of the values that groups of messages have at a place."""
+    column = np.empty(shape, dtype)
+    for where, values in groups:
+        column[where] = values[place]
+    return column
+
+
+def _stamped(times: Times, groups: list[Any]) -> tuple[Times, Times, Texts]:
+    k = len(times)
+    return times, _filled(groups, 0, (k,), np.int64), _filled(groups, 1, (k,), np.object_)
+
+
+def _vectors(times: Times, groups: list[Any], place: int) -> Numbers:
+    return _filled(groups, place, (len(times), 3), np.float64)
+
+
+def _joint_columns(times: Times, groups: list[Any]) -> JointColumns:
+    names = tuple(dict.fromkeys(name for _, values in groups for name in values[2]))
+    arrays = []
+    for field in range(3):
+        widths = {values[3][field].shape[1] for _, values in groups}
+        is_complete = widths <= {len(names)} and all(values[2] == names for _, values in groups)
+        array = np.empty((len(times), len(names) if any(widths) else 0))
+        if not is_complete:
+            array[:] = np.nan
+        for where, (_, _, own, fields) in groups if any(widths) else ():
+            values = fields[field][:, : len(own)]
+            if own == names and values.shape[1] == len(names):
+                array[where] = values
+                continue
+            for i, name in enumerate(own[: values.shape[1]]):
+                array[where, names.index(name)] = values[:, i]
+        arrays.append(array)
+    return JointColumns(*_stamped(times, groups), names, *arrays)
+
+
+def _table_columns(times: Times, groups: list[Any]) -> TableColumns:
+    rows = np.arange(len(times))
+    found = [table._replace(messages=rows[where][table.messages]) for where, values in groups for table in values[2]]
+    return TableColumns(*_stamped(times, groups), *table_columns(found))
+
+
+Extract = Callable[[Group], tuple[Any, ...]]
+Assemble = Callable[[Times, list[Any]], Columns]
+_TYPES: Final[dict[str, tuple[Extract, Assemble]]] = {
+    "sensor_msgs/msg/JointState": (_joints, _joint_columns),
+    "geometry_msgs/msg/WrenchStamped": (
+        lambda group: (*_header(group), group.vector("wrench.force"), group.vector("wrench.torque")),
+        lambda times, groups: WrenchColumns(
+            *_stamped(times, groups), _vectors(times, groups, 2), _vectors(times, groups, 3)
+        ),
+    ),
+    "geometry_msgs/msg/PointStamped": (
+        lambda group: (*_header(group), group.vector("point")),
+        lambda times, groups: PointColumns(*_stamped(times, groups), _vectors(times, groups, 2)),
+    ),
+    "sensor_msgs/msg/PointCloud2": (lambda group: (*_header(group), tables(group)), _table_columns),
+    "std_msgs/msg/Bool": (
+        lambda group: (group.numbers("data")[:, 0] != 0,),
+        lambda times, groups: BoolColumns(times, _filled(groups, 0, (len(times),), np.bool_)),
+    ),
+    "rosgraph_msgs/msg/Clock": (
+        lambda group: (group.time("clock"),),
+        lambda times, groups: ClockColumns(times, _filled(groups, 0, (len(times),), np.int64)),
+    ),
+}

@@ -1,0 +1,95 @@
+"""Message definitions as text: the fields of a type, from a .msg file or from the schema of a bag."""
+
+import re
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+SEPARATOR: Final = "=" * 80
+PRIMITIVES: Final = {
+    "bool": 1, "byte": 1, "char": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4,
+    "int64": 8, "uint64": 8, "float32": 4, "float64": 8,
+}  # fmt: skip
+_FIELD = re.compile(r"^([A-Za-z][\w/]*)(?:<=\d+)?(?:\[(<=)?(\d*)\])?\s+([A-Za-z]\w*)\s*(=?)")
+
+
+class MessageField(NamedTuple):
+    """One field of a message: `type` is a primitive or ``package/msg/Type``.
+
+    `length` is None for a single value, 0 for a sequence, else the length of a fixed array.
+    """
+
+    name: str
+    type: str
+    length: int | None
+
+
+Fields = tuple[MessageField, ...]
+
+
+def fields(text: str, package: str) -> Fields:
+    """The fields that a .msg text of a package defines, without constants."""
+    found = []
+    for line in text.splitlines():
+        match = _FIELD.match(line.split("#")[0].strip())
+        if match is None or match[5]:
+            continue
+        kind = _full_name(match[1], package)
+        length = None if match[3] is None else 0 if match[2] or not match[3] else int(match[3])
+        found.append(MessageField(match[4], kind, length))
+    return tuple(found)
+
+
+@lru_cache(maxsize=256)
+def definitions(name: str, schema: bytes) -> dict[str, Fields]:
+    """The types of a ``ros2msg`` schema by their full names, the type itself and those it consists of.
+
+    Parameters
+    ----------
+    name : ``package/msg/Type``.
+    schema : text of the type and, each below a line of '=' and its name, of the others.
+
+    Raises
+    ------
+    ValueError
+        if the text is not a schema of that type; the message gives the reason.
+    """
+    parts = name.split("/")
+    if len(parts) != 3:
+        raise ValueError(f"type {name!r} does not have the form package/msg/Type")
+    first, *others = re.split(r"^={80}\n", schema.decode("utf-8").replace("\r\n", "\n"), flags=re.MULTILINE)
+    found = {
+        "builtin_interfaces/msg/Time": fields("int32 sec\nuint32 nanosec", ""),
+        "builtin_interfaces/msg/Duration": fields("int32 sec\nuint32 nanosec", ""),
+        name: fields(first, parts[0]),
+    }
+    for other in others:
+        heading, _, text = other.partition("\n")
+        package, _, kind = heading.removeprefix("MSG: ").strip().replace("/msg/", "/").partition("/")
+        found[f"{package}/msg/{kind}"] = fields(text, package)
+    _check(name, found, (), set())
+    return found
+
+
+def _check(name: str, found: dict[str, Fields], outer: tuple[str, ...], checked: set[str]) -> None:
+    if name in outer:
+        raise ValueError(f"type {name} contains itself")
+    if name in checked:
+        return
+    for field in found[name]:
+        if "/" in field.type:
+            if field.type not in found:
+                raise ValueError(f"type {field.type} of field '{field.name}' of {name} is not defined")
+            _check(field.type, found, (*outer, name), checked)
+        elif field.type not in PRIMITIVES and field.type != "string":
+            raise ValueError(f"field '{field.name}' of {name} is a {field.type}, which is not read")
+    checked.add(name)
+
+
+def _full_name(kind: str, package: str) -> str:
+    if kind in PRIMITIVES or kind in ("string", "wstring"):
+        return kind
+    if kind == "Header":
+        return "std_msgs/msg/Header"
+    if "/" not in kind:
+        return f"{package}/msg/{kind}"
+    return "{}/msg/{}".format(*kind.replace("/msg/", "/").split("/", 1))

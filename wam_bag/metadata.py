@@ -1,0 +1,92 @@
+"""metadata.yaml of a bag, as rosbag2 (version 9) writes it."""
+
+import contextlib
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import yaml
+from mcap.records import Channel, Schema
+
+from wam_bag import safe_yaml
+
+LIBRARY: Final = "wam_stack"  # that writes the files
+INFINITE: Final = {"sec": 9223372036, "nsec": 854775807}
+_QOS = {
+    "history": "keep_last", "depth": 1000, "reliability": "reliable", "durability": "volatile", "deadline": INFINITE,
+    "lifespan": INFINITE, "liveliness": "automatic", "liveliness_lease_duration": INFINITE,
+    "avoid_ros_namespace_conventions": False,
+}  # fmt: skip
+
+
+class FileSummary(NamedTuple):
+    """One file in metadata.yaml: name, first and last log time in ns, messages."""
+
+    name: str
+    first: int
+    last: int
+    messages: int
+
+
+def bag_information(
+    files: Sequence[FileSummary], topics: Sequence[Mapping[str, Any]], counts: Sequence[int]
+) -> dict[str, Any]:
+    """Content of metadata.yaml (version 9 of rosbag2).
+
+    Parameters
+    ----------
+    files : files of the bag in their order.
+    topics : name, type, serialization_format, offered_qos_profiles and type_description_hash of each.
+    counts : messages of each topic.
+    """
+    filled = [file for file in files if file.messages]
+    first = min((file.first for file in filled), default=0)
+    last = max((file.last for file in filled), default=0)
+    return {
+        "version": 9,
+        "storage_identifier": "mcap",
+        **_extent(first, last, sum(file.messages for file in files)),
+        "topics_with_message_count": [
+            {"topic_metadata": topic, "message_count": count} for topic, count in zip(topics, counts, strict=True)
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.name for file in files],
+        "files": [{"path": file.name, **_extent(file.first, file.last, file.messages)} for file in files],
+        "custom_data": None,
+        "ros_distro": os.environ.get("ROS_DISTRO", "jazzy"),
+    }
+
+
+def _extent(first: int, last: int, count: int) -> dict[str, Any]:
+    return {
+        "duration": {"nanoseconds": last - first if count else 0},
+        "starting_time": {"nanoseconds_since_epoch": first if count else 0},
+        "message_count": count,
+    }
+
+
+def write_metadata(path: Path, information: Mapping[str, Any]) -> None:
+    """Write metadata.yaml of a bag directory, whole or not at all."""
+    temporary = path / "metadata.yaml.tmp"
+    temporary.write_text(safe_yaml.dump({"rosbag2_bagfile_information": information}), encoding="utf-8")
+    temporary.replace(path / "metadata.yaml")
+
+
+def topic_information(channel: Channel, schema: Schema) -> dict[str, Any]:
+    """One topic in metadata.yaml, from its records in a file."""
+    return {
+        "name": channel.topic,
+        "type": schema.name,
+        "serialization_format": channel.message_encoding,
+        "offered_qos_profiles": profiles(channel.metadata.get("offered_qos_profiles", "")),
+        "type_description_hash": channel.metadata.get("topic_type_hash", ""),
+    }
+
+
+def profiles(text: str) -> Any:
+    """QoS policies that a topic's publishers offer; defaults if there are none or they cannot be read."""
+    with contextlib.suppress(yaml.YAMLError):
+        return safe_yaml.load(text) or [_QOS]  # readers drop a topic that offers nothing
+    return [_QOS]

@@ -1,0 +1,42 @@
+"""YAML of bags: read with bounded effort, written without anchors."""
+
+from typing import Any, Final
+
+import yaml
+
+DEEPEST: Final = 50  # nested maps and lists; the C loader recurses and would end the process at some thousands
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C, if it was built
+
+
+def load(text: str | bytes) -> Any:
+    """Values of a YAML text.
+
+    Raises
+    ------
+    yaml.YAMLError
+        if it is not YAML, is nested too deeply or has aliases, whose expansion may take any amount of memory.
+    UnicodeDecodeError
+        if it is not UTF-8.
+    """
+    text = text.decode() if isinstance(text, bytes) else text
+    depth = 0
+    for event in yaml.parse(text, Loader=_LOADER):
+        if isinstance(event, yaml.AliasEvent):
+            raise yaml.YAMLError("aliases are not read")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
+    return yaml.load(text, _LOADER)
+
+
+class _Plain(yaml.SafeDumper):
+    """YAML without anchors, which rosbag2's reader and people read more easily."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        """Write everything out."""
+        return True
+
+
+def dump(value: Any) -> str:
+    """YAML text of a value, maps in their own order."""
+    return str(yaml.dump(value, Dumper=_Plain, sort_keys=False))

@@ -1,0 +1,132 @@
+"""The commands of `wam`, a module each: `arguments(parser)` and `run(given)`, which returns the exit code.
+
+Here is what several of them take.
+"""
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from wam_description.configuration import Configuration, packaged
+from wam_sim.batch import executor
+from wam_sim.pieces import default_folder
+from wam_sim.progress import Progress
+
+BASE_CONFIGURATION = "wam"
+
+
+def take_configuration(parser: argparse.ArgumentParser) -> None:
+    """Give a command the option --config."""
+    parser.add_argument(
+        "--config", default=BASE_CONFIGURATION, help="configuration: a YAML file, or the name of one that is installed"
+    )
+
+
+def configuration_of(given: argparse.Namespace) -> Configuration:
+    """The configuration that --config names."""
+    name: str = given.config
+    return Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
+
+
+class BatchOptions(NamedTuple):
+    """Executor, folder of finished pieces, and progress report of a batch."""
+
+    executor: Executor
+    folder: Path | None
+    report: Progress
+
+
+def take_batch(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options of a long computation."""
+    parser.add_argument("--workers", type=int, help="processes; default: one for each core")
+    parser.add_argument(
+        "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, for example tcp://10.0.0.1:8786"
+    )
+    parser.add_argument(
+        "--keep",
+        type=Path,
+        default=default_folder(),
+        metavar="DIRECTORY",
+        help="finished pieces are kept and looked for here; default: %(default)s",
+    )
+    parser.add_argument("--fresh", action="store_true", help="compute everything, keep nothing")
+
+
+@contextmanager
+def batch_of(given: argparse.Namespace) -> Iterator[BatchOptions]:
+    """What the options of `take_batch` name; progress goes to stderr."""
+    if given.workers is not None:
+        at_least("--workers", given.workers, 1)
+    if not given.fresh:
+        writable_directory("--keep", given.keep)
+    with executor(given.workers, given.dask) as found:
+        yield BatchOptions(found, None if given.fresh else given.keep, Progress(given.command, sys.stderr))
+
+
+def at_least(option: str, value: float, low: float) -> None:
+    """Refuse the value of an option that is too small, or no number.
+
+    Raises
+    ------
+    ValueError
+        which names the option, the value and what is allowed.
+    """
+    if not value >= low:
+        raise ValueError(f"{option} is {value:g}; it must be at least {low:g}")
+
+
+def rising(option: str, ends: Sequence[float]) -> None:
+    """Refuse the ends of a range that do not rise from above zero.
+
+    Raises
+    ------
+    ValueError
+        which names the option, the values and what is allowed.
+    """
+    low, high = ends
+    if not 0.0 < low <= high < math.inf:
+        raise ValueError(f"{option} is {low:g} to {high:g}; LOW must be above 0 and HIGH not below it")
+
+
+def writable_file(option: str, file: Path) -> None:
+    """Refuse, before the work, a file that could not be written after it.
+
+    Raises
+    ------
+    ValueError
+        which says why, and what to do.
+    """
+    folder = file.parent
+    if file.is_dir():
+        why = "it is a directory"
+    elif not folder.is_dir():
+        why = f"{folder} is no directory"
+    elif not os.access(file if file.exists() else folder, os.W_OK):
+        why = f"no permission to write {'it' if file.exists() else f'into {folder}'}"
+    else:
+        return
+    raise ValueError(f"cannot write {file}: {why}; give another file as {option}")
+
+
+def writable_directory(option: str, directory: Path) -> None:
+    """Refuse, before the work, a directory that could not be made or written into.
+
+    Raises
+    ------
+    ValueError
+        which says why, and what to do.
+    """
+    there = next(folder for folder in (directory, *directory.parents) if folder.exists() or folder == folder.parent)
+    if not there.is_dir():
+        why = f"{there} is no directory"
+    elif not os.access(there, os.W_OK | os.X_OK):
+        why = f"no permission to write into {there.absolute()}"
+    else:
+        return
+    raise ValueError(f"cannot write into {directory}: {why}; give another directory as {option}")

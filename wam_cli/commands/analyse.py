@@ -1,0 +1,50 @@
+"""`wam analyse`: a recording, measured and compared with theory."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from wam_analysis.findings.analysis import analyse
+from wam_analysis.findings.page import page
+from wam_analysis.findings.text import json_text, text
+from wam_cli.commands import writable_file
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("bag", type=Path, help="directory of the bag, or its .mcap file")
+    parser.add_argument(
+        "--html", type=Path, metavar="FILE", help="also write one HTML page with pictures; it needs no network"
+    )
+    parser.add_argument(
+        "--json", metavar="FILE", help="also write the numbers as JSON; '-' prints JSON instead of the text"
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress output")
+
+
+def run(given: argparse.Namespace) -> int:
+    """Analyse, print, write."""
+    if given.html:
+        writable_file("--html", given.html)
+    if given.json and given.json != "-":
+        writable_file("--json", Path(given.json))
+    begin = time.monotonic()
+
+    def progress(doing: str) -> None:
+        if not given.quiet:
+            print(f"{time.monotonic() - begin:5.1f} s  {doing}", file=sys.stderr, flush=True)
+
+    analysis = analyse(given.bag, progress)
+    if given.json == "-":
+        print(json_text(analysis))
+    else:
+        print(text(analysis))
+        if given.json:
+            Path(given.json).write_text(json_text(analysis) + "\n", encoding="utf-8")
+            progress(f"wrote {given.json}")
+    if given.html:
+        progress("drawing")
+        given.html.write_text(page(analysis), encoding="utf-8")
+        progress(f"wrote {given.html}")
+    return 0

@@ -1,0 +1,131 @@
+"""`wam evaluate`: benchmark a part of the stack."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import yaml
+
+from wam_cli.commands import at_least, batch_of, configuration_of, take_batch, take_configuration, writable_file
+from wam_description.configuration import Configuration
+from wam_experiments.contact_benchmark.evaluation import BenchmarkExtent, BenchmarkResult, evaluate, scenarios
+from wam_experiments.contact_benchmark.figure import figure
+from wam_experiments.contact_benchmark.over_topics import recorded, script
+from wam_experiments.contact_benchmark.page import missed, page, report
+from wam_experiments.contact_benchmark.scenarios import BenchmarkScenario, dither_values
+from wam_experiments.contact_benchmark.score import ScenarioScore, score
+from wam_experiments.contact_benchmark.simulation import Played
+from wam_experiments.contact_benchmark.timing import section, times
+from wam_ros.bring_up import Composition
+from wam_sim.progress import Progress
+
+SEEDS = (1, 2, 3)
+PARTS = ("contact",)
+
+
+def over_topics(
+    configuration: Configuration, chosen: Sequence[BenchmarkScenario], report: Progress
+) -> list[ScenarioScore]:
+    """Play scenarios with the nodes, in lockstep, and score the recordings."""
+    found: list[ScenarioScore] = []
+    for scenario in chosen:
+        report(len(found), len(chosen))
+        found.append(score(play_over_topics(configuration, scenario), configuration.shared.arm))
+    report(len(found), len(chosen))
+    return found
+
+
+def play_over_topics(configuration: Configuration, scenario: BenchmarkScenario, domain_id: int | None = None) -> Played:
+    """Play a scenario with the nodes in this process, in lockstep; its records come from the bag."""
+    shared = configuration.shared
+    with TemporaryDirectory(prefix="wam_benchmark_") as folder:
+        steps = Path(folder) / "scenario.yaml"
+        steps.write_text(yaml.safe_dump(script(scenario)), encoding="utf-8")
+        own = {
+            "nodes": [*shared.nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "timing.timeout": 60.0,
+            "timing.display_divisor": 1,
+            "scenario:script": str(steps),
+            "recorder:directory": folder,
+            "recorder:name": "scenario",
+        }
+        with Composition(configuration.with_values({**scenario.values, **own}), domain_id=domain_id) as composition:
+            player: Any = composition.nodes["scenario"]
+            composition.spin(lambda: player.done)
+            failure = str(player.failure)
+        return recorded(scenario, Path(folder) / "scenario", shared.arm, failure)
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("part", choices=PARTS, help="contact: contact estimation on the whole arm")
+    parser.add_argument(
+        "--seed", type=int, nargs="+", default=list(SEEDS), help="seeds of the scenarios, default 1 2 3"
+    )
+    parser.add_argument("--contacts", type=int, default=200, help="contacts in motion per seed, default 200")
+    parser.add_argument("--resting", type=int, default=30, help="contacts at rest per seed, default 30")
+    parser.add_argument("--free", type=float, default=200.0, help="seconds of motion without contact per seed")
+    parser.add_argument("--joint-sensors", action="store_true", help="estimate from the joint sensors")
+    parser.add_argument(
+        "--mode",
+        choices=("direct", "lockstep"),
+        default="direct",
+        help="direct: without ROS; lockstep: over topics, one scenario at a time",
+    )
+    parser.add_argument("--write", type=Path, help="page to write, for example docs/contact.md")
+    take_configuration(parser)
+    take_batch(parser)
+
+
+def _write(
+    given: argparse.Namespace, configuration: Configuration, result: BenchmarkResult, scenario: BenchmarkScenario
+) -> None:
+    """Write the page, and its figure into a folder of the page's name."""
+    arm, file = configuration.shared.arm, Path(given.write)
+    picture = file.with_suffix("") / "benchmark.png"
+    figure(result.total, arm, picture)
+    defaults = f"--contacts {given.contacts} --resting {given.resting} --free {given.free:g}"
+    seeds = " ".join(map(str, given.seed))
+    sensors = " --joint-sensors" * given.joint_sensors
+    command = f"wam evaluate contact --seed {seeds} {defaults}{sensors} --mode {given.mode} --write {file}"
+    compute = section(times(configuration, scenario))
+    text = page(result, arm, command, compute, f"{picture.parent.name}/{picture.name}")
+    file.write_text(text, encoding="utf-8")
+
+
+def run(given: argparse.Namespace) -> int:
+    """Evaluate; 1 if a required value is missed."""
+    at_least("--contacts", given.contacts, 1)
+    at_least("--resting", given.resting, 0)
+    at_least("--free", given.free, 0.0)
+    for seed in given.seed:
+        at_least("--seed", seed, 0)
+    if given.write:
+        writable_file("--write", given.write)
+    configuration = configuration_of(given)
+    arm = configuration.shared.arm
+    extent = BenchmarkExtent(given.contacts, given.resting, given.free)
+    dither = dither_values(configuration)
+    chosen = {seed: scenarios(configuration, seed, extent, given.joint_sensors, dither) for seed in given.seed}
+    order = [(seed, scenario) for seed, own in chosen.items() for scenario in own]
+    every_scenario = [scenario for _, scenario in order]
+    if given.mode == "direct":
+        with batch_of(given) as batch:
+            scored = evaluate(configuration, every_scenario, *batch)
+    else:
+        scored = over_topics(configuration, every_scenario, Progress("scenarios", sys.stderr))
+    result = BenchmarkResult(tuple(given.seed), {seed: [] for seed in given.seed})
+    for (seed, _), scenario in zip(order, scored, strict=True):
+        result.scores[seed].append(scenario)
+    text = report(result, arm)
+    print(text)
+    if given.write:
+        _write(given, configuration, result, chosen[given.seed[0]][0])
+    short = missed(result, arm)
+    if short:
+        print(f"missed: {'; '.join(short)}", file=sys.stderr)
+    return 1 if short else 0

@@ -1,0 +1,107 @@
+"""`wam experiment`: an experiment of the thesis, run over topics in lockstep, recorded, evaluated from its bags."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from wam_cli.commands import writable_directory, writable_file
+from wam_experiments.thesis.definition import Experiment, Run, configured, load, names
+from wam_experiments.thesis.evaluation import evaluate, text
+from wam_experiments.thesis.figure import draw
+from wam_experiments.thesis.page import write
+from wam_experiments.thesis.rows import Result
+from wam_ros.bring_up import Composition
+from wam_ros.run import Stop
+
+PICTURE = "result.png"
+SHOWN_EVERY = 0.2  # s
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("experiment", nargs="?", help="name, or path of a YAML file; --list prints the names")
+    parser.add_argument("--list", action="store_true", help="print the name of every experiment")
+    parser.add_argument("--all", action="store_true", help="run every experiment")
+    parser.add_argument("--evaluate", metavar="DIRECTORY", help="evaluate the bags in this directory and run nothing")
+    parser.add_argument("--directory", default="bags", help="directory for the bags; default: bags")
+    parser.add_argument("--name", default="", help="subdirectory; default: the experiment, date and time")
+    parser.add_argument("--write", metavar="PAGE", help="also write tables and pictures into this documentation page")
+
+
+def run(given: argparse.Namespace) -> int:
+    """Run and evaluate."""
+    if given.list:
+        for name in names():
+            print(f"{name:22} {load(name).title}")
+        return 0
+    if bool(given.experiment) == given.all:
+        raise ValueError("name one experiment, or give --all; --list prints the names")
+    if not given.evaluate:
+        writable_directory("--directory", Path(given.directory))
+    if given.write:
+        writable_file("--write", Path(given.write))
+    results: dict[str, tuple[Experiment, Result, Path]] = {}
+    for experiment in map(load, names() if given.all else [given.experiment]):
+        if given.evaluate:
+            directory = Path(given.evaluate) / experiment.name if given.all else Path(given.evaluate)
+        else:
+            name = given.name or f"{experiment.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+            directory = Path(given.directory) / (f"{name}/{experiment.name}" if given.all and given.name else name)
+            if not _record(experiment, directory):
+                return 130
+        result = evaluate(experiment, directory)
+        draw(experiment, result, directory / PICTURE)
+        print(f"{text(experiment, result)}\nbags     {directory}\npicture  {directory / PICTURE}\n", flush=True)
+        results[experiment.name] = (experiment, result, directory / PICTURE)
+    if given.write:
+        write(Path(given.write), list(results.values()))
+    return 0 if all(result.agrees for _, result, _ in results.values()) else 1
+
+
+def _record(experiment: Experiment, directory: Path) -> bool:
+    """Record every run; False where it was interrupted."""
+    stop = Stop()
+    for i, each in enumerate(experiment.runs):
+        play(experiment, each, directory, f"{experiment.name} {i + 1}/{len(experiment.runs)} {each.name}", stop)
+        if stop.is_set:
+            print(f"stopped; what was recorded until then is in {directory}")
+            return False
+    return True
+
+
+def play(experiment: Experiment, each: Run, directory: Path, label: str, stop: Stop) -> None:
+    """One run in lockstep.
+
+    Raises
+    ------
+    ValueError
+        where the scenario failed for another reason than that the driver protected the arm.
+    """
+    shown = [0.0]
+    with Composition(configured(experiment, each, directory)) as composition:
+        scenario: Any = composition.nodes["scenario"]
+        driver: Any = composition.nodes["driver"]
+
+        def is_over() -> bool:
+            now = time.monotonic()
+            if now >= shown[0]:
+                shown[0] = now + SHOWN_EVERY
+                _say(f"{label}: {driver.driver.stamp / 1e9:5.1f} of {each.seconds:.1f} s")
+            return stop.is_set or bool(scenario.done)
+
+        composition.spin(is_over)
+        failure, fault, is_done = scenario.failure, driver.driver.safety.fault, bool(scenario.done)
+    ended = f"stopped by the driver: {fault}" if fault else "done" if is_done else "stopped"
+    _say(f"{label}: {ended}", end="\n")
+    if failure and not fault:
+        raise ValueError(f"{label}: {failure}")
+
+
+def _say(words: str, end: str = "") -> None:
+    """Show the progress: in one line on a terminal, otherwise only the end."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{words}", end=end, file=sys.stderr, flush=True)
+    elif end:
+        print(words, file=sys.stderr, flush=True)

@@ -1,0 +1,27 @@
+"""`wam figures`: the thesis's figures that carry data."""
+
+import argparse
+from pathlib import Path
+
+from wam_cli.commands import batch_of, take_batch, writable_directory
+from wam_experiments.figures.catalogue import FIGURES, file_of, known, numbers, table
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}; default: all")
+    parser.add_argument("--to", type=Path, default=Path("docs/figures"), help="directory; default: %(default)s")
+    take_batch(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Compute, draw, print how far the plant is from the lines."""
+    names = known(given.names or list(FIGURES))  # before anything is started
+    writable_directory("--to", given.to)
+    with batch_of(given) as batch:
+        found = numbers(names, *batch)
+    given.to.mkdir(parents=True, exist_ok=True)
+    for name, values in found.items():
+        FIGURES[name].draw(values, file_of(name, given.to))
+    print(table(found), end="")
+    return 0

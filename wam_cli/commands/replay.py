@@ -1,0 +1,72 @@
+"""`wam replay`: a node run again on its recorded inputs."""
+
+import argparse
+
+from wam_cli.commands import configuration_of
+from wam_sim.replay import REPLAYED, Compared, Replay, replay
+
+EXIT_CODES = "Exit code: 0 if every topic is the same bit for bit, 1 if one is not or the bag cannot be used."
+_MOST_GAPS = 5  # named one by one
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.epilog = EXIT_CODES
+    parser.add_argument("bag", help="directory of the bag, or an .mcap file")
+    parser.add_argument("node", help=f"{', '.join(REPLAYED)}, or my_package.module:Class")
+    parser.add_argument(
+        "--config", help="values instead of those in the bag: a YAML file, or the name of an installed one"
+    )
+
+
+def run(given: argparse.Namespace) -> int:
+    """Replay and print the comparison of each topic; 0 if all are the same bit for bit, else 1."""
+    done = replay(given.bag, given.node, configuration_of(given) if given.config else None)
+    for line in (*(f"INCOMPLETE: {line}" for line in done.lost), *map(told, done.topics), *reasons(done)):
+        print(line)
+    return 0 if done.is_same else 1
+
+
+def reasons(done: Replay) -> list[str]:
+    """Why topics are not the same, as far as the recording shows."""
+    if done.is_same:
+        return []
+    lines = []
+    gaps = done.gaps if done.mode != "realtime" or done.lost else ()  # else the driver left periods out itself
+    if gaps:
+        lines.append(
+            f"the bag lacks inputs of {done.node}: where one is missing nothing comes out, in lockstep perhaps for the "
+            "rest of it, and what comes out behind a gap remembers something else"
+        )
+        lines += [
+            f"    {gap.topic}: {gap.missing} missing between {gap.begin / 1e9:.3f} s and {gap.end / 1e9:.3f} s"
+            for gap in sorted(gaps, key=lambda gap: -gap.missing)[:_MOST_GAPS]
+        ]
+        if len(gaps) > _MOST_GAPS:
+            lines.append(f"    and {len(gaps) - _MOST_GAPS} gaps that are not longer")
+    different, compared = (sum(getattr(topic, name) for topic in done.topics) for name in ("different", "compared"))
+    if done.mode == "realtime" and different:
+        lines.append(
+            f"recorded in realtime: {different} of {compared} messages ({100.0 * different / compared:.1f} %) differ: "
+            f"{done.node} took what was newest when it worked, and the bag knows the order of arrival only roughly, "
+            "from when the recorder received it. Only a lockstep recording can be the same bit for bit"
+        )
+    return lines
+
+
+def told(topic: Compared) -> str:
+    """A line about a topic, a second one about its first difference."""
+    line = f"{topic.topic}: {topic.compared} messages, "
+    if topic.different:
+        share = 100.0 * topic.different / topic.compared
+        line += f"{topic.different} differ ({share:.1f} %), at most by {topic.largest:.6g} {topic.unit}".rstrip()
+    else:
+        line += "the same bit for bit"
+    if topic.only_recorded or topic.only_replayed:
+        line += f"; {topic.only_recorded} only recorded, {topic.only_replayed} only replayed"
+    if topic.alone is not None:
+        line += f"\n    first only recorded at {topic.alone / 1e9:.9f} s"
+    if topic.first:
+        stamp, field, recorded, replayed = topic.first
+        line += f"\n    first at {stamp / 1e9:.9f} s: {field} {recorded!r} recorded, {replayed!r} replayed"
+    return line

@@ -1,0 +1,101 @@
+"""The command line `wam` and the table of its commands."""
+
+import argparse
+import importlib
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from wam_ros.program import end_at_once_on_signals, ignore_signals
+
+# each command is the module of its name in wam_cli.commands, imported when it is called
+COMMANDS = {
+    "demo": "run the demonstration, record it and print its report",
+    "up": "start the nodes and run them until Ctrl-C",
+    "node": "start one node, with ROS arguments if needed",
+    "call": "call a service of a running stack: enable, disable, estop, reset_fault, reset, tare",
+    "record": "record every topic of a running stack until Ctrl-C",
+    "bag": "print the contents of a bag, or repair a broken bag",
+    "report": "print the demo report again",
+    "analyse": "analyse a recording and compare it with theory (text, HTML, JSON)",
+    "view": "show a recording in the Rerun viewer, or save it as a Rerun file",
+    "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
+    "experiment": "run an experiment of the thesis, record it and print predicted against measured",
+    "samples": "check the sample bags, one of each experiment, or record them again",
+    "figures": "draw the figures of chapters 3 to 6 with points of the simulated plant",
+    "map": "compute the stability map of figure 5.8: the largest stable step over gamma and zeta",
+    "scorecard": "compare the arm with the requisites of chapter 3",
+    "plant": "draw the plant's effects with the theory and print the differences",
+    "guard": "validate the stability guard by Monte Carlo simulation",
+    "evaluate": "evaluate a part of the stack in a seeded benchmark: contact",
+    "model": "print the arm's model as URDF or MJCF",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line; exits with 0 on success."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    command: Any = importlib.import_module(f"wam_cli.commands.{words[0]}") if words and words[0] in COMMANDS else None
+    parser = _parser(command)
+    given, rest = parser.parse_known_args(words)
+    if rest and not getattr(command, "TAKES_ROS_ARGUMENTS", False):
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    given.ros = rest
+    # a signal raises an exception, so that the command cleans up; commands that run nodes handle signals themselves
+    handlers = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: _end}
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    try:
+        code = command.run(given)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the pipe was closed: `wam ... | head`
+        code = 128 + signal.SIGPIPE
+    except (ValueError, OSError) as error:
+        parser.exit(1, f"wam {given.command}: {error}{_hint(error, given.command)}\n")
+    except KeyboardInterrupt:
+        code = 128 + signal.SIGINT
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    sys.exit(code or 0)
+
+
+def program() -> None:
+    """Run the command line as this process, which no signal ends with a traceback."""
+    end_at_once_on_signals()
+    try:
+        main()
+    finally:
+        ignore_signals()
+
+
+def _end(number: int, frame: object) -> None:
+    sys.exit(128 + number)
+
+
+def _hint(error: Exception, command: str) -> str:
+    """What the user can do about an error of the system."""
+    if not isinstance(error, PermissionError) or error.filename is None:
+        return ""
+    return f"; run it in a directory that you may write into, or choose one: 'wam {command} --help' lists the options"
+
+
+def _parser(command: Any) -> argparse.ArgumentParser:
+    """All commands with their texts; arguments only of the one that is called."""
+    parser = argparse.ArgumentParser(
+        prog="wam",
+        description="Force control of the cable-driven MIT/WAM arm, simulated down to its motor shafts.",
+        epilog="Start with: wam demo.  With ROS 2 sourced, 'ros2 run wam_stack <node>' starts a single node.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, text in COMMANDS.items():
+        own = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        if command is not None and command.__name__.endswith(f".{name}"):
+            command.arguments(own)
+    return parser
+
+
+if __name__ == "__main__":
+    program()

@@ -1,0 +1,78 @@
+"""Contact hypotheses as rows of numbers, as the topic `contact/hypotheses` carries them, and back."""
+
+from collections.abc import Sequence
+
+from wam_control.contact_inference import REASONS, Hypothesis
+from wam_description.signals import BASE, NO_CONTACT, Contact, Table, Triple
+from wam_description.topics import HYPOTHESIS_COLUMNS
+
+_COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
+_LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "place", "position_sd"))
+_FORCE, _DIRECTION_SD, _REASONS = (_COLUMN[name] for name in ("force_x", "direction_sd", "reasons"))
+
+
+def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
+    """Rows in the order of `HYPOTHESIS_COLUMNS`, the most probable hypothesis first."""
+    rows = tuple(
+        (
+            float(covers.index(h.cover)),
+            h.probability,
+            h.place,
+            h.position_sd,
+            h.low,
+            h.high,
+            *h.force,
+            h.force_sd,
+            float(h.is_lower_bound),
+            h.direction,
+            h.direction_sd,
+            *h.moment,
+            h.residual,
+            float(sum(2**i for i, reason in enumerate(REASONS) if reason in h.reason)),
+        )
+        for h in hypotheses
+    )
+    return Table(hypotheses[0].cover if hypotheses else BASE, rows)
+
+
+def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
+    """The contact of the most probable hypothesis; none without a row or a table."""
+    if table is None or not table.rows:
+        return NO_CONTACT
+    row = table.rows[0]
+    x, y, z = row[_FORCE : _FORCE + 3]
+    return Contact(covers[int(row[_LINK])], row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD])
+
+
+def reasons_of(row: Sequence[float]) -> tuple[str, ...]:
+    """Why the position of a hypothesis is unknown or the estimate is not to be trusted."""
+    return tuple(reason for i, reason in enumerate(REASONS) if int(row[_REASONS]) >> i & 1)
+
+
+def hypotheses_of(table: Table, covers: Sequence[str]) -> tuple[Hypothesis, ...]:
+    """The hypotheses that the rows of a table describe; the inverse of `hypothesis_table`."""
+    return tuple(_hypothesis(row, covers) for row in table.rows)
+
+
+def _hypothesis(row: Sequence[float], covers: Sequence[str]) -> Hypothesis:
+    value = dict(zip(HYPOTHESIS_COLUMNS, row, strict=True))
+
+    def vector(name: str) -> Triple:
+        return value[f"{name}_x"], value[f"{name}_y"], value[f"{name}_z"]
+
+    return Hypothesis(
+        cover=covers[int(value["link"])],
+        probability=value["probability"],
+        place=value["place"],
+        position_sd=value["position_sd"],
+        low=value["low"],
+        high=value["high"],
+        force=vector("force"),
+        force_sd=value["force_sd"],
+        is_lower_bound=bool(value["is_lower_bound"]),
+        direction=value["direction"],
+        direction_sd=value["direction_sd"],
+        moment=vector("moment"),
+        residual=value["residual"],
+        reason="; ".join(reasons_of(row)),
+    )

@@ -1,0 +1,158 @@
+"""The interface of a bring-up: who publishes and who takes each topic, from the declarations of its nodes."""
+
+import importlib
+from collections.abc import Collection
+from functools import cache
+from typing import Any
+
+from wam_description.arm import Shared
+from wam_description.nodes import NODES
+from wam_description.parameters import ParameterError
+from wam_description.synchroniser import InputSpec, Synchroniser
+from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
+from wam_description.wiring import Declaration, Input, Reaction, declaration
+
+
+@cache
+def declared(entry: str) -> Declaration:
+    """The declaration of a node.
+
+    Parameters
+    ----------
+    entry : name in the table of nodes, or 'module:Class' of a node of your own.
+
+    Raises
+    ------
+    ParameterError
+        where there is no such node, or it cannot be imported.
+    """
+    module, colon, name = NODES.get(entry, entry).partition(":")
+    if not colon:
+        raise ParameterError(
+            f"no node is named '{entry}'; nodes: {', '.join(NODES)}; name one of your own as my_package.module:Class"
+        )
+    try:
+        return declaration(getattr(importlib.import_module(module), name))
+    except TypeError as error:
+        raise ParameterError(f"node '{entry}': {error}") from error
+    except (ImportError, AttributeError) as error:
+        raise ParameterError(
+            f"node '{entry}' cannot be imported: {error}; check that '{module}' is installed or on PYTHONPATH"
+        ) from error
+
+
+class Interface:
+    """Who publishes and who takes each topic among the nodes of a bring-up.
+
+    Parameters
+    ----------
+    shared : shared parameters; `nodes` lists the nodes.
+    replaced : node classes by name that take the place of those in the table.
+    started_by_hand : a node that may not be among `shared.nodes`; nobody waits for it.
+
+    Attributes
+    ----------
+    declarations : of the nodes, by node name, in the order of `shared.nodes`.
+    topics : rows of the table of topics that exist on this arm, by name, with those that nodes add.
+    """
+
+    def __init__(
+        self, shared: Shared, replaced: dict[str, Any] | None = None, started_by_hand: Declaration | None = None
+    ) -> None:
+
+        self._timing = shared.timing
+        found = [declared(entry) for entry in shared.nodes]
+        replaced = dict(replaced or {})
+        self.declarations: dict[str, Declaration] = {}
+        for one in found:
+            if one.name in self.declarations:
+                raise ParameterError(f"two nodes of the configuration are named '{one.name}'; list one of them")
+            node = replaced.pop(one.name, None)
+            self.declarations[one.name] = one if node is None else declaration(node)._replace(name=one.name)
+        for name, node in replaced.items():
+            self.declarations[name] = declaration(node)._replace(name=name)
+        known = [*self.declarations.values(), *([started_by_hand] if started_by_hand else [])]
+        every = {**{topic.name: topic for one in known for topic in one.topics}, **BY_NAME}
+        self.topics: dict[str, Topic] = {
+            name: topic for name, topic in every.items() if shared.arm.joint_sensors or not topic.needs_joint_sensors
+        }
+        self._check()
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the nodes."""
+        return list(self.declarations)
+
+    def publishers(self, topic: str) -> list[str]:
+        """Names of the nodes that publish a topic."""
+        if topic in EVERY_NODE:
+            return self.names
+        return [name for name, one in self.declarations.items() if topic in one.outputs]
+
+    def subscribers(self, topic: str) -> list[str]:
+        """Names of the nodes that take a topic; the recorder takes every one."""
+
+        def takes(name: str, one: Declaration) -> bool:
+            listens_to_status = topic == STATUS and hasattr(one.node, "take_status")
+            return topic in one.inputs or listens_to_status or name == "recorder"
+
+        return [name for name, one in self.declarations.items() if takes(name, one)]
+
+    def is_streamed(self, topic: str) -> bool:
+        """Whether a message of this topic comes in every period, so that lockstep can wait for it.
+
+        It does where the driver publishes it, or a node of the bring-up in answer to such a topic.
+        """
+        return self._is_answer(topic, frozenset())
+
+    def _is_answer(self, topic: str, passed: frozenset[str]) -> bool:
+        """Whether a topic comes in answer to one of the driver's, not by way of those passed already."""
+        if topic in _sources():
+            return True
+        return topic not in passed and any(
+            topic in reaction.outputs and self._is_answer(reaction.trigger.topic, passed | {topic})
+            for one in self.declarations.values()
+            for reaction in one.reactions
+        )
+
+    def synchroniser(self, reaction: Reaction, unused: Collection[str] = ()) -> tuple[list[str], Synchroniser]:
+        """The topics that a reaction takes, and their synchroniser.
+
+        Parameters
+        ----------
+        reaction : of one of the nodes.
+        unused : topics that the node does not use as it is configured; topics that this arm lacks are left out, too.
+        """
+        trigger = reaction.trigger.topic
+        used = [item for item in reaction.inputs if item.topic in self.topics and item.topic not in unused]
+        specs = {item.topic: self._spec(item) for item in used}
+        is_outer = reaction.thinned or self.topics[trigger].rate != "inner"
+        return [trigger, *specs], Synchroniser(self._timing, trigger, specs, is_outer, reaction.thinned)
+
+    def _spec(self, item: Input) -> InputSpec:
+
+        delay = self._timing.outer_delay if item.delayed else 0
+        return InputSpec(self.topics[item.topic].rate != "inner", delay, self.is_streamed(item.topic))
+
+    def _check(self) -> None:
+
+        for name, one in self.declarations.items():
+            for topic in (*one.inputs, *one.outputs):
+                if topic not in self.topics and topic not in BY_NAME:
+                    raise ParameterError(f"node '{name}' names the topic '{topic}', which is in no table of topics")
+            for row in one.topics:
+                if self.topics.get(row.name) != row:
+                    raise ParameterError(
+                        f"node '{name}' adds the topic '{row.name}', which exists; give it another name"
+                    )
+            for topic in one.outputs:
+                if (others := self.publishers(topic)) != [name]:
+                    raise ParameterError(
+                        f"topic '{topic}' has {len(others)} publishers, {', '.join(others)}; list only one in 'nodes'"
+                    )
+
+
+@cache
+def _sources() -> tuple[str, ...]:
+    """Topics that start everything else, from the simulated driver or another one."""
+    return declared("driver").sources

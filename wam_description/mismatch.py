@@ -1,0 +1,84 @@
+"""Model mismatch: how the true plant differs from the configured arm, which is all that the controllers know."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from wam_description.arm import Arm, Joints, Links, Motors
+from wam_description.parameters import lengths, parameter, require
+
+Shafts = TypeVar("Shafts", Motors, Joints)
+
+
+@dataclass(frozen=True)
+class ModelMismatch:
+    """Factors of the true plant on the configured values; without mismatch all are 1 and there is no payload."""
+
+    mass: tuple[float, ...] = parameter("factor on mass and inertia of each link", low=0.1, high=10.0)
+    motor_friction: tuple[float, ...] = parameter("factor on the friction of each motor", low=0.0, high=10.0)
+    joint_friction: tuple[float, ...] = parameter("factor on the friction of each joint", low=0.0, high=10.0)
+    stiffness: tuple[float, ...] = parameter("factor on the stiffness of each cable circuit", low=0.01, high=100.0)
+    payload: float = parameter("unmodelled payload at the tool", "kg", low=0.0)
+
+
+def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
+    """The arm of the true plant.
+
+    Raises
+    ------
+    ParameterError
+        if a list has not one value each, or a payload would tilt the principal axes of the last link.
+    """
+    lengths("mismatch", arm.links.names, {"mass": mismatch.mass})
+    lengths("mismatch", arm.motors.names, {"motor_friction": mismatch.motor_friction})
+    lengths("mismatch", arm.motors.names, {"stiffness": mismatch.stiffness})
+    lengths("mismatch", arm.joints.names, {"joint_friction": mismatch.joint_friction})
+    by_motor = dict(zip(arm.motors.names, mismatch.stiffness, strict=True))
+    stages = [by_motor[motor] for motor in arm.cables.stage_motors]
+    return dataclasses.replace(
+        arm,
+        motors=_with_friction(arm.motors, mismatch.motor_friction),
+        joints=_with_friction(arm.joints, mismatch.joint_friction),
+        links=_loaded(arm, mismatch),
+        cables=dataclasses.replace(arm.cables, stage_ea=_scaled(arm.cables.stage_ea, stages)),
+    )
+
+
+def _scaled(values: Sequence[float], factors: Sequence[float]) -> tuple[float, ...]:
+    return tuple(value * factor for value, factor in zip(values, factors, strict=True))
+
+
+def _with_friction(shafts: Shafts, factors: Sequence[float]) -> Shafts:
+    return dataclasses.replace(
+        shafts,
+        static_friction=_scaled(shafts.static_friction, factors),
+        dynamic_friction=_scaled(shafts.dynamic_friction, factors),
+        viscous_friction=_scaled(shafts.viscous_friction, factors),
+    )
+
+
+def _loaded(arm: Arm, mismatch: ModelMismatch) -> Links:
+    links = arm.links
+    mass = np.multiply(links.mass, mismatch.mass)
+    centre = np.reshape(links.centre, (-1, 3)).astype(float)
+    inertia = np.reshape(links.inertia, (-1, 3)) * np.array(mismatch.mass)[:, None]
+    if mismatch.payload > 0.0:
+        lever = np.array(arm.tool) - centre[-1]
+        require(
+            int(np.count_nonzero(lever)) <= 1,
+            f"mismatch.payload is {mismatch.payload:g} kg, but the tool is not on an axis of the last link's "
+            "inertia; set it to 0",
+        )
+        fraction = mismatch.payload / (mass[-1] + mismatch.payload)
+        reduced = mass[-1] * fraction
+        inertia[-1] += reduced * (lever @ lever - lever * lever)
+        centre[-1] += fraction * lever
+        mass[-1] += mismatch.payload
+    return dataclasses.replace(links, mass=_row(mass), centre=_row(centre), inertia=_row(inertia))
+
+
+def _row(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(values.ravel().tolist())

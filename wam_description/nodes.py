@@ -1,0 +1,14 @@
+"""The table of nodes: name and class, which declares everything else.  setup.py reads this file, too."""
+
+from typing import Final
+
+NODES: Final = {
+    "driver": "wam_driver.interface:DriverInterface",
+    "transform": "wam_control.transform_node:TransformNode",
+    "velocity_loop": "wam_control.velocity_loop_node:VelocityLoopNode",
+    "gravity": "wam_control.gravity_node:GravityNode",
+    "force_loop": "wam_control.force_loop_node:ForceLoopNode",
+    "contact_estimator": "wam_control.contact_estimator_node:ContactEstimatorNode",
+    "scenario": "wam_control.scenario_node:ScenarioNode",
+    "recorder": "wam_ros.recorder_interface:RecorderInterface",
+}

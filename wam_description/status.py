@@ -1,0 +1,33 @@
+"""The status of a node as key-value pairs and back: the one place that knows the keys."""
+
+from collections.abc import Iterable
+
+from wam_description.signals import Level, NodeStatus
+
+_CONNECTED = ("waiting", "connected")
+
+
+def pairs(status: NodeStatus) -> list[tuple[str, str]]:
+    """The fields of a status that are not empty, then its facts, as (key, value)."""
+    own = {"peers": _CONNECTED[status.connected], "mode": status.mode, "fault": status.fault, "step": status.step}
+    found = [(key, value) for key, value in own.items() if value]
+    if status.stamp:
+        found.append(("stamp", str(status.stamp)))
+    return [*found, *status.facts.items()]
+
+
+def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]]) -> NodeStatus:
+    """The status that these pairs describe; unknown keys become facts, an unknown level the highest."""
+    facts = dict(given)
+    stamp = facts.pop("stamp", "")
+    return NodeStatus(
+        level=Level(level) if level in Level._value2member_map_ else Level.ERROR,
+        message=message,
+        node=node,
+        connected=facts.pop("peers", "") == _CONNECTED[True],
+        mode=facts.pop("mode", ""),
+        fault=facts.pop("fault", ""),
+        step=facts.pop("step", ""),
+        stamp=int(stamp) if stamp.isascii() and stamp.isdigit() and len(stamp) < 20 else 0,
+        facts=facts,
+    )

@@ -1,0 +1,156 @@
+"""The table of topics: every topic of the stack, one row each.
+
+Names are relative to the arm's namespace, except those that begin with '/'.  Who publishes and who
+subscribes follows from the declarations of the nodes (`wam_description.nodes`); `docs/topics.md` is
+written from both, nodes take their types and QoS from here, the recorder records every row.
+"""
+
+from typing import Final, NamedTuple
+
+JOINT_STATE, WRENCH, POINT = (
+    "sensor_msgs/msg/JointState",
+    "geometry_msgs/msg/WrenchStamped",
+    "geometry_msgs/msg/PointStamped",
+)
+TABLE = "sensor_msgs/msg/PointCloud2"
+EVERY_NODE: Final = ("status", "/diagnostics")  # published by every node, declared by none
+STATUS: Final = "status"
+
+LINK: Final = "link"  # column with the index of a cover in arm.covers.names
+HYPOTHESIS_COLUMNS: Final = (
+    LINK,  # index of the cover in arm.covers.names
+    "probability",  # of this hypothesis among all
+    "place",  # m along the cover, NaN where it cannot be observed
+    "position_sd",  # m, NaN with the place
+    "low",  # m, ends of the part of the cover that is in the 90 % set, NaN where no part is
+    "high",
+    "force_x",  # N, of the world on the link, in the cover's frame
+    "force_y",
+    "force_z",
+    "force_sd",  # N, NaN where the force is a lower bound
+    "is_lower_bound",  # 1 where the force is the least one that explains the torques
+    "direction",  # rad, angle of the force about the link, from the cover's y to its z axis
+    "direction_sd",  # rad
+    "moment_x",  # N m, of the force about the origin of the cover's frame
+    "moment_y",
+    "moment_z",
+    "residual",  # chi^2 that the contact leaves unexplained
+    "reasons",  # why the place is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact_inference.REASONS`
+)
+
+
+class Topic(NamedTuple):
+    """One row of the table of topics.
+
+    Attributes
+    ----------
+    name : relative to the arm's namespace, or absolute.
+    type : ROS message type.
+    rate : 'inner', 'outer', 'display', 'latched' or '1 Hz'.
+    doc : what it carries, with units.
+    side : 'motors' or 'joints': whose names a JointState carries.
+    columns : of a table, float64 each.
+    needs_joint_sensors : whether it exists only on an arm with joint-side sensors.
+    """
+
+    name: str
+    type: str
+    rate: str
+    doc: str
+    side: str = ""
+    columns: tuple[str, ...] = ()
+    needs_joint_sensors: bool = False
+
+    @property
+    def latched(self) -> bool:
+        """True where a late subscriber gets the last message (transient local)."""
+        return self.rate == "latched"
+
+    @property
+    def is_numbers(self) -> bool:
+        """Whether a message is a stamp, a frame and numbers, which the simulation keeps and a replay compares."""
+        return self.type in {JOINT_STATE, WRENCH, POINT, TABLE}
+
+
+def _motors(name: str, rate: str, doc: str) -> Topic:
+    return Topic(name, JOINT_STATE, rate, doc, "motors")
+
+
+def _joints(name: str, rate: str, doc: str, needs_joint_sensors: bool = False) -> Topic:
+    return Topic(name, JOINT_STATE, rate, doc, "joints", needs_joint_sensors=needs_joint_sensors)
+
+
+TOPICS: Final = (
+    _motors("motor_states", "inner", "motor1..N: rad, rad/s, effort = motor torque in N m"),
+    _motors("motor_currents", "outer", "effort = measured current in AMPERES"),
+    _motors("motor_current_command", "inner", "effort = commanded current in AMPERES"),
+    _joints(
+        "joint_sensors",
+        "inner",
+        "joint1..N: joint-side encoder in rad and rad/s, strain torque on the link side of the friction in N m",
+        needs_joint_sensors=True,
+    ),
+    _joints("joint_states", "outer", "joint1..N: rad, rad/s, effort = motor torque seen at the joint in N m"),
+    _joints("gravity_effort", "outer", "effort that carries the links, N m"),
+    _joints("joint_velocity_command", "outer", "rad/s; an empty velocity array commands torque only"),
+    _joints("joint_effort_command", "outer", "feed-forward torque without gravity, N m"),
+    _motors("motor_velocity_command", "outer", "rad/s; an empty velocity array commands torque only"),
+    _motors("motor_effort_command", "outer", "feed-forward torque with gravity, N m"),
+    _joints("joint_posture_command", "outer", "posture held in the complement of the force, rad"),
+    _joints("joint_torque_command", "outer", "joint torques commanded in the joint_torque mode, by your program, N m"),
+    Topic("force_command", WRENCH, "outer", "force of the arm on the world, N; zero releases the force axis"),
+    Topic(
+        "force_measured", WRENCH, "outer", "force of the arm on the world along the commanded direction, measured, N"
+    ),
+    Topic("force_error", WRENCH, "outer", "F_error = F_des - F_c before saturation, N"),
+    Topic("force_error_limited", WRENCH, "outer", "F_error after saturation, N"),
+    _joints("external_joint_torques", "outer", "effort = estimated torque of the world on the joints, N m"),
+    _joints("external_joint_torques_sd", "outer", "effort = standard deviation of `external_joint_torques`, N m"),
+    Topic(
+        "contact/wrench",
+        WRENCH,
+        "outer",
+        "estimated force of the world on the touched link, frame = its cover, N; frame base without contact",
+    ),
+    Topic(
+        "contact/point",
+        POINT,
+        "outer",
+        "x = estimated position of the contact along the touched link in m, NaN where it cannot be observed",
+    ),
+    Topic(
+        "contact/hypotheses",
+        TABLE,
+        "outer",
+        "one row per hypothesis, the most probable first, none without contact; float64 columns: "
+        "link, probability, place (m) and so on, see docs/estimator.md",
+        columns=HYPOTHESIS_COLUMNS,
+    ),
+    Topic("contact/in_contact", "std_msgs/msg/Bool", "latched", "whether something touches the arm"),
+    Topic(
+        "contact/markers",
+        "visualization_msgs/msg/MarkerArray",
+        "display",
+        "the contact as an arrow and a sphere, and the likely positions, 90 % in all, as a band along the links",
+    ),
+    _joints("sim/joint_states", "outer", "truth: joint angles, velocities, torques through the cables"),
+    Topic(
+        "sim/contact/wrench",
+        WRENCH,
+        "outer",
+        "truth: force of the world on the link with the largest load, moment about the origin of its cover, the frame",
+    ),
+    Topic("sim/contact/point", POINT, "outer", "truth: x = position along that link, NaN without contact"),
+    Topic(
+        "sim/disturbance",
+        WRENCH,
+        "outer",
+        "a push: force at and torque about the origin of the cover named by frame_id",
+    ),
+    Topic("robot_description", "std_msgs/msg/String", "latched", "URDF of the arm"),
+    Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node, latched by each"),
+    Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "1 Hz", "counts, timing and refusals of each node"),
+    Topic("/clock", "rosgraph_msgs/msg/Clock", "outer", "time of the arm, strictly increasing"),
+)
+
+BY_NAME: Final = {topic.name: topic for topic in TOPICS}

@@ -1,0 +1,207 @@
+"""How a node is declared: what starts a step, what it takes, what it gives.
+
+A node is a plain class without ROS.  From its declaration the ROS node (`wam_ros.node`), the simulation
+in one process (`wam_sim.simulation`) and the replay of a recording (`wam_sim.replay`) are made.  ::
+
+    class Gravity:
+        name, parameters = "gravity", Nothing
+
+        def __init__(self, shared: Shared, own: Nothing) -> None:
+            self._body = RigidBody(shared.arm)
+
+        @reaction(Input("joint_states", "position"), outputs=("gravity_effort",))
+        def step(self, inputs: Inputs) -> Outputs:
+            q = inputs["joint_states"].position
+            return {"gravity_effort": State([], [], self._body.gravity_torque(q).tolist())}
+
+`name` is the name of the node and of its section in a configuration, `parameters` the class of the
+parameters in that section, or 'module:Class' where its import takes long.  What else a node may have:
+
+tune(own) : take new live parameters, or refuse them with ParameterError.
+owns : name of a group of shared parameters that are live at this node, taken by ``retune(group)``.
+follows : a `Followed` group of shared parameters of another node; changes come to ``retune(group)``, too.
+take_status(status) : called with the `NodeStatus` that any other node reports.
+services : by name, the method that answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
+requests : list of `Call` and `SetParameters`, made once and filled by steps; they are made, in order, before the
+    outputs of the step are published.  A refusal goes to ``refused(message)``, which returns outputs.
+refusals : by topic, why the present input is not used; reported once for each message.
+diagnostics() : further values for /diagnostics, by name.
+done, failure : the node has finished, and why it failed ('' where it did not).
+high_priority : ask the system for a higher priority in realtime.
+starts_with_all : in realtime, do nothing before all nodes of the bring-up are connected.
+topics : rows of the table of topics that this node adds.
+"""
+
+import importlib
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+from wam_description.arm import Shared
+from wam_description.signals import State
+from wam_description.synchroniser import Inputs
+from wam_description.topics import EVERY_NODE, Topic
+
+Outputs = Mapping[str, Any]  # value by topic
+WHOLE = "position velocity effort"  # arrays of a JointState
+Method = TypeVar("Method", bound=Callable[[Any, Inputs], Outputs])
+
+
+class Input(NamedTuple):
+    """A topic that a step takes.
+
+    Attributes
+    ----------
+    topic : name in the table of topics.
+    arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
+    delayed : whether it is used `timing.outer_delay` periods after the state that caused it.
+    """
+
+    topic: str
+    arrays: str = WHOLE
+    delayed: bool = False
+
+
+class Reaction(NamedTuple):
+    """One kind of step: the trigger that starts it, the other inputs, the topics that it may publish."""
+
+    trigger: Input
+    inputs: tuple[Input, ...]
+    outputs: tuple[str, ...]
+    thinned: bool
+    method: str
+
+
+class Call(NamedTuple):
+    """A request to a service of another node; `data` is None for a std_srvs/Trigger."""
+
+    node: str
+    service: str
+    data: bool | None = None
+
+
+class SetParameters(NamedTuple):
+    """A request to set live parameters of another node."""
+
+    node: str
+    values: Mapping[str, Any]
+
+
+class Followed(NamedTuple):
+    """A group of shared parameters that is live at another node."""
+
+    node: str
+    group: str
+
+
+class Declared(Protocol):
+    """A node class as this module describes it."""
+
+    name: str
+    parameters: Any
+
+    def __init__(self, shared: Shared, own: Any) -> None: ...
+
+
+class Declaration(NamedTuple):
+    """What a node takes and gives, read off its class.
+
+    Attributes
+    ----------
+    name : of the node.
+    node : the class.
+    reactions : its steps.
+    sources : topics that it publishes by itself, not as an answer.
+    listens : inputs outside of steps.
+    topics : rows that it adds to the table of topics.
+    ros_node : 'module:Class' of a ROS node written by hand; '' where the adapter makes one.
+    """
+
+    name: str
+    node: Any
+    reactions: tuple[Reaction, ...]
+    sources: tuple[str, ...]
+    listens: tuple[str, ...]
+    topics: tuple[Topic, ...]
+    ros_node: str
+
+    @property
+    def parameter_class(self) -> Any:
+        """The class of the node's own parameters; imported now where it is given as 'module:Class'."""
+        kind = self.node.parameters
+        if not isinstance(kind, str):
+            return kind
+        module, _, name = kind.partition(":")
+        return getattr(importlib.import_module(module), name)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Every topic that the node publishes, without status and diagnostics."""
+        reacting = (topic for reaction in self.reactions for topic in reaction.outputs)
+        return tuple(dict.fromkeys([*self.sources, *reacting]))
+
+    def require_declared(self, outputs: Outputs) -> None:
+        """Refuse outputs on topics that the node does not declare.
+
+        Raises
+        ------
+        ValueError
+            which names the node, the topic and those that are declared.
+        """
+        for topic in outputs:
+            if topic not in self.outputs and topic not in EVERY_NODE:
+                raise ValueError(
+                    f"node '{self.name}' returned the topic '{topic}'; its reactions declare {', '.join(self.outputs)}"
+                )
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Every topic that the node listens to, without status."""
+        taken = (item.topic for reaction in self.reactions for item in (reaction.trigger, *reaction.inputs))
+        return tuple(dict.fromkeys([*self.listens, *taken]))
+
+
+def masked(value: Any, arrays: str) -> Any:
+    """A value with the arrays of a JointState that an input does not take left empty, as on topics."""
+    if not isinstance(value, State):
+        return value
+    taken = arrays.replace("?", "").split()
+    return State(*(array if name in taken else [] for name, array in zip(State._fields, value, strict=True)))
+
+
+def reaction(
+    trigger: Input, *inputs: Input, outputs: tuple[str, ...], thinned: bool = False
+) -> Callable[[Method], Method]:
+    """Declare a method as a step of its node.
+
+    Parameters
+    ----------
+    trigger : input that starts a step.
+    inputs : taken with it, by stamp in lockstep, the newest in realtime.
+    outputs : topics that the step may publish.
+    thinned : whether only triggers at the start of an outer period start a step.
+    """
+
+    def declare(method: Method) -> Method:
+        method.__dict__["reaction"] = Reaction(trigger, inputs, outputs, thinned, method.__name__)
+        return method
+
+    return declare
+
+
+def declaration(node: type[Declared]) -> Declaration:
+    """Read the declaration off a node class.
+
+    Raises
+    ------
+    TypeError
+        where the class lacks its name, its parameters or any reaction.
+    """
+    methods = {name: getattr(node, name) for kind in reversed(node.__mro__) for name in vars(kind)}  # in their order
+    reactions = tuple(found for value in methods.values() if (found := getattr(value, "reaction", None)))
+    sources, listens = getattr(node, "sources", ()), getattr(node, "listens", ())
+    missing = [item for item in ("name", "parameters") if not hasattr(node, item)]
+    if missing or not (reactions or sources or listens or hasattr(node, "ros_node")):
+        lack = " and ".join(missing) or "no method with @reaction"
+        raise TypeError(f"{node.__module__}:{node.__qualname__} is no node: {lack}; see wam_description.wiring")
+    extra = tuple(getattr(node, "topics", ()))
+    return Declaration(node.name, node, reactions, sources, listens, extra, getattr(node, "ros_node", ""))

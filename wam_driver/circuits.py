@@ -1,0 +1,95 @@
+"""Cable circuits of the plant as MuJoCo simulates them: creep, slack, torque and tension."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from wam_description.arm import Arm
+from wam_description.effects import Effects
+
+
+class CableCircuits:
+    """The cable circuit of each motor; two tendons of the model, one per strand.
+
+    MuJoCo computes the elastic torque.  Creep, which MuJoCo does not know, moves the stretch at which a strand goes
+    slack: the plastic length of its tendon.
+
+    Attributes
+    ----------
+    depends_on_torque : True if `follow` has anything to do.
+    is_slack : True if a strand is slack and friction depends on the tension.
+    """
+
+    def __init__(self, data: Any, arm: Arm, effects: Effects, step: float) -> None:
+        n = len(arm.motors.names)
+        friction_counts = effects.slack and any(effects.tension_friction)
+        self.depends_on_torque = effects.creep or friction_counts
+        self.is_slack = False
+        self._may_slacken = effects.slack
+        self._friction_counts = friction_counts
+        self._circuits = arm.circuits
+        # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
+        self._speed, self._pull = data.qvel[:n], data.qfrc_spring[:n]
+        self._stretch_rate = data.ten_velocity[: 2 * n : 2]
+        # two of each strand: it is slack between them; the tight strand comes first and pulls beyond the second, the
+        # loose one beyond the first
+        self._slack_ends = memoryview(data.plastic)
+        self._each = [
+            (
+                4 * i + 1,
+                step * circuit.loss_per_torque if effects.creep else 0.0,
+                2.0 * circuit.pretension * circuit.radius if friction_counts else math.inf,
+            )
+            for i, circuit in enumerate(arm.circuits)
+        ]  # first slack end between the strands, creep of a step per speed and torque, torque that makes a strand slack
+
+    def reset(self) -> None:
+        """Return to power-up; the first step finds out whether a strand is slack."""
+        self.is_slack = self._friction_counts
+
+    def follow(self, direction: Sequence[int]) -> None:
+        """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; look for slack strands.
+
+        Parameters
+        ----------
+        direction : sign of the velocity of each rotor, 0 while it is stuck.
+        """
+        ends = self._slack_ends
+        self.is_slack = False
+        for (i, rate, most), way, speed, pull in zip(  # noqa: B905 - costs 1 % of a step
+            self._each, direction, self._speed.tolist(), self._pull.tolist()
+        ):
+            if way:
+                crept = rate * abs(speed) * pull
+                ends[i] -= crept
+                ends[i + 1] -= crept
+            if abs(pull) > most:
+                self.is_slack = True
+
+    @property
+    def elastic_torque(self) -> list[float]:
+        """Elastic torque of each circuit on its rotor, N m, (n,), at the start of the last step."""
+        torque: list[float] = self._pull.tolist()
+        return torque
+
+    @property
+    def torque(self) -> list[float]:
+        """Torque of each circuit at its motor, elastic and damping, N m, (n,), at the start of the last step."""
+        return [
+            circuit.damping * rate - pull
+            for circuit, rate, pull in zip(
+                self._circuits, self._stretch_rate.tolist(), self._pull.tolist(), strict=True
+            )
+        ]
+
+    @property
+    def tensions(self) -> list[tuple[float, float]]:
+        """Tension of the tight and of the loose strand of each first stage, N, at the start of the last step."""
+        result = []
+        for circuit, pull in zip(self._circuits, self._pull.tolist(), strict=True):
+            difference = abs(pull) / circuit.radius
+            if self._may_slacken and difference > 2.0 * circuit.pretension:
+                result.append((difference, 0.0))
+            else:
+                result.append((circuit.pretension + difference / 2.0, circuit.pretension - difference / 2.0))
+        return result

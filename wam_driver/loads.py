@@ -1,0 +1,143 @@
+"""Loads on the covers: pushes that are applied to them, and the sum of everything that acts on each."""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from wam_description.arm import Arm
+from wam_description.signals import Load
+from wam_description.world import Springs
+
+
+class SpringOnCover(NamedTuple):
+    """A spring whose lever is on a link that carries a cover."""
+
+    tendon: int
+    body: int
+    cover: str
+    lever: float  # m
+    rest: float  # length of the tendon at which the spring is not pressed, m
+    bilateral: bool
+
+
+class PartialLoad(NamedTuple):
+    """One of the forces that make a load, in the cover's frame."""
+
+    force: np.ndarray  # N
+    moment: np.ndarray  # about the frame's origin, N m
+    position: float  # where it acts along the cover, m
+
+
+class CoverLoads:
+    """What acts on the covers: contacts, springs and pushes.
+
+    Parameters
+    ----------
+    model, data : of MuJoCo.
+    arm : its covers.
+    springs : those of the world.
+
+    Attributes
+    ----------
+    pushes : force, (3,), N, and torque, (3,), N m, of each cover that is pushed, in its frame.
+    """
+
+    def __init__(self, model: Any, data: Any, arm: Arm, springs: Springs) -> None:
+        self._model, self._data = model, data
+        covers = arm.covers
+        # views into MuJoCo's memory: to fetch them in each step costs more than the push
+        sites = {name: model.site(f"{name}_frame").id for name in covers.names}
+        self._rotation = {name: data.site_xmat[site].reshape(3, 3) for name, site in sites.items()}
+        self._origin = {name: data.site_xpos[site] for name, site in sites.items()}
+        self._applied = data.qfrc_applied
+        self._cover_of_geom = {model.geom(name).id: name for name in covers.names}
+        self._body = {name: model.body(link).id for name, link in zip(covers.names, covers.links, strict=True)}
+        self._springs = list(_springs_on_covers(model, arm, springs))
+        self.pushes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._wrench = np.zeros(6)
+
+    def push(self, cover: str, force: np.ndarray, torque: np.ndarray) -> None:
+        """Push on a cover, see `Plant.push`."""
+        if cover not in self._origin:
+            raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._origin)}")
+        if np.any(force) or np.any(torque):
+            self.pushes[cover] = (np.array(force, float), np.array(torque, float))
+        else:
+            self.pushes.pop(cover, None)
+
+    def release(self) -> None:
+        """End every push."""
+        self.pushes.clear()
+
+    def apply_pushes(self) -> None:
+        """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""
+        for cover, (force, torque) in self.pushes.items():
+            rotation, origin = self._rotation[cover], self._origin[cover]
+            force, torque = rotation @ force, rotation @ torque  # noqa: PLW2901
+            mujoco.mj_applyFT(self._model, self._data, force, torque, origin, self._body[cover], self._applied)
+
+    def measure(self) -> list[Load]:
+        """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
+        parts: dict[str, list[PartialLoad]] = {name: [] for name in self._origin}
+        for cover, part in chain(self._contacts(), self._pushed(), self._sprung()):
+            parts[cover].append(part)
+        loads = (_sum(cover, on_cover) for cover, on_cover in parts.items())
+        return [load for load in loads if load is not None]
+
+    def _contacts(self) -> Iterator[tuple[str, PartialLoad]]:
+        data = self._data
+        for i in range(data.ncon):
+            first, second = data.contact.geom[i].tolist()
+            cover, sign = self._cover_of_geom.get(second), 1.0
+            if cover is None:
+                cover, sign = self._cover_of_geom[first], -1.0
+            mujoco.mj_contactForce(self._model, data, i, self._wrench)
+            rotation = self._rotation[cover]
+            force = rotation.T @ (sign * (data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3]))
+            at = rotation.T @ (data.contact.pos[i] - self._origin[cover])
+            yield cover, PartialLoad(force, np.cross(at, force), float(at[0]))
+
+    def _pushed(self) -> Iterator[tuple[str, PartialLoad]]:
+        for cover, (force, torque) in self.pushes.items():
+            square = float(force[1] ** 2 + force[2] ** 2)  # a force along x passes through every position
+            moment = float(force[1] * torque[2] - force[2] * torque[1])
+            yield cover, PartialLoad(force, torque, moment / square if square > 0.0 else np.nan)
+
+    def _sprung(self) -> Iterator[tuple[str, PartialLoad]]:
+        data = self._data
+        for tendon, body, cover, lever, rest, bilateral in self._springs:
+            squeeze = rest - float(data.ten_length[tendon])
+            if squeeze > 0.0 or bilateral:
+                along, across = data.xmat[body].reshape(3, 3).T[:2]
+                rotation = self._rotation[cover]
+                force = rotation.T @ across * (squeeze * float(self._model.tendon_stiffness[tendon]))
+                at = rotation.T @ (data.xpos[body] + lever * along - self._origin[cover])
+                yield cover, PartialLoad(force, np.cross(at, force), float(at[0]))
+
+
+def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
+    """All forces on a cover as one load, at their mean position weighted by force; None if there is no force."""
+    weights = [float(np.linalg.norm(part.force)) for part in parts]
+    if not sum(weights) > 0.0:
+        return None
+    place = sum(w * part.position for w, part in zip(weights, parts, strict=True)) / sum(weights)
+    force = np.sum([part.force for part in parts], axis=0)
+    moment = np.sum([part.moment for part in parts], axis=0)
+    return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))
+
+
+def _springs_on_covers(model: Any, arm: Arm, springs: Springs) -> Iterator[SpringOnCover]:
+    tendons = iter(range(2 * len(arm.motors.names), model.ntendon))  # after the strands of the cables
+    for i, joint in enumerate(springs.joints):
+        if springs.stiffness[i] == 0.0:
+            continue
+        tendon = next(tendons)
+        link = arm.links.names[arm.joints.names.index(joint)]
+        if link in arm.covers.links:
+            cover = arm.covers.names[arm.covers.links.index(link)]
+            lever = springs.lever[i]
+            rest = lever * springs.rest[i]
+            yield SpringOnCover(tendon, model.body(link).id, cover, lever, rest, springs.bilateral[i])

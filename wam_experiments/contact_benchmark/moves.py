@@ -1,0 +1,74 @@
+"""Random moves of the arm that stay within its limits."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
+
+SLOWEST, FASTEST = 0.4, 2.5  # rad/s, peak of the fastest joint
+SHORTEST, LONGEST = 0.7, 1.1  # s
+ELBOW_SPEED, TIP_SPEED = 1.9, 3.2  # m/s, well below the driver's limits
+PEAK = 1.875  # greatest speed of a minimum-jerk path over its mean speed
+RANGE = (1.5, 1.8, 1.5, 1.2)  # rad, each way from the middle
+MIDDLE = (0.0, 0.0, 0.0, 0.5)  # rad
+RETURN_PROBABILITY = 0.3  # of a move back to the start of the last one
+
+
+class Move(NamedTuple):
+    """A minimum-jerk move."""
+
+    posture: tuple[float, ...]  # rad
+    seconds: float
+
+
+class MoveGenerator:
+    """Random poses and moves of one arm."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._arm, self._body = arm, RigidBody(arm)
+        joints = len(arm.joints.names)
+        middle, span = np.array(MIDDLE[:joints]), np.array(RANGE[:joints])
+        self._low = np.maximum(middle - span, np.array(arm.joints.lower) + 0.1)
+        self._high = np.minimum(middle + span, np.array(arm.joints.upper) - 0.1)
+
+    def pose(self, random: np.random.Generator) -> tuple[float, ...]:
+        """A pose within the range, rad."""
+        return tuple(random.uniform(self._low, self._high).tolist())
+
+    def moves(
+        self, random: np.random.Generator, start: Sequence[float], count: int, before: Sequence[float] = ()
+    ) -> list[Move]:
+        """Successive moves, some of them back to the last start.
+
+        Parameters
+        ----------
+        start : pose before the first one, rad.
+        before : pose before `start`; empty if unknown.
+        """
+        result: list[Move] = []
+        last, here = np.array(before), np.array(start)
+        for _ in range(count):
+            seconds = float(random.uniform(SHORTEST, LONGEST))
+            target = np.array(self.pose(random))
+            if last.size and random.random() < RETURN_PROBABILITY and np.abs(last - here).max() > 0.1:
+                target = last
+            way = target - here
+            way *= min(1.0, float(random.uniform(SLOWEST, FASTEST)) * seconds / PEAK / float(np.abs(way).max()))
+            way *= min(1.0, 1.0 / self._speed_ratio(here, way, seconds))
+            last, here = here, here + way
+            result.append(Move(tuple(here.tolist()), round(seconds, 3)))
+        return result
+
+    def _speed_ratio(self, here: np.ndarray, way: np.ndarray, seconds: float) -> float:
+        """Greatest speed of elbow or tip, over the allowed one."""
+        worst, outer = 0.0, self._arm.covers.names[-1]
+        for s in np.linspace(0.1, 0.9, 9):
+            q = here + way * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+            qd = way * 30.0 * s * s * (1.0 - s) ** 2 / seconds
+            elbow = self._body.point_jacobian(q, outer, (0.0, 0.0, 0.0)) @ qd
+            tip = self._body.tool_jacobian(q) @ qd
+            worst = max(worst, float(np.linalg.norm(elbow)) / ELBOW_SPEED, float(np.linalg.norm(tip)) / TIP_SPEED)
+        return worst

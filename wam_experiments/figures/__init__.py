@@ -1,0 +1,13 @@
+"""The thesis's figures that carry data: theory as lines, points of the plant.
+
+catalogue                 every figure: caption, function of its numbers, function that draws it
+links                     numbers of figure 3.1
+bandwidth                 numbers of figure 4.9
+responses                 numbers of figures 5.3, 5.5, 5.9, 5.10, 5.11
+stability                 numbers of figures 5.7 and 5.8
+cables                    numbers of the figures of chapter 6
+transmission_drawings     drawings of chapters 3, 4 and 6
+force_control_drawings    drawings of chapter 5
+series                    a line with points, and their distance
+style                     colours and sizes
+"""

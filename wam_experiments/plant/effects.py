@@ -1,0 +1,261 @@
+"""Curves of the plant's effects, measured on the simulated plant and computed from theory.
+
+One link on one motor, the testbed of section 5.6 with one effect at a time.  A motor that must turn at a given speed
+has a rotor of practically infinite inertia.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.effects import Ripples
+from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
+from wam_driver.plant import Plant
+from wam_experiments.plant.force_response import force_step
+from wam_experiments.plant.ideal_testbed import (
+    IMMOVABLE,
+    LEVER,
+    NOTHING,
+    STEP,
+    ideal_testbed,
+    link_inertia,
+    one_step_map,
+    released_plant,
+)
+from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, stage_loss
+from wam_theory.resonance import force_resonances
+from wam_theory.stick_slip import IntegralLoop, simulate
+
+Numbers = NDArray[np.float64]
+
+
+class PlantCurve(NamedTuple):
+    """Plant and theory over x."""
+
+    x: Numbers
+    plant: Numbers
+    theory: Numbers
+
+    @property
+    def error(self) -> float:
+        """Greatest difference over the greatest theoretical value."""
+        return float(np.abs(self.plant - self.theory).max() / np.abs(self.theory).max())
+
+
+class Resonance(NamedTuple):
+    """Both resonances over contact stiffness, for one transmission ratio, rad/s."""
+
+    ratio: float
+    lower: PlantCurve
+    upper: PlantCurve
+
+
+def _run(plant: Plant, seconds: float) -> None:
+    for _ in range(round(seconds / STEP)):
+        plant.step([0.0])
+
+
+def slack() -> PlantCurve:
+    """Torque of a circuit over its stretch, beyond the slack of the loose strand."""
+    arm = ideal_testbed()
+    plant = released_plant(arm, slack=True)
+    (circuit,) = arm.circuits
+    stretch = np.linspace(-2.5, 2.5, 101) * circuit.slack_stretch
+    torques = []
+    for value in stretch:
+        plant.data.qpos[:] = (value, 0.0)
+        mujoco.mj_forward(plant.model, plant.data)
+        torques.append(plant.circuit_torque[0])
+    theory = circuit_torque(stretch, circuit.stiffness, circuit.pretension, circuit.radius)
+    return PlantCurve(stretch, np.array(torques), theory)
+
+
+def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float = 10.0) -> PlantCurve:
+    """Creep of the link while the motor turns out and back under a constant load.
+
+    Parameters
+    ----------
+    torque : load at the joint, N m.
+    speed : of the motor, rad/s.
+    seconds : in each direction.
+
+    Returns
+    -------
+    PlantCurve
+        over the motor's absolute travel, rad; angles at the joint, rad.
+    """
+    plant = _loaded(torque)
+    arm = ideal_testbed()
+    rest = plant.q[0] - plant.theta[0] / 14.0
+    travel, crept = [], []
+    done = 0.0
+    for direction in (1.0, -1.0):
+        plant.data.qvel[:] = (direction * speed, direction * speed / 14.0)
+        for _ in range(round(seconds / STEP / 40)):
+            before = plant.theta[0]
+            _run(plant, 40 * STEP)
+            done += abs(plant.theta[0] - before)
+            travel.append(done)
+            crept.append(plant.q[0] - plant.theta[0] / 14.0 - rest)
+    at_motor = torque / 14.0
+    stages = zip(arm.cables.stage_ratio, arm.cables.stage_radius, arm.cables.stage_ea, strict=True)
+    expected = sum(n * creep(np.array(travel) / n, n * at_motor, r, ea) for n, r, ea in stages)
+    return PlantCurve(np.array(travel), np.array(crept), np.asarray(expected) / 14.0)
+
+
+def _loaded(torque: float) -> Plant:
+    """The testbed at rest under a load at the joint, N m, with creep, its rotor immovable."""
+    arm = ideal_testbed(rotor=IMMOVABLE, damping=0.02)
+    plant = released_plant(arm, creep=True)
+    plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+    plant.data.qpos[0] = -torque / 14.0 / arm.circuits[0].stiffness
+    _run(plant, 0.1)
+    return plant
+
+
+def efficiency_under_load() -> PlantCurve:
+    """Power out over power in of slow turning under load, over the motor's torque, N m."""
+    torques = np.linspace(1.0, 6.779, 6)
+    efficiencies = []
+    for torque in torques:
+        plant = _loaded(-14.0 * torque)
+        plant.data.qvel[:] = (5.0, 5.0 / 14.0)
+        _run(plant, 1.5)
+        q, work = plant.q[0], 0.0
+        for _ in range(round(1.0 / STEP)):
+            before = plant.theta[0]
+            plant.step([0.0])
+            work += plant.circuit_torque[0] * (plant.theta[0] - before)
+        efficiencies.append(14.0 * torque * (plant.q[0] - q) / work)
+    cables = ideal_testbed().cables
+    theory = [
+        efficiency(stage_loss(torque, cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio))
+        for torque in torques
+    ]
+    return PlantCurve(torques, np.array(efficiencies), np.array(theory))
+
+
+def ripple(eccentricity: float = 2.54e-4) -> PlantCurve:
+    """Torque of an eccentric pulley at a third of the motor's speed, over the motor's angle, rad."""
+    arm = ideal_testbed(rotor=IMMOVABLE)
+    (circuit,) = arm.circuits
+    amplitude = 2.0 * eccentricity * circuit.pretension
+    ripples = Ripples(("motor1",), (1.0 / 3.0,), (amplitude,), (1,), (0.5,))
+    plant = released_plant(arm, ripples=ripples)
+    angles, torques = [], []
+    plant.data.qvel[:] = (20.0, 20.0 / 14.0)
+    for _ in range(round(2.0 / STEP)):
+        angles.append(plant.theta[0])
+        plant.step([0.0])
+        torques.append(3.0 * plant.data.qfrc_actuator[0])
+    angle = np.array(angles)
+    return PlantCurve(angle, np.array(torques), eccentric_ripple(eccentricity, circuit.pretension, angle / 3.0 + 0.5))
+
+
+def resonances(ratio: float, stiffness: Numbers) -> Resonance:
+    """Both resonances of (4.4) from the plant's own one-step map, over k_c at the joint, N m/rad."""
+    arm = ideal_testbed(ratio)
+    (circuit,) = arm.circuits
+    found = []
+    for k in stiffness:
+        world = World(NOTHING, Springs(("joint1",), (float(k),), (1.0,), (0.0,), (True,)))
+        angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(released_plant(arm, world)))))
+        found.append(np.sort(angles)[[0, 2]] / STEP)
+    inertia = float(arm.motors.inertia[0]), link_inertia(arm)
+    theory = force_resonances(*inertia, circuit.stiffness, stiffness, ratio)
+    lower, upper = np.array(found).T
+    return Resonance(ratio, PlantCurve(stiffness, lower, theory.lower), PlantCurve(stiffness, upper, theory.upper))
+
+
+def surface(hardening: float) -> PlantCurve:
+    """Force of a surface of 4000 N/m over the depth of the tip in it, m, force in N."""
+    depths = np.linspace(1e-4, 0.01, 25)
+    below = 0.01  # m below the link, which then touches with its tip only
+    position = (0.0, 0.0, -0.0254 - below)
+    floor = Obstacles(
+        ("floor",), ("plane",), position, (0.0,) * 3, (2.0, 2.0, 0.0), (4e3,), (0.0,), (hardening,), (0.0,)
+    )
+    plant = released_plant(ideal_testbed(rotor=IMMOVABLE), World(floor, NO_SPRINGS))
+    forces = []
+    for depth in depths:
+        q = -np.arcsin((depth + below) / LEVER)
+        plant.data.qpos[:], plant.data.qvel[:] = (14.0 * q, q), 0.0
+        plant.step([0.0])
+        (load,) = plant.loads()
+        forces.append(float(np.linalg.norm(load.force)))
+    return PlantCurve(depths, np.array(forces), 4e3 * depths * (1.0 + hardening * depths))
+
+
+class ResponseComparison(NamedTuple):
+    """Step response of integral force control over time: force F_c and motor position, plant and exact."""
+
+    force: PlantCurve
+    motor: PlantCurve
+
+
+def step_response(friction: tuple[float, float], damping: float, gain: float, seconds: float) -> ResponseComparison:
+    """Response of the testbed to a step of 20 N m, and the exact motion.
+
+    The motor is an ideal velocity source, the loop is closed in every step.
+
+    Parameters
+    ----------
+    friction : static and dynamic, at the joint, N m.
+    damping : b at the joint, N m s/rad.
+    gain : G_I, rad/s/(N m).
+    seconds : duration.
+    """
+    found = force_step(20.0, 1464.28, gain, damping, friction, seconds)
+    exact = simulate(found.node, IntegralLoop(gain=gain), 20.0, seconds).at(found.time)
+    return ResponseComparison(
+        PlantCurve(found.time, found.force, exact.contact_force), PlantCurve(found.time, found.motor, exact.x_m)
+    )
+
+
+def stiction_cycle() -> PlantCurve:
+    """F_c of a force loop with stiction, (5.8) and (5.9), N m over s."""
+    return step_response((6.0, 4.0), damping=12.0, gain=2e-2, seconds=8.0).force
+
+
+def actuator_cycle() -> PlantCurve:
+    """Motor position of a force loop with Coulomb friction, (5.20), rad over s; domain I, above gamma_b."""
+    return step_response((6.0, 6.0), damping=18.7, gain=4.3e-2, seconds=6.0).motor
+
+
+def impact() -> PlantCurve:
+    """Greatest force of a link that runs into a spring at 0.5 rad/s, over its stiffness at the tip, N/m; (3.1).
+
+    F = v sqrt(J k); the cable is so long that the rotor has no effect.
+    """
+    stiffness = np.linspace(200.0, 2e4, 25)
+    arm = ideal_testbed()
+    arm = replace(arm, cables=replace(arm.cables, stage_length=(1e6, 0.0)))
+    inertia = link_inertia(arm)
+    found = []
+    for k in stiffness:
+        world = World(NOTHING, Springs(("joint1",), (float(k),), (LEVER,), (0.0,), (False,)))
+        plant = released_plant(arm, world)
+        plant.data.qvel[:] = (-7.0, -0.5)
+        greatest = 0.0
+        for _ in range(round(np.pi * np.sqrt(inertia / k) / LEVER / STEP)):
+            plant.step([0.0])
+            greatest = max(greatest, -float(k) * LEVER * plant.q[0])
+        found.append(greatest)
+    return PlantCurve(stiffness, np.array(found), 0.5 * np.sqrt(inertia * stiffness))
+
+
+STUDIES: dict[str, Callable[[], PlantCurve]] = {
+    "slack": slack,
+    "creep": creep_out_and_back,
+    "efficiency": efficiency_under_load,
+    "ripple": ripple,
+    "linear surface": lambda: surface(0.0),
+    "hardening surface": lambda: surface(50.0),
+    "impact": impact,
+    "actuator cycle": actuator_cycle,
+    "stiction cycle": stiction_cycle,
+}

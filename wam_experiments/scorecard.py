@@ -1,0 +1,147 @@
+"""The arm of a configuration compared with the requisites of chapter 3: ``wam scorecard``."""
+
+import math
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.table import markdown
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.constants import ARM_PRINTED
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.driver import DriverParameters
+from wam_theory.cable import efficiency, stage_loss, tensions
+from wam_theory.requisites import Measures, Requisite, scorecard
+
+Array = NDArray[np.float64]
+POSES = 15  # of each joint apart from the first, which does not change the torques
+DIRECTIONS = 180
+
+
+def printed(meaning: str) -> tuple[float, ...]:
+    """A constant printed in the thesis, SI."""
+    (row,) = (row for row in ARM_PRINTED if row.meaning == meaning)
+    return row.si
+
+
+def measures(configuration: Configuration) -> Measures:
+    """Quantities of the scorecard from the parameters of the arm.
+
+    Inertia and stiffness are those in the pose of (A.2), each joint with the others at rest.
+
+    Parameters
+    ----------
+    configuration : of an arm with the four joints and two links of the MIT/WAM.
+
+    Raises
+    ------
+    ValueError
+        for another arm, for which the thesis has no numbers.
+    """
+    arm = configuration.shared.arm
+    if len(arm.joints.names) != 4 or len(arm.covers.names) != 2:
+        raise ValueError(
+            f"arm '{arm.name}' has {len(arm.joints.names)} joints and {len(arm.covers.names)} covers; the "
+            "scorecard is that of the MIT/WAM, which has 4 and 2: use the configuration 'wam'"
+        )
+    driver = configuration.node("driver", DriverParameters)
+    body, gears = RigidBody(arm), TransmissionMap.of(arm).motor_from_joint
+    pose = printed("pose in the middle of the workspace")
+    rotor = gears.T @ np.diag(arm.motors.inertia) @ gears
+    links = body.mass_matrix(pose) + np.diag(arm.joints.armature)
+    levers = normal_directions(body, pose) @ body.tool_jacobian(pose)  # (directions, joints), m
+    friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction
+    stiffness = max(driver.world.obstacles.stiffness)
+    radius, pretension = [c.radius for c in arm.circuits], np.array(arm.cables.pretension)
+    tight, _ = tensions(arm.motors.peak_torque, pretension, radius)
+    return Measures(
+        steady_force=steady_force(arm),
+        steady_force_required=printed("steady contact force at any point, any pose")[0],
+        least_force=masked_force(levers, friction),
+        friction_share=tuple((friction / (np.abs(gears.T) @ arm.motors.peak_torque)).tolist()),
+        friction_required=printed("joint friction, of peak torque; 2 to 4 are bounds"),
+        impact_speed=driver.tip_speed_limit,
+        effective_mass=effective_mass(levers, links + rotor),
+        contact_stiffness=stiffness,
+        cable_tension=float(np.max(tight / arm.cables.breaking_strength)),
+        pretension=float(np.min(2.0 * pretension * radius / arm.motors.peak_torque)),
+        link_inertia=tuple(np.diag(links).tolist()),
+        rotor_inertia=tuple(np.diag(rotor).tolist()),
+        transmission_stiffness=tuple((np.square(gears.T) @ [c.stiffness for c in arm.circuits]).tolist()),
+        joint_contact_stiffness=tuple((stiffness * np.square(levers).max(axis=0)).tolist()),
+        aspect_ratio=aspect_ratios(arm),
+        aspect_required=(*printed("aspect ratio of the inner link"), *printed("aspect ratio of the outer link")),
+        cover_friction=min(driver.world.obstacles.friction),
+        efficiency=min(_efficiency(arm, i) for i in range(len(arm.motors.names))),
+        efficiency_required=printed("least limiting efficiency at full torque")[0],
+    )
+
+
+def normal_directions(body: RigidBody, q: tuple[float, ...]) -> Array:
+    """Unit vectors normal to the outer link, (directions, 3), in the base frame."""
+    rotation = body.cover_pose(q, body.covers[-1]).rotation
+    angles = np.linspace(0.0, math.pi, DIRECTIONS, endpoint=False)
+    return np.outer(np.cos(angles), rotation[:, 1]) + np.outer(np.sin(angles), rotation[:, 2])
+
+
+def steady_force(arm: Arm) -> float:
+    """Force, N, at the tip and at the elbow within the continuous torques, in any direction and pose."""
+    body, torque_share = RigidBody(arm), TransmissionMap.of(arm).joint_from_motor.T
+    limits = np.array(arm.motors.continuous_torque)
+    ranges = [np.linspace(low, high, POSES) for low, high in zip(arm.joints.lower, arm.joints.upper, strict=True)]
+    least = math.inf
+    for angles in product(*ranges[1:]):
+        q = (0.0, *angles)
+        left = limits - np.abs(torque_share @ body.gravity_torque(q))
+        for jacobian in (body.tool_jacobian(q), body.point_jacobian(q, arm.covers.names[0], arm.covers.end[:3])):
+            needed = np.linalg.norm(torque_share @ jacobian.T, axis=1)
+            least = min(least, float(np.min(left / np.maximum(needed, 1e-12))))
+    return least
+
+
+def masked_force(levers: Array, friction: Array) -> float:
+    """Greatest push, N, normal to the link at the tip that moves no joint, each held by its own friction only."""
+    needed = friction / np.maximum(np.abs(levers), 1e-12)
+    return float(needed.min(axis=1).max())
+
+
+def effective_mass(levers: Array, inertia: Array) -> float:
+    """Greatest effective mass, kg, at the tip over directions with these levers, (directions, joints)."""
+    mobility = np.einsum("di,ij,dj->d", levers, np.linalg.inv(inertia), levers)
+    return float(1.0 / mobility.min())
+
+
+def aspect_ratios(arm: Arm) -> tuple[float, ...]:
+    """Length over width by 7.2.1: inner link over the joint-4 mechanism, outer tube with its ends."""
+    (hole,) = printed("hole through which the joint-4 mechanism fits")
+    tube = np.linalg.norm(np.subtract(arm.covers.end[3:], arm.covers.start[3:])) + 2.0 * arm.covers.radius[1]
+    inner_width = max(hole, 2.0 * arm.covers.radius[0])
+    return arm.covers.length[0] / inner_width, float(tube) / (2.0 * arm.covers.radius[1])
+
+
+def _efficiency(arm: Arm, motor: int) -> float:
+    """Limiting efficiency, (6.15), of the stages of one motor at its peak torque."""
+    cables = arm.cables
+    stages = [k for k, name in enumerate(cables.stage_motors) if name == arm.motors.names[motor]]
+    columns = (cables.stage_radius, cables.stage_ea, cables.stage_circuits, cables.stage_ratio)
+    radius, ea, circuits, ratio = ([column[k] for k in stages] for column in columns)
+    return efficiency(stage_loss(arm.motors.peak_torque[motor], radius, ea, circuits, ratio))
+
+
+def table(rows: tuple[Requisite, ...]) -> str:
+    """The scorecard as Markdown."""
+    lines = []
+    for row in rows:
+        required = f"{row.sense} {row.required:.3g}" if row.sense else "no number"
+        met = {True: "yes", False: "no", None: ""}[row.met]
+        value = f"{row.value:.3g} {row.unit}".strip()
+        lines.append((row.requisite, row.measure, value, required, row.source, met))
+    return markdown(("requisite", "measure", "value", "thesis", "source", "met"), lines)
+
+
+def report(configuration: Configuration) -> str:
+    """The scorecard of a configuration's arm as Markdown."""
+    return table(scorecard(measures(configuration)))

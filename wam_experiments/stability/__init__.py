@@ -1,0 +1,5 @@
+"""Studies of stability.
+
+guard_validation   the stability guard validated by Monte Carlo simulation (`wam guard`)
+stability_map      the stability map of figure 5.8, computed in parallel (`wam map`)
+"""

@@ -1,0 +1,20 @@
+"""Experiments of the thesis: recorded runs, evaluated against predictions from the recorded parameters.
+
+An experiment is `config/experiments/NAME.yaml`; its `evaluation` names a function `MODULE.FUNCTION` of this package,
+or `PACKAGE.MODULE:FUNCTION` of any other, from recordings to a result.
+
+definition      an experiment as data: runs, values, steps, sample
+evaluation      from the bags of an experiment to its result
+recording       a bag as an experiment reads it: signals, parameters, steps
+rows            a result: predicted and measured quantities, curves, tables
+figure, page    the result as a figure, and on a page of the documentation
+samples         the sample bags and their index
+
+step_response   (5.2), (5.3), half cycles of (5.17) and (5.18)
+limit_cycles    stiction (5.8), (5.9); actuator (5.20) to (5.22)
+testbed         section 5.6: stable gain with friction, step size, saturation and delay
+transmission    chapter 4: force response by chirp, position of the reducer
+cables          chapter 6: efficiency (6.15), creep (6.19)
+arm_forces      the arm presses, slides and is pushed
+one_link        node, loop and response of a testbed with one link, for the evaluations above
+"""

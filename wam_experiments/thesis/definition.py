@@ -1,0 +1,177 @@
+"""An experiment as data: its runs, and the function that evaluates them.
+
+`config/experiments/NAME.yaml` holds title, section, configuration, evaluation, `include` (sets of
+values in `config/experiments/sets/`), values, runs with a name, values and the steps of a scenario, and a
+sample: the part of a run that is kept in `bags/sample/NAME`, and its evaluation.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from wam_description import yaml_text
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError, require
+
+FOLDER = "experiments"
+SETS = "experiments/sets"
+KEYS = ("title", "section", "configuration", "evaluation", "include", "values", "runs", "sample")
+RUN_KEYS = ("name", "values", "steps", "stops")
+SAMPLE_KEYS = ("run", "shows", "seconds", "topics", "evaluation")
+
+
+class Run(NamedTuple):
+    """One recording: values in addition to those of the experiment, and the steps of its scenario."""
+
+    name: str
+    values: Mapping[str, Any]
+    steps: Sequence[Mapping[str, Any]]
+    stops: bool  # whether the driver is expected to stop the arm
+
+    @property
+    def seconds(self) -> float:
+        """Length of all steps, s."""
+        return sum(float(step["seconds"]) for step in self.steps)
+
+
+class SampleDefinition(NamedTuple):
+    """The part of a run that is kept as a sample bag.
+
+    Attributes
+    ----------
+    run : its name.
+    shows : description.
+    begin, end : s of the arm's time.
+    topics : kept of those recorded; None for all.
+    evaluation : of the sample, from a mapping with this run only.
+    """
+
+    run: str
+    shows: str
+    begin: float
+    end: float
+    topics: tuple[str, ...] | None
+    evaluation: str
+
+
+class Experiment(NamedTuple):
+    """Runs and their evaluation: `MODULE.FUNCTION` of `wam_experiments.thesis` or `PACKAGE.MODULE:FUNCTION`."""
+
+    name: str
+    title: str
+    section: str
+    configuration: str
+    evaluation: str
+    runs: tuple[Run, ...]
+    sample: SampleDefinition | None
+
+    def run(self, name: str) -> Run:
+        """The run of a name."""
+        return next(run for run in self.runs if run.name == name)
+
+
+def names() -> list[str]:
+    """The experiments that come with the package."""
+    folder = packaged("wam").parent / FOLDER
+    return sorted(path.stem for path in folder.glob("*.yaml"))
+
+
+def load(name: str) -> Experiment:
+    """Read an experiment.
+
+    Parameters
+    ----------
+    name : of an experiment of the package, or the path of a YAML file.
+
+    Raises
+    ------
+    ParameterError
+        if there is none of this name, or the file is not an experiment.
+    """
+    if name.endswith(".yaml"):
+        path = Path(name)
+        require(path.is_file(), f"experiment {path} is not a file")
+    else:
+        require(name in names(), f"no experiment is named '{name}'; choose from {', '.join(names())}")
+        path = packaged(f"{FOLDER}/{name}")
+    tree = _mapping(path)
+    _keys(str(path), tree, KEYS, ("title", "section", "configuration", "evaluation", "runs"))
+    shared: dict[str, Any] = {}
+    for included in tree.get("include", ()):
+        shared.update(_mapping(packaged(f"{SETS}/{included}")))
+    shared.update(tree.get("values", {}))
+    require(isinstance(tree["runs"], list) and bool(tree["runs"]), f"{path}: 'runs' must be a list with at least one")
+    runs = tuple(_run(f"{path}, run {i + 1}", body, shared) for i, body in enumerate(tree["runs"]))
+    doubled = sorted({run.name for run in runs if sum(run.name == other.name for other in runs) > 1})
+    require(not doubled, f"{path}: several runs are named {', '.join(doubled)}")
+    title, section, configuration, evaluation = (str(tree[key]) for key in KEYS[:4])
+    sample = _sample(str(path), tree["sample"], evaluation, [run.name for run in runs]) if "sample" in tree else None
+    return Experiment(path.stem, title, section, configuration, evaluation, runs, sample)
+
+
+def configured(experiment: Experiment, run: Run, directory: Path) -> Configuration:
+    """The configuration of a run, recorded into `directory`; its steps are written next to the bag.
+
+    Raises
+    ------
+    ParameterError
+        if a value has no parameter or is not allowed.
+    """
+    base = Configuration.load(packaged(experiment.configuration))
+    script = directory / f"{run.name}.yaml"
+    script.parent.mkdir(parents=True, exist_ok=True)
+    script.write_text(yaml.safe_dump({"steps": list(run.steps)}, sort_keys=False), encoding="utf-8")
+    nodes = run.values.get("nodes", base.shared.nodes)
+    return base.with_values(
+        {
+            **run.values,
+            "nodes": [*nodes, "scenario", "recorder"],
+            "timing.mode": "lockstep",
+            "scenario:script": str(script),
+            "recorder:directory": str(directory),
+            "recorder:name": run.name,
+        }
+    )
+
+
+def _run(where: str, body: Any, shared: Mapping[str, Any]) -> Run:
+    require(isinstance(body, dict), f"{where} is {body!r}; it must be a mapping with name and steps")
+    _keys(where, body, RUN_KEYS, ("name", "steps"))
+    name = str(body["name"])
+    require(name == Path(name).name and name != "..", f"{where}: name is '{name}'; it must be valid for a directory")
+    require(
+        isinstance(body["steps"], list) and bool(body["steps"]), f"{where}: 'steps' must be a list with at least one"
+    )
+    return Run(name, {**shared, **body.get("values", {})}, tuple(body["steps"]), bool(body.get("stops", False)))
+
+
+def _sample(where: str, body: Any, evaluation: str, runs: Sequence[str]) -> SampleDefinition:
+    require(isinstance(body, dict), f"{where}: 'sample' is {body!r}; it must be a mapping with run, shows and seconds")
+    _keys(f"{where}, sample", body, SAMPLE_KEYS, ("run", "shows", "seconds"))
+    name, seconds, topics = str(body["run"]), body["seconds"], body.get("topics")
+    require(name in runs, f"{where}, sample: no run is named '{name}'; choose from {', '.join(runs)}")
+    require(
+        isinstance(seconds, list) and len(seconds) == 2 and 0.0 <= seconds[0] < seconds[1],
+        f"{where}, sample: 'seconds' is {seconds!r}; it must be start and end, [0.0, 4.0]",
+    )
+    chosen = None if topics is None else tuple(map(str, topics))
+    begin, end = map(float, seconds)
+    return SampleDefinition(name, str(body["shows"]), begin, end, chosen, str(body.get("evaluation", evaluation)))
+
+
+def _mapping(path: Path) -> dict[str, Any]:
+    try:
+        tree = yaml_text.parse(path.read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        raise ParameterError(f"{path} is not YAML: {error}") from error
+    require(isinstance(tree, dict), f"{path} is not a mapping of names to values")
+    return dict(tree)
+
+
+def _keys(where: str, body: Mapping[str, Any], allowed: Sequence[str], needed: Sequence[str]) -> None:
+    for key in body:
+        require(key in allowed, f"{where}: unknown key '{key}'; allowed: {', '.join(allowed)}")
+    for key in needed:
+        require(key in body, f"{where}: '{key}' is missing")

@@ -1,0 +1,56 @@
+"""The figure of an experiment: predicted lines, measured traces."""
+
+import textwrap
+from pathlib import Path
+
+from matplotlib.axes import Axes
+
+from wam_experiments.figures.style import panels
+from wam_experiments.thesis.definition import Experiment
+from wam_experiments.thesis.rows import Panel, Result
+
+COLOURS = ("#d55e00", "#0b6fb8", "#009e73", "#cc79a7", "#7a5c00")
+MOST_POINTS = 2000
+FEW = 40  # points, below which each is drawn as a circle
+
+
+def draw(experiment: Experiment, result: Result, file: Path) -> None:
+    """Draw the panels of a result side by side.
+
+    Parameters
+    ----------
+    file : picture; its suffix is the format.
+    """
+    count = len(result.panels)
+    columns = min(count, 2)
+    rows = -(-count // columns)
+    with panels(file, rows, columns, 4.6 * columns, 2.6 * rows + 0.3) as (picture, axes):
+        for panel, panel_axes in zip(result.panels, axes, strict=False):
+            _panel(panel_axes, panel)
+        for unused in axes[count:]:
+            unused.set_axis_off()
+        title = f"{experiment.title} (section {experiment.section})"
+        picture.suptitle("\n".join(textwrap.wrap(title, 60 * columns)), fontsize=9)
+
+
+def _panel(axes: Axes, panel: Panel) -> None:
+    colour = -1
+    for curve in panel.curves:
+        step = max(1, len(curve.x) // MOST_POINTS)
+        x, y = curve.x[::step], curve.y[::step]
+        if curve.role == "predicted":
+            axes.plot(x, y, color="black", linewidth=0.9, linestyle="--", label=curve.label or None, zorder=3)
+            continue
+        colour += 1
+        label = curve.label or None
+        if len(x) < FEW:
+            axes.plot(x, y, "o", color=COLOURS[colour % len(COLOURS)], markersize=3.5, mfc="none", label=label)
+        else:
+            axes.plot(x, y, color=COLOURS[colour % len(COLOURS)], linewidth=1.1, label=label)
+    axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
+    if "x" in panel.logarithmic:
+        axes.set_xscale("log")
+    if "y" in panel.logarithmic:
+        axes.set_yscale("log")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False, fontsize=7.5)

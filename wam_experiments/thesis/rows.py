@@ -1,0 +1,118 @@
+"""The result of an evaluation: predicted and measured quantities, and curves."""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis import table
+
+Numbers = NDArray[np.float64]
+
+
+class Comparison(NamedTuple):
+    """One quantity, predicted from the recorded parameters and measured in the bag.
+
+    Attributes
+    ----------
+    bound : largest deviation of agreement, relative to the prediction; NaN without a claim.  Texts agree if equal.
+    absolute : whether deviation and bound are in the quantity's unit.
+    """
+
+    quantity: str
+    predicted: float | str
+    measured: float | str
+    unit: str = ""
+    bound: float = 0.0
+    equation: str = ""
+    absolute: bool = False
+
+    @property
+    def deviation(self) -> float:
+        """Relative deviation from the prediction, or the difference if absolute; NaN for texts."""
+        if isinstance(self.predicted, str) or isinstance(self.measured, str):
+            return math.nan
+        difference = self.measured - self.predicted
+        if self.absolute:
+            return difference
+        return difference / abs(self.predicted) if self.predicted else math.inf
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the deviation is within its bound; a missing measurement does not agree."""
+        if math.isnan(self.bound):
+            return True
+        if isinstance(self.predicted, str) or isinstance(self.measured, str):
+            return self.predicted == self.measured
+        return abs(self.deviation) <= self.bound
+
+
+class Curve(NamedTuple):
+    """One line of a figure; `role` is predicted or measured."""
+
+    role: str
+    label: str
+    x: Numbers
+    y: Numbers
+
+
+class Panel(NamedTuple):
+    """One pair of axes."""
+
+    title: str
+    x: str
+    y: str
+    curves: Sequence[Curve]
+    logarithmic: str = ""  # of '', 'x', 'y', 'xy'
+
+
+class Result(NamedTuple):
+    """Result of an experiment."""
+
+    rows: list[Comparison]
+    panels: list[Panel]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every quantity is within its bound."""
+        return all(row.agrees for row in self.rows)
+
+
+HEAD = ("quantity", "predicted", "measured", "unit", "deviation", "bound", "equation", "")
+
+
+def cells(row: Comparison) -> tuple[str, ...]:
+    """The texts of a row, in the order of `HEAD`."""
+    return (
+        row.quantity,
+        _value(row.predicted),
+        _value(row.measured),
+        row.unit,
+        _deviation(row, row.deviation, "+"),
+        _deviation(row, row.bound, ""),
+        row.equation,
+        "" if math.isnan(row.bound) else "ok" if row.agrees else "MISSED",
+    )
+
+
+def plain(rows: Iterable[Comparison]) -> str:
+    """The rows as a table for a terminal."""
+    return "\n".join(table.plain([HEAD], [cells(row) for row in rows], left=(0, 3, 6, 7)))
+
+
+def markdown(rows: Iterable[Comparison]) -> str:
+    """The rows as a table of Markdown."""
+    return table.markdown(HEAD, map(cells, rows))
+
+
+def _value(value: float | str) -> str:
+    return value if isinstance(value, str) else "-" if math.isnan(value) else f"{value:.4g}"
+
+
+def _deviation(row: Comparison, value: float, sign: str) -> str:
+    if math.isnan(value) or isinstance(row.predicted, str) or isinstance(row.measured, str):
+        return ""
+    return f"{value:{sign}.2g}" if row.absolute else f"{100.0 * value:{sign}.2f} %"

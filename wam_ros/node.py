@@ -1,0 +1,241 @@
+"""The adapter that makes a ROS node from a declared one (`wam_description.wiring`)."""
+
+import importlib
+import sys
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rcl_interfaces.srv import SetParameters as SetParametersService
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.timer import Timer
+from std_srvs.srv import SetBool, Trigger
+
+from wam_description.interface import Interface, declared
+from wam_description.parameters import ParameterError
+from wam_description.signals import Level, NodeStatus
+from wam_description.synchroniser import Inputs, Synchroniser
+from wam_description.topics import STATUS
+from wam_description.wiring import Call, Declaration, Followed, Outputs, Reaction, SetParameters
+from wam_ros.parameters import declare, follow, follow_other
+from wam_ros.ports import SECOND, Ports
+from wam_ros.run import raise_priority, run
+
+
+class AdaptedNode(Node):
+    """A declared node on topics: it converts messages, calls the node, publishes with the input's stamp.
+
+    Parameters
+    ----------
+    declaration : of the node.
+    ros : context, namespace and so on, as rclpy's Node takes them.
+
+    Attributes
+    ----------
+    node : the declared node itself.
+    """
+
+    def __init__(self, declaration: Declaration, **ros: Any) -> None:
+        super().__init__(declaration.name, **ros)
+        owned: str | None = getattr(declaration.node, "owns", None)
+        shared, own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
+        try:
+            self.node = declaration.node(shared, own)
+        except ParameterError as error:
+            raise ParameterError(f"node '{self.get_name()}': {error}") from None
+        self._declaration, self._outputs = declaration, frozenset(declaration.outputs)
+        self._is_realtime = shared.timing.mode == "realtime"
+        if self._is_realtime and getattr(self.node, "high_priority", False):
+            raise_priority(shared.timing.niceness)
+        if tune := getattr(self.node, "tune", None):
+            follow(self, own, tune)
+        if owned:
+            follow(self, getattr(shared, owned), self.node.retune, f"{owned}.")
+        followed: Followed | None = getattr(self.node, "follows", None)
+        if followed:
+            group = getattr(shared, followed.group)
+            follow_other(self, followed.node, group, self.node.retune, f"{followed.group}.", self._warn)
+        interface = Interface(shared, started_by_hand=declaration)
+        self._ports = Ports(self, declaration, shared, interface)
+        self._requests: list[Call | SetParameters] = getattr(self.node, "requests", [])
+        self._waiting: deque[Callable[[], None]] = deque()  # what follows a request that is under way
+        self._asking = False
+        self._service_clients: dict[tuple[str, str], Any] = {}
+        self._refused: dict[str, int] = {}
+        self._starts_with_all = getattr(self.node, "starts_with_all", False)
+        take_status = getattr(self.node, "take_status", None)
+        if take_status or self._starts_with_all:
+            self._ports.watch_peers(take_status)
+        for reaction in declaration.reactions:
+            self._connect(reaction, interface)
+        for name in getattr(self.node, "services", ()):
+            self.create_service(Trigger, f"~/{name}", _answering(getattr(self.node, name)))
+
+    @property
+    def done(self) -> bool:
+        """Whether the node has finished, with nothing left to publish."""
+        return getattr(self.node, "done", False) and not self._asking and not self._waiting
+
+    @property
+    def failure(self) -> str:
+        """Why the node failed, '' where it did not."""
+        return getattr(self.node, "failure", "")
+
+    def _connect(self, reaction: Reaction, interface: Interface) -> None:
+        unused = getattr(self.node, "unused", ())
+        topics, synchroniser = interface.synchroniser(reaction, unused)
+        work = getattr(self.node, reaction.method)
+        for item in (reaction.trigger, *reaction.inputs):
+            if item.topic in topics:
+                accepts = partial(synchroniser.accepts, item.topic)
+                self._ports.feed(item.topic, self._taking(synchroniser, item.topic, work), item.arrays, accepts)
+            elif item.topic in interface.topics:  # its publisher waits until all its listeners are there
+                self._ports.listen(item.topic, lambda data: None, raw=True)
+
+    def _taking(
+        self, synchroniser: Synchroniser, topic: str, work: Callable[[Inputs], Outputs]
+    ) -> Callable[[int, Any], None]:
+        def take(stamp: int, value: Any) -> None:
+            for inputs in synchroniser.put(topic, stamp, value):
+                self._step(inputs, work)
+
+        return take
+
+    def _step(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
+        ports = self._ports
+        if self._starts_with_all and self._is_realtime and ports.absent:
+            return  # in lockstep the driver waits for all
+        ports.counts["steps"] += 1
+        outputs = work(inputs)
+        self._report_refusals(inputs)
+        if self._requests or self._asking:
+            self._waiting.extend([*map(self._making, self._requests), lambda: self._publish(inputs.stamp, outputs)])
+            self._requests.clear()
+            self._go_on()
+        else:
+            self._publish(inputs.stamp, outputs)
+
+    def _publish(self, stamp: int, outputs: Outputs) -> None:
+        for topic, value in outputs.items():
+            if topic == STATUS:
+                self._set_status(stamp, value)
+            elif topic not in self._outputs:
+                self._declaration.require_declared(outputs)
+            else:
+                self._ports.publish(topic, stamp, value)
+        if self._ports.report_due(stamp):
+            if diagnostics := getattr(self.node, "diagnostics", None):
+                self._ports.facts = diagnostics()
+            self._ports.report(stamp)
+
+    def _set_status(self, stamp: int, status: NodeStatus) -> None:
+        self._ports.set_status(status)
+        if status.level is Level.ERROR:
+            self.get_logger().error(status.message)
+        elif status.step:
+            self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
+
+    def _warn(self, reason: str) -> None:
+        """Report that the node works with parameters of another one that it does not accept."""
+        self._ports.set_status(NodeStatus(Level.WARN, reason))
+        self.get_logger().warning(reason)
+
+    def _report_refusals(self, inputs: Inputs) -> None:
+        """Report each refused message once."""
+        refusals: dict[str, str] = getattr(self.node, "refusals", {})
+        for topic, reason in refusals.items():
+            stamp = inputs.stamp_of(topic)
+            if self._refused.get(topic) != stamp:
+                self._ports.refuse(topic, reason)
+            self._refused[topic] = stamp
+
+    # requests to other nodes
+
+    def _go_on(self) -> None:
+        """Do what waits, up to the next request that has to be answered."""
+        while self._waiting and not self._asking:
+            self._waiting.popleft()()
+
+    def _making(self, request: Call | SetParameters) -> Callable[[], None]:
+        return lambda: self._make(request)
+
+    def _make(self, request: Call | SetParameters) -> None:
+        message: Any
+        if isinstance(request, SetParameters):
+            client = self._client(request.node, "set_parameters", SetParametersService)
+            parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in request.values.items()]
+            message = SetParametersService.Request(parameters=parameters)
+        else:
+            client = self._client(request.node, request.service, Trigger if request.data is None else SetBool)
+            message = Trigger.Request() if request.data is None else SetBool.Request(data=request.data)
+        self._asking = True
+        timer: Timer
+
+        def ask_when_found() -> None:
+            if client.service_is_ready():  # before, the request would be lost
+                timer.cancel()
+                self.destroy_timer(timer)
+                client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result()))
+
+        timer = self.create_timer(0.005, ask_when_found, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _client(self, node: str, service: str, kind: Any) -> Any:
+        if (node, service) not in self._service_clients:
+            self._service_clients[node, service] = self.create_client(kind, f"{node}/{service}")
+        return self._service_clients[node, service]
+
+    def _answered(self, request: Call | SetParameters, answer: Any) -> None:
+        self._asking = False
+        if isinstance(request, SetParameters):
+            reasons = [result.reason for result in answer.results if not result.successful]
+            refusal = f"{request.node} refuses: {'; '.join(reasons)}" if reasons else ""
+        else:
+            refusal = "" if answer.success else answer.message
+        if refusal:
+            self._waiting.clear()
+            self.get_logger().error(refusal)
+            if refused := getattr(self.node, "refused", None):
+                self._publish(0, refused(refusal))
+        self._go_on()
+
+
+def _answering(method: Callable[[], Any]) -> Callable[[Any, Any], Any]:
+    def serve(_: Any, response: Any) -> Any:
+        response.success, response.message = method()
+        return response
+
+    return serve
+
+
+def make_node(entry: str, **ros: Any) -> Node:
+    """The ROS node of an entry of the parameter `nodes`.
+
+    Parameters
+    ----------
+    entry : name in the table of nodes, or 'module:Class' of a node of your own.
+    ros : context, namespace and so on, as rclpy's Node takes them.
+    """
+    declaration = declared(entry)
+    if not declaration.ros_node:
+        return AdaptedNode(declaration, **ros)
+    module, _, name = declaration.ros_node.partition(":")
+    node: Node = getattr(importlib.import_module(module), name)(**ros)
+    return node
+
+
+def main() -> None:
+    """Run the node that the name of this program, or its first argument, names; for `wam_ros.program`."""
+    name = Path(sys.argv[0]).name
+    if name in ("node", "program.py"):
+        if len(sys.argv) < 2:
+            raise SystemExit("usage: python3 -m wam_ros.program NAME [--ros-args ...]")
+        name = sys.argv.pop(1)
+    try:
+        declared(name)
+    except ParameterError as error:
+        raise SystemExit(f"error: {error}") from None
+    run(lambda **ros: make_node(name, **ros))

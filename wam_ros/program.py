@@ -1,0 +1,44 @@
+"""Signals while a program of ours still imports, and while Python ends it.
+
+Python itself would print the traceback of the import that Ctrl-C interrupts, and a second Ctrl-C while
+Python ends would kill the program.  Only the standard library is imported here, so that a program can
+call `end_at_once_on_signals` before all else.
+"""
+
+import os
+import signal
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def end_at_once_on_signals() -> None:
+    """Until the program handles SIGINT and SIGTERM itself, they end it silently, with code 128 + number."""
+    for number in SIGNALS:
+        signal.signal(number, _end)
+    # mujoco would look for GLFW in a child process, which prints a traceback of its own; we open no window
+    os.environ.setdefault("MUJOCO_GL", "disable")
+
+
+def ignore_signals() -> None:
+    """Ignore SIGINT and SIGTERM: the program has done its work and ends."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def main() -> None:
+    """Run the node that the name of this program, or its first argument, names."""
+    end_at_once_on_signals()
+    try:
+        from wam_ros.node import main as run_node
+
+        run_node()
+    finally:
+        ignore_signals()
+
+
+def _end(number: int, frame: object) -> None:
+    os._exit(128 + number)  # there is nothing to clean up yet
+
+
+if __name__ == "__main__":
+    main()

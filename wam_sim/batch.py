@@ -1,0 +1,172 @@
+"""Batches: one function over many inputs, on any `concurrent.futures` executor.
+
+Finished pieces are kept in files (`pieces`) and not computed again.  The caller defines the pieces, so the results are
+equal bit for bit on every executor.
+"""
+
+import importlib
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from multiprocessing.connection import wait as wait_for
+from pathlib import Path
+from typing import Any, TypeVar
+
+from wam_sim import pieces
+
+Input = TypeVar("Input")
+Output = TypeVar("Output")
+Report = Callable[[int, int], None]
+_POLL = 0.2  # s, between two checks for Ctrl-C
+
+
+class PieceError(ValueError):
+    """The function failed for an input; pieces finished before are kept."""
+
+
+def results(
+    function: Callable[[Input], Output],
+    inputs: Sequence[Input],
+    executor: Executor,
+    folder: Path | None = None,
+    report: Report | None = None,
+) -> list[Output]:
+    """The function's result for each input, in order.
+
+    Parameters
+    ----------
+    function : at the top level of a module, so that other processes find it; depends on its input only.
+    inputs : plain data: numbers, strings, arrays, tuples and dataclasses of them.
+    executor : see `processes` and `dask`.
+    folder : of finished pieces, owned by the user (`pieces.default_folder`); None keeps nothing.
+    report : called with the numbers of finished and of all pieces, at the start and after each piece.
+
+    Raises
+    ------
+    PieceError
+        if the function raises; the error names the input.
+    KeyboardInterrupt
+        on Ctrl-C; pieces that have not started are cancelled.
+    ValueError
+        if the folder belongs to another user.
+    """
+    progress = report or (lambda done, of: None)
+    if folder is not None:
+        pieces.require_own(folder)
+    files = [None if folder is None else pieces.file_of(folder, function, given) for given in inputs]
+    found = dict[int, Output]()
+    for i, file in enumerate(files):
+        if file is not None and (kept := pieces.read(file)) is not None:
+            found[i] = kept[0]
+    progress(len(found), len(inputs))
+    pending: dict[Future[Output], int] = {}
+    try:
+        for i, given in enumerate(inputs):
+            if i not in found:
+                pending[executor.submit(function, given)] = i
+        while pending:
+            done, _ = wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED)
+            for future in done:
+                i = pending.pop(future)
+                found[i] = _result(future, inputs[i])
+                if (file := files[i]) is not None:
+                    pieces.write(file, found[i])
+                progress(len(found), len(inputs))
+    finally:
+        for future in pending:
+            future.cancel()
+    return [found[i] for i in range(len(inputs))]
+
+
+def _result(future: Future[Output], given: Any) -> Output:
+    """Result of a piece, or its error with the input."""
+    try:
+        return future.result()
+    except Exception as error:
+        raise PieceError(f"{given!r}: {type(error).__name__}: {error}") from error
+
+
+# executors
+
+
+@contextmanager
+def executor(workers: int | None, dask_address: str | None) -> Iterator[Executor]:
+    """The executor of `dask` if an address is given, else that of `processes`.
+
+    Parameters
+    ----------
+    workers : processes on this computer.
+    dask_address : of a scheduler.
+    """
+    with dask(dask_address) if dask_address else processes(workers) as found:
+        yield found
+
+
+@contextmanager
+def processes(workers: int | None = None) -> Iterator[Executor]:
+    """Executor of processes on this computer; on Ctrl-C, or if this process dies, they end at once.
+
+    Parameters
+    ----------
+    workers : number; None for one per core.
+    """
+    count = workers or os.cpu_count() or 1
+    context = multiprocessing.get_context("spawn")
+    end, ours = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_worker, initargs=(end,))
+    # workers inherit the mask: only this process handles a Ctrl-C of the terminal, which goes to all of them
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    for _ in range(count):
+        pool.submit(os.getpid)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    try:
+        yield pool
+    except BaseException:
+        ours.close()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+        ours.close()
+        end.close()
+
+
+def _worker(end: Connection) -> None:
+    """End when the parent process closes its end of the pipe, or dies."""
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        wait_for([end] if parent is None else [end, parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def dask(address: str, patience: float = 10.0) -> Iterator[Executor]:
+    """Executor of a Dask cluster, whose workers have this package installed.
+
+    Parameters
+    ----------
+    address : of the scheduler, for example tcp://10.0.0.1:8786.
+    patience : s, to wait for an answer.
+
+    Raises
+    ------
+    ValueError
+        if Dask is not installed, or the scheduler does not answer.
+    """
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError:
+        raise ValueError("Dask is not installed; pip install 'wam_stack[dask]'") from None
+    try:
+        client = distributed.Client(address, timeout=patience, set_as_default=False)
+    except OSError as error:
+        raise ValueError(f"no Dask scheduler answers at {address}: {error}") from None
+    with client:
+        yield client.get_executor(pure=False)

@@ -1,0 +1,155 @@
+"""The parameters in a bag: read with care, and completed to those of this version."""
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple, TypeVar
+
+import yaml
+
+from wam_bag import safe_yaml
+from wam_bag.bag import Bag, BagError
+from wam_bag.losses import PARAMETERS as ATTACHMENT
+from wam_description.arm import Shared
+from wam_description.configuration import PARAMETERS
+from wam_description.interface import declared
+from wam_description.nodes import NODES
+from wam_description.parameter_history import Completed, complete
+from wam_description.parameters import ParameterError, build_part, flatten
+
+T = TypeVar("T")
+Values = Mapping[str, Any]
+
+LARGEST: Final = 2**20  # bytes; those of the whole stack are about 30 kB
+
+
+class RecordedParameters(NamedTuple):
+    """The parameters of an arm's nodes at the start of a recording.
+
+    Attributes
+    ----------
+    source : the bag, for messages.
+    nodes : flat values by node, completed to those of this version.
+    sha256 : of the attachment, hexadecimal, '' if there is none.
+    problem : why there are no parameters, '' if there are some.
+    notes : which were added, which are not known.
+    """
+
+    source: str
+    nodes: Mapping[str, Values]
+    sha256: str
+    problem: str
+    notes: tuple[str, ...]
+
+    def node(self, name: str) -> Values:
+        """The flat values of a node.
+
+        Raises
+        ------
+        BagError
+            if the bag does not have them.
+        """
+        if self.problem:
+            raise BagError(f"{self.source}: {self.problem}")
+        if name not in self.nodes:
+            raise BagError(
+                f"{self.source}: {ATTACHMENT} in the bag has no parameters of node '{name}'; "
+                f"it has those of {', '.join(self.nodes) or 'no node'}"
+            )
+        return self.nodes[name]
+
+    def part(self, node: str, cls: type[T], prefix: str = "") -> T:
+        """A parameter object from the values of a node, as ``part("driver", Springs, "world.springs.")``.
+
+        Raises
+        ------
+        BagError
+            if the bag does not have them, or they are not allowed in this version.
+        """
+        values = self.node(node)
+        try:
+            return build_part(cls, values, prefix)
+        except ParameterError as error:
+            raise BagError(
+                f"{self.source}: the recorded parameters of node '{node}' do not fit this version: {error}"
+            ) from None
+
+    def with_values(self, settings: Mapping[str, Any]) -> "RecordedParameters":
+        """The same with some values replaced, by 'node:parameter', such as the live ones that a step set."""
+        nodes = {
+            node: {**values, **{key.partition(":")[2]: v for key, v in settings.items() if key.startswith(f"{node}:")}}
+            for node, values in self.nodes.items()
+        }
+        return self._replace(nodes=nodes)
+
+    @property
+    def shared(self) -> Shared:
+        """What every node reads."""
+        return self.part(next((node for node in NODES if node in self.nodes), "driver"), Shared)
+
+
+def recorded_parameters(bag: Bag, namespace: str) -> RecordedParameters:
+    """The parameters of an arm in a bag.
+
+    Parameters
+    ----------
+    bag : with the attachment ``parameters.yaml`` as the recorder writes it, or without.
+    namespace : of the arm.
+    """
+    attached = bag.attachments.get(ATTACHMENT)
+    if attached is None:
+        return RecordedParameters(str(bag.path), {}, "", f"no {ATTACHMENT} in the bag", ())
+    digest = hashlib.sha256(attached).hexdigest()
+    try:
+        tree = untrusted_yaml(attached)
+        if not isinstance(tree, dict):
+            raise ValueError("it has no sections")
+        recorded = {
+            str(name).removeprefix(f"{namespace}/"): flatten(body[PARAMETERS])
+            for name, body in tree.items()
+            if str(name).rpartition("/")[0] == namespace
+        }
+    except (ValueError, TypeError, LookupError, AttributeError) as error:
+        reason = " ".join(str(error).split())
+        return RecordedParameters(str(bag.path), {}, digest, f"{ATTACHMENT} in the bag cannot be read: {reason}", ())
+    found = {node: _completed(node, recorded) for node in recorded}
+    notes = (
+        _note(
+            "the recording is older than", {node: one.added for node, one in found.items()}, "have their former effect"
+        ),
+        _note("this version does not know", {node: one.unknown for node, one in found.items()}, "are ignored"),
+    )
+    nodes = {node: one.values for node, one in found.items()}
+    return RecordedParameters(str(bag.path), nodes, digest, "", tuple(note for note in notes if note))
+
+
+def _completed(node: str, recorded: Mapping[str, Values]) -> Completed:
+    """The values of a node as this version knows them; those of a node that is not ours as they are."""
+    if node not in NODES or node == "recorder":
+        return Completed(recorded[node], (), (), ())
+    return complete(node, recorded, (Shared, declared(node).parameter_class))
+
+
+def _note(begin: str, names: Mapping[str, tuple[str, ...]], end: str) -> str:
+    """A sentence about parameters of some nodes; one of several nodes is named once, without a node."""
+    of: dict[str, list[str]] = {}
+    for node, some in names.items():
+        for name in some:
+            of.setdefault(name, []).append(node)
+    listed = ", ".join(name if len(nodes) > 1 else f"{nodes[0]}:{name}" for name, nodes in of.items())
+    return f"{begin} the parameters {listed}; they {end}" if listed else ""
+
+
+def untrusted_yaml(text: bytes | str) -> Any:
+    """The content of a YAML text of unknown origin.
+
+    Raises
+    ------
+    ValueError
+        if it is too large, too deep or no YAML, or has aliases, by which a short text can become any length.
+    """
+    if len(text) > LARGEST:
+        raise ValueError(f"it has {len(text)} bytes; at most {LARGEST} are read")
+    try:
+        return safe_yaml.load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(str(error)) from None

@@ -1,0 +1,173 @@
+"""Contents of a bag as a run: arm, parameters, steps, faults, status and mode; the one reader of all these."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from wam_bag.bag import Bag, JointColumns, Messages, PointColumns, WrenchColumns
+from wam_bag.contents import mode_of
+from wam_bag.losses import PARAMETERS as ATTACHMENT
+from wam_description.parameter_history import present_name
+from wam_description.signals import NodeStatus
+from wam_description.status import parse
+from wam_description.topics import TOPICS
+from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
+
+DONE: Final = "done"  # outcome of a scenario that was played to its end
+
+
+class RecordedStep(NamedTuple):
+    """A step of the scenario: begin and end in ns, with the live parameters that it set, by 'node:parameter'."""
+
+    name: str
+    begin: int
+    end: int
+    settings: Mapping[str, Any]
+
+
+class RecordedFault(NamedTuple):
+    """A fault of the driver and when it was reported, ns."""
+
+    stamp: int
+    reason: str
+
+
+class RecordedRun(NamedTuple):
+    """A recorded run of an arm.
+
+    Attributes
+    ----------
+    namespace : of the arm, as '/wam'.
+    arms : namespaces of all arms in the bag.
+    parameters : of the arm's nodes.
+    statuses : in the order of the bag.
+    steps : those that were played to their end.
+    unfinished : the step in which the recording ended, None if the scenario came to an end.
+    outcome : 'done', why the scenario failed, or '' if the recording ended before.
+    faults : of the driver, each once.
+    mode : 'lockstep', 'realtime' or 'unknown'.
+    """
+
+    bag: Bag
+    namespace: str
+    arms: tuple[str, ...]
+    parameters: RecordedParameters
+    statuses: tuple[NodeStatus, ...]
+    steps: tuple[RecordedStep, ...]
+    unfinished: RecordedStep | None
+    outcome: str
+    faults: tuple[RecordedFault, ...]
+    mode: str
+
+    def joints(self, topic: str) -> JointColumns | None:
+        """Columns of a JointState topic of the arm, None if nothing was recorded."""
+        columns = self.bag.topics.get(f"{self.namespace}/{topic}")
+        return columns if isinstance(columns, JointColumns) and len(columns.stamp_ns) else None
+
+    def wrench(self, topic: str) -> WrenchColumns | None:
+        """Columns of a WrenchStamped topic of the arm, None if nothing was recorded."""
+        columns = self.bag.topics.get(f"{self.namespace}/{topic}")
+        return columns if isinstance(columns, WrenchColumns) and len(columns.stamp_ns) else None
+
+    def points(self, topic: str) -> PointColumns | None:
+        """Columns of a PointStamped topic of the arm, None if nothing was recorded."""
+        columns = self.bag.topics.get(f"{self.namespace}/{topic}")
+        return columns if isinstance(columns, PointColumns) and len(columns.stamp_ns) else None
+
+    def messages(self, topic: str) -> Sequence[Any]:
+        """Decoded messages of a topic that is no column, none if it was not recorded."""
+        return messages_of(self.bag, f"{self.namespace}/{topic}")
+
+
+def recorded_run(bag: Bag) -> RecordedRun:
+    """The run in a bag, which may lack anything; of several arms the one with the most topics."""
+    namespace, arms = namespaces(bag)
+    parameters = recorded_parameters(bag, namespace)
+    statuses = tuple(status_of(message) for message in messages_of(bag, f"{namespace}/status"))
+    commands = bag.topics.get(f"{namespace}/force_command")
+    last = int(commands.stamp_ns[-1]) if isinstance(commands, WrenchColumns) and len(commands.stamp_ns) else 0
+    steps, unfinished, outcome = _steps(statuses, last)
+    faults = dict.fromkeys(RecordedFault(s.stamp, s.fault) for s in statuses if s.node == "driver" and s.fault)
+    return RecordedRun(
+        bag,
+        namespace,
+        arms,
+        parameters,
+        statuses,
+        steps,
+        unfinished,
+        outcome,
+        tuple(faults),
+        mode_of(bag.metadata, bag.attachments.get(ATTACHMENT)),
+    )
+
+
+def namespaces(bag: Bag) -> tuple[str, tuple[str, ...]]:
+    """Namespace of the arm with the most topics, and those of all arms."""
+    counts: Counter[str] = Counter()
+    for topic in TOPICS:
+        if not topic.name.startswith("/"):
+            ending = f"/{topic.name}"
+            counts.update(name.removesuffix(ending) for name in sorted(bag.topics) if name.endswith(ending))
+    arms = tuple(name for name in sorted(counts) if f"{name}/status" in bag.topics)
+    return counts.most_common(1)[0][0] if counts else "", arms
+
+
+def messages_of(bag: Bag, topic: str) -> Sequence[Any]:
+    """Decoded messages of a topic that is no column, none if it was not recorded."""
+    columns = bag.topics.get(topic)
+    return columns.messages if isinstance(columns, Messages) else ()
+
+
+def status_of(message: Any) -> NodeStatus:
+    """The status in a DiagnosticStatus message; the node without its namespace."""
+    given = ((item.key, item.value) for item in message.values)
+    return parse(str(message.name).rpartition("/")[2], int(message.level), str(message.message), given)
+
+
+def _steps(statuses: Sequence[NodeStatus], last: int) -> tuple[tuple[RecordedStep, ...], RecordedStep | None, str]:
+    """Steps that ended, the one that did not, and the outcome.
+
+    Parameters
+    ----------
+    last : latest stamp that is known of the run, ns.
+    """
+    begun: list[RecordedStep] = []
+    for status in statuses:
+        if status.node != "scenario" or not status.stamp:
+            continue
+        if begun and begun[-1][:2] == (status.message, status.stamp):  # published again with what it has set
+            begun[-1] = begun[-1]._replace(settings={**begun[-1].settings, **_settings(status)})
+        else:
+            begun.append(RecordedStep(status.message, status.stamp, status.stamp, _settings(status)))
+        if status.message == DONE or status.level:
+            break
+    else:
+        if not begun:
+            return (), None, ""
+        *steps, unfinished = _ended(begun)
+        return tuple(steps), unfinished._replace(end=max(last, unfinished.begin)), ""
+    return tuple(_ended(begun)[:-1]), None, begun[-1].name
+
+
+def _ended(begun: Sequence[RecordedStep]) -> list[RecordedStep]:
+    """Each step with the start of the next one as its end."""
+    ends = [step.begin for step in begun[1:]] + [step.end for step in begun[-1:]]
+    return [step._replace(end=end) for step, end in zip(begun, ends, strict=True)]
+
+
+def _settings(status: NodeStatus) -> dict[str, Any]:
+    """Live parameters that a step set, by their present names."""
+    found = {}
+    for key, text in status.facts.items():
+        node, colon, name = key.partition(":")
+        if colon:
+            found[f"{node}:{present_name(node, name)}"] = _value(text)
+    return found
+
+
+def _value(text: str) -> Any:
+    try:
+        return untrusted_yaml(text)
+    except ValueError:
+        return text
