@@ -85,6 +85,11 @@ class AdaptedNode(Node):
         """Why the node failed, '' where it did not."""
         return getattr(self.node, "failure", "")
 
+    def destroy_node(self) -> None:
+        """End only when the others have what was published."""
+        self._ports.wait_for_delivery()
+        super().destroy_node()
+
     def _connect(self, reaction: Reaction, interface: Interface) -> None:
         unused = getattr(self.node, "unused", ())
         topics, synchroniser = interface.synchroniser(reaction, unused)

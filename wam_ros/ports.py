@@ -28,7 +28,7 @@ WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 LOG_PERIOD, MOST_REASONS = 1.0, 20  # s, a reason is logged at most so often; reasons that are remembered
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
-LONGEST_DELIVERY = 0.5  # s
+LONGEST_DELIVERY = 1.0  # s, for all topics of a node together
 
 
 class Ports:
@@ -153,8 +153,13 @@ class Ports:
             self._publishers[STATUS].publish(diagnostic_status(status, self.shared.arm.name))
 
     def wait_for_delivery(self) -> None:
-        """Wait until the recorder and all others have the last status, at most `LONGEST_DELIVERY`."""
-        self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_DELIVERY))
+        """Wait until the recorder and all others have the last messages, at most `LONGEST_DELIVERY`.
+
+        What a process leaves behind unacknowledged ends with it: on a loaded machine that was the last second of a bag.
+        """
+        end = time.monotonic() + LONGEST_DELIVERY
+        for publisher in self._publishers.values():
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
 
     def watch_peers(self, take: Callable[[NodeStatus], None] | None = None) -> None:
         """Listen to the status of the other nodes, for `absent` and `faults`, and hand each to `take`."""
