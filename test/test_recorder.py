@@ -164,7 +164,7 @@ def test_counts_and_drops_are_in_the_bag(ros: Any, tmp_path: Path) -> None:
         sender.publish(state(k, 0.0))
     ros.wait(lambda: received(node, "/wam/motor_states") == 1001)
     (count,) = [count for count in node.recorder.counts() if count.topic == "/wam/motor_states"]
-    assert count == ("/wam/motor_states", "driver", 1001, 500, 0)
+    assert count == ("/wam/motor_states", "driver", 1001, 500, 0, 0)
     ros.remove(node)
     record = read(tmp_path / "bag").metadata["recording"]
     assert record["mode"] == "realtime"

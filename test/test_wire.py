@@ -10,7 +10,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import Point, State, Table, Wrench
-from wam_description.topics import BY_NAME, JOINT_STATE, POINT, TABLE, WRENCH, Topic
+from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS, JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_ros.messages import Refused, message_type, reader, writer
 from wam_ros.wire import decoder, encoder, stamp_of
 
@@ -20,11 +20,11 @@ STAMP = 12_345_678_901
 SEED = 20261120
 
 
-def value_of(topic: Topic, rng: random.Random) -> Any:
-    """A value with numbers of every size, and arrays that may be empty."""
+def value_of(topic: Topic, rng: random.Random, absurd: float = 0.0) -> Any:
+    """A value with numbers of every size, and `absurd` ones, and arrays that may be empty."""
 
     def number() -> float:
-        return rng.choice([0.0, -0.0, 1e-308, rng.uniform(-1e3, 1e3), rng.uniform(-1e300, 1e300)])
+        return rng.choice([0.0, -0.0, 1e-308, 1e3, rng.uniform(-1.0, 1.0), rng.uniform(-1e3, 1e3), absurd])
 
     if topic.type == JOINT_STATE:
         arrays = [[number() for _ in range(4)] if rng.random() < 0.7 else [] for _ in range(3)]
@@ -73,7 +73,7 @@ def test_a_message_with_one_changed_byte_is_taken_or_refused_alike(kind: str) ->
     encode, decode, read = encoder(topic, SHARED), decoder(topic, SHARED, arrays), reader(topic, SHARED, arrays)
     refused = 0
     for _ in range(1500):
-        value = value_of(topic, rng)
+        value = value_of(topic, rng, rng.choice([0.0] * 40 + [1e200, -1e9]))
         data = bytearray(encode(STAMP, value))
         data[rng.randrange(12, len(data))] = rng.choice([0, 1, 0x7F, 0x80, 0xF0, 0xFF, rng.randrange(256)])
         try:
@@ -95,6 +95,23 @@ def test_numbers_that_are_not_finite_are_refused_by_name() -> None:
     wrong = data.replace(struct.pack("<d", 2.0), struct.pack("<d", math.nan), 1)
     with pytest.raises(Refused, match="velocity of motor1 is nan"):
         decode(wrong)
+
+
+ABSURD = {
+    JOINT_STATE: State([1.0] * 4, [2.0, -1e200, 0.0, 0.0], [3.0] * 4),
+    WRENCH: Wrench("base", (1.0, 2.0, 1e7), (0.0, 0.0, 0.0)),
+    POINT: Point("base", (1e200, math.nan, math.nan)),
+    TABLE: Table("base", ((0.0, 1.0, 1e200, *[0.0] * (len(HYPOTHESIS_COLUMNS) - 3)),)),
+}
+
+
+@pytest.mark.parametrize("topic", NUMBERS, ids=lambda topic: topic.name)
+def test_a_number_that_no_arm_reaches_is_refused_by_either_way(topic: Topic) -> None:
+    data = encoder(topic, SHARED)(STAMP, ABSURD[topic.type])
+    decode, read = decoder(topic, SHARED, "position velocity effort"), reader(topic, SHARED, "position velocity effort")
+    said = refusal(decode, data)
+    assert said == refusal(read, deserialize_message(data, message_type(topic)))
+    assert "no arm reaches that, send at most" in said
 
 
 @pytest.mark.parametrize("data", [b"", b"\0", b"\0\1\0\0", b"\0\1\0\0" + b"\xff" * 40])

@@ -9,6 +9,7 @@ For users:
 - `cut`: `cut` writes a part of a bag as a new bag.
 - `repair`: `repair` writes files that are broken or were not closed again from what can be read.
 - `errors`: `BagError`, `RecordingError`, and what is raised within the package.
+- `printable`: text from outside without control characters, for terminals and logs.
 
 Messages:
 

@@ -4,6 +4,7 @@ No node and no clock of its own: the recorder decides what is written and at wha
 """
 
 import contextlib
+import errno
 import fcntl
 import os
 import shutil
@@ -206,6 +207,32 @@ class BagWriter:
             with self._closing_on_failure():
                 self._flush()
 
+    def check(self) -> None:
+        """Look whether what is written still is where the bag is; call it every few tenths of a second.
+
+        Raises
+        ------
+        RecordingError
+            if its file was deleted, moved or replaced; nothing more is written then.
+        """
+        if self.closed:
+            return
+        file = self.path / self._file_name()
+        held = os.fstat(self._stream.fileno())
+        try:
+            found = file.stat()
+            if (found.st_dev, found.st_ino) == (held.st_dev, held.st_ino):
+                return
+            what = "is another file now"
+        except OSError as error:
+            what = f"is gone ({error.strerror})"
+        self.closed = True
+        self._reserve.close()
+        with contextlib.suppress(OSError):
+            self._finish_file()  # whole where it was only moved
+        self._stream.close()
+        raise RecordingError(f"{file.name} {what}: it was deleted or moved while it was recorded")
+
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Add a file to the bag, without a time, so that equal runs give equal bags."""
         with self._closing_on_failure():
@@ -302,14 +329,15 @@ class BagWriter:
     def _give_up(self, error: OSError) -> None:
         """Close the bag with what is on disk, in the space that was reserved for it."""
         reason = error.strerror or str(error)
+        hint = "; free some space" if error.errno in (errno.ENOSPC, errno.EDQUOT) else ""
         try:
             self._finish_bag()
         except OSError as second:
             raise RecordingError(
-                f"{reason}, and there was no space to close it ({second.strerror}); "
-                f"'wam bag repair {self.path}' closes it"
+                f"{reason}, and it could not be closed ({second.strerror}); "
+                f"'wam bag repair {self.path}' closes it{hint}"
             ) from None
-        raise RecordingError(f"{reason}; it was closed with what was recorded before") from None
+        raise RecordingError(f"{reason}; it was closed with what was recorded before{hint}") from None
 
     def _finish_bag(self) -> None:
         self.closed = True

@@ -4,6 +4,7 @@ import json
 from collections import Counter
 from collections.abc import Collection, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import yaml
@@ -13,7 +14,10 @@ from wam_bag import safe_yaml
 REPAIRED: Final = "repaired"  # metadata record of a repair; an entry of JSON for each repair of a file
 PARAMETERS: Final = "parameters.yaml"  # attachment of the recorder
 RECORDING: Final = "recording"  # metadata record of the recorder
+LOST_AT_END: Final = "lost_at_end"  # last word of an entry of it
+UNFINISHED: Final = "no final count"  # entry of it, the names of nodes
 CUT: Final = "cut"  # metadata record of a part of a bag
+_LONGEST_NUMBER: Final = 20  # digits of a count
 _NAMED: Final = 3  # topics that a sentence lists
 _TIME_OF_DAY: Final = 10**18  # ns; smaller log times are stamps of lockstep, which start near 0
 
@@ -61,6 +65,8 @@ class Losses(NamedTuple):
     repaired : by file, None if the entry cannot be read.
     missing : messages by topic that the recorder received and that are not in the bag.
     dropped : messages lost on their way to the recorder, by 'topic from publisher'.
+    at_end : messages that were announced and did not come before the recorder ended, by 'topic from publisher'.
+    unfinished : nodes that gave no final count, so that it is not known what is lost of them at the end.
     uncounted : whether the recorder of this project ended without writing its counts.
     """
 
@@ -68,6 +74,8 @@ class Losses(NamedTuple):
     missing: dict[str, int]
     dropped: dict[str, int]
     uncounted: bool
+    at_end: Mapping[str, int] = MappingProxyType({})
+    unfinished: str = ""
 
     @property
     def by_topic(self) -> dict[str, int]:
@@ -98,6 +106,11 @@ class Losses(NamedTuple):
         if self.dropped:
             listed = ", ".join(f"{count} of {where}" for where, count in self.dropped.items())
             lines.append(f"Lost on the way to the recorder: {listed}.")
+        if self.at_end:
+            listed = ", ".join(f"{count} of {where}" for where, count in self.at_end.items())
+            lines.append(f"Lost at the end: {listed}.")
+        if self.unfinished:
+            lines.append(f"Lost at the end: not known of {self.unfinished}, which gave no final count.")
         if self.uncounted:
             lines.append(
                 "The recorder wrote no counts, because it was killed or its disk was full: further losses are unknown."
@@ -117,13 +130,15 @@ def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts:
     """
     repaired = {key: _parsed(value) for key, value in metadata.get(REPAIRED, {}).items()}
     recording = metadata.get(RECORDING, {})
-    received, dropped = Counter[str](), dict[str, int]()
+    received, dropped, at_end = Counter[str](), dict[str, int](), dict[str, int]()
     for key, value in recording.items():
         where, _, what = key.rpartition(" ")
         if what == "received":
             received[where.split(" ")[0]] += _number(value)
         elif what == "dropped" and _number(value):
             dropped[where.replace(" ", " from ")] = _number(value)
+        elif what == LOST_AT_END and _number(value):
+            at_end[where.replace(" ", " from ")] = _number(value)
     is_part = not counts or CUT in metadata or _is_one_of_several(path, metadata)
     if is_part:
         received = Counter()
@@ -133,6 +148,8 @@ def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts:
         {topic: count for topic, count in missing.items() if count > 0},
         dropped,
         bool(counts) and PARAMETERS in attachments and not recording,
+        at_end,
+        recording.get(UNFINISHED, ""),
     )
 
 
@@ -190,7 +207,7 @@ def _parsed(text: str) -> FileLosses | None:
 
 
 def _number(text: str) -> int:
-    return int(text) if text.isdecimal() else 0
+    return int(text) if text.isdecimal() and len(text) < _LONGEST_NUMBER else 0
 
 
 def _is_one_of_several(path: Path, metadata: Metadata) -> bool:

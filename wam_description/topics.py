@@ -5,6 +5,7 @@ subscribes follows from the declarations of the nodes (`wam_description.nodes`);
 written from both, nodes take their types and QoS from here, the recorder records every row.
 """
 
+from functools import cache
 from typing import Final, NamedTuple
 
 JOINT_STATE, WRENCH, POINT = (
@@ -37,6 +38,31 @@ HYPOTHESIS_COLUMNS: Final = (
     "residual",  # chi^2 that the contact leaves unexplained
     "reasons",  # why the place is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact_inference.REASONS`
 )
+
+
+# Magnitudes that no arm reaches, by quantity: a message with more is refused whole.
+LARGEST: Final = {
+    "position": 1e5,  # rad, of motors too, which turn on without stops
+    "velocity": 1e5,  # rad/s
+    "effort": 1e5,  # N m, or A where the topic carries amperes
+    "force": 1e6,  # N
+    "torque": 1e6,  # N m
+    "point": 1e3,  # m
+}
+_LARGEST_BY_COLUMN: Final = {
+    **dict.fromkeys(("place", "position_sd", "low", "high"), LARGEST["point"]),
+    **dict.fromkeys(("force_x", "force_y", "force_z", "force_sd"), LARGEST["force"]),
+    **dict.fromkeys(("moment_x", "moment_y", "moment_z"), LARGEST["torque"]),
+    **dict.fromkeys(("direction", "direction_sd"), LARGEST["position"]),
+    **dict.fromkeys((LINK, "probability", "is_lower_bound", "reasons"), 1e9),
+}
+LARGEST_ELSEWHERE: Final = 1e100  # in columns without a unit: the square of it is finite
+
+
+@cache
+def largest_of(columns: tuple[str, ...]) -> tuple[float, ...]:
+    """The largest magnitude in each column of a table."""
+    return tuple(_LARGEST_BY_COLUMN.get(name, LARGEST_ELSEWHERE) for name in columns)
 
 
 class Topic(NamedTuple):

@@ -1,6 +1,7 @@
 """Node `driver`: the arm's hardware as the stack sees it, simulated."""
 
 import math
+import tempfile
 import time
 from collections import deque
 from collections.abc import Callable
@@ -9,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from wam_description.interface import Interface, declared
@@ -21,9 +21,10 @@ from wam_ros.messages import Refused
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
 from wam_ros.run import raise_priority
+from wam_ros.tolerance import TolerantNode
 
 
-class DriverNode(Node):
+class DriverNode(TolerantNode):
     """Publishes the state of the arm and takes currents.
 
     realtime: a period of the steady clock is a period of the arm; the last command is held.
@@ -49,7 +50,7 @@ class DriverNode(Node):
         self._watchdog = own.watchdog
         ports.feed("motor_current_command", self._take_currents, "effort")
         ports.feed("sim/disturbance", self._take_push)
-        ports.watch_peers()
+        ports.watch_peers(self._hear)
         for name, kind, answer in (
             ("enable", SetBool, self._enable),
             ("pause", SetBool, self._pause),
@@ -60,6 +61,7 @@ class DriverNode(Node):
         ):
             self.create_service(kind, f"~/{name}", self._served(answer))
         ports.publish("robot_description", 0, urdf(shared.arm))
+        self._try_post_mortem()
         if shared.timing.mode == "realtime":  # in lockstep the first status goes to all peers
             self._announce()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -88,7 +90,17 @@ class DriverNode(Node):
         self._ports.wait_for_delivery()
         super().destroy_node()
 
+    def take_fault(self, reason: str) -> None:
+        """Brake where a callback raised."""
+        if reason:
+            self._fault(reason)
+
     # what comes in
+
+    def _hear(self, status: NodeStatus) -> None:
+        """Brake where another node reports a fault."""
+        if status.level is Level.ERROR and status.fault:
+            self._fault(f"{status.node}: {status.fault}")
 
     def _take_currents(self, stamp: int, command: State) -> None:
         if self._ports.publisher_count("motor_current_command") > 1:
@@ -216,7 +228,7 @@ class DriverNode(Node):
             ports.publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
             ports.publish("sim/contact/point", stamp, Point(frame, (load.place, 0.0, 0.0)))
         if self._timing.mode == "realtime" and ports.report_due(stamp):
-            ports.facts = self._timing_facts()
+            ports.facts |= self._timing_facts()
         ports.report(stamp)
 
     def _announce(self) -> None:
@@ -251,9 +263,28 @@ class DriverNode(Node):
         rows += [
             ",".join(map(repr, (s.stamp, *s.theta, *s.thetad, *s.commanded, *s.actual))) for s in self.driver.recent
         ]
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-        self.get_logger().error(f"the last {len(self.driver.recent)} samples are in {path}")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+        except OSError as error:
+            self._warn_of_post_mortem(error)
+        else:
+            self.get_logger().error(f"the last {len(self.driver.recent)} samples are in {path}")
+
+    def _try_post_mortem(self) -> None:
+        """Warn at the start where the samples of a fault could not be written."""
+        if not self._directory:
+            return
+        try:
+            Path(self._directory).mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=self._directory).close()
+        except OSError as error:
+            self._warn_of_post_mortem(error)
+
+    def _warn_of_post_mortem(self, error: OSError) -> None:
+        reason = f"post_mortem_directory {self._directory} cannot be written: {error.strerror or error}"
+        self._ports.facts["post_mortem"] = reason
+        self.get_logger().warning(f"{reason}; the last samples before a fault are not kept, give another directory")
 
     # services
 
@@ -274,6 +305,8 @@ class DriverNode(Node):
             obstacle = TWO_PUBLISHERS
         elif self.count_publishers("motor_states") > 1:
             obstacle = TWO_DRIVERS
+        elif faults := [f"{node}: {fault}" for node, fault in sorted(self._ports.faults.items()) if fault]:
+            obstacle = "; ".join(faults)
         elif self._timing.mode == "realtime" and now - self._command_came > self._watchdog:
             obstacle = "no motor_current_command comes in; start velocity_loop and its peers, then enable"
         self._progress = now

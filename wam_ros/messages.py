@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import isfinite, isinf
-from typing import Any
+from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped, WrenchStamped
@@ -14,16 +14,22 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, PointCloud2, PointField
 from std_msgs.msg import Bool, String
 
+from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.signals import BASE, NodeStatus, Point, State, Table, Wrench
 from wam_description.status import pairs, parse
-from wam_description.topics import JOINT_STATE, LINK, POINT, TABLE, WRENCH, Topic
+from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, largest_of
 from wam_ros.header import header
 from wam_ros.markers import contact_markers
+
+LONGEST_REASON: Final = 400  # characters; a message may hold a name of any length
 
 
 class Refused(ValueError):
     """A message that is refused; the text names the value, what is allowed and what to do."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(printable(reason, LONGEST_REASON))
 
 
 def joint_state(stamp: int, names: Sequence[str], state: State) -> JointState:
@@ -60,6 +66,8 @@ def read_joint_state(message: JointState, names: list[str], fields: str) -> Stat
         for value, owner in zip(values, message.name, strict=False):
             if not isfinite(value):
                 raise Refused(f"{name} of {owner} is {value}; send finite numbers")
+            if abs(value) > LARGEST[name]:
+                raise Refused(f"{name} of {owner} is {value:g}; {_allowed(LARGEST[name])}")
         if not (name in wanted or name + "?" in wanted):
             values = []
         arrays.append([values[i] for i in order] if order and values else values)
@@ -76,6 +84,10 @@ def _order(found: list[str], names: list[str]) -> list[int]:
         if name not in found:
             raise Refused(f"name '{name}' is missing; send all of {', '.join(names)}")
     return [found.index(name) for name in names]
+
+
+def _allowed(limit: float) -> str:
+    return f"no arm reaches that, send at most {limit:g}"
 
 
 def wrench_stamped(stamp: int, wrench: Wrench) -> WrenchStamped:
@@ -100,6 +112,9 @@ def read_wrench(message: WrenchStamped, frames: Sequence[str]) -> Wrench:
     result = Wrench(frame, (force.x, force.y, force.z), (torque.x, torque.y, torque.z))
     if not all(isfinite(value) for value in (*result.force, *result.torque)):
         raise Refused(f"force {result.force} N, torque {result.torque} N m; send finite numbers")
+    for name, unit, vector in (("force", "N", result.force), ("torque", "N m", result.torque)):
+        if (most := max(map(abs, vector))) > LARGEST[name]:
+            raise Refused(f"{name} has {most:g} {unit}; {_allowed(LARGEST[name])}")
     return result
 
 
@@ -124,6 +139,8 @@ def read_point(message: PointStamped, frames: Sequence[str]) -> Point:
     position = (float(point.x), float(point.y), float(point.z))
     if any(isinf(value) for value in position):
         raise Refused(f"position is {position} m; send finite numbers, or NaN where it is not known")
+    if any(abs(value) > LARGEST["point"] for value in position):
+        raise Refused(f"position is {position} m; {_allowed(LARGEST['point'])}, or NaN where it is not known")
     return Point(frame, position)
 
 
@@ -168,6 +185,11 @@ def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[st
     rows = tuple(struct.iter_unpack(f"<{len(columns)}d", data))
     if any(isinf(value) for row in rows for value in row):
         raise Refused("a number is infinite; send finite numbers, or NaN where one is not known")
+    largest = largest_of(tuple(columns))
+    for row in rows:
+        for name, value, limit in zip(columns, row, largest, strict=True):
+            if abs(value) > limit:
+                raise Refused(f"{name} is {value:g}; {_allowed(limit)}, or NaN where it is not known")
     for link in (row[0] for row in rows if columns[0] == LINK):
         if link not in range(len(frames) - 1):
             raise Refused(f"link is {link}; send the index of one of {', '.join(frames[1:])}")

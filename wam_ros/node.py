@@ -24,9 +24,10 @@ from wam_description.wiring import Call, Declaration, Followed, Outputs, Reactio
 from wam_ros.parameters import declare, follow, follow_other
 from wam_ros.ports import SECOND, Ports
 from wam_ros.run import raise_priority, run
+from wam_ros.tolerance import TolerantNode
 
 
-class AdaptedNode(Node):
+class AdaptedNode(TolerantNode):
     """A declared node on topics: it converts messages, calls the node, publishes with the input's stamp.
 
     Parameters
@@ -84,6 +85,10 @@ class AdaptedNode(Node):
     def failure(self) -> str:
         """Why the node failed, '' where it did not."""
         return getattr(self.node, "failure", "")
+
+    def take_fault(self, reason: str) -> None:
+        """Report what a callback raised."""
+        self._ports.set_fault(reason)
 
     def destroy_node(self) -> None:
         """End only when the others have what was published."""

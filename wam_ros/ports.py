@@ -12,23 +12,25 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
+from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.interface import Interface
 from wam_description.signals import Level, NodeStatus
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
 from wam_ros.header import header
-from wam_ros.messages import Refused, diagnostic_status, message_type, read_status
+from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
 from wam_ros.qos import DEPTH, qos
 from wam_ros.wire import decoder, encoder, stamp_of
 
 DIAGNOSTICS = "/diagnostics"
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
-LOG_PERIOD, MOST_REASONS = 1.0, 20  # s, a reason is logged at most so often; reasons that are remembered
+LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
-LONGEST_DELIVERY = 1.0  # s, for all topics of a node together
+LONGEST_DELIVERY = 3.0  # s, for all topics of a node together
+PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
 
 class Ports:
@@ -57,23 +59,30 @@ class Ports:
         self.faults: dict[str, str] = {}
         self._name = declaration.name
         self._refusals_reported = 0
-        self._status = WAITING
+        self._status = self._own_status = WAITING
+        self._fault = ""
         self._wanted: NodeStatus | None = None
-        self._next_report = 0
+        self._next_report = self._last_report = 0
         self._absent: set[str] = set()
-        self._logged: dict[tuple[str, str], float] = {}
+        self._logged: dict[str, tuple[float, int]] = {}  # by topic: when, and how many had been refused by then
         self._subscriptions: dict[str, Subscription] = {}
         rows = [interface.topics[topic] for topic in declaration.outputs if topic in interface.topics]
         own = [interface.topics[topic] for topic in (STATUS, DIAGNOSTICS)]
         self._publishers: dict[str, Publisher] = {
             row.name: node.create_publisher(message_type(row), row.name, qos(row)) for row in [*rows, *own]
         }
+        self._published = dict.fromkeys(self._publishers, 0)
+        self._full = {topic: node.resolve_topic_name(topic) for topic in self._publishers}
         self._encoders = {row.name: encoder(row, shared) for row in rows}
         self._readiness = node.create_timer(0.02, self._look_for_peers, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
-        self._publishers[topic].publish(self._encoders[topic](stamp, value))
+        self._send(topic, self._encoders[topic](stamp, value))
+
+    def _send(self, topic: str, message: Any) -> None:
+        self._published[topic] += 1
+        self._publishers[topic].publish(message)
 
     def feed(
         self,
@@ -129,14 +138,15 @@ class Ports:
         return int(self._subscriptions[topic].get_publisher_count())
 
     def refuse(self, topic: str, reason: str) -> None:
-        """Count and report a refused message."""
+        """Count a refused message; one a second of each topic is logged."""
         self.refusals[topic] += 1
         now = time.monotonic()
-        if now - self._logged.get((topic, reason), -LOG_PERIOD) >= LOG_PERIOD:
-            if len(self._logged) > MOST_REASONS:  # a reason may carry a number that never comes again
-                self._logged.clear()
-            self._logged[topic, reason] = now
-            self.node.get_logger().warning(f"{topic}: refused: {reason}")
+        since, count = self._logged.get(topic, (-LOG_PERIOD, 0))
+        if now - since >= LOG_PERIOD:
+            others = self.refusals[topic] - count - 1
+            more = f" ({others} more were refused before)" if others else ""
+            self._logged[topic] = now, self.refusals[topic]
+            self.node.get_logger().warning(f"{topic}: refused: {printable(reason, LONGEST_REASON)}{more}")
 
     def set_status(self, status: NodeStatus) -> None:
         """Publish the status of the node, latched; kept until the node is ready."""
@@ -145,21 +155,37 @@ class Ports:
             return
         self.publish_status(status._replace(connected=True))
 
+    def set_fault(self, reason: str) -> None:
+        """Publish the status with a fault of the node itself; '' where it is over."""
+        self._fault = reason
+        self.publish_status(self._own_status)
+
     def publish_status(self, status: NodeStatus) -> None:
         """Publish the status of the node as it is, where it has changed."""
+        self._own_status = status
+        if self._fault:
+            status = status._replace(level=Level.ERROR, message=self._fault, fault=self._fault)
         status = status._replace(node=self._name)
         if status != self._status:
             self._status = status
-            self._publishers[STATUS].publish(diagnostic_status(status, self.shared.arm.name))
+            self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
 
     def wait_for_delivery(self) -> None:
-        """Wait until the recorder and all others have the last messages, at most `LONGEST_DELIVERY`.
+        """Report how much was published, then wait until the recorder and all others have the last messages.
 
         What a process leaves behind unacknowledged ends with it: on a loaded machine that was the last second of a bag.
         """
+        self._report(**{ENDED: "yes"})
         end = time.monotonic() + LONGEST_DELIVERY
-        for publisher in self._publishers.values():
-            publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
+        late = [
+            topic
+            for topic, publisher in self._publishers.items()
+            if not publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
+        ]
+        if late:
+            self.node.get_logger().warning(
+                f"ends before all listeners took the last messages of {', '.join(late)}: one is very slow, or gone"
+            )
 
     def watch_peers(self, take: Callable[[NodeStatus], None] | None = None) -> None:
         """Listen to the status of the other nodes, for `absent` and `faults`, and hand each to `take`."""
@@ -169,9 +195,9 @@ class Ports:
             status = read_status(message)
             if status.connected:
                 self._absent.discard(status.node)
-            if status.node in self.interface.declarations:
+            if status.node in self.interface.declarations and status.node != self._name:
                 self.faults[status.node] = status.fault
-                if take is not None and status.node != self._name:
+                if take is not None:
                     take(status)
 
         self.listen(STATUS, receive)
@@ -206,11 +232,20 @@ class Ports:
         if not self.report_due(stamp):
             return
         self._next_report = stamp - stamp % SECOND + SECOND
+        self._last_report = stamp
+        self._report()
+
+    def _report(self, **more: str) -> None:
+        """Publish the diagnostics, with how many messages were published on each topic, this one included."""
         total = sum(self.refusals.values())
         refused = {f"refused on {topic}": str(count) for topic, count in sorted(self.refusals.items())}
         level = max(self._status.level, Level.WARN if total > self._refusals_reported else Level.OK)
         self._refusals_reported = total
-        facts = {**{key: str(count) for key, count in sorted(self.counts.items())}, **refused, **self.facts}
-        status = NodeStatus(level, self._status.message, self._name, fault=self._status.fault, facts=facts)
+        counts = {key: str(count) for key, count in sorted(self.counts.items())}
+        totals = {**self._published, DIAGNOSTICS: self._published[DIAGNOSTICS] + 1}
+        published = {f"{PUBLISHED}{self._full[topic]}": str(count) for topic, count in totals.items()}
+        own = {NODE: self.node.get_fully_qualified_name(), **published}
+        facts = {**counts, **refused, **own, **self.facts}
+        status = NodeStatus(level, self._status.message, self._name, fault=self._status.fault, facts={**facts, **more})
         message = diagnostic_status(status._replace(connected=self.ready), self.shared.arm.name)
-        self._publishers[DIAGNOSTICS].publish(DiagnosticArray(header=header(stamp), status=[message]))
+        self._send(DIAGNOSTICS, DiagnosticArray(header=header(self._last_report), status=[message]))

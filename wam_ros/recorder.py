@@ -2,16 +2,19 @@
 
 import struct
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import Final, NamedTuple
 
 from wam_bag.bag_writer import BagWriter, RecordingError
+from wam_bag.losses import LOST_AT_END, UNFINISHED
 from wam_bag.message_layout import stamp_reader
-from wam_description.topics import Topic
+from wam_bag.printable import printable
+from wam_description.topics import EVERY_NODE, Topic
 
 _MOST_STREAMS: Final = 8  # numberings tracked for one topic and publisher
 _MOST_PUBLISHERS: Final = 64  # publishers counted separately in one topic
+_LONGEST_NAME: Final = 200  # bytes of a publisher's name
 _NODE_STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 _NODE_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
@@ -21,6 +24,7 @@ class Count(NamedTuple):
 
     `missed` are the messages it had numbered before the first one received: published before the
     recorder started, or before the first message of a late publisher (latched topics).
+    `lost_at_end` are those that it announced and that did not come, nor any behind them.
     """
 
     topic: str
@@ -28,6 +32,7 @@ class Count(NamedTuple):
     received: int
     dropped: int
     missed: int
+    lost_at_end: int = 0
 
 
 class Numbering:
@@ -62,6 +67,11 @@ class Numbering:
         self.dropped += number - nearest - 1
         self._last[self._last.index(nearest)] = number
 
+    def lacking(self, total: int) -> int:
+        """Messages that are missing behind the last one, of a publisher that has sent so many."""
+        before = [last for last in self._last if last <= total]
+        return total - max(before) if before else max(0, total - self.received - self.dropped)
+
 
 class _Channel:
     """One topic on its way into the bag."""
@@ -72,6 +82,22 @@ class _Channel:
         self.publisher_of = _publisher_reader(topic, partial(sender, name))
         self.stamp_of = stamp_reader(topic.type)
         self.publishers: OrderedDict[str, Numbering] = OrderedDict()
+        self.totals: dict[str, int] = {}  # published by each node that has announced it
+        self._first_totals: dict[str, int] = {}
+        self._is_shared = topic.name in EVERY_NODE
+
+    def announce(self, node: str, total: int) -> None:
+        """A node has published so many messages on this topic."""
+        self._first_totals.setdefault(node, total)
+        self.totals[node] = total
+
+    def lost_at_end(self, node: str) -> int:
+        """Messages that a node announced and that are missing behind the last one of it."""
+        total = self.totals.get(node, 0)
+        found = [numbering for name, numbering in self.publishers.items() if not self._is_shared or name == node]
+        if not found:  # what was sent before its first report may have been sent before there was a recorder
+            return total - self._first_totals.get(node, total)
+        return min(numbering.lacking(total) for numbering in found) if total else 0
 
     def numbering(self, publisher: str) -> Numbering:
         """Counts of one publisher; if there are too many, the oldest is dropped."""
@@ -114,6 +140,11 @@ class Recorder:
             bag.add_topic(name, topic.type, qos[name])
             self._channels[name] = _Channel(topic, name, sender)
 
+    def announce(self, node: str, name: str, total: int) -> None:
+        """Take the number of messages that a node says it has published on a topic, by its full name."""
+        if channel := self._channels.get(name):
+            channel.announce(node, total)
+
     def receive(self, name: str, data: bytes, received: int, sent: int, number: int) -> None:
         """Record one message; a message of a topic that is not recorded is ignored.
 
@@ -135,6 +166,8 @@ class Recorder:
                 stamp = self._stamps.get(publisher, 0)
             else:
                 self._stamps[publisher] = stamp
+                if len(self._stamps) > _MOST_PUBLISHERS * len(self._channels):
+                    del self._stamps[next(iter(self._stamps))]
             received = sent = stamp
         self._received += 1
         if self.failure:
@@ -145,8 +178,9 @@ class Recorder:
             self._fail(error)
 
     def flush(self) -> None:
-        """Write received messages to disk; call it every few tenths of a second."""
+        """Write received messages to disk and see that they are there; call it every few tenths of a second."""
         self._try(self._bag.flush_when_due)
+        self._try(self._bag.check)
 
     def attach(self, name: str, media_type: str, data: bytes) -> bool:
         """Add a file to the bag; False if it cannot be written."""
@@ -159,24 +193,33 @@ class Recorder:
 
     def counts(self) -> list[Count]:
         """Received and lost messages by topic and publisher."""
-        return [
-            Count(channel.name, publisher, numbering.received, numbering.dropped, numbering.missed)
-            for channel in self._channels.values()
-            for publisher, numbering in channel.publishers.items()
-        ]
+        return [count for channel in self._channels.values() for count in _counts(channel)]
 
     def dropped(self) -> int:
         """Messages lost on the way to the recorder."""
         return sum(count.dropped for count in self.counts())
 
-    def finish(self) -> None:
-        """Write counts and drops into the bag and close it; `failure` gives the reason if that was not possible."""
+    def lost_at_end(self) -> int:
+        """Messages that their nodes announced and that have not come, so far."""
+        return sum(count.lost_at_end for count in self.counts())
+
+    def finish(self, unfinished: Sequence[str] = ()) -> None:
+        """Write counts and losses into the bag and close it; `failure` gives the reason if that was not possible.
+
+        Parameters
+        ----------
+        unfinished : nodes that ended without their final count.
+        """
         values = {"mode": "lockstep" if self._lockstep else "realtime"}
+        if unfinished:
+            values[UNFINISHED] = ", ".join(unfinished)
         for count in self.counts():
             key = f"{count.topic} {count.publisher}"
             values[f"{key} received"] = str(count.received)
             values[f"{key} dropped"] = str(count.dropped)
             values[f"{key} missed"] = str(count.missed)
+            if count.lost_at_end:
+                values[f"{key} {LOST_AT_END}"] = str(count.lost_at_end)
         self._try(lambda: self._bag.metadata("recording", values))
         self._try(self._bag.close)
 
@@ -189,17 +232,29 @@ class Recorder:
         return not self.failure
 
     def _fail(self, error: RecordingError) -> None:
-        self.failure = (
-            f"bag {self._bag.path} can no longer be written: {error}; free some space and start a new recording"
-        )
+        self.failure = f"bag {self._bag.path} can no longer be written: {error}; start a new recording"
 
 
-def summary(counts: Iterable[Count]) -> str:
-    """One line for people: how many messages came and of which topics some were lost."""
+def summary(counts: Iterable[Count], unfinished: Sequence[str] = ()) -> str:
+    """One line for people: how many messages came, and of which topics some were lost, on the way and at the end."""
     listed = list(counts)
     lost = [f"{c.dropped} of {c.topic} from {c.publisher}" for c in listed if c.dropped]
-    total = sum(c.received for c in listed)
-    return f"{total} messages, " + ("none lost" if not lost else "lost: " + ", ".join(lost))
+    at_end = [f"{c.lost_at_end} of {c.topic} from {c.publisher}" for c in listed if c.lost_at_end]
+    said = [f"{sum(c.received for c in listed)} messages"]
+    said += [f"lost: {', '.join(lost)}"] * bool(lost) + [f"lost at the end: {', '.join(at_end)}"] * bool(at_end)
+    said += [f"lost at the end: not known of {', '.join(unfinished)}, which gave no final count"] * bool(unfinished)
+    return ", ".join([*said, *["none lost"] * (len(said) == 1)])
+
+
+def _counts(channel: _Channel) -> Iterator[Count]:
+    """Of one topic by publisher; what was lost at the end counts where the node is known by name, else once."""
+    lost = {node: channel.lost_at_end(node) for node in channel.totals}
+    for publisher, found in channel.publishers.items():
+        at_end = lost.pop(publisher, 0)
+        yield Count(channel.name, publisher, found.received, found.dropped, found.missed, at_end)
+    for node, count in lost.items():
+        if count:
+            yield Count(channel.name, node, 0, 0, 0, count)
 
 
 def _publisher_reader(topic: Topic, sender: Callable[[], str]) -> Callable[[bytes], str]:
@@ -234,7 +289,8 @@ def _node_name(data: bytes, position: int) -> str:
         (length,) = struct.unpack_from("<I", data, position)
     except struct.error:
         return "?"
-    name = data[position + 4 : position + 3 + length].decode("utf-8", "replace").strip("/")
+    end = position + 3 + min(length, _LONGEST_NAME)
+    name = printable(data[position + 4 : end].decode("utf-8", "replace").strip("/"))
     return name.split(":")[0].split("/")[0].strip() or "?"
 
 

@@ -2,28 +2,33 @@
 
 import inspect
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 
 from wam_bag.bag_writer import BagWriter, RecordingError, Split
 from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, parameter, values
+from wam_description.signals import Level, NodeStatus
 from wam_description.topics import BY_NAME, Topic
-from wam_ros.messages import diagnostic_status, message_type
+from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.parameters import declare
-from wam_ros.ports import READY
+from wam_ros.ports import DIAGNOSTICS, ENDED, NODE, PUBLISHED, READY
 from wam_ros.qos import DEPTH, qos
 from wam_ros.recorder import Recorder, summary
 from wam_ros.recorder_interface import RecorderInterface
 from wam_ros.remote_parameters import RemoteParameters, as_yaml
+from wam_ros.tolerance import TolerantNode
 
 EVERY = "*"
+LONGEST_WAIT = 1.0  # s, at the end, for messages that were announced
+MOST_STATUSES, LONGEST_COUNT = 64, 16  # in a message of /diagnostics; digits
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,7 @@ class RecorderParameters:
     directory: str = parameter("directory of the bag; created if it is missing")
     name: str = parameter("name of the bag, a new directory; empty: arm, date and time of the start")
     topics: tuple[str, ...] = parameter("recorded topics, named as in docs/topics.md; '*' for all")
+    required: bool = parameter("whether the arm brakes when the bag can no longer be written", before=False)
     split_size: int = parameter("size at which the bag continues in another file; 0: never", "byte", 0)
     split_time: float = parameter("time after which the bag continues in another file; 0: never", "s", 0.0)
 
@@ -44,7 +50,7 @@ class RecorderParameters:
             raise ParameterError(f"parameter 'name' is '{self.name}'; allowed: a name without directories")
 
 
-class RecorderNode(Node):
+class RecorderNode(TolerantNode):
     """Records from construction to `destroy_node`, which closes the bag."""
 
     def __init__(self, **ros: Any) -> None:
@@ -52,6 +58,7 @@ class RecorderNode(Node):
         shared, own = declare(self, RecorderParameters)
         self._own_parameters = {**values(shared), **values(own)}
         self._arm = shared.arm.name
+        self._required = own.required
         name = own.name or f"{shared.arm.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
         try:
             self.bag = BagWriter(Path(own.directory) / name, Split(own.split_size, own.split_time))
@@ -66,6 +73,9 @@ class RecorderNode(Node):
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription
         self._inlets = {name: self._listen(name, topic) for name, topic in topics.items()}
         own_name = RecorderInterface.name
+        self._nodes = frozenset(interface.names) - {own_name}
+        self._ends_last = own_name in interface.names  # one that was started by hand may end before the others
+        self._unfinished = set(self._nodes) if self._ends_last else set()  # nodes without a final count
         self._expected = {name: len([one for one in found if one != own_name]) for name, found in publishers.items()}
         self.parameters_of_nodes = RemoteParameters(self, [name for name in interface.names if name != own_name])
         self._status = self.create_publisher(DiagnosticStatus, "status", qos(BY_NAME["status"]))
@@ -84,6 +94,10 @@ class RecorderNode(Node):
     def destroy_node(self) -> None:
         """Record the messages that have arrived, write parameters and counts, close the bag."""
         self._drain()
+        end = time.monotonic() + LONGEST_WAIT
+        while self.recorder.lost_at_end() and time.monotonic() < end:  # it may still be on the way
+            time.sleep(0.02)
+            self._drain()
         self._close()
         super().destroy_node()
 
@@ -92,11 +106,34 @@ class RecorderNode(Node):
         """Why the bag is incomplete, '' if it is not."""
         return self.recorder.failure
 
+    def take_fault(self, reason: str) -> None:
+        """Report what a callback raised; a recorder that fails in this way may lack messages."""
+        self._status.publish(self._state(reason or self.recorder.failure or "recording", reason))
+
     def _listen(self, name: str, topic: Topic) -> Any:
         profile = qos(topic)
         profile.depth = DEPTH
-        receiver = _Receiver(self.recorder, name)
+        receiver = _Receiver(self.recorder, name, self._take_totals if topic.name == DIAGNOSTICS else None)
         return self.create_subscription(message_type(topic), name, receiver, profile, raw=True)
+
+    def _take_totals(self, data: bytes) -> None:
+        """Take what the nodes report about the messages that they have published."""
+        try:
+            message = deserialize_message(data, DiagnosticArray)
+        except Exception:  # rclpy raises its own kinds for bytes that are no such message
+            return
+        for facts in (read_status(status).facts for status in message.status[:MOST_STATUSES]):
+            namespace, _, node = facts.get(NODE, "").rpartition("/")
+            if node not in self._nodes or namespace != self.get_namespace().rstrip("/"):
+                continue  # a node of another arm
+            for key, value in facts.items():
+                topic = key.removeprefix(PUBLISHED)
+                if topic != key and value.isdecimal() and len(value) < LONGEST_COUNT:
+                    self.recorder.announce(node, topic, int(value))
+            if ENDED in facts:
+                self._unfinished.discard(node)
+            elif self._ends_last:
+                self._unfinished.add(node)
 
     def _sender(self, name: str) -> str:
         """The node that publishes a topic, '' where there are several."""
@@ -126,7 +163,7 @@ class RecorderNode(Node):
         if self.recorder.failure and not self._failed:
             self._failed = True
             self.get_logger().error(self.recorder.failure)
-            self._status.publish(self._state(self.recorder.failure))
+            self._status.publish(self._state(self.recorder.failure, self.recorder.failure if self._required else ""))
         dropped = self.recorder.dropped()
         if dropped > self._dropped:
             self._dropped = dropped
@@ -137,7 +174,7 @@ class RecorderNode(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
-    def _state(self, text: str) -> DiagnosticStatus:
+    def _state(self, text: str, fault: str = "") -> DiagnosticStatus:
         counts = self.recorder.counts()
         facts = {
             "bag": str(self.bag.path),
@@ -148,12 +185,9 @@ class RecorderNode(Node):
         for count in counts:
             if count.dropped:
                 facts[f"dropped {count.topic} from {count.publisher}"] = str(count.dropped)
-        return DiagnosticStatus(
-            level=DiagnosticStatus.ERROR if self.recorder.failure else DiagnosticStatus.OK,
-            name=self.get_name(),
-            message=text,
-            hardware_id=self._arm,
-            values=[KeyValue(key=key, value=value) for key, value in facts.items()],
+        level = Level.ERROR if self.recorder.failure or fault else Level.OK
+        return diagnostic_status(
+            NodeStatus(level, text, self.get_name(), connected=self.ready, fault=fault, facts=facts), self._arm
         )
 
     def _drain(self) -> None:
@@ -176,11 +210,14 @@ class RecorderNode(Node):
 
     def _close(self) -> None:
         self._attach_parameters()
-        self.recorder.finish()
-        counts = summary(self.recorder.counts())
+        unfinished = sorted(self._unfinished)
+        self.recorder.finish(unfinished)
+        counts = summary(self.recorder.counts(), unfinished)
         if self.recorder.failure:
             lost = f"; {self.recorder.lost_at_disk} messages could not be written"
             self.get_logger().error(f"{self.recorder.failure}{lost}; {counts}")
+        elif self.recorder.lost_at_end() or unfinished:
+            self.get_logger().warning(f"{self.bag.path}: {counts}")
         else:
             self.get_logger().info(f"{self.bag.path}: {counts}")
 
@@ -194,9 +231,10 @@ class _Receiver:
 
     __signature__ = inspect.signature(lambda data, info: None)
 
-    def __init__(self, recorder: Recorder, name: str) -> None:
+    def __init__(self, recorder: Recorder, name: str, take: Callable[[bytes], None] | None) -> None:
         self._receive = recorder.receive
         self._name = name
+        self._take = take
 
     def __call__(self, *taken: Any) -> None:
         data, info = taken if len(taken) == 2 else taken[0]
@@ -207,3 +245,5 @@ class _Receiver:
             info["source_timestamp"],
             info["publication_sequence_number"] or 0,
         )
+        if self._take is not None:
+            self._take(data)

@@ -56,8 +56,11 @@ class RemoteParameters:
         question.add_done_callback(partial(self._got, name, names))
 
     def _got(self, name: str, names: list[str], future: Any) -> None:
-        values = (parameter_value_to_python(value) for value in future.result().values)
-        self.found[name] = dict(zip(names, values, strict=True))
+        try:
+            values = [parameter_value_to_python(value) for value in future.result().values]
+            self.found[name] = dict(zip(names, values, strict=True))
+        except (RuntimeError, ValueError):
+            return  # no answer of a node of ours; the next request follows
 
 
 def as_yaml(parameters: Mapping[str, Mapping[str, Any]]) -> str:

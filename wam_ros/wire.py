@@ -8,20 +8,21 @@ refuse the same.  Padding is written as zeros.  benchmarks/speed.py shows the ga
 import struct
 from collections.abc import Callable
 from functools import cache
-from math import isfinite, isinf
+from math import isfinite
 from typing import Any
 
 from rclpy.serialization import deserialize_message, serialize_message
 
 from wam_description.arm import Shared
 from wam_description.signals import BASE, State, Table, Wrench
-from wam_description.topics import JOINT_STATE, LINK, POINT, TABLE, WRENCH, Topic
+from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, largest_of
 from wam_ros.messages import Refused, message_type, reader, writer
 
 LITTLE_ENDIAN = b"\0\1\0\0"
 HEAD = struct.Struct("<4siI")  # encapsulation, seconds, nanoseconds
 SECOND = 1_000_000_000
 _COUNT = struct.Struct("<I")
+_LARGEST = tuple(LARGEST[name] for name in State._fields)
 
 Encode = Callable[[int, Any], bytes]
 Decode = Callable[[bytes], Any]
@@ -142,7 +143,7 @@ def _read_joint_state(data: bytes, names: bytes, count: int, needed: list[bool],
                 return None
             values = list(struct.unpack_from(f"<{count}d", data, at))
             at += 8 * count
-            if not all(map(isfinite, values)):
+            if not all(map(isfinite, values)) or max(values) > _LARGEST[i] or min(values) < -_LARGEST[i]:
                 return None
         elif needed[i]:
             return None
@@ -183,6 +184,8 @@ def _read_wrench(data: bytes, frames: frozenset[str]) -> Wrench | None:
     frame = _frame(data, size)
     fx, fy, fz, tx, ty, tz = numbers = struct.unpack_from("<6d", data, at)
     if frame not in frames or not all(map(isfinite, numbers)):
+        return None
+    if max(map(abs, (fx, fy, fz))) > LARGEST["force"] or max(map(abs, (tx, ty, tz))) > LARGEST["torque"]:
         return None
     return Wrench(frame, (fx, fy, fz), (tx, ty, tz))
 
@@ -238,7 +241,8 @@ def _read_table(data: bytes, columns: tuple[str, ...], frames: frozenset[str]) -
     if len(numbers) != count:
         return None
     rows = tuple(struct.iter_unpack(f"<{len(columns)}d", numbers))
-    if any(isinf(number) for row in rows for number in row):
+    largest = largest_of(columns)
+    if any(abs(number) > limit for row in rows for number, limit in zip(row, largest, strict=True)):
         return None
     if columns[0] == LINK and any(row[0] not in range(len(frames) - 1) for row in rows):
         return None

@@ -1,0 +1,122 @@
+"""A ROS node that no message, request or timer ends: what a callback raises is a fault with the node's name."""
+
+import functools
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from wam_bag.printable import printable
+
+HELD: Final = 1.0  # s without a further exception, after which a fault is over
+LONGEST: Final = 300  # characters of an exception that are reported
+_READABLE: Final = frozenset(kind.value for kind in Parameter.Type)
+
+
+class TolerantNode(Node):
+    """Callbacks that raise are reported, once a second at most, and the node goes on.
+
+    A node that ends at an exception leaves the arm enabled until a watchdog sees it, and anybody could end it who
+    finds a message that it cannot bear.  Here the exception goes to `take_fault`, which reports a status of level
+    ERROR with a `fault`: the driver brakes and names it.
+    """
+
+    _exceptions = 0  # so far
+    _exception_time = 0.0  # of the newest one, s
+    _exception_fault = ""
+    _exception_timer: Any = None
+
+    def take_fault(self, reason: str) -> None:
+        """Report a fault of this node; '' where it is over."""
+
+    def create_subscription(self, msg_type: Any, topic: str, callback: Any, *more: Any, **options: Any) -> Any:
+        """As that of rclpy."""
+        bearing = self._bearing(callback, f"a message on {topic}")
+        return super().create_subscription(msg_type, topic, bearing, *more, **options)
+
+    def create_timer(self, timer_period_sec: float, callback: Any, *more: Any, **options: Any) -> Any:
+        """As that of rclpy."""
+        name = getattr(callback, "__name__", "a timer")
+        return super().create_timer(timer_period_sec, self._bearing(callback, name), *more, **options)
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Any, **options: Any) -> Any:
+        """As that of rclpy."""
+        if srv_type in (SetParameters, SetParametersAtomically):
+            callback = _refusing_unknown_types(callback)
+        return super().create_service(
+            srv_type, srv_name, self._serving(callback, f"a request to {srv_name}"), **options
+        )
+
+    def _bearing(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
+        @functools.wraps(callback)  # rclpy looks at its signature
+        def bear(*arguments: Any) -> Any:
+            try:
+                return callback(*arguments)
+            except Exception as error:
+                self._take_exception(what, error)
+
+        return bear
+
+    def _serving(self, callback: Callable[[Any, Any], Any], what: str) -> Callable[[Any, Any], Any]:
+        @functools.wraps(callback)
+        def serve(request: Any, response: Any) -> Any:
+            try:
+                return callback(request, response)
+            except Exception as error:
+                self._take_exception(what, error)
+                if hasattr(response, "message"):
+                    response.success, response.message = False, self._exception_fault
+                return response
+
+        return serve
+
+    def _take_exception(self, what: str, error: Exception) -> None:
+        self._exceptions += 1
+        self._exception_time = time.monotonic()
+        if self._exception_fault:
+            return
+        text = printable(f"{type(error).__name__}: {error}", LONGEST)
+        self._exception_fault = f"unexpected {text}, at {what}; please report it with the log of node {self.get_name()}"
+        trace = printable("".join(traceback.format_exception(error)[-8:]), 20 * LONGEST, "\n")
+        self.get_logger().error(f"{self._exception_fault} ({self._exceptions} so far)\n{trace}")
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._exception_timer = super().create_timer(HELD, self._look_for_end, clock=steady)
+        self.take_fault(self._exception_fault)
+
+    def _look_for_end(self) -> None:
+        """Report that the fault is over, when callbacks have gone well for a while."""
+        if time.monotonic() - self._exception_time < HELD:
+            return
+        self._exception_fault = ""
+        self.destroy_timer(self._exception_timer)
+        self.take_fault("")
+
+
+def _refusing_unknown_types(callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    """The service of rclpy raises where the type of a value is none of ROS."""
+
+    def answer(request: Any, response: Any) -> Any:
+        if not (wrong := _wrong(request.parameters)):
+            return callback(request, response)
+        refused = SetParametersResult(successful=False, reason=wrong)
+        if hasattr(response, "results"):
+            response.results = [refused] * len(request.parameters)
+        else:
+            response.result = refused
+        return response
+
+    return answer
+
+
+def _wrong(parameters: Sequence[Any]) -> str:
+    for found in parameters:
+        if found.value.type not in _READABLE:
+            name = printable(found.name, 100)
+            return f"parameter '{name}' has the type {found.value.type}; allowed: {min(_READABLE)} to {max(_READABLE)}"
+    return ""
