@@ -40,29 +40,36 @@ HYPOTHESIS_COLUMNS: Final = (
 )
 
 
-# Magnitudes that no arm reaches, by quantity: a message with more is refused whole.
+# Magnitudes that no arm reaches, by quantity, also in an experiment without limits: a message with more is refused
+# whole.  What is computed from less stays finite.
 LARGEST: Final = {
-    "position": 1e5,  # rad, of motors too, which turn on without stops
-    "velocity": 1e5,  # rad/s
-    "effort": 1e5,  # N m, or A where the topic carries amperes
-    "force": 1e6,  # N
-    "torque": 1e6,  # N m
+    "position": 1e6,  # rad, of motors too, which turn on without stops
+    "velocity": 1e6,  # rad/s
+    "effort": 1e12,  # N m, or A where the topic carries amperes
+    "force": 1e9,  # N
+    "torque": 1e9,  # N m
     "point": 1e3,  # m
 }
-_LARGEST_BY_COLUMN: Final = {
-    **dict.fromkeys(("place", "position_sd", "low", "high"), LARGEST["point"]),
-    **dict.fromkeys(("force_x", "force_y", "force_z", "force_sd"), LARGEST["force"]),
-    **dict.fromkeys(("moment_x", "moment_y", "moment_z"), LARGEST["torque"]),
-    **dict.fromkeys(("direction", "direction_sd"), LARGEST["position"]),
-    **dict.fromkeys((LINK, "probability", "is_lower_bound", "reasons"), 1e9),
-}
-LARGEST_ELSEWHERE: Final = 1e100  # in columns without a unit: the square of it is finite
+LARGEST_ESTIMATE: Final = 1e12  # in a column of the contact hypotheses, whatever its unit
+LARGEST_ELSEWHERE: Final = 1e100  # in other tables
+_KNOWN: Final = (LINK, "probability", "force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+
+
+class Column(NamedTuple):
+    """What numbers a column of a table may have."""
+
+    name: str
+    largest: float  # magnitude
+    may_be_unknown: bool  # NaN
 
 
 @cache
-def largest_of(columns: tuple[str, ...]) -> tuple[float, ...]:
-    """The largest magnitude in each column of a table."""
-    return tuple(_LARGEST_BY_COLUMN.get(name, LARGEST_ELSEWHERE) for name in columns)
+def columns_of(names: tuple[str, ...]) -> tuple[Column, ...]:
+    """The columns of a table by their names."""
+    known = HYPOTHESIS_COLUMNS
+    return tuple(
+        Column(name, LARGEST_ESTIMATE if name in known else LARGEST_ELSEWHERE, name not in _KNOWN) for name in names
+    )
 
 
 class Topic(NamedTuple):

@@ -5,7 +5,7 @@ import struct
 from array import array
 from collections.abc import Callable, Sequence
 from functools import cache
-from math import isfinite, isinf
+from math import isfinite, isinf, isnan
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -18,7 +18,7 @@ from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.signals import BASE, NodeStatus, Point, State, Table, Wrench
 from wam_description.status import pairs, parse
-from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, largest_of
+from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, columns_of
 from wam_ros.header import header
 from wam_ros.markers import contact_markers
 
@@ -185,11 +185,12 @@ def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[st
     rows = tuple(struct.iter_unpack(f"<{len(columns)}d", data))
     if any(isinf(value) for row in rows for value in row):
         raise Refused("a number is infinite; send finite numbers, or NaN where one is not known")
-    largest = largest_of(tuple(columns))
     for row in rows:
-        for name, value, limit in zip(columns, row, largest, strict=True):
-            if abs(value) > limit:
-                raise Refused(f"{name} is {value:g}; {_allowed(limit)}, or NaN where it is not known")
+        for (name, largest, may_be_unknown), value in zip(columns_of(tuple(columns)), row, strict=True):
+            if isnan(value) and not may_be_unknown:
+                raise Refused(f"{name} is nan; send a finite number")
+            if abs(value) > largest:
+                raise Refused(f"{name} is {value:g}; {_allowed(largest)}, or NaN where it is not known")
     for link in (row[0] for row in rows if columns[0] == LINK):
         if link not in range(len(frames) - 1):
             raise Refused(f"link is {link}; send the index of one of {', '.join(frames[1:])}")

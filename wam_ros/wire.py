@@ -8,14 +8,13 @@ refuse the same.  Padding is written as zeros.  benchmarks/speed.py shows the ga
 import struct
 from collections.abc import Callable
 from functools import cache
-from math import isfinite
 from typing import Any
 
 from rclpy.serialization import deserialize_message, serialize_message
 
 from wam_description.arm import Shared
 from wam_description.signals import BASE, State, Table, Wrench
-from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, largest_of
+from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, columns_of
 from wam_ros.messages import Refused, message_type, reader, writer
 
 LITTLE_ENDIAN = b"\0\1\0\0"
@@ -23,6 +22,7 @@ HEAD = struct.Struct("<4siI")  # encapsulation, seconds, nanoseconds
 SECOND = 1_000_000_000
 _COUNT = struct.Struct("<I")
 _LARGEST = tuple(LARGEST[name] for name in State._fields)
+_LARGEST_WRENCH = (LARGEST["force"],) * 3 + (LARGEST["torque"],) * 3
 
 Encode = Callable[[int, Any], bytes]
 Decode = Callable[[bytes], Any]
@@ -143,8 +143,10 @@ def _read_joint_state(data: bytes, names: bytes, count: int, needed: list[bool],
                 return None
             values = list(struct.unpack_from(f"<{count}d", data, at))
             at += 8 * count
-            if not all(map(isfinite, values)) or max(values) > _LARGEST[i] or min(values) < -_LARGEST[i]:
-                return None
+            limit = _LARGEST[i]
+            for value in values:
+                if not -limit <= value <= limit:  # NaN, too
+                    return None
         elif needed[i]:
             return None
         arrays.append(values if taken[i] else [])
@@ -183,10 +185,11 @@ def _read_wrench(data: bytes, frames: frozenset[str]) -> Wrench | None:
         return None
     frame = _frame(data, size)
     fx, fy, fz, tx, ty, tz = numbers = struct.unpack_from("<6d", data, at)
-    if frame not in frames or not all(map(isfinite, numbers)):
+    if frame not in frames:
         return None
-    if max(map(abs, (fx, fy, fz))) > LARGEST["force"] or max(map(abs, (tx, ty, tz))) > LARGEST["torque"]:
-        return None
+    for value, limit in zip(numbers, _LARGEST_WRENCH, strict=True):
+        if not -limit <= value <= limit:  # NaN, too
+            return None
     return Wrench(frame, (fx, fy, fz), (tx, ty, tz))
 
 
@@ -221,6 +224,15 @@ def _table(columns: tuple[str, ...], stamp: int, value: Table) -> bytes:
     )
 
 
+@cache
+def _table_limits(columns: tuple[str, ...]) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """The largest magnitude of each column, and which ones may not be NaN."""
+    found = columns_of(columns)
+    return tuple(column.largest for column in found), tuple(
+        i for i, column in enumerate(found) if not column.may_be_unknown
+    )
+
+
 def _read_table(data: bytes, columns: tuple[str, ...], frames: frozenset[str]) -> Table | None:
     """The value, None where the message has to be looked at more closely."""
     if len(data) < 16 or data[:4] != LITTLE_ENDIAN:
@@ -241,9 +253,14 @@ def _read_table(data: bytes, columns: tuple[str, ...], frames: frozenset[str]) -
     if len(numbers) != count:
         return None
     rows = tuple(struct.iter_unpack(f"<{len(columns)}d", numbers))
-    largest = largest_of(columns)
-    if any(abs(number) > limit for row in rows for number, limit in zip(row, largest, strict=True)):
-        return None
+    largest, known = _table_limits(columns)
+    for row in rows:
+        for number, limit in zip(row, largest, strict=True):
+            if abs(number) > limit:
+                return None
+        for i in known:
+            if row[i] != row[i]:
+                return None
     if columns[0] == LINK and any(row[0] not in range(len(frames) - 1) for row in rows):
         return None
     return Table(frame, rows)
