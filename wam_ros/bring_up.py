@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
+from rclpy.logging import get_logger
 from rclpy.node import Node
 
 from wam_description.configuration import Configuration
@@ -19,9 +20,12 @@ from wam_description.interface import declared
 from wam_ros.node import make_node
 from wam_ros.run import NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
+LOGGER: Final = get_logger("wam")
 FIRST: Final = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST: Final = "recorder"  # to be stopped: it closes the bag
-PATIENCE: Final = 5.0  # s, for a node to end by itself on a busy machine; usually it takes a tenth of one
+PATIENCE: Final = 5.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
+RECORDER_PATIENCE: Final = 30.0  # s without any sign of work, before a recorder that does not end is killed
+TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
 
 
 def node_names(configuration: Configuration) -> dict[str, str]:
@@ -51,11 +55,16 @@ class Processes:
     ----------
     configuration : values for all nodes; its `shared.nodes` says which ones are started.
     namespace : namespace of the nodes.
+
+    Attributes
+    ----------
+    killed : nodes that did not end by themselves.
     """
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
         names = node_names(configuration)
         prepare_logging_directory()
+        self.killed: list[str] = []
         self._stack = ExitStack()
         parameters = self._stack.enter_context(parameter_file(configuration))
         self._processes = {
@@ -81,11 +90,56 @@ class Processes:
         return ended
 
     def stop(self) -> None:
-        """Stop every node that runs, the hard way where one does not end by itself."""
+        """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
+
+        All nodes but the recorder have one deadline together.  The recorder has as long as it goes on.
+        """
+        deadline = time.monotonic() + PATIENCE
         others = [name for name in self._processes if name not in (FIRST, LAST)]
-        for names in ([FIRST], others, [LAST]):
-            _stop([self._processes[name] for name in names if name in self._processes])
+        for names in ([FIRST], others):
+            for name in names:
+                self._terminate(name)
+            for name in names:
+                self._wait_until(name, deadline)
+        self._terminate(LAST)
+        self._wait_for_recorder()
         self._stack.close()
+
+    def _terminate(self, name: str) -> None:
+        process = self._processes.get(name)
+        if process is not None and process.poll() is None:
+            process.terminate()
+
+    def _wait_until(self, name: str, deadline: float) -> None:
+        if process := self._processes.get(name):
+            try:
+                process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                self._kill(name, "did not end")
+
+    def _wait_for_recorder(self) -> None:
+        process = self._processes.get(LAST)
+        if process is None:
+            return
+        begin = now = moved = time.monotonic()
+        state, said = _work_of(process.pid), begin
+        while process.poll() is None:
+            time.sleep(0.02)
+            now = time.monotonic()
+            if (work := _work_of(process.pid)) != state:
+                state, moved = work, now
+            if now - moved > RECORDER_PATIENCE:
+                self._kill(LAST, f"has done nothing for {RECORDER_PATIENCE:.0f} s; 'wam bag repair' closes its bag")
+            elif now - said > TOLD:
+                said = now
+                LOGGER.warning(f"waiting for the recorder to write the bag, {now - begin:.0f} s")
+
+    def _kill(self, name: str, reason: str) -> None:
+        process = self._processes[name]
+        LOGGER.error(f"node {name} is killed: it {reason}")
+        self.killed.append(name)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def _start(entry: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
@@ -97,17 +151,16 @@ def _start(entry: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
     )
 
 
-def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
-    for process in processes:
-        if process.poll() is None:
-            process.terminate()
-    deadline = time.monotonic() + PATIENCE
-    for process in processes:
-        try:
-            process.wait(max(0.0, deadline - time.monotonic()))
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+def _work_of(pid: int) -> tuple[str, ...]:
+    """What changes while a process works: its time of computing, what it has written, whether it waits for a disk."""
+    folder = Path("/proc", str(pid))
+    try:
+        fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        written = (folder / "io").read_text()
+    except OSError:
+        return ()
+    waits_for_disk = str(time.monotonic()) if fields[0] == "D" else ""
+    return fields[11], fields[12], written, waits_for_disk
 
 
 class Composition:

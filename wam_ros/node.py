@@ -88,7 +88,7 @@ class AdaptedNode(TolerantNode):
 
     def take_fault(self, reason: str) -> None:
         """Report what a callback raised."""
-        self._ports.set_fault(reason)
+        self._ports.set_problem("exception", reason)
 
     def destroy_node(self) -> None:
         """End only when the others have what was published."""

@@ -29,7 +29,7 @@ WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
-LONGEST_DELIVERY = 3.0  # s, for all topics of a node together
+LONGEST_DELIVERY = 1.0  # s, for all topics of a node together
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
 
@@ -49,6 +49,7 @@ class Ports:
     refusals : refused messages by topic.
     facts : further values for the diagnostics.
     faults : present fault of each other node, '' where it has none.
+    problems : why the driver has to brake, by what is concerned.
     """
 
     def __init__(self, node: Node, declaration: Declaration, shared: Shared, interface: Interface) -> None:
@@ -57,10 +58,10 @@ class Ports:
         self.refusals: Counter[str] = Counter()
         self.facts: dict[str, str] = {}
         self.faults: dict[str, str] = {}
+        self.problems: dict[str, str] = {}
         self._name = declaration.name
         self._refusals_reported = 0
-        self._status = self._own_status = WAITING
-        self._fault = ""
+        self._status = self._plain = WAITING
         self._wanted: NodeStatus | None = None
         self._next_report = self._last_report = 0
         self._absent: set[str] = set()
@@ -155,16 +156,16 @@ class Ports:
             return
         self.publish_status(status._replace(connected=True))
 
-    def set_fault(self, reason: str) -> None:
-        """Publish the status with a fault of the node itself; '' where it is over."""
-        self._fault = reason
-        self.publish_status(self._own_status)
+    def set_problem(self, concerned: str, reason: str) -> None:
+        """Say in the status, with level ERROR, why the driver has to brake; '' where there is no reason any more."""
+        self.problems[concerned] = reason
+        self.publish_status(self._plain)
 
     def publish_status(self, status: NodeStatus) -> None:
         """Publish the status of the node as it is, where it has changed."""
-        self._own_status = status
-        if self._fault:
-            status = status._replace(level=Level.ERROR, message=self._fault, fault=self._fault)
+        self._plain = status
+        if problem := next(filter(None, self.problems.values()), ""):
+            status = status._replace(level=Level.ERROR, message=problem, fault=problem)
         status = status._replace(node=self._name)
         if status != self._status:
             self._status = status

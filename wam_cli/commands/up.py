@@ -31,4 +31,4 @@ def run(given: argparse.Namespace) -> int:
         ended = processes.wait(lambda ended: stop.is_set or bool(ended))
     for node, code in ended.items():
         print(f"node {node} ended with code {code}; all were stopped", file=sys.stderr)
-    return max([abs(code) for code in ended.values()], default=0)
+    return max([abs(code) for code in ended.values()], default=0) or int(bool(processes.killed))
