@@ -2,9 +2,12 @@
 
 import contextlib
 import os
+import random
+import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -13,7 +16,8 @@ from typing import Any
 
 import pytest
 import yaml
-from conftest import LONG
+from conftest import LONG, soon
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
@@ -30,12 +34,14 @@ from std_msgs.msg import Bool, String
 from wam_bag.bag import read
 from wam_bag.bag_writer import BagWriter
 from wam_bag.contents import contents
+from wam_bag.losses import losses
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, flatten
+from wam_description.signals import Level, NodeStatus
 from wam_description.topics import BY_NAME, TOPICS
 from wam_ros.bring_up import Composition
 from wam_ros.header import header
-from wam_ros.messages import message_type
+from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.qos import qos
 from wam_ros.recorder import Numbering, Recorder
 from wam_ros.recorder_node import RecorderNode
@@ -345,8 +351,6 @@ def test_gaps_in_the_numbering_are_drops(numbers: list[int], received: int, drop
 
 
 def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
-    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-
     def data(node: str) -> bytes:
         message = DiagnosticArray(header=header(5, "abc"), status=[DiagnosticStatus(name=f"{node}: timing")])
         return bytes(serialize_message(message))
@@ -398,6 +402,121 @@ def test_a_node_whose_disk_is_full_says_so_in_its_status(ros: Any, tmp_path: Pat
     sender.publish(state(1, 0.0))
     ros.wait(lambda: any(said.level == said.ERROR and "No space left" in said.message for said in states))
     assert "No space left" in node.failure
+
+
+def report(node: str, ended: bool, arm: str = "wam", **published: int) -> DiagnosticArray:
+    """What a node says about how much it has published."""
+    facts = {"node": f"/{arm}/{node}", **{f"published /wam/{topic}": str(count) for topic, count in published.items()}}
+    status = NodeStatus(Level.OK, "ready", node, facts=facts | ({"ended": "yes"} if ended else {}))
+    return DiagnosticArray(status=[diagnostic_status(status, "wam")])
+
+
+def test_what_was_announced_and_has_not_come_is_lost_at_the_end(ros: Any, tmp_path: Path, capfd: Any) -> None:
+    node = recorder(ros, tmp_path, nodes=("driver", "gravity", "transform", "recorder"))
+    states, said = (publisher(ros.node("driver"), topic) for topic in ("motor_states", "/diagnostics"))
+    ros.wait(matched(states, said))
+    for k in range(7):
+        states.publish(state(k, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 7)
+    said.publish(report("driver", True, motor_states=10, robot_description=4))
+    said.publish(report("gravity", False, gravity_effort=5))
+    said.publish(report("transform", True, "other_arm", motor_states=10**9))
+    ros.wait(lambda: received(node, "/diagnostics") == 3)
+    ros.remove(node)
+    lost = "lost at the end: 3 of /wam/motor_states from driver"
+    unknown = "lost at the end: not known of gravity, transform, which gave no final count"
+    assert f"10 messages, {lost}, {unknown}" in capfd.readouterr().err
+    bag = read(tmp_path / "bag")
+    assert bag.metadata["recording"]["/wam/motor_states driver lost_at_end"] == "3"
+    found = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
+    assert found.at_end == {"/wam/motor_states from driver": 3}
+    assert found.sentences(0) == [
+        "Lost at the end: 3 of /wam/motor_states from driver.",
+        "Lost at the end: not known of gravity, transform, which gave no final count.",
+    ]
+
+
+def test_what_is_on_its_way_at_the_end_is_waited_for(ros: Any, tmp_path: Path) -> None:
+    node = recorder(ros, tmp_path)
+    states = publisher(ros.node("driver"), "motor_states")
+    ros.wait(matched(states))
+    node.recorder.announce("driver", "/wam/motor_states", 1)
+    states.publish(state(1, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    node.recorder.announce("driver", "/wam/motor_states", 2)
+    late = threading.Timer(0.2, lambda: states.publish(state(2, 0.0)))
+    late.start()
+    ros.remove(node)
+    late.join()
+    assert len(read(tmp_path / "bag").topics["/wam/motor_states"].stamp_ns) == 2
+
+
+@pytest.mark.parametrize(
+    ("numbers", "total", "lacking"),
+    [([1, 2, 3], 3, 0), ([1, 2, 3], 10, 7), ([5, 6], 9, 3), ([1, 2, 9, 1, 2], 4, 2), ([0, 0], 5, 3), ([7], 3, 2)],
+)
+def test_messages_behind_the_last_one_are_counted_by_the_total(numbers: list[int], total: int, lacking: int) -> None:
+    numbering = Numbering()
+    for number in numbers:
+        numbering.add(number)
+    assert numbering.lacking(total) == lacking
+
+
+@pytest.mark.parametrize("required", [False, True])
+@pytest.mark.parametrize("change", ["deleted", "moved"])
+def test_a_bag_that_vanishes_is_told_at_once_and_is_a_fault_if_it_was_required(
+    change: str, required: bool, ros: Any, tmp_path: Path
+) -> None:
+    states: list[Any] = []
+    row = BY_NAME["status"]
+    ros.node("listener").create_subscription(message_type(row), "status", states.append, qos(row))
+    node = recorder(ros, tmp_path, required=required)
+    sender = publisher(ros.node("driver"), "motor_states")
+    ros.wait(lambda: sender.get_subscription_count() == 1 and node.count_subscribers("/wam/status") == 2)
+    sender.publish(state(1, 0.0))
+    ros.wait(lambda: received(node, "/wam/motor_states") == 1)
+    node.recorder.flush()
+    if change == "deleted":
+        shutil.rmtree(tmp_path / "bag")
+    else:
+        (tmp_path / "bag").rename(tmp_path / "elsewhere")
+    begin = time.monotonic()
+    ros.wait(lambda: any(said.level == said.ERROR for said in states), what="an error in the status")
+    assert time.monotonic() - begin < soon()
+    (said,) = (said for said in states if said.level == said.ERROR)
+    assert "bag_0.mcap is gone (No such file or directory): it was deleted or moved" in said.message
+    assert read_status(said).fault == (said.message if required else "")
+    if change == "moved":  # what was recorded before is whole
+        assert len(read(tmp_path / "elsewhere").topics["/wam/motor_states"].stamp_ns) <= 1
+
+
+def test_foreign_names_do_not_fill_the_memory(tmp_path: Path) -> None:
+    row = BY_NAME["status"]
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: "")
+        for k in range(300):
+            status = DiagnosticStatus(name=f"\x1b{k}" + "x" * 10_000)
+            machine.receive(row.name, bytes(serialize_message(status)), 0, 0, 1)
+        counts = machine.counts()
+    assert len(counts) <= 64
+    assert max(len(count.publisher) for count in counts) < 300
+    assert "\x1b" not in counts[0].publisher
+
+
+@pytest.mark.slow
+def test_no_bytes_on_any_topic_end_the_recorder(tmp_path: Path) -> None:
+    chance = random.Random(20261120)
+    rows = list(BY_NAME.values())
+    with BagWriter(tmp_path / "bag") as bag:
+        machine = Recorder(bag, BY_NAME, "lockstep", {row.name: qos(row) for row in rows}, lambda name: "")
+        for k in range(5000):
+            row = chance.choice(rows)
+            data = bytearray(serialize_message(message_type(row)()) + bytes(chance.randrange(40)))
+            for _ in range(chance.randrange(6)):
+                data[chance.randrange(len(data))] = chance.choice([0, 1, 0x7F, 0x80, 0xFF, chance.randrange(256)])
+            machine.receive(row.name, bytes(data[: chance.randrange(len(data) + 1)]), k, k, k)
+        assert not machine.failure
+    assert sum(read(tmp_path / "bag", may_lack=True, topics=[]).counts.values()) == 5000
 
 
 def test_a_bag_goes_on_in_another_file_by_size_and_by_time(ros: Any, tmp_path: Path) -> None:

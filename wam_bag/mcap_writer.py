@@ -88,13 +88,12 @@ class McapWriter:
     def add(self, channel: int, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
         """Add a message to the chunk; the chunk goes to disk when it is full."""
         buffer = self._buffer
+        head = _MESSAGE.pack(_OPCODE, _WITHOUT_DATA + len(data), channel, sequence & 0xFFFFFFFF, log_time, publish_time)
         index = self._index.get(channel)
         if index is None:
             index = self._index[channel] = []
         index += (log_time, len(buffer))
-        buffer += _MESSAGE.pack(
-            _OPCODE, _WITHOUT_DATA + len(data), channel, sequence & 0xFFFFFFFF, log_time, publish_time
-        )
+        buffer += head
         buffer += data
         if len(buffer) > self._chunk_size:
             self.flush()

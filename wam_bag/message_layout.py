@@ -17,7 +17,7 @@ def stamp_reader(name: str) -> Callable[[bytes], int | None]:
     """A function that reads the stamp of a message of this type from its bytes, in ns.
 
     The stamp is the one the message begins with, or that of the first element if it begins with a
-    sequence of stamped messages (MarkerArray).  The function returns None if there is none.
+    sequence of stamped messages (MarkerArray).  The function returns None if there is none, or too few bytes.
     """
     first = definition(name).fields[0]
     if first.type in _STAMPS and first.length is None:
@@ -27,12 +27,16 @@ def stamp_reader(name: str) -> Callable[[bytes], int | None]:
     return lambda data: None
 
 
-def _first_stamp(data: bytes) -> int:
+def _first_stamp(data: bytes) -> int | None:
+    if len(data) < ENCAPSULATION + 8:
+        return None
     sec, nanosec = struct.unpack_from("<iI" if data[1] else ">iI", data, ENCAPSULATION)
     return int(sec) * 1_000_000_000 + int(nanosec)
 
 
 def _element_stamp(data: bytes) -> int | None:
+    if len(data) < ENCAPSULATION:
+        return None
     layout = "<IiI" if data[1] else ">IiI"
     count, sec, nanosec = struct.unpack_from(layout, data.ljust(ENCAPSULATION + 12, b"\0"), ENCAPSULATION)
     return int(sec) * 1_000_000_000 + int(nanosec) if count else None

@@ -23,7 +23,7 @@ from wam_ros.run import NAMESPACE, PARENT, Connection, prepare_logging_directory
 LOGGER: Final = get_logger("wam")
 FIRST: Final = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST: Final = "recorder"  # to be stopped: it closes the bag
-PATIENCE: Final = 5.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
+PATIENCE: Final = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
 RECORDER_PATIENCE: Final = 30.0  # s without any sign of work, before a recorder that does not end is killed
 TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
 

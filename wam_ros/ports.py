@@ -29,7 +29,7 @@ WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
-LONGEST_DELIVERY = 1.0  # s, for all topics of a node together
+LONGEST_DELIVERY = 4.0  # s, for all topics of a node together; the middleware repeats what was lost every 3 s
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
 

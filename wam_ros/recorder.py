@@ -14,6 +14,7 @@ from wam_description.topics import EVERY_NODE, Topic
 
 _MOST_STREAMS: Final = 8  # numberings tracked for one topic and publisher
 _MOST_PUBLISHERS: Final = 64  # publishers counted separately in one topic
+_LATEST: Final = 2**63 - 1  # ns; log times of a bag
 _LONGEST_NAME: Final = 200  # bytes of a publisher's name
 _NODE_STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 _NODE_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
@@ -170,6 +171,8 @@ class Recorder:
                     del self._stamps[next(iter(self._stamps))]
             received = sent = stamp
         self._received += 1
+        if not (0 <= received <= _LATEST and 0 <= sent <= _LATEST):  # anybody can send such a stamp
+            received, sent = min(max(received, 0), _LATEST), min(max(sent, 0), _LATEST)
         if self.failure:
             return
         try:
@@ -197,7 +200,7 @@ class Recorder:
 
     def dropped(self) -> int:
         """Messages lost on the way to the recorder."""
-        return sum(count.dropped for count in self.counts())
+        return sum(found.dropped for channel in self._channels.values() for found in channel.publishers.values())
 
     def lost_at_end(self) -> int:
         """Messages that their nodes announced and that have not come, so far."""
