@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +17,8 @@ from conftest import LONG, soon
 from wam_bag.bag import read
 from wam_cli.main import COMMANDS, main
 from wam_description.configuration import Configuration, packaged
+from wam_ros import bring_up
+from wam_ros.bring_up import Processes
 
 ROOT = Path(__file__).parents[1]
 NODES = 7  # six and the recorder
@@ -123,6 +126,53 @@ def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
     assert stack.process.returncode == 0
     assert "Traceback" not in stack.said()
     assert statuses(tmp_path, "driver")[-2:] == ["enabled", "braked"]
+
+
+@pytest.fixture
+def recording(tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Processes:
+    """A recorder as a process, with a bag that is open."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(bring_up, "PATIENCE", 0.2)
+    monkeypatch.setattr(bring_up, "TOLD", 0.2)
+    processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
+    wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
+    return processes
+
+
+def pid_of(processes: Processes, name: str) -> int:
+    return processes._processes[name].pid
+
+
+def test_the_end_waits_for_a_recorder_that_is_slow_and_says_so(
+    recording: Processes, tmp_path: Path, capfd: Any
+) -> None:
+    pid = pid_of(recording, "recorder")
+    os.kill(pid, signal.SIGSTOP)
+    threading.Timer(1.5, os.kill, (pid, signal.SIGCONT)).start()  # much later than the patience with other nodes
+    recording.stop()
+    assert recording.killed == []
+    assert list(tmp_path.glob("bags/*/metadata.yaml"))
+    assert "waiting for the recorder to write the bag, " in capfd.readouterr().err
+
+
+def test_a_recorder_that_does_nothing_any_more_is_killed_and_named(
+    recording: Processes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    monkeypatch.setattr(bring_up, "RECORDER_PATIENCE", 0.5)
+    os.kill(pid_of(recording, "recorder"), signal.SIGSTOP)
+    recording.stop()
+    assert recording.killed == ["recorder"]
+    assert "node recorder is killed: it has done nothing for" in capfd.readouterr().err
+    (bag,) = tmp_path.glob("bags/*")
+    assert not (bag / "metadata.yaml").exists()
+    main_without_exit("bag", "repair", str(bag))
+    assert (bag / "metadata.yaml").is_file()
+
+
+def main_without_exit(*words: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 0
 
 
 def test_a_shell_without_ros2_asks_the_stack(started: Any, domain_id: int) -> None:

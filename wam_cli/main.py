@@ -1,13 +1,15 @@
 """The command line `wam` and the table of its commands."""
 
 import argparse
+import contextlib
 import importlib
 import os
 import signal
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TextIO
 
+from wam_bag.printable import printable
 from wam_ros.program import end_at_once_on_signals, ignore_signals
 
 # each command is the module of its name in wam_cli.commands, imported when it is called
@@ -47,19 +49,35 @@ def main(arguments: Sequence[str] | None = None) -> None:
     handlers = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: _end}
     before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
-        code = command.run(given)
+        with contextlib.redirect_stdout(_Printable(sys.stdout)):
+            code = command.run(given)
         sys.stdout.flush()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the pipe was closed: `wam ... | head`
         code = 128 + signal.SIGPIPE
     except (ValueError, OSError) as error:
-        parser.exit(1, f"wam {given.command}: {error}{_hint(error, given.command)}\n")
+        parser.exit(1, printable(f"wam {given.command}: {error}{_hint(error, given.command)}", kept="\n") + "\n")
     except KeyboardInterrupt:
         code = 128 + signal.SIGINT
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
     sys.exit(code or 0)
+
+
+class _Printable:
+    """Standard output on which control characters, as those in a topic's name of a bag, are shown and not sent."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        self._stream.write(printable(text, kept="\n\t\r"))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 def program() -> None:
