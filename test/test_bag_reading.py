@@ -24,7 +24,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
-from wam_bag import safe_yaml
+from wam_bag import bag_file, safe_yaml
 from wam_bag.bag import (
     Bag,
     BagError,
@@ -41,6 +41,7 @@ from wam_bag.bag import (
 from wam_bag.contents import mode_of
 from wam_bag.cut import Cut, cut
 from wam_bag.errors import BROKEN
+from wam_bag.losses import losses
 from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC, chunk_index, serialized
 from wam_bag.message_groups import Grouping
 from wam_bag.message_text import definitions
@@ -511,6 +512,82 @@ def test_yaml_that_would_take_much_memory_or_end_the_process_is_refused(text: by
     with pytest.raises((yaml.YAMLError, UnicodeDecodeError)):
         safe_yaml.load(text)
     assert mode_of({}, text) == "unknown"
+
+
+def test_yaml_that_is_too_long_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
+    long = b"- 1\n" * (safe_yaml.LONGEST // 4 + 1)
+    with pytest.raises(yaml.YAMLError, match="bytes; at most"):
+        safe_yaml.load(long)
+    assert mode_of({}, long) == "unknown"
+    split_bag(tmp_path / "bag")
+    with (tmp_path / "bag" / "metadata.yaml").open("a") as stream:
+        stream.truncate(2**32)  # sparse
+    with limits(MEMORY // 16), pytest.raises(BagError, match="at most 67108864 are read"):
+        read(tmp_path / "bag")
+
+
+def hostile(path: Path, schema: str, *messages: bytes, **metadata: dict[str, str]) -> Path:
+    """A bag of one topic with any schema and any messages."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        channel = writer.register_channel("/a", "cdr", writer.register_schema("a/msg/T", "ros2msg", schema.encode()))
+        for k, message in enumerate(messages):
+            writer.add_message(channel, k, b"\0\1\0\0" + message, k)
+        for name, values in metadata.items():
+            writer.add_metadata(name, values)
+        writer.finish()
+    return path
+
+
+def doubling(depth: int, last: str) -> str:
+    """Types that each have two of the next one: 2^depth numbers."""
+    parts = [f"{'=' * 80}\nMSG: a/B{i}\nB{i + 1} x\nB{i + 1} y\n" for i in range(depth)]
+    return "B0 x\n" + "".join(parts) + f"{'=' * 80}\nMSG: a/B{depth}\n{last}\n"
+
+
+@pytest.mark.parametrize(
+    ("schema", "reason"),
+    [
+        (doubling(40, "uint8 z"), "a message ends early"),
+        (doubling(40, ""), "a message ends early"),
+        ("float64[1000000000000] x", "a message ends early"),
+        ("string[] x", "a message ends early"),
+        ("uint8 a\nuint8 a", "has a field twice"),
+        (f"uint8[{'9' * 5000}] x", "with a schema that cannot be read"),
+    ],
+)
+def test_a_hostile_schema_is_refused_in_no_time(schema: str, reason: str, tmp_path: Path) -> None:
+    path = hostile(tmp_path / "bag.mcap", schema, b"\xff" * 4 + bytes(100))
+    with limits(MEMORY // 16), pytest.raises(BagError, match=reason):
+        list(read(path).topics["/a"].messages)  # type: ignore[union-attr]
+
+
+def test_hostile_records_of_the_recorder_are_no_more_than_text(tmp_path: Path) -> None:
+    digits = "9" * 6000
+    path = hostile(
+        tmp_path / "bag.mcap",
+        "uint8 z",
+        b"\0",
+        recording={"/a d received": digits, "/a d dropped": digits, "/a d lost_at_end": digits},
+        repaired={"f": "[" * 100_000},
+        rosbag2={"serialized_metadata": "a: " + "[" * 50_000},
+    )
+    bag = read(path)
+    found = losses(path, bag.metadata, bag.attachments, bag.counts)
+    assert found.sentences(0) == ["f was repaired; the record of its losses cannot be read."]
+
+
+def test_a_file_that_decompresses_to_a_thousand_times_its_size_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    message = struct.pack("<I", 2**23) + bytes(2**23)
+    path = hostile(tmp_path / "bag.mcap", "uint8[] z", *[message] * 4)
+    assert path.stat().st_size < 10_000
+    assert len(read(path).topics["/a"].log_time_ns) == 4, "so little may be that small"
+    monkeypatch.setattr(bag_file, "LARGEST_BOMB", 2**24)
+    with pytest.raises(BagError, match="bytes decompress to more than 1000 times as many"):
+        read(path)
 
 
 @pytest.mark.slow

@@ -15,10 +15,12 @@ from wam_bag import safe_yaml
 from wam_bag.errors import BROKEN, BagError, Damage, NotClosedError, TooLargeError
 from wam_bag.mcap_file import McapFile
 from wam_bag.mcap_records import MAGIC, Bytes
-from wam_bag.message_search import NEVER, Found, together
+from wam_bag.message_search import NEVER, Found, MessageBatch, together
 from wam_bag.message_text import Fields, definitions
 
 PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
+LARGEST_METADATA = 2**26  # bytes of metadata.yaml
+LARGEST_BOMB, LARGEST_RATIO = 2**29, 1000  # bytes, and times the file, that are decompressed; recordings have 5 to 100
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
 
 
@@ -53,6 +55,8 @@ def _listed_files(path: Path) -> list[str]:
     if not file.is_file():
         return []
     try:
+        if (size := file.stat().st_size) > LARGEST_METADATA:
+            raise ValueError(f"it has {size} bytes; at most {LARGEST_METADATA} are read")
         text = file.read_text(encoding="utf-8")
         part = _FILE_NAMES.search(text)  # the only lines that are needed of a long file
         listed = [str(name) for name in safe_yaml.load(part[0] if part else text)["relative_file_paths"]]
@@ -102,7 +106,10 @@ def _explain(path: Path, error: Exception) -> str:
             "'wam bag repair' makes it readable up to the break"
         )
     if isinstance(error, TooLargeError):
-        return f"{path} is not read: {error}; more would take too much memory. Record in smaller chunks"
+        return (
+            f"{path} is not read: {error}; more would take too much memory. "
+            "Record in smaller chunks, or read a part of its time"
+        )
     reason = str(error) if isinstance(error, Damage) else f"{type(error).__name__}: {error}"
     return f"{path} is damaged ({reason}); copy it again, or let 'wam bag repair' save what can be read"
 
@@ -138,7 +145,7 @@ def parts(
         if topics is not None:
             numbers = frozenset(n for n, channel in mcap.channels.items() if is_selected(channel.topic, topics))
     counts: Counter[int] = Counter()
-    for batch in mcap.batches(numbers, *times):
+    for batch in _bounded(mcap, mcap.batches(numbers, *times)):
         by_topic: dict[str, list[int]] = {}
         for number, found in batch.found.items():
             if number not in mcap.channels:
@@ -159,6 +166,16 @@ def parts(
         expected = mcap.counts.by_channel.get(number, 0)
         if is_selected(channel.topic, topics) and counts[number] != expected:
             raise Damage(f"topic {channel.topic} has {counts[number]} messages instead of {expected}")
+
+
+def _bounded(mcap: McapFile, batches: Iterator[MessageBatch]) -> Iterator[MessageBatch]:
+    """The batches, as long as they are no more than a recording can have been compressed from."""
+    size = 0
+    for batch in batches:
+        size += len(batch.buffer)
+        if size > LARGEST_BOMB and size > LARGEST_RATIO * mcap.size:
+            raise TooLargeError(f"its {mcap.size} bytes decompress to more than {LARGEST_RATIO} times as many")
+        yield batch
 
 
 def type_of(file: McapFile, channel: Channel) -> tuple[str, dict[str, Fields]]:

@@ -147,21 +147,25 @@ class Decoder:
     def __init__(self, kind: str, definitions: Definitions) -> None:
         self.kind, self.definitions = kind, definitions
         self._classes: dict[str, Any] = {}
-        self._steps: dict[str, Step] = {}
+        self._steps: dict[tuple[str, str], Step] = {}
 
     def __call__(self, data: bytes) -> Any:
         """The message; raises Damage if it is not of this type."""
         order = byte_order(data)
-        step = self._steps.get(order)
-        if step is None:
-            step = self._steps[order] = self._struct(self.kind, order)
         try:
-            message, _ = step(data[ENCAPSULATION:], 0)
+            message, _ = self._struct(self.kind, order)(data[ENCAPSULATION:], 0)
         except struct.error:
             raise Damage("a message ends early") from None
         return message
 
     def _struct(self, kind: str, order: str) -> Step:
+        """The step of a type, made once: types in types may occur any number of times."""
+        step = self._steps.get((kind, order))
+        if step is None:
+            step = self._steps[kind, order] = self._new_struct(kind, order)
+        return step
+
+    def _new_struct(self, kind: str, order: str) -> Step:
         fields = self.definitions[kind]
         make = self.maker(kind)
         steps = [self._field(inner, length, order) for _, inner, length in fields]
@@ -171,6 +175,8 @@ class Decoder:
             for step in steps:
                 value, position = step(data, position)
                 values.append(value)
+            if not steps and position > len(data):
+                raise Damage("a message ends early")
             return make(values), position + (not steps)
 
         return decode

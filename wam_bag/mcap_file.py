@@ -72,6 +72,7 @@ class McapFile:
     ----------
     schemas, channels : by id; those within chunks are known only when these were read.
     counts : messages as the file itself counts them, None if it does not.
+    size : bytes of the file.
 
     Raises
     ------
@@ -86,7 +87,7 @@ class McapFile:
         self.counts: MessageCounts | None = None
         self.profile = ""
         self._stream = path.open("rb")
-        self._size = os.fstat(self._stream.fileno()).st_size
+        self.size = self._size = os.fstat(self._stream.fileno()).st_size
         self._blocks: list[ChunkIndex | Loose] = []
         self._attachments: list[RecordExtent] = []
         self._metadata: list[RecordExtent] = []
@@ -256,6 +257,8 @@ class McapFile:
     def _read(self, start: int, size: int) -> bytes:
         if size < 0:
             raise Damage(f"a record at byte {start} is shorter than its head")
+        if size > self._size:
+            raise Damage(f"a record at byte {start} is to have {size} bytes, more than the file")
         data = os.pread(self._stream.fileno(), size, start)
         while len(data) < size:
             more = os.pread(self._stream.fileno(), size - len(data), start + len(data))

@@ -75,6 +75,9 @@ def _check(name: str, found: dict[str, Fields], outer: tuple[str, ...], checked:
         raise ValueError(f"type {name} contains itself")
     if name in checked:
         return
+    names = [field.name for field in found[name]]
+    if len(set(names)) < len(names):
+        raise ValueError(f"type {name} has a field twice; its fields: {', '.join(names)}")
     for field in found[name]:
         if "/" in field.type:
             if field.type not in found:

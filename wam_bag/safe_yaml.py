@@ -5,6 +5,7 @@ from typing import Any, Final
 import yaml
 
 DEEPEST: Final = 50  # nested maps and lists; the C loader recurses and would end the process at some thousands
+LONGEST: Final = 2**22  # bytes; the longest files of our own, of bags of a thousand files, have a tenth of it
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C, if it was built
 
 
@@ -14,10 +15,12 @@ def load(text: str | bytes) -> Any:
     Raises
     ------
     yaml.YAMLError
-        if it is not YAML, is nested too deeply or has aliases, whose expansion may take any amount of memory.
+        if it is not YAML, too long or nested too deeply, or has aliases, whose expansion may take any amount of memory.
     UnicodeDecodeError
         if it is not UTF-8.
     """
+    if len(text) > LONGEST:
+        raise yaml.YAMLError(f"it has {len(text)} bytes; at most {LONGEST} are read")
     text = text.decode() if isinstance(text, bytes) else text
     depth = 0
     for event in yaml.parse(text, Loader=_LOADER):
