@@ -1,12 +1,13 @@
 """No message, request or timer ends a node: what a callback raises is a fault by its name, and the arm brakes."""
 
+import contextlib
 import random
 from pathlib import Path
 from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.msg import Parameter, ParameterEvent, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -15,16 +16,17 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
+from rclpy._rclpy_pybind11 import RCLError
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 from wam_bag.printable import printable
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import Level, NodeStatus
-from wam_description.topics import BY_NAME
+from wam_description.topics import BY_NAME, TOPICS
 from wam_driver.safety import Mode
 from wam_ros.header import header
-from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status
+from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type
 from wam_ros.node import make_node
 from wam_ros.qos import qos
 from wam_ros.tolerance import TolerantNode
@@ -106,6 +108,27 @@ def test_no_request_about_parameters_ends_a_node(ros: Any, tmp_path: Path) -> No
         future = clients[kind].call_async(asked)
         ros.wait(future.done, what=f"an answer to {asked}")
     assert not node._ports.problems.get("exception")
+
+
+def test_no_bytes_on_any_topic_end_a_node(ros: Any, tmp_path: Path) -> None:
+    names = ["driver", "force_loop", "recorder"]
+    nodes = [make(ros, tmp_path, name, names, recorder__directory=str(tmp_path / "bags")) for name in names]
+    sender = ros.node("sender")
+    publishers = {row.name: sender.create_publisher(message_type(row), row.name, qos(row)) for row in TOPICS}
+    publishers["/parameter_events"] = sender.create_publisher(ParameterEvent, "/parameter_events", 10)
+    ros.wait(lambda: all(one.get_subscription_count() for one in publishers.values()))
+    chance = random.Random(SEED)
+    for one in publishers.values():
+        for _ in range(8):
+            noise = chance.randbytes(chance.randrange(300))
+            data = chance.choice([b"\0\1\0\0" + noise, b"\0\0\0\0" + noise, noise, b"\0\1\0\0" + b"\xff" * 40])
+            with contextlib.suppress(RCLError):  # some the middleware itself does not send
+                one.publish(data)
+            ros.executor.spin_once(timeout_sec=0.001)
+    client = sender.create_client(ListParameters, "force_loop/list_parameters")
+    ros.wait(client.call_async(ListParameters.Request()).done, what="an answer after all of it")
+    assert not nodes[1]._ports.problems.get("exception")
+    assert not nodes[2].failure
 
 
 class Clumsy(TolerantNode):
