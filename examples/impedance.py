@@ -47,7 +47,7 @@ class Impedance:
 
     @reaction(
         Input("joint_states", "position velocity"),
-        Input("joint_posture_command", "position"),
+        Input("joint_posture_command", "position", age="command", absent="hold"),
         outputs=("joint_velocity_command", "joint_effort_command"),
     )
     def step(self, inputs: Inputs) -> Outputs:

@@ -99,12 +99,23 @@ def test_enable_discards_every_command_before_it() -> None:
     hardware.advance(0.0)
     assert hardware.currents == [0.0] * 4
     hardware.command(hardware.stamp, [5.0] * 4)
+    hardware.disable()
     hardware.enable("")
     hardware.advance(0.0)
     assert hardware.currents == [0.0] * 4
     hardware.command(hardware.stamp, [5.0] * 4)
     hardware.advance(0.0)
     assert hardware.currents == [5.0] * 4
+
+
+def test_to_enable_an_enabled_driver_changes_nothing() -> None:
+    hardware = driver()
+    hardware.enable("")
+    hardware.command(hardware.stamp, [5.0] * 4)
+    for _ in range(3):
+        assert hardware.enable("an obstacle").success
+        hardware.advance(0.0)
+        assert hardware.currents == [5.0] * 4, "no period without current while the brakes are off"
 
 
 def test_answer_to_a_state_before_the_release_of_the_brakes_is_ignored_when_it_comes_late() -> None:

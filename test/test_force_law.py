@@ -188,7 +188,7 @@ def measured_across(torque: list[float]) -> ForceOutput:
         ask(loop, World(400.0, force=9.0), down(9.5))
     world = World(400.0, force=3.0)
     command = ForceCommand("base", down(9.5))
-    return loop.step(State(POSE, STILL, torque), world.sensors, NO_CONTACT, None, command, 0.0, None, None, DT)
+    return loop.step(State(POSE, STILL, torque), world.sensors, NO_CONTACT, None, command, None, None, DT)
 
 
 def test_brakes_and_faults_make_the_loop_forget_filter_and_delayed_answers() -> None:
@@ -204,7 +204,7 @@ def test_the_posture_to_hold_is_that_of_the_enabling() -> None:
     moved = [0.3, -1.0, 0.4, 0.9]
 
     def hold(q: list[float], effort: list[float]) -> list[float]:
-        return loop.step(State(q, STILL, effort), None, NO_CONTACT, None, None, 0.0, None, None, DT).velocity
+        return loop.step(State(q, STILL, effort), None, NO_CONTACT, None, None, None, None, DT).velocity
 
     hold(POSE, DRIVEN)
     assert max(map(abs, hold(moved, DRIVEN))) > 0.5, "driven, the arm goes back to where it started"

@@ -88,7 +88,6 @@ def ask(loop: ForceLoop, world: World, force: Any, dt: float = DT, **more: Any) 
         given["contact"],
         given["external"],
         given.get("command", command),
-        given.get("age", 0.0),
         given["posture"],
         given["torque"],
         dt,
@@ -144,7 +143,7 @@ def test_a_short_lever_does_not_make_a_joint_race() -> None:
         state = State(upright, [0.0] * 4, [0.0] * 4)
         sensed = State(upright, [0.0] * 4, BODY.gravity_torque(upright).tolist())
         press = ForceCommand("base", (0.0, 0.0, -20.0))
-        out = controller.step(state, sensed, NO_CONTACT, None, press, 0.0, upright, None, 0.005)
+        out = controller.step(state, sensed, NO_CONTACT, None, press, upright, None, 0.005)
         assert max(map(abs, out.velocity)) <= most * (1.0 + 1e-12)
     assert max(map(abs, out.velocity)) > 10.0 * OWN.joint_speed_limit
 
@@ -235,7 +234,7 @@ def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
     for _ in range(4000):
         external = -stiffness * np.subtract(world.q, POSE)
         sensors = State(world.q, STILL, (BODY.gravity_torque(world.q) - external).tolist())
-        out = loop.step(world.joints, sensors, NO_CONTACT, None, None, 0.0, None, commanded, DT)
+        out = loop.step(world.joints, sensors, NO_CONTACT, None, None, None, commanded, DT)
         assert out.effort == commanded
         world.move(out.velocity)
     assert stiffness * np.subtract(world.q, POSE) == pytest.approx(commanded, rel=1e-3)
@@ -255,22 +254,21 @@ def test_a_stale_force_command_is_dropped_and_the_arm_holds_its_position() -> No
         world.move(ask(loop, world, down(6.0), posture=POSE).velocity)
     pressed = list(world.q)
     assert world.force == pytest.approx(6.0, abs=1e-3)
-    for age, commanded in ((0.9 * OWN.command_timeout, 6.0), (1.1 * OWN.command_timeout, 0.0)):
-        out = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0], age=age)
-        assert any(out.effort) == bool(commanded)
+    assert not any(ask(loop, world, None, posture=[0.5, 0.0, 0.0, 0.0]).effort)
+    out = ask(loop, world, None, posture=[0.5, 0.0, 0.0, 0.0])
     assert out.velocity == pytest.approx([0.0] * 4, abs=1e-9)  # holds here, not at the posture of old
     assert world.q == pressed
-    again = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0], age=0.0)
+    again = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0])
     assert max(map(abs, again.velocity)) > 0.1
 
 
 def test_after_a_stale_command_the_arm_is_pulled_back_to_where_the_command_ended() -> None:
     loop, world = force_loop(ARM, OWN), World(400.0)
     ask(loop, world, down(6.0))
-    ask(loop, world, down(6.0), age=2.0 * OWN.command_timeout)
+    ask(loop, world, None)
     world.q = [angle + 0.01 for angle in POSE]  # pushed away
     for _ in range(3):
-        out = ask(loop, world, down(6.0), age=2.0 * OWN.command_timeout)
+        out = ask(loop, world, None)
     assert out.velocity == pytest.approx([-0.01 * OWN.posture_gain] * 4)
 
 
@@ -397,7 +395,7 @@ def test_a_force_without_a_lever_commands_no_motion_along_it() -> None:
 def test_missing_sensors_count_as_no_force() -> None:
     loop = force_loop(ARM, OWN)
     command = ForceCommand("base", (0.0, 0.0, -5.0))
-    out = loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, command, 0.0, None, None, DT)
+    out = loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, command, None, None, DT)
     assert out.measured == pytest.approx((0.0, 0.0, 0.0))
     assert all(math.isfinite(value) for value in (*out.velocity, *out.effort))
 

@@ -9,12 +9,14 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from test_nodes import ARM, WAM, Listener, start
 
+from wam_description.rigid_body import RigidBody
 from wam_description.signals import State, Wrench
 from wam_description.topics import BY_NAME
 from wam_ros.messages import joint_state, message_type, wrench_stamped
 from wam_ros.qos import qos
 
 MS = 1_000_000
+CARRYING = RigidBody(ARM).gravity_torque([0.0, -1.8, 0.0, 1.45]).tolist()  # N m: nothing touches
 
 
 class Feeder:
@@ -25,7 +27,7 @@ class Feeder:
         self.node = ros.node("feeder")
         self._publishers = {
             name: self.node.create_publisher(message_type(BY_NAME[name]), name, qos(BY_NAME[name]))
-            for name in ("joint_states", "force_command")
+            for name in ("joint_states", "joint_sensors", "force_command")
         }
         self.loop = start(ros, folder, ["force_loop"])["force_loop"]
         self.heard = Listener(ros, "status", "force_error", "/diagnostics")
@@ -36,6 +38,8 @@ class Feeder:
         self.stamp += 5 * MS
         force = wrench_stamped(self.stamp, Wrench("base", (0.0, 0.0, -newtons), (0.0, 0.0, 0.0)))
         self._publishers["force_command"].publish(force)
+        sensed = State([0.0, -1.8, 0.0, 1.45], [0.0] * 4, CARRYING)
+        self._publishers["joint_sensors"].publish(joint_state(self.stamp, ARM.joints.names, sensed))
         state = State([0.0, -1.8, 0.0, 1.45], [0.0] * 4, [1.0] * 4)
         self._publishers["joint_states"].publish(joint_state(self.stamp, ARM.joints.names, state))
         before = len(self.heard.seen["force_error"])

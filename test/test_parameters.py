@@ -226,10 +226,10 @@ def test_gains_of_a_wrong_number_are_refused_over_ros(ros: Any) -> None:
 
 def test_a_parameter_that_is_not_live_cannot_be_set_while_running(ros: Any) -> None:
     make(ros, "velocity_loop")
-    request = SetParameters.Request(parameters=[Parameter("command_timeout", value=0.5).to_parameter_msg()])
+    request = SetParameters.Request(parameters=[Parameter("ages.command", value=0.5).to_parameter_msg()])
     (result,) = call(ros, SetParameters, "velocity_loop/set_parameters", request).results
     assert not result.successful
-    assert "command_timeout" in result.reason
+    assert "ages.command" in result.reason
 
 
 def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -258,7 +258,6 @@ def follow(
             contact,
             [0.0] * len(q),
             ForceCommand(cover, force),
-            0.0,
             None,
             [0.0] * len(q),
             0.005,
@@ -307,7 +306,7 @@ def test_the_velocity_obeys_the_factor() -> None:
     state, command = State(list(STIFF_POSE), [0.0] * 4, [1.0] * 4), ForceCommand("outer_link", (0.0, -1.0, 0.0))
     speeds = []
     for _ in range(300):
-        out = loop.step(state, state, NO_CONTACT, None, command, 0.0, list(STIFF_POSE), None, 0.005)
+        out = loop.step(state, state, NO_CONTACT, None, command, list(STIFF_POSE), None, 0.005)
         speeds.append(float(np.linalg.norm(out.velocity)) / (out.error[1] or 1.0))
     assert loop.watch is not None
     assert loop.watch.factor < 0.75

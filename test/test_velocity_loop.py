@@ -4,8 +4,7 @@ import cmath
 
 import pytest
 
-from wam_control.dither import DitherParameters
-from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
+from wam_control.velocity_loop import VelocityLoop
 from wam_description.arm import Motors, Servo
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
@@ -13,9 +12,7 @@ from wam_description.parameters import ParameterError
 INERTIA, CONSTANT, PEAK = 4.0e-5, 0.25, 4.0
 KP, KI = 0.015, 0.8
 ONE = Motors(("motor1",), (INERTIA,), (CONSTANT,), (PEAK,), (1.0,), (0.0,), (0.0,), (0.0,))
-STILL = DitherParameters(0.0, (0.0,))
 SERVO = Servo((KP,), (KI,))
-OWN = VelocityLoopParameters(STILL, 0.1)
 DT = 1e-3
 
 
@@ -23,13 +20,13 @@ class Rotor:
     """Inertia under the torque of a motor and a constant load; the loop closed around it."""
 
     def __init__(self, load: float = 0.0, dt: float = DT, law: "VelocityLoop | Naive | None" = None) -> None:
-        self.loop = law or VelocityLoop(ONE, SERVO, OWN)
+        self.loop = law or VelocityLoop(ONE, SERVO)
         self.load, self.dt = load, dt
         self.speed = self.torque = 0.0
         self.blocked = False
 
-    def step(self, command: list[float], feedforward: float = 0.0, age: float = 0.0) -> float:
-        (current,) = self.loop.step([self.speed], [self.torque], command, age, [feedforward], self.dt)
+    def step(self, command: list[float], feedforward: float = 0.0) -> float:
+        (current,) = self.loop.step([self.speed], [self.torque], command, [feedforward], self.dt)
         self.torque = current * CONSTANT
         self.speed = 0.0 if self.blocked else self.speed + (self.torque - self.load) / INERTIA * self.dt
         return self.torque
@@ -42,7 +39,7 @@ class Naive:
         self.integral = 0.0
 
     def step(
-        self, speed: list[float], _: list[float], command: list[float], __: float, feed: list[float], dt: float
+        self, speed: list[float], _: list[float], command: list[float], feed: list[float], dt: float
     ) -> list[float]:
         self.integral += KI * (command[0] - speed[0]) * dt
         torque = KP * (command[0] - speed[0]) + self.integral + feed[0]
@@ -82,7 +79,7 @@ def test_feedforward_that_equals_the_load_keeps_the_rotor_at_rest() -> None:
 
 def test_a_blocked_motor_does_not_wind_up_and_recovers_at_once() -> None:
     speeds = []
-    for law in (VelocityLoop(ONE, SERVO, OWN), Naive()):
+    for law in (VelocityLoop(ONE, SERVO), Naive()):
         rotor = Rotor(law=law)
         rotor.blocked = True
         for _ in range(500):
@@ -101,7 +98,7 @@ def test_a_blocked_motor_does_not_wind_up_and_recovers_at_once() -> None:
 
 def test_a_motor_that_creeps_into_its_limit_leaves_it_when_the_error_turns() -> None:
     torques = []
-    for law in (VelocityLoop(ONE, SERVO, OWN), Naive()):
+    for law in (VelocityLoop(ONE, SERVO), Naive()):
         rotor = Rotor(law=law)
         rotor.blocked = True
         for _ in range(500):
@@ -115,12 +112,12 @@ def test_a_motor_that_creeps_into_its_limit_leaves_it_when_the_error_turns() -> 
 
 
 def test_torque_commanded_against_the_brakes_is_forgotten_when_they_release() -> None:
-    braked, flowing = VelocityLoop(ONE, SERVO, OWN), VelocityLoop(ONE, SERVO, OWN)
+    braked, flowing = VelocityLoop(ONE, SERVO), VelocityLoop(ONE, SERVO)
     torque = 0.0
     for _ in range(1000):
-        braked.step([0.0], [0.0], [2.0], 0.0, [0.1], DT)  # commanded, but no current flows
-        torque = CONSTANT * flowing.step([0.0], [torque], [2.0], 0.0, [0.1], DT)[0]
-    (current,) = braked.step([0.0], [0.0], [2.0], 0.0, [0.1], DT)
+        braked.step([0.0], [0.0], [2.0], [0.1], DT)  # commanded, but no current flows
+        torque = CONSTANT * flowing.step([0.0], [torque], [2.0], [0.1], DT)[0]
+    (current,) = braked.step([0.0], [0.0], [2.0], [0.1], DT)
     assert current * CONSTANT == pytest.approx(KP * 2.0 + KI * 2.0 * DT + 0.1)
     assert torque == pytest.approx(KP * 2.0 + KI * 2.0 * 1.0 + 0.1)
 
@@ -137,30 +134,19 @@ def test_an_empty_command_is_torque_only_and_forgets_the_integral() -> None:
     assert rotor.step([0.0]) == 0.0, "the integral is gone"
 
 
-@pytest.mark.parametrize("command", [[30.0], []])
-def test_a_stale_command_counts_as_zero_velocity(command: list[float]) -> None:
-    answers = []
-    for commanded, age in ((command, 0.11), ([0.0], 0.0), (command, 0.1)):
-        loop = VelocityLoop(ONE, SERVO, OWN)
-        answers.append([loop.step([speed], [0.1], commanded, age, [0.1], DT) for speed in (0.0, 3.0, 5.0)])
-    old, still, young = answers
-    assert old == still
-    assert young != still
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_current_is_clipped_to_the_peak(sign: float) -> None:
-    loop = VelocityLoop(ONE, SERVO, OWN)
-    assert loop.step([0.0], [0.0], [], 0.0, [sign * 100.0], DT) == [sign * PEAK / CONSTANT]
-    assert loop.step([0.0], [0.0], [sign * 1e6], 0.0, [0.0], DT) == [sign * PEAK / CONSTANT]
+    loop = VelocityLoop(ONE, SERVO)
+    assert loop.step([0.0], [0.0], [], [sign * 100.0], DT) == [sign * PEAK / CONSTANT]
+    assert loop.step([0.0], [0.0], [sign * 1e6], [0.0], DT) == [sign * PEAK / CONSTANT]
 
 
 def test_motors_do_not_mix() -> None:
     motors = Configuration.load(packaged("wam")).shared.arm.motors
     kp, ki = (0.01, 0.02, 0.03, 0.04), (0.1, 0.2, 0.3, 0.4)
-    loop = VelocityLoop(motors, Servo(kp, ki), OWN)
+    loop = VelocityLoop(motors, Servo(kp, ki))
     command, speed, feed = [1.0, 2.0, 3.0, 4.0], [0.5, -0.5, 0.0, 8.0], [0.1, 0.0, -0.1, 0.2]
-    currents = loop.step(speed, [0.0] * 4, command, 0.0, feed, DT)
+    currents = loop.step(speed, [0.0] * 4, command, feed, DT)
     expected = [
         (p * (c - s) + i * (c - s) * DT + f) / k
         for p, i, c, s, f, k in zip(kp, ki, command, speed, feed, motors.torque_constant, strict=True)
@@ -176,7 +162,7 @@ def test_gains_change_without_a_jump_of_the_integral() -> None:
     rotor.step([0.0])
     before = rotor.step([0.0])
     assert before == pytest.approx(0.8)
-    rotor.loop.tune(Servo((0.1,), (8.0,)), OWN)  # type: ignore[union-attr]
+    rotor.loop.tune(Servo((0.1,), (8.0,)))  # type: ignore[union-attr]
     assert rotor.step([0.0]) == before
     assert rotor.step([1.0]) == pytest.approx(before + 0.1 + 8.0 * DT)
 
@@ -192,10 +178,10 @@ def test_gains_of_a_wrong_number_are_refused(
     proportional: tuple[float, ...], integral: tuple[float, ...], text: str
 ) -> None:
     with pytest.raises(ParameterError, match=text):
-        VelocityLoop(ONE, Servo(proportional, integral), OWN)
-    loop = VelocityLoop(ONE, SERVO, OWN)
+        VelocityLoop(ONE, Servo(proportional, integral))
+    loop = VelocityLoop(ONE, SERVO)
     with pytest.raises(ParameterError, match=text):
-        loop.tune(Servo(proportional, integral), OWN)
-    assert loop.step([0.0], [0.0], [1.0], 0.0, [0.0], DT) == VelocityLoop(ONE, SERVO, OWN).step(
-        [0.0], [0.0], [1.0], 0.0, [0.0], DT
-    ), "the gains in use stay"
+        loop.tune(Servo(proportional, integral))
+    assert loop.step([0.0], [0.0], [1.0], [0.0], DT) == VelocityLoop(ONE, SERVO).step([0.0], [0.0], [1.0], [0.0], DT), (
+        "the gains in use stay"
+    )

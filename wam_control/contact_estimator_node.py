@@ -38,7 +38,7 @@ class ContactEstimatorNode:
 
     @reaction(
         Input("motor_states"),
-        Input("joint_sensors"),
+        Input("joint_sensors", absent="zero"),
         outputs=(
             "external_joint_torques",
             "external_joint_torques_sd",

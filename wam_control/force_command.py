@@ -1,4 +1,4 @@
-"""Which commands the force loop obeys: within the limits, and not stale."""
+"""Which commands the force loop obeys: within the limits; what it does where one ends."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ class Commands(NamedTuple):
 
     Attributes
     ----------
-    force : commanded force; None where there is none or it is stale.
+    force : commanded force; None where there is none.
     torque : commanded joint torques of the arm on the world (n,), N m; None where there are none.
     posture : joint angles to hold (n,), rad.
     refusals : why a command of this period is not taken, by topic.
@@ -26,21 +26,29 @@ class Commands(NamedTuple):
 
 
 class CommandAdmission:
-    """Keeps the last good command in place of one above the limits, and drops a stale force command.
+    """Keeps the last good command in place of one above the limits; where a command ends, the arm stays where it is.
+
+    Parameters
+    ----------
+    command_age : time for which the last good command counts while others are refused, s.
 
     Attributes
     ----------
     posture : joint angles to hold (n,), rad; empty before the first state.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, command_age: float) -> None:
+        self._command_age = command_age
+        self._force_age = self._torque_age = 0.0
         self.posture: list[float] = []
         self._force: ForceCommand | None = None
         self._torque: Sequence[float] | None = None
-        self._command_stale = False
+        self._is_moved = self._has_lapsed = False
 
-    def hold(self, q: Sequence[float]) -> None:
-        """Hold these joint angles (n,), rad, until another posture is commanded."""
+    def restart(self, q: Sequence[float]) -> None:
+        """Hold these joint angles (n,), rad, until another posture is commanded; forget every command."""
+        self._force = self._torque = None
+        self._is_moved = self._has_lapsed = False
         self.posture = list(q)
 
     def step(
@@ -48,32 +56,37 @@ class CommandAdmission:
         parameters: ForceLoopParameters,
         q: Sequence[float],
         force: ForceCommand | None,
-        age: float,
         posture: Sequence[float] | None,
         torque: Sequence[float] | None,
+        dt: float,
     ) -> Commands:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
         refusals = {}
+        pressed = self._force is not None and any(self._force.force)
         commanded = math.hypot(*force.force) if force is not None else 0.0
         if commanded > parameters.force_limit:
             refusals["force_command"] = _refusal(commanded, "force_limit", parameters.force_limit, "N")
+            self._force_age += dt
+            if self._force_age > self._command_age:
+                self._force = force = None
         else:
-            self._force = force
+            self._force, self._force_age = force, 0.0
         commanded = max(map(abs, torque)) if torque is not None else 0.0
         if commanded > parameters.torque_limit:
             refusals["joint_torque_command"] = _refusal(commanded, "torque_limit", parameters.torque_limit, "N m")
+            self._torque_age += dt
+            if self._torque_age > self._command_age:
+                self._torque = None
         else:
-            self._torque = torque
-        admitted = self._force
-        is_stale = admitted is not None and any(admitted.force) and age > parameters.command_timeout
-        if is_stale:
-            admitted = None
-            if not self._command_stale:  # the commanding node is gone: stop pressing and stay here
-                self.hold(q)
-        elif posture is not None:
-            self.hold(posture)
-        self._command_stale = is_stale
-        return Commands(admitted, self._torque, self.posture, refusals)
+            self._torque, self._torque_age = torque, 0.0
+        has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
+        self._has_lapsed = force is None and (self._has_lapsed or has_ended)
+        if posture is not None and not self._has_lapsed:
+            self.posture = list(posture)
+        elif has_ended or self._is_moved:
+            self.posture = list(q)
+        self._is_moved = posture is not None and not self._has_lapsed
+        return Commands(self._force, self._torque, self.posture, refusals)
 
 
 def _refusal(commanded: float, name: str, limit: float, unit: str) -> str:

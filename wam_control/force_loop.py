@@ -26,7 +26,7 @@ from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
 from wam_control.stability_guard import GuardAssessment
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import Contact, ForceCommand, State, Triple
+from wam_description.signals import NO_CONTACT, Contact, ForceCommand, State, Triple
 
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
@@ -56,6 +56,7 @@ class ForceLoop:
     servo : gains of the velocity loop, on which the guard relies.
     parameters : gains and limits.
     timing : periods of the loops, for the guard.
+    command_age : time for which the last good command counts while others are refused, s; without end by default.
 
     Attributes
     ----------
@@ -65,12 +66,19 @@ class ForceLoop:
     fallback : why the estimated contact position is not used, '' if it is or if no contact is detected.
     """
 
-    def __init__(self, arm: Arm, servo: Servo, parameters: ForceLoopParameters, timing: Timing) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        servo: Servo,
+        parameters: ForceLoopParameters,
+        timing: Timing,
+        command_age: float = math.inf,
+    ) -> None:
         self._arm, self._timing = arm, timing
         self._body = RigidBody(arm)
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
-        self._admission = CommandAdmission()
+        self._admission = CommandAdmission(command_age)
         self._position = ContactPosition()
         self._contact_rejected = False
         self._measurement = ForceMeasurement(self._body)
@@ -133,10 +141,9 @@ class ForceLoop:
         self,
         joints: State,
         sensors: State | None,
-        contact: Contact,
+        contact: Contact | None,
         external: Sequence[float] | None,
         command: ForceCommand | None,
-        command_age: float,
         posture: Sequence[float] | None,
         torque: Sequence[float] | None,
         dt: float,
@@ -148,11 +155,12 @@ class ForceLoop:
         joints : joint state from the motors.  Where no motor gives any torque they are braked or in
             fault: all controller state is reset then.
         sensors : joint-side sensors, None where there are none.
-        contact : estimated contact, force of the world on the cover.
+        contact : estimated contact, force of the world on the cover; None where nobody estimates it.  Without
+            the signals that `feedback` names neither force nor joint torque is controlled.
         external : estimated torques of the world on the joints (n,), N m.
-        command : commanded force; None or zero leaves all axes to the posture.
-        command_age : time since the state that the command answers, s; a stale command counts as none.
-        posture : commanded joint angles (n,), rad; None holds those of the start.
+        command : commanded force; None or zero leaves all axes to the posture.  Where a force ends with None, the arm
+            stays where it is.
+        posture : commanded joint angles (n,), rad; None holds those of the start, or those where a posture ended.
         torque : commanded joint torques on the world in the joint_torque mode (n,), N m.
         dt : outer period, s.
         """
@@ -160,8 +168,11 @@ class ForceLoop:
         if not self._joints or not any(joints.effort):
             self._reset(joints.position)
         self._joints = tuple(joints.position)
-        commands = self._admission.step(own, joints.position, command, command_age, posture, torque)
-        self.refused += len(commands.refusals)
+        if (contact if own.feedback == "contact_estimate" else sensors) is None and own.mode != "open_loop":
+            command = torque = None  # a force that is not measured would grow without bounds
+        contact = contact or NO_CONTACT
+        commands = self._admission.step(own, joints.position, command, posture, torque, dt)
+        self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
         self.refusals, self.fallback = commands.refusals, ""
         self._measurement.step(own, sensors, external)
         if own.mode == "joint_torque":
@@ -173,7 +184,7 @@ class ForceLoop:
 
     def _reset(self, q: Sequence[float]) -> None:
         """Hold this posture and forget what was before."""
-        self._admission.hold(q)
+        self._admission.restart(q)
         self._transfer.reset()
         self._begin("")
 

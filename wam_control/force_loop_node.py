@@ -17,7 +17,7 @@ class ForceLoopNode:
     follows = Followed("velocity_loop", "servo")
 
     def __init__(self, shared: Shared, own: ForceLoopParameters) -> None:
-        self._loop = ForceLoop(shared.arm, shared.servo, own, shared.timing)
+        self._loop = ForceLoop(shared.arm, shared.servo, own, shared.timing, shared.ages.command)
         self.tune = self._loop.tune
         self.retune = self._loop.retune_servo
         self._covers = shared.arm.covers.names
@@ -25,12 +25,12 @@ class ForceLoopNode:
 
     @reaction(
         Input("joint_states"),
-        Input("joint_sensors"),
-        Input("external_joint_torques", "effort"),
-        Input("contact/hypotheses"),
-        Input("force_command"),
-        Input("joint_posture_command", "position"),
-        Input("joint_torque_command", "effort"),
+        Input("joint_sensors", absent="hold"),
+        Input("external_joint_torques", "effort", absent="brake"),
+        Input("contact/hypotheses", absent="brake"),
+        Input("force_command", age="command", absent="hold"),
+        Input("joint_posture_command", "position", age="command", absent="hold"),
+        Input("joint_torque_command", "effort", age="command", absent="hold"),
         outputs=(
             "joint_velocity_command",
             "joint_effort_command",
@@ -41,17 +41,16 @@ class ForceLoopNode:
     )
     def step(self, inputs: Inputs) -> Outputs:
         """One outer period."""
-        command, external, posture, torque = (
-            inputs[topic]
-            for topic in ("force_command", "external_joint_torques", "joint_posture_command", "joint_torque_command")
+        command, posture, torque = (
+            inputs[topic] for topic in ("force_command", "joint_posture_command", "joint_torque_command")
         )
+        external, hypotheses = inputs["external_joint_torques"], inputs["contact/hypotheses"]
         out = self._loop.step(
             inputs["joint_states"],
             inputs["joint_sensors"],
-            contact_of(inputs["contact/hypotheses"], self._covers),
+            contact_of(hypotheses, self._covers) if external and hypotheses else None,
             external.effort if external else None,
             ForceCommand(command.frame, command.force) if command else None,
-            inputs.age("force_command"),
             posture.position if posture else None,
             torque.effort if torque else None,
             inputs.dt,
@@ -65,6 +64,12 @@ class ForceLoopNode:
             "force_error_limited": Wrench(frame, out.limited, ZERO),
             **self._status(),
         }
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """The estimate, where the force is controlled by it."""
+        is_fed_back = self._loop.parameters.feedback == "contact_estimate"
+        return frozenset({"external_joint_torques", "contact/hypotheses"} if is_fed_back else ())
 
     def _status(self) -> Outputs:
         """What the guard reports, where it has changed."""

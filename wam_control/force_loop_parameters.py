@@ -71,12 +71,6 @@ class ForceLoopParameters:
         "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", low=0.0, live=True
     )
     spring_rest: tuple[float, ...] = parameter("joint angle at which that spring is relaxed", "rad", live=True)
-    command_timeout: float = parameter(
-        "age at which a force command is stale: the arm stops pressing and holds its position",
-        "s",
-        low=0.001,
-        live=True,
-    )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
     contact_position: float = parameter("contact position assumed along it", "m", live=True)
     schedule: str = parameter(

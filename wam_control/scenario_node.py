@@ -41,7 +41,7 @@ class ScenarioNode:
 
     @reaction(
         Input("joint_states", "position"),
-        Input("contact/hypotheses"),
+        Input("contact/hypotheses", absent="zero"),
         outputs=("joint_posture_command", "force_command", "sim/disturbance"),
     )
     def step(self, inputs: Inputs) -> Outputs:

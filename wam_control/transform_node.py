@@ -29,7 +29,9 @@ class TransformNode:
         return {"motor_velocity_command": State([], velocity, [])}
 
     @reaction(
-        Input("gravity_effort", "effort"), Input("joint_effort_command", "effort"), outputs=("motor_effort_command",)
+        Input("gravity_effort", "effort"),
+        Input("joint_effort_command", "effort", absent="zero"),
+        outputs=("motor_effort_command",),
     )
     def effort(self, inputs: Inputs) -> Outputs:
         """Motor torques that carry the links and give the commanded joint torques on top."""

@@ -5,19 +5,14 @@ from dataclasses import dataclass
 
 from wam_control.dither import DitherParameters
 from wam_description.arm import Motors, Servo
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import lengths
 
 
 @dataclass(frozen=True)
 class VelocityLoopParameters:
-    """Dither and time limit of the velocity loop; its gains are `wam_description.arm.Servo`."""
+    """Dither of the velocity loop; its gains are `wam_description.arm.Servo`."""
 
     dither: DitherParameters
-    command_timeout: float = parameter(
-        "age at which a velocity command, also an empty one, is stale: zero velocity is commanded",
-        "s",
-        low=0.001,
-    )
 
 
 class VelocityLoop:
@@ -29,15 +24,15 @@ class VelocityLoop:
     an enabled arm starts without a jolt.
     """
 
-    def __init__(self, motors: Motors, servo: Servo, parameters: VelocityLoopParameters) -> None:
+    def __init__(self, motors: Motors, servo: Servo) -> None:
         self._motors = motors
         self._peak = motors.peak_torque
         self._constant = motors.torque_constant
         self._integral = [0.0] * len(self._peak)
         self._commanded = [0.0] * len(self._peak)
-        self.tune(servo, parameters)
+        self.tune(servo)
 
-    def tune(self, servo: Servo, parameters: VelocityLoopParameters) -> None:
+    def tune(self, servo: Servo) -> None:
         """Take new gains; the integral, kept as a torque, does not jump.
 
         Raises
@@ -47,14 +42,12 @@ class VelocityLoop:
         """
         lengths("servo", self._motors.names, vars(servo))
         self._kp, self._ki = servo.proportional_gain, servo.integral_gain
-        self._timeout = parameters.command_timeout
 
     def step(
         self,
         thetad: Sequence[float],
         tau_motor: Sequence[float],
         command: Sequence[float],
-        command_age: float,
         feedforward: Sequence[float],
         dt: float,
     ) -> list[float]:
@@ -65,8 +58,6 @@ class VelocityLoop:
         thetad : measured motor velocities (n,), rad/s.
         tau_motor : torques that the motors gave in the last period (n,), N m.
         command : commanded motor velocities (n,), rad/s; empty for torque only.
-        command_age : time since the state that the command answers, s; a stale command, also one for torque
-            only, counts as zero velocity.
         feedforward : torques (n,), N m.
         dt : time since the last measurement, s.
 
@@ -75,8 +66,6 @@ class VelocityLoop:
         list of float
             currents (n,), A.
         """
-        if command_age > self._timeout:
-            command = [0.0] * len(self._peak)
         currents = []
         for i, peak in enumerate(self._peak):
             if not command:

@@ -16,8 +16,7 @@ class VelocityLoopNode:
     owns = "servo"
 
     def __init__(self, shared: Shared, own: VelocityLoopParameters) -> None:
-        self._own = own
-        self._loop = VelocityLoop(shared.arm.motors, shared.servo, own)
+        self._loop = VelocityLoop(shared.arm.motors, shared.servo)
         self._dither = Dither(shared.arm, shared.timing, own.dither)
         self._cost = self._dither.cost(shared.arm.joints.start)
         zero = [0.0] * len(shared.arm.motors.names)
@@ -25,8 +24,8 @@ class VelocityLoopNode:
 
     @reaction(
         Input("motor_states"),
-        Input("motor_velocity_command", "velocity?", delayed=True),
-        Input("motor_effort_command", "effort", delayed=True),
+        Input("motor_velocity_command", "velocity?", delayed=True, absent="brake"),
+        Input("motor_effort_command", "effort", delayed=True, absent="brake"),
         outputs=("motor_current_command",),
     )
     def step(self, inputs: Inputs) -> Outputs:
@@ -38,7 +37,6 @@ class VelocityLoopNode:
             motors.velocity,
             motors.effort,
             velocity.velocity,
-            inputs.age("motor_velocity_command"),
             self._dither.added(inputs.stamp, effort.effort),
             inputs.dt,
         )
@@ -46,7 +44,7 @@ class VelocityLoopNode:
 
     def retune(self, servo: Servo) -> None:
         """Take new gains while the arm moves."""
-        self._loop.tune(servo, self._own)
+        self._loop.tune(servo)
 
     def diagnostics(self) -> dict[str, str]:
         """What the dither costs, where it is on."""

@@ -231,10 +231,32 @@ def seconds(nanoseconds: int) -> float:
 
 
 @dataclass(frozen=True)
+class InputAges:
+    """Ages from which an input counts as absent; also how far its stamp may be ahead of the newest state."""
+
+    feedback: float = parameter(
+        "age from which what another node sends is absent; where the arm cannot do without, the driver brakes",
+        "s",
+        low=0.002,
+        high=1.0,
+        before=0.1,
+    )
+    command: float = parameter(
+        "age from which a command of a program is absent: force, posture, joint torque", "s", low=0.002, high=1.0,
+        before=0.2,
+    )  # fmt: skip
+
+    def limit_ns(self, kind: str) -> int:
+        """One of the limits by its name, ns."""
+        return round(getattr(self, kind) * 1e9)
+
+
+@dataclass(frozen=True)
 class Shared:
     """The part of a configuration that every node reads."""
 
     timing: Timing
+    ages: InputAges
     arm: Arm
     servo: Servo
     nodes: tuple[str, ...] = parameter("nodes of this bring-up; lockstep starts when all are present")

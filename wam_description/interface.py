@@ -60,7 +60,7 @@ class Interface:
         self, shared: Shared, replaced: dict[str, Any] | None = None, started_by_hand: Declaration | None = None
     ) -> None:
 
-        self._timing = shared.timing
+        self._timing, self._ages = shared.timing, shared.ages
         found = [declared(entry) for entry in shared.nodes]
         replaced = dict(replaced or {})
         self.declarations: dict[str, Declaration] = {}
@@ -90,11 +90,10 @@ class Interface:
         return [name for name, one in self.declarations.items() if topic in one.outputs]
 
     def subscribers(self, topic: str) -> list[str]:
-        """Names of the nodes that take a topic; the recorder takes every one."""
+        """Names of the nodes that take a topic; the recorder takes every one, and every node the driver's status."""
 
         def takes(name: str, one: Declaration) -> bool:
-            listens_to_status = topic == STATUS and hasattr(one.node, "take_status")
-            return topic in one.inputs or listens_to_status or name == "recorder"
+            return topic in one.inputs or topic == STATUS or name == "recorder"
 
         return [name for name, one in self.declarations.items() if takes(name, one)]
 
@@ -132,7 +131,35 @@ class Interface:
     def _spec(self, item: Input) -> InputSpec:
 
         delay = self._timing.outer_delay if item.delayed else 0
-        return InputSpec(self.topics[item.topic].rate != "inner", delay, self.is_streamed(item.topic))
+        limit = self._ages.limit_ns(item.age)
+        is_outer, is_streamed = self.topics[item.topic].rate != "inner", self.is_streamed(item.topic)
+        return InputSpec(is_outer, delay, is_streamed, limit, item.age == "command")
+
+    def essential(self, reaction: Reaction) -> frozenset[str]:
+        """The inputs of a reaction that a node of the bring-up streams and without which the driver has to brake."""
+        return frozenset(i.topic for i in reaction.inputs if i.absent == "brake" and self.is_streamed(i.topic))
+
+    def upstream(self, topic: str) -> frozenset[str]:
+        """Names of the nodes between the driver and a topic: those whose loss ends it."""
+        found, passed, waiting = set(), set(_sources()), [topic]
+        while waiting:
+            passed.add(topic := waiting.pop())
+            for name, one in self.declarations.items():
+                triggers = [reaction.trigger.topic for reaction in one.reactions if topic in reaction.outputs]
+                found |= {name} if triggers else set()
+                waiting += [trigger for trigger in triggers if trigger not in passed]
+        return frozenset(found)
+
+    def silent(self, lost: Collection[str], present: Collection[str]) -> list[str]:
+        """Which nodes must have ended for these topics to be lost while others still come.
+
+        A node that still answers in one of the topics that come cannot be it; one that all lost topics have in
+        common explains them best.
+        """
+        suspects = [self.upstream(topic) for topic in lost]
+        every: frozenset[str] = frozenset().union(*suspects)
+        alive: frozenset[str] = frozenset().union(*(self.upstream(topic) for topic in present))
+        return sorted(every.intersection(*suspects) - alive or every - alive or every)
 
     def _check(self) -> None:
 

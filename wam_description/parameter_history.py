@@ -24,6 +24,8 @@ FORMER_NAMES: Final = {
     "inference.positions": "inference.places",
     "servo.proportional_gain": "velocity_loop:proportional_gain",
     "servo.integral_gain": "velocity_loop:integral_gain",
+    "ages.feedback": "velocity_loop:command_timeout",
+    "ages.command": "force_loop:command_timeout",
 }
 OF_ROS: Final = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # every node has these
 

@@ -109,8 +109,10 @@ class NodeStatus(NamedTuple):
     node : name of the node; filled in by the adapter where it is empty.
     connected : whether all publishers and subscribers that the node expects are there.
     mode : of the driver: braked, enabled or fault; '' for other nodes.
-    fault : why the driver has stopped, '' where it has not.
+    fault : why the driver has stopped, or why it has to, '' where there is no reason.
     step : of the scenario, '' for other nodes.
+    session : of the driver, its number; of another node, the one that it follows; 0 where it has none.
+    since : of the driver, the time from which commands count, ns: the brakes were switched then.
     stamp : time of the arm that the status belongs to, ns, 0 where it has none.
     facts : further values for people, by name.
     """
@@ -122,6 +124,8 @@ class NodeStatus(NamedTuple):
     mode: str = ""
     fault: str = ""
     step: str = ""
+    session: int = 0
+    since: int = 0
     stamp: int = 0
     facts: Mapping[str, str] = {}
 

@@ -11,15 +11,15 @@ def pairs(status: NodeStatus) -> list[tuple[str, str]]:
     """The fields of a status that are not empty, then its facts, as (key, value)."""
     own = {"peers": _CONNECTED[status.connected], "mode": status.mode, "fault": status.fault, "step": status.step}
     found = [(key, value) for key, value in own.items() if value]
-    if status.stamp:
-        found.append(("stamp", str(status.stamp)))
+    numbers = {"session": status.session, "since": status.since, "stamp": status.stamp}
+    found += [(key, str(value)) for key, value in numbers.items() if value]
     return [*found, *status.facts.items()]
 
 
 def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]]) -> NodeStatus:
     """The status that these pairs describe; unknown keys become facts, an unknown level the highest."""
     facts = dict(given)
-    stamp = facts.pop("stamp", "")
+    session, since, stamp = (_number(facts.pop(key, "")) for key in ("session", "since", "stamp"))
     return NodeStatus(
         level=Level(level) if level in Level._value2member_map_ else Level.ERROR,
         message=message,
@@ -28,6 +28,13 @@ def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]])
         mode=facts.pop("mode", ""),
         fault=facts.pop("fault", ""),
         step=facts.pop("step", ""),
-        stamp=int(stamp) if stamp.isascii() and stamp.isdigit() and len(stamp) < 20 else 0,
+        session=session,
+        since=since,
+        stamp=stamp,
         facts=facts,
     )
+
+
+def _number(text: str) -> int:
+    """A number that is not negative, 0 for any other text."""
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 20 else 0

@@ -3,6 +3,15 @@
 A node works when its trigger comes.  In lockstep it first waits, by stamp, for each other input that a
 node of the bring-up streams; in realtime it takes the newest of each.  Pure logic on stamps in
 nanoseconds, no ROS.
+
+Nothing is used that is from the future, too old, or from before the driver's session:
+
+- The stamps of the trigger are the node's clock.  One that goes back or jumps is refused, until the next
+  one goes on from it: a single message never moves the clock, a driver that starts again does.
+- An input far ahead of the clock is refused; one a little ahead is kept until the clock is there.
+- An input older than its limit is given as absent, and an older one never replaces a newer one.
+- A command of a program counts while it is streamed: a message of its own, which no other has preceded within
+  the limit, does nothing.  Without a stamp it has that of the newest state when it comes.
 """
 
 from collections import deque
@@ -10,6 +19,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wam_description.arm import Timing, seconds
+
+LONGEST_JUMP = (
+    200_000_000  # ns, by which a clock goes on at once where a node was late; a longer one needs two messages
+)
+MOST_AHEAD = 1000  # messages ahead of the clock that are kept
+
+
+class OutOfTime(ValueError):
+    """A message of the future; the text names the value, what is allowed and what to do."""
 
 
 class InputSpec(NamedTuple):
@@ -20,11 +38,15 @@ class InputSpec(NamedTuple):
     outer : True where it comes once per outer period, False where it comes every inner period.
     delay : inner periods after which it is used.
     streamed : True where a node of the bring-up sends it in every period, so that a step can wait for it.
+    limit_ns : age from which it counts as absent, ns, and how far it may be ahead of the clock.
+    is_command : whether it is a command of a program, which has to be streamed and may lack a stamp.
     """
 
     outer: bool
     delay: int = 0
     streamed: bool = True
+    limit_ns: int = LONGEST_JUMP
+    is_command: bool = False
 
 
 class Inputs:
@@ -42,7 +64,7 @@ class Inputs:
         self.stamp, self.dt, self._taken = stamp, dt, taken
 
     def __getitem__(self, topic: str) -> Any:
-        """The value, None where there is none or the topic does not exist on this arm."""
+        """The value, None where there is none, it is too old, or the topic does not exist on this arm."""
         found = self._taken.get(topic)
         return found[1] if found is not None else None
 
@@ -66,6 +88,10 @@ class Synchroniser:
     inputs : the other inputs by topic.
     outer : whether steps come at the outer rate, so that waited inputs of other periods are of no interest.
     thinned : whether the trigger comes at the inner rate and only those of outer periods start a step.
+
+    Attributes
+    ----------
+    strays : messages that do not go on from those before: older ones, or a second one for the same state.
     """
 
     def __init__(
@@ -81,20 +107,44 @@ class Synchroniser:
         self._period = timing.outer_period_ns if outer else timing.period_ns
         waits = timing.mode == "lockstep"
         waited = {topic: spec for topic, spec in inputs.items() if waits and spec.streamed}
+        self._limits = {topic: spec.limit_ns for topic, spec in waited.items()}
+        self._longest_jump = max(LONGEST_JUMP, 3 * self._period)
         self._kept: dict[str, dict[int, Any]] = {topic: {} for topic in waited}
-        self._newest: dict[str, tuple[int, Any] | None] = {topic: None for topic in inputs if topic not in waited}
+        self._newest = {topic: _Newest(topic, spec) for topic, spec in inputs.items() if topic not in waited}
         self._groups = [
             _Group(
                 spec.outer,
                 spec.delay * timing.period_ns,
                 spec.outer == outer and not spec.delay,
-                [(t, self._kept[t]) for t in waited if waited[t] == spec],
+                [(t, self._kept[t]) for t in waited if waited[t][:2] == spec[:2]],
             )
-            for spec in dict.fromkeys(waited.values())
+            for spec in {spec[:2]: spec for spec in waited.values()}.values()
         ]
         self._is_alone = not inputs  # a trigger is all there is to a step
         self._triggers: deque[tuple[int, Any]] = deque()
-        self._last = self._last_done = 0
+        self.strays = 0
+        self.restart()
+
+    def restart(self, begin: int = 0) -> None:
+        """Forget everything: another session of the driver has begun, or the clock has jumped.
+
+        Parameters
+        ----------
+        begin : first state of the session, ns; nothing can come in answer to one before it.
+        """
+        self._begin = begin
+        self._last = self._last_done = self._suspect = 0
+        self._triggers.clear()
+        for kept in self._kept.values():
+            kept.clear()
+        for newest in self._newest.values():
+            newest.clear()
+
+    def discard_commands(self, before: int) -> None:
+        """Forget the commands whose stamp is before this time, ns: the brakes have been switched."""
+        for newest in self._newest.values():
+            if newest.is_command:
+                newest.discard(before)
 
     def accepts(self, topic: str, stamp: int) -> bool:
         """Whether a message of this stamp can be part of a step; if not, it need not be decoded."""
@@ -103,16 +153,23 @@ class Synchroniser:
         return not self._outer or topic in self._newest or self._timing.is_outer(stamp)
 
     def put(self, topic: str, stamp: int, value: Any) -> Sequence[Inputs]:
-        """Take an input; returns the inputs of each step that is now complete, in the order of their stamps."""
+        """Take an input; returns the inputs of each step that is now complete, in the order of their stamps.
+
+        Raises
+        ------
+        OutOfTime
+            where the stamp is ahead of the newest state, by more than the limit of the input.
+        """
+        last = self._last
         if topic == self._trigger:
-            if stamp <= self._last or (self._thinned and not self._timing.is_outer(stamp)):
+            if self._thinned and not self._timing.is_outer(stamp):
                 return ()
-            self._last = stamp
+            if not last < stamp <= last + self._longest_jump and (last or stamp <= 0) and not self._has_jumped(stamp):
+                return ()
+            self._last, self._suspect = stamp, 0
             self._triggers.append((stamp, value))
-        elif topic in self._newest:
-            self._newest[topic] = (stamp, value)
-        elif not self._outer or self._timing.is_outer(stamp):
-            self._kept[topic][stamp] = value
+        elif not self._outer or topic in self._newest or self._timing.is_outer(stamp):
+            self._keep(topic, stamp, value)
         if not self._triggers:
             return ()
         if self._is_alone:
@@ -124,6 +181,42 @@ class Synchroniser:
             taken[self._trigger] = (stamp, value)
             complete.append(self._step(stamp, taken))
         return complete
+
+    def _keep(self, topic: str, stamp: int, value: Any) -> None:
+        """Keep an input that is not the trigger."""
+        newest = self._newest.get(topic)
+        if newest is None:
+            if 0 < self._last < stamp - self._limits[topic]:
+                self._require_present(stamp, self._limits[topic])
+            kept = self._kept[topic]
+            if stamp in kept:
+                self.strays += 1
+            else:
+                kept[stamp] = value
+            return
+        if newest.is_command and not stamp:
+            stamp = self._last
+        self._require_present(stamp, newest.limit_ns)
+        if not newest.put(stamp, value, self._last):
+            self.strays += 1
+
+    def _require_present(self, stamp: int, limit_ns: int) -> None:
+        """Refuse what is ahead of the clock; before the first state there is none."""
+        if 0 < self._last < stamp - limit_ns:
+            raise OutOfTime(
+                f"stamp {stamp} ns is {seconds(stamp - self._last):.3g} s ahead of the newest state, {self._last} ns; "
+                "give a command the stamp of the state that it answers"
+            )
+
+    def _has_jumped(self, stamp: int) -> bool:
+        """Whether a trigger that does not go on from the last one goes on from the one that was suspected before."""
+        suspect, self._suspect = self._suspect, stamp
+        if 0 < suspect < stamp <= suspect + self._longest_jump:
+            self.restart()
+            return True
+        self.strays += 1
+        self._require_present(stamp, self._longest_jump)
+        return False
 
     def _step(self, stamp: int, taken: Mapping[str, tuple[int, Any] | None]) -> Inputs:
         """The inputs of a step that is complete, with the time since the one before."""
@@ -141,16 +234,27 @@ class Synchroniser:
             if cause not in kept
         ]
 
+    def ages(self) -> dict[str, float]:
+        """How old the inputs are that no step waits for and that have come, as parts of their limits, by topic."""
+        return {
+            topic: (self._last - newest.stamp) / newest.limit_ns
+            for topic, newest in self._newest.items()
+            if newest.stamp
+        }
+
     def _cause(self, group: "_Group", stamp: int) -> int:
         """Stamp of the inputs that belong to a step, 0 where none can have come yet."""
         cause = stamp - group.delay_ns
         if cause <= 0:
             return 0
-        return self._timing.outer_stamp(cause) if group.outer else cause
+        cause = self._timing.outer_stamp(cause) if group.outer else cause
+        return cause if cause >= self._begin else 0
 
     def _taken(self, stamp: int) -> dict[str, tuple[int, Any] | None] | None:
         """The inputs of a step, None where it still waits for one; older ones are forgotten."""
-        taken = self._newest.copy()
+        taken: dict[str, tuple[int, Any] | None] = {}
+        for topic, newest in self._newest.items():
+            taken[topic] = newest.taken(stamp)
         for group in self._groups:
             cause = self._cause(group, stamp)
             for topic, kept in group.members:
@@ -167,6 +271,49 @@ class Synchroniser:
                 if group.once:
                     kept.pop(stamp, None)
         return taken
+
+
+class _Newest:
+    """The newest value of an input that no step waits for, and those that are ahead of the clock."""
+
+    __slots__ = ("_ahead", "_before", "_value", "is_command", "limit_ns", "stamp", "topic")
+
+    def __init__(self, topic: str, spec: InputSpec) -> None:
+        self.topic, self.limit_ns, self.is_command = topic, spec.limit_ns, spec.is_command
+        self._ahead: deque[tuple[int, Any]] = deque(maxlen=MOST_AHEAD)
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self.stamp, self._before, self._value = 0, 0, None
+        self._ahead.clear()
+
+    def discard(self, before: int) -> None:
+        """Forget the value if its stamp is before this time, and all that are ahead of the clock."""
+        self._ahead.clear()
+        if self.stamp < before:
+            self.clear()
+
+    def put(self, stamp: int, value: Any, clock: int) -> bool:
+        """Take a value; False where it is no newer than the one that is known."""
+        if stamp > clock:
+            self._ahead.append((stamp, value))
+            return True
+        if stamp < self.stamp or (stamp == self.stamp and not self.is_command):
+            return False
+        self._before, self.stamp, self._value = self.stamp, stamp, value
+        return True
+
+    def taken(self, clock: int) -> tuple[int, Any] | None:
+        """Stamp and value at this time, None where there is none or it does not count."""
+        if self._ahead:
+            for _ in range(len(self._ahead)):
+                self.put(*self._ahead.popleft(), clock)
+        if not self.stamp or clock - self.stamp > self.limit_ns:
+            return None
+        if self.is_command and not (self._before and self.stamp - self._before <= self.limit_ns):
+            return None
+        return self.stamp, self._value
 
 
 class _Group(NamedTuple):

@@ -25,6 +25,7 @@ services : by name, the method that answers a std_srvs/Trigger at ``~/name`` wit
 requests : list of `Call` and `SetParameters`, made once and filled by steps; they are made, in order, before the
     outputs of the step are published.  A refusal goes to ``refused(message)``, which returns outputs.
 refusals : by topic, why the present input is not used; reported once for each message.
+needs : of the inputs with absent='brake' those that the node relies on as it is tuned now; all where it has none.
 diagnostics() : further values for /diagnostics, by name.
 done, failure : the node has finished, and why it failed ('' where it did not).
 high_priority : ask the system for a higher priority in realtime.
@@ -54,11 +55,17 @@ class Input(NamedTuple):
     topic : name in the table of topics.
     arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
     delayed : whether it is used `timing.outer_delay` periods after the state that caused it.
+    age : limit of its age, one of the parameters `ages`: feedback, of another node; command, of a program.
+    absent : what absence means, of an input that is not there or too old; the step sees None.
+        hold: the arm stays where it is; zero: nothing is added; brake: as zero or hold, and the driver brakes
+        where it was there before and another node of the bring-up streams it.
     """
 
     topic: str
     arrays: str = WHOLE
     delayed: bool = False
+    age: str = "feedback"
+    absent: str = "zero"
 
 
 class Reaction(NamedTuple):

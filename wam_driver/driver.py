@@ -215,6 +215,8 @@ class Driver:
 
     def enable(self, obstacle: str) -> Answer:
         """Release the brakes and discard every command received before, unless an `obstacle` is named."""
+        if self.safety.mode is Mode.ENABLED:
+            return Answer(True, "enabled already: nothing has changed")
         answer = self.safety.enable(obstacle)
         if answer.success:
             self._release()

@@ -17,11 +17,14 @@ from wam_description.signals import BASE, Answer, Level, NodeStatus, Point, Stat
 from wam_description.urdf import urdf
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.safety import Mode
+from wam_driver.session import Session
 from wam_ros.messages import Refused
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
 from wam_ros.run import raise_priority
 from wam_ros.tolerance import TolerantNode
+
+ROLL_CALL = 0.4  # s before the time-out in which the nodes say that they run
 
 
 class DriverNode(TolerantNode):
@@ -44,13 +47,20 @@ class DriverNode(TolerantNode):
         self._currents: tuple[int, list[float]] = (0, [])
         self._push_stamp = 0
         self._paused = False
-        self._reported = ("", False)
+        self._reported = ("", False, 0, 0)
         self._connected = False
         self._command_came = -math.inf
         self._watchdog = own.watchdog
+        interface = ports.interface
+        self._chain = [name for name, one in interface.declarations.items() if one.reactions]
+        is_live = shared.timing.mode == "realtime"
+        self._session = Session(self._chain, int(time.time() * 1e3) if is_live else 0)  # ms: no driver before had it
+        self._mode = self.driver.safety.mode
+        self._is_resuming, self._stalled = False, ""
+        ports.takes_problem = self._take_problem
         ports.feed("motor_current_command", self._take_currents, "effort")
         ports.feed("sim/disturbance", self._take_push)
-        ports.watch_peers(self._hear)
+        ports.watch_peers(self._take_status)
         for name, kind, answer in (
             ("enable", SetBool, self._enable),
             ("pause", SetBool, self._pause),
@@ -97,22 +107,17 @@ class DriverNode(TolerantNode):
 
     # what comes in
 
-    def _hear(self, status: NodeStatus) -> None:
-        """Brake where another node reports a fault."""
-        if status.level is Level.ERROR and status.fault:
-            self._fault(f"{status.node}: {status.fault}")
-
     def _take_currents(self, stamp: int, command: State) -> None:
-        if self._ports.publisher_count("motor_current_command") > 1:
-            self._fault(TWO_PUBLISHERS)
-            raise Refused(TWO_PUBLISHERS)
         currents, now = command.effort, self._now()
+        if not 0 < stamp <= self.driver.stamp:
+            raise Refused(
+                f"stamp {stamp} ns is not that of a state that was sent, newest {self.driver.stamp} ns; "
+                "answer a state with its own stamp"
+            )
+        if stamp <= self._currents[0]:
+            self._ports.claims.stray("motor_current_command")
         if self._timing.mode == "realtime":
-            if not 0 < stamp <= self.driver.stamp:
-                raise Refused(
-                    f"stamp {stamp} ns is not that of a state that was sent, newest {self.driver.stamp} ns; "
-                    "answer a state with its own stamp"
-                )
+            self._currents = (stamp, currents)
             while self._published and self._published[0][0] < stamp:
                 self._published.popleft()
             if self._published and self._published[0][0] == stamp:
@@ -121,8 +126,31 @@ class DriverNode(TolerantNode):
             self._progress = now
             self._command_came = now
             return
-        self._currents = (stamp, currents)
-        self._go_on()
+        if stamp > self._currents[0]:
+            self._currents = (stamp, currents)
+            self._go_on()
+
+    def _take_status(self, status: NodeStatus) -> None:
+        """Brake where another node reports a fault; go on where all follow the session."""
+        self._session.hear(status)
+        if status.level is Level.ERROR and status.fault and self.driver.safety.mode is Mode.ENABLED:
+            self._fault(f"{status.node}: {status.fault}")
+        if self._is_resuming and not self._session.silent:
+            self._is_resuming = False
+            self._end_the_roll_call()
+            self._currents, self._push_stamp = (0, []), 0
+            self._progress = self._now()
+            self._publish()
+
+    def _take_problem(self, reason: str) -> None:
+        if reason and self.driver.safety.mode is Mode.ENABLED:
+            self.driver.fault(reason)
+        self._announce()
+
+    def end(self) -> None:
+        """Put on the brakes at once; the others hear of it when the node is destroyed."""
+        self.driver.disable()
+        self._announce()
 
     def _take_push(self, stamp: int, wrench: Wrench) -> None:
         if wrench.frame == BASE:
@@ -144,6 +172,12 @@ class DriverNode(TolerantNode):
             self._announce()
         if not self._connected or self._ports.absent:
             return
+        if not self._started:
+            if not self._session.number:
+                self._session.begin()
+                self._announce()
+            if self._session.silent:
+                return
         self._watching.cancel()
         if not self._started:
             self._started = True
@@ -158,7 +192,7 @@ class DriverNode(TolerantNode):
         return missing
 
     def _go_on(self) -> None:
-        if self._started and not self._paused and not self._missing():
+        if self._started and not self._paused and not self._is_resuming and not self._missing():
             self._one_period()
 
     def _one_period(self) -> None:
@@ -170,14 +204,32 @@ class DriverNode(TolerantNode):
 
     def _watch_progress(self) -> None:
         waited = self._now() - self._progress
+        is_due = waited > self._timing.timeout - min(ROLL_CALL, 0.5 * self._timing.timeout)
+        if self._started and not self._paused and not self._is_resuming and is_due:
+            self._call_the_roll(waited)
         if waited < self._timing.timeout or self._paused or not self._started:
             if not self._started and waited > self._timing.timeout:
                 absent = ", ".join(self._ports.absent) or "the peers of the driver"
                 self.get_logger().warning(f"waiting for {absent} to be ready", throttle_duration_sec=5.0)
             return
+        self._end_the_roll_call()
+
+    def _call_the_roll(self, waited: float) -> None:
+        """Begin another session, so that the nodes that run say that they follow it; the arm is braked meanwhile."""
         if self.driver.safety.mode is Mode.ENABLED:
             missing = " and ".join(self._missing())
-            self._fault(f"lockstep: no {missing} for the state of {self.driver.stamp} ns within {waited:.1f} s")
+            self._stalled = f"lockstep: no {missing} for the state of {self.driver.stamp} ns within {waited:.1f} s"
+        self.driver.disable()
+        self._is_resuming = True
+        self._session.begin()
+        self._announce()
+
+    def _end_the_roll_call(self) -> None:
+        """Say why the arm was braked, and which node does not answer."""
+        reason, self._stalled = self._stalled, ""
+        if reason:
+            silent = " and ".join(self._session.silent)
+            self._fault(f"{reason}; {silent} has stopped, start it again, then reset_fault" if silent else reason)
 
     # realtime
 
@@ -234,12 +286,17 @@ class DriverNode(TolerantNode):
     def _announce(self) -> None:
         """Publish the status where it has changed."""
         safety, warnings = self.driver.safety, self.driver.warnings
-        message = f"{safety.mode.value}: {safety.fault or '; '.join(warnings)}".removesuffix(": ")
-        if (message, self._connected) == self._reported:
+        if safety.mode is not self._mode:
+            self._mode = safety.mode
+            self._session.since = self.driver.stamp + self._timing.period_ns
+        problem = self._ports.problem
+        message = f"{safety.mode.value}: {safety.fault or problem or '; '.join(warnings)}".removesuffix(": ")
+        reported = (message, self._connected, self._session.number, self._session.since)
+        if reported == self._reported:
             return
         is_new_fault = bool(safety.fault) and message != self._reported[0]
-        self._reported = (message, self._connected)
-        level = Level.ERROR if safety.fault else Level.WARN if warnings else Level.OK
+        self._reported = reported
+        level = Level.ERROR if safety.fault or problem else Level.WARN if warnings else Level.OK
         self._ports.publish_status(
             NodeStatus(
                 level,
@@ -247,6 +304,8 @@ class DriverNode(TolerantNode):
                 connected=self._connected,
                 mode=safety.mode.value,
                 fault=safety.fault,
+                session=self._session.number,
+                since=self._session.since,
                 stamp=self.driver.stamp,
             )
         )
@@ -301,12 +360,17 @@ class DriverNode(TolerantNode):
             return self.driver.disable()
         now = self._now()
         obstacle = ""
-        if self._ports.publisher_count("motor_current_command") > 1:
-            obstacle = TWO_PUBLISHERS
+        if self.driver.safety.mode is Mode.ENABLED:
+            return self.driver.enable("")
+        others = {
+            node: fault for node, fault in sorted(self._ports.faults.items()) if fault and node != self.get_name()
+        }
+        if problem := self._ports.problem:
+            obstacle = problem
         elif self.count_publishers("motor_states") > 1:
             obstacle = TWO_DRIVERS
-        elif faults := [f"{node}: {fault}" for node, fault in sorted(self._ports.faults.items()) if fault]:
-            obstacle = "; ".join(faults)
+        elif others:
+            obstacle = "; ".join(f"{node}: {fault}" for node, fault in others.items())
         elif self._timing.mode == "realtime" and now - self._command_came > self._watchdog:
             obstacle = "no motor_current_command comes in; start velocity_loop and its peers, then enable"
         self._progress = now
@@ -339,7 +403,4 @@ class DriverNode(TolerantNode):
 TWO_DRIVERS = (
     "another driver sends motor_states in this namespace; stop it, or give one of the two another namespace "
     "(-r __ns:=/other) or another ROS_DOMAIN_ID"
-)
-TWO_PUBLISHERS = (
-    "two publishers send motor_current_command; stop all but one ('ros2 topic info -v' lists them), then reset_fault"
 )

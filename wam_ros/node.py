@@ -18,9 +18,10 @@ from std_srvs.srv import SetBool, Trigger
 from wam_description.interface import Interface, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import Level, NodeStatus
-from wam_description.synchroniser import Inputs, Synchroniser
+from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Followed, Outputs, Reaction, SetParameters
+from wam_ros.messages import Refused
 from wam_ros.parameters import declare, follow, follow_other
 from wam_ros.ports import SECOND, Ports
 from wam_ros.run import raise_priority, run
@@ -68,9 +69,9 @@ class AdaptedNode(TolerantNode):
         self._service_clients: dict[tuple[str, str], Any] = {}
         self._refused: dict[str, int] = {}
         self._starts_with_all = getattr(self.node, "starts_with_all", False)
-        take_status = getattr(self.node, "take_status", None)
-        if take_status or self._starts_with_all:
-            self._ports.watch_peers(take_status)
+        self._interface, self._since, self._is_enabled = interface, 0, False
+        self._synchronisers: list[Synchroniser] = []
+        self._ports.watch_peers(self._take_status)
         for reaction in declaration.reactions:
             self._connect(reaction, interface)
         for name in getattr(self.node, "services", ()):
@@ -98,22 +99,73 @@ class AdaptedNode(TolerantNode):
     def _connect(self, reaction: Reaction, interface: Interface) -> None:
         unused = getattr(self.node, "unused", ())
         topics, synchroniser = interface.synchroniser(reaction, unused)
+        self._synchronisers.append(synchroniser)
         work = getattr(self.node, reaction.method)
+        essential = interface.essential(reaction) if self._is_realtime else frozenset()
         for item in (reaction.trigger, *reaction.inputs):
             if item.topic in topics:
                 accepts = partial(synchroniser.accepts, item.topic)
-                self._ports.feed(item.topic, self._taking(synchroniser, item.topic, work), item.arrays, accepts)
+                self._ports.feed(
+                    item.topic, self._taking(synchroniser, item.topic, work, essential), item.arrays, accepts
+                )
             elif item.topic in interface.topics:  # its publisher waits until all its listeners are there
                 self._ports.listen(item.topic, lambda data: None, raw=True)
 
     def _taking(
-        self, synchroniser: Synchroniser, topic: str, work: Callable[[Inputs], Outputs]
+        self,
+        synchroniser: Synchroniser,
+        topic: str,
+        work: Callable[[Inputs], Outputs],
+        essential: frozenset[str],
     ) -> Callable[[int, Any], None]:
         def take(stamp: int, value: Any) -> None:
-            for inputs in synchroniser.put(topic, stamp, value):
+            strays = synchroniser.strays
+            try:
+                complete = synchroniser.put(topic, stamp, value)
+            except OutOfTime as reason:
+                raise Refused(str(reason)) from None
+            for inputs in complete:
                 self._step(inputs, work)
+                if essential:
+                    self._watch(synchroniser, essential)
+            if synchroniser.strays != strays:
+                self._ports.claims.stray(topic)
 
         return take
+
+    def _watch(self, synchroniser: Synchroniser, essential: frozenset[str]) -> None:
+        """Let the driver brake where an input has stopped to come without which the node cannot control."""
+        needed = essential & getattr(self.node, "needs", essential)
+        ages = {topic: age for topic, age in synchroniser.ages().items() if topic in needed}
+        if not ages or max(ages.values()) <= 1.0:
+            self._ports.set_problem("inputs", "")
+        elif not self._ports.problems.get("inputs"):
+            lost = [topic for topic, age in ages.items() if age > 0.5]  # what stopped together is not lost together
+            silent = " and ".join(self._interface.silent(lost, [topic for topic in ages if topic not in lost]))
+            self._ports.set_problem(
+                "inputs",
+                f"{silent} has stopped: {' and '.join(lost)} is too old; start {silent} again, then reset_fault",
+            )
+
+    def _take_status(self, status: NodeStatus) -> None:
+        """Follow the driver: forget what came before its session, and commands from before the brakes were switched."""
+        if status.node == "driver":
+            self._is_enabled = status.mode == "enabled"
+            if status.session and status.session != self._ports.session:
+                for synchroniser in self._synchronisers:
+                    synchroniser.restart(status.stamp)
+                self._ports.follow(status.session)
+            if status.since != self._since:
+                self._since = status.since
+                for synchroniser in self._synchronisers:
+                    synchroniser.discard_commands(status.since)
+        if take_status := getattr(self.node, "take_status", None):
+            take_status(status)
+
+    def end(self) -> None:
+        """Say at once that this node ends, so that an enabled arm is braked before its commands cease."""
+        if self._is_enabled:
+            self._ports.set_problem("end", f"{self.get_name()} has ended; start it again, then reset_fault")
 
     def _step(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
         ports = self._ports

@@ -18,6 +18,7 @@ from wam_description.interface import Interface
 from wam_description.signals import Level, NodeStatus
 from wam_description.topics import STATUS
 from wam_description.wiring import Declaration
+from wam_ros.claims import Claims
 from wam_ros.header import header
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
 from wam_ros.qos import DEPTH, qos
@@ -29,6 +30,7 @@ WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
+CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
 LONGEST_DELIVERY = 4.0  # s, for all topics of a node together; the middleware repeats what was lost every 3 s
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
@@ -49,7 +51,9 @@ class Ports:
     refusals : refused messages by topic.
     facts : further values for the diagnostics.
     faults : present fault of each other node, '' where it has none.
-    problems : why the driver has to brake, by what is concerned.
+    problems : why the driver has to brake, by what is concerned: an input that is lost, a topic with two publishers.
+    session : of the driver that this node follows, 0 before it is known.
+    claims : who publishes what this node works on.
     """
 
     def __init__(self, node: Node, declaration: Declaration, shared: Shared, interface: Interface) -> None:
@@ -59,14 +63,18 @@ class Ports:
         self.facts: dict[str, str] = {}
         self.faults: dict[str, str] = {}
         self.problems: dict[str, str] = {}
+        self.session = 0
         self._name = declaration.name
         self._refusals_reported = 0
         self._status = self._plain = WAITING
+        self.takes_problem: Callable[[str], None] | None = None  # where the node itself has to brake
         self._wanted: NodeStatus | None = None
         self._next_report = self._last_report = 0
         self._absent: set[str] = set()
         self._logged: dict[str, tuple[float, int]] = {}  # by topic: when, and how many had been refused by then
         self._subscriptions: dict[str, Subscription] = {}
+        self._claimed: dict[str, Subscription] = {}
+        self.claims = Claims(node, self._claimed)
         rows = [interface.topics[topic] for topic in declaration.outputs if topic in interface.topics]
         own = [interface.topics[topic] for topic in (STATUS, DIAGNOSTICS)]
         self._publishers: dict[str, Publisher] = {
@@ -75,7 +83,9 @@ class Ports:
         self._published = dict.fromkeys(self._publishers, 0)
         self._full = {topic: node.resolve_topic_name(topic) for topic in self._publishers}
         self._encoders = {row.name: encoder(row, shared) for row in rows}
-        self._readiness = node.create_timer(0.02, self._look_for_peers, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._readiness = node.create_timer(0.02, self._look_for_peers, clock=steady)
+        node.create_timer(CLAIM_PERIOD, self._look_for_rivals, clock=steady)
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
@@ -104,11 +114,15 @@ class Ports:
         decode = decoder(self.interface.topics[topic], self.shared, arrays)
 
         def receive(data: bytes) -> None:
+            if subscription.get_publisher_count() > 1 and (rivals := self.claims.rivals(topic)):
+                self.set_problem(topic, rivals)
+                raise Refused(rivals)
             stamp = stamp_of(data)
             if accepts is None or accepts(stamp):
                 take(stamp, decode(data))
 
         self.listen(topic, receive, raw=True)
+        self._claimed[topic] = subscription = self._subscriptions[topic]
 
     def listen(self, topic: str, take: Callable[[Any], None], raw: bool = False) -> None:
         """Subscribe; a message that `take` refuses is counted and reported, and the last good one is used.
@@ -149,6 +163,35 @@ class Ports:
             self._logged[topic] = now, self.refusals[topic]
             self.node.get_logger().warning(f"{topic}: refused: {printable(reason, LONGEST_REASON)}{more}")
 
+    def set_problem(self, concerned: str, reason: str) -> None:
+        """Say in the status, with level ERROR, why the driver has to brake; '' where there is no reason any more."""
+        if self.problems.get(concerned, "") == reason:
+            return
+        self.problems[concerned] = reason
+        if reason:
+            self.node.get_logger().error(reason)
+        if self.takes_problem is not None:
+            self.takes_problem(reason)
+        else:
+            self.publish_status(self._plain._replace(connected=self.ready))
+
+    @property
+    def problem(self) -> str:
+        """The first problem that there is, '' where there is none."""
+        return next(filter(None, self.problems.values()), "")
+
+    def follow(self, session: int) -> None:
+        """Say that this node follows another session of the driver."""
+        self.session = session
+        self.claims.restart()
+        if self.ready:
+            self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_DELIVERY))  # only the last one is kept
+            self.publish_status(self._plain._replace(connected=True))
+
+    def _look_for_rivals(self) -> None:
+        for topic in self._claimed:
+            self.set_problem(topic, self.claims.rivals(topic))
+
     def set_status(self, status: NodeStatus) -> None:
         """Publish the status of the node, latched; kept until the node is ready."""
         if not self.ready:
@@ -156,17 +199,13 @@ class Ports:
             return
         self.publish_status(status._replace(connected=True))
 
-    def set_problem(self, concerned: str, reason: str) -> None:
-        """Say in the status, with level ERROR, why the driver has to brake; '' where there is no reason any more."""
-        self.problems[concerned] = reason
-        self.publish_status(self._plain)
-
     def publish_status(self, status: NodeStatus) -> None:
         """Publish the status of the node as it is, where it has changed."""
         self._plain = status
-        if problem := next(filter(None, self.problems.values()), ""):
+        problem = self.problem if self.takes_problem is None else ""
+        if problem:
             status = status._replace(level=Level.ERROR, message=problem, fault=problem)
-        status = status._replace(node=self._name)
+        status = status._replace(node=self._name, session=status.session or self.session)
         if status != self._status:
             self._status = status
             self._send(STATUS, diagnostic_status(status, self.shared.arm.name))

@@ -69,8 +69,8 @@ class Stop:
         self.is_set = True
 
 
-def spin(executor: Any, until: Callable[[], bool]) -> None:
-    """Spin until `until` is true, which is evaluated after each callback; then handle what has arrived until then.
+def spin(executor: Any, until: Callable[[], bool], end: Callable[[], object] = lambda: None) -> None:
+    """Spin until `until` is true, which is evaluated after each callback; then `end` and handle what has arrived.
 
     The events executor's own spin() hangs in the wheels built against old C libraries, and its
     spin_until_future_complete() sees its time-out only when no message waits: that is what the end
@@ -78,6 +78,7 @@ def spin(executor: Any, until: Callable[[], bool]) -> None:
     """
     while not until():
         executor.spin_once(timeout_sec=0.1)
+    end()
     future: rclpy.Future[None] = rclpy.Future()
     limit = threading.Timer(LONGEST_END, executor.create_task, [future.set_result, None])
     limit.start()
@@ -163,7 +164,8 @@ def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
     try:
         node = make(context=connection.context, namespace=NAMESPACE)
         connection.add(node)
-        spin(connection.executor, lambda: stop.is_set or getattr(node, "done", False))
+        end = getattr(node, "end", lambda: None)
+        spin(connection.executor, lambda: stop.is_set or getattr(node, "done", False), lambda: stop.is_set and end())
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     finally:

@@ -23,6 +23,7 @@ from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build_part
 from wam_description.signals import Point, State, Table, Wrench
+from wam_description.synchroniser import OutOfTime
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, masked
 from wam_sim.recording import RecordedRun, recorded_run
@@ -202,7 +203,11 @@ def _run(
         for arrays, synchroniser, work in steps:
             if topic not in arrays:
                 continue
-            for inputs in synchroniser.put(topic, stamp, masked(value, arrays[topic])):
+            try:
+                complete = synchroniser.put(topic, stamp, masked(value, arrays[topic]))
+            except OutOfTime:  # as the node did, which went on
+                continue
+            for inputs in complete:
                 for name, output in work(inputs).items():
                     if name in interface.topics and interface.topics[name].is_numbers:
                         published.setdefault(name, []).append(flat(inputs.stamp, output))

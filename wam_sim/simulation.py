@@ -18,7 +18,7 @@ from wam_description.configuration import Configuration
 from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, build
 from wam_description.signals import BASE, Level, NodeStatus, Point, State, Table, Wrench
-from wam_description.synchroniser import Inputs
+from wam_description.synchroniser import Inputs, Synchroniser
 from wam_description.topics import EVERY_NODE
 from wam_description.wiring import WHOLE, Call, Declaration, Outputs, SetParameters, masked
 from wam_driver.driver import Driver, DriverParameters
@@ -72,6 +72,7 @@ class Simulation:
         self._currents: tuple[int, list[float]] = (0, [])
         self._fault = ""
         self.nodes: dict[str, Any] = {}
+        self._synchronisers: list[Synchroniser] = []
         for name, declaration in self._interface.declarations.items():
             if name != "driver":
                 self._connect(name, declaration, shared, configuration, steps)
@@ -96,6 +97,7 @@ class Simulation:
         unused = getattr(node, "unused", ())
         for reaction in declaration.reactions:
             topics, synchroniser = self._interface.synchroniser(reaction, unused)
+            self._synchronisers.append(synchroniser)
             listener = Listener(
                 synchroniser.put,
                 getattr(node, reaction.method),
@@ -207,6 +209,8 @@ class Simulation:
             return ""
         if request.service == "enable":
             answer = self.driver.enable("") if request.data else self.driver.disable()
+            for synchroniser in self._synchronisers:
+                synchroniser.discard_commands(self.driver.stamp + self._timing.period_ns)
         else:
             answer = getattr(self.driver if request.node == "driver" else self.nodes[request.node], request.service)()
         return "" if answer.success else answer.message

@@ -1,0 +1,38 @@
+"""The session of a driver: which of its lives the nodes follow, and since when commands count."""
+
+from collections.abc import Collection
+
+from wam_description.signals import NodeStatus
+
+
+class Session:
+    """A number that no driver before had, and the nodes that have reported that they follow it.
+
+    Parameters
+    ----------
+    followers : nodes that have to follow.
+    number : of the session, 0 before it has begun.
+
+    Attributes
+    ----------
+    number : of the session; every node forgets what came before another one.
+    since : time from which commands count, ns: the next state after the brakes were switched.
+    """
+
+    def __init__(self, followers: Collection[str], number: int = 0) -> None:
+        self.number, self.since = number, 0
+        self._followed = dict.fromkeys(followers, 0)
+
+    def begin(self) -> None:
+        """Begin another session, with a number that no node follows yet."""
+        self.number = 1 + max([self.number, *self._followed.values()])
+
+    def hear(self, status: NodeStatus) -> None:
+        """Take which session a node follows."""
+        if status.node in self._followed:
+            self._followed[status.node] = status.session
+
+    @property
+    def silent(self) -> list[str]:
+        """The nodes that do not follow yet."""
+        return sorted(name for name, number in self._followed.items() if number != self.number)
