@@ -5,6 +5,7 @@ import cmath
 import pytest
 
 from wam_control.dither import DitherParameters
+from wam_control.servo_guard import ServoGuardParameters
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Motors, Servo
 from wam_description.configuration import Configuration, packaged
@@ -15,7 +16,8 @@ KP, KI = 0.015, 0.8
 ONE = Motors(("motor1",), (INERTIA,), (CONSTANT,), (PEAK,), (1.0,), (0.0,), (0.0,), (0.0,))
 STILL = DitherParameters(0.0, (0.0,))
 SERVO = Servo((KP,), (KI,))
-OWN = VelocityLoopParameters(STILL, 0.1)
+OFF = ServoGuardParameters("off", 1.0, 0, False)
+OWN = VelocityLoopParameters(STILL, OFF, 0.1, 1e12, 1e12)
 DT = 1e-3
 
 
@@ -199,3 +201,27 @@ def test_gains_of_a_wrong_number_are_refused(
     assert loop.step([0.0], [0.0], [1.0], 0.0, [0.0], DT) == VelocityLoop(ONE, SERVO, OWN).step(
         [0.0], [0.0], [1.0], 0.0, [0.0], DT
     ), "the gains in use stay"
+
+
+def test_commanded_velocity_and_feedforward_change_no_faster_than_their_limits() -> None:
+    slow = VelocityLoop(ONE, Servo((KP,), (0.0,)), VelocityLoopParameters(STILL, OFF, 0.1, 500.0, 200.0))
+    fast = VelocityLoop(ONE, Servo((KP,), (0.0,)), OWN)
+
+    def torque(loop: VelocityLoop, command: list[float], feedforward: float) -> float:
+        (current,) = loop.step([0.0], [1.0], command, 0.0, [feedforward], DT)
+        return current * CONSTANT
+
+    assert torque(fast, [2.0], 1.0) == pytest.approx(KP * 2.0 + 1.0)
+    rising = [torque(slow, [2.0], 1.0) for _ in range(7)]
+    steps = [min(0.5 * k, 2.0) * KP + min(0.2 * k, 1.0) for k in range(1, 8)]
+    assert rising == pytest.approx(steps)
+    assert torque(slow, [2.1], 1.1) == pytest.approx(KP * 2.1 + 1.1), "a command within the limits is taken as it is"
+    assert torque(slow, [], 1.1) == pytest.approx(1.1)
+    assert torque(slow, [2.0], 1.1) == pytest.approx(KP * 0.5 + 1.1), "it begins at the measured velocity, 0"
+
+
+def test_commanded_velocity_begins_at_the_measured_one_when_the_brakes_are_released() -> None:
+    loop = VelocityLoop(ONE, Servo((KP,), (0.0,)), VelocityLoopParameters(STILL, OFF, 0.1, 500.0, 1e12))
+    for _ in range(10):  # braked: the commanded torque does not act
+        (current,) = loop.step([0.0], [0.0], [2.0], 0.0, [0.0], DT)
+    assert current * CONSTANT == pytest.approx(KP * 0.5)

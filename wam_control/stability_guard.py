@@ -247,11 +247,9 @@ class StabilityGuard:
         if max(law.error_limit) <= error:
             return found
         most = (1.0 - SLACK) * share * found.scale
-        allowed = f"{group}_gain up to {_list([_rounded_down(most * gain) for gain in law.gain])}"
+        allowed = f"{group}_gain up to {_list([rounded_down(most * gain) for gain in law.gain])}"
         if error:
-            allowed += (
-                f", or {group}_error_limit up to {_rounded_down(error):g} at this gain (guard.mode limit sets it)"
-            )
+            allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
         reason = (
             f"{group}_gain {_list(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
             f"one (axis {found.where}, contact up to {self.parameters.contact_stiffness:g} N/m), "
@@ -321,7 +319,7 @@ def _lags(feedback: Feedback) -> list[Feedback]:
     return [feedback._replace(lag=lag) for lag in sorted({0.0, feedback.lag if feedback.kind == ESTIMATE else 0.0})]
 
 
-def _rounded_down(value: float) -> float:
+def rounded_down(value: float) -> float:
     """To three digits, never up: a value that is named as allowed has to be accepted."""
     if not value:
         return 0.0
