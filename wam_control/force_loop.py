@@ -70,7 +70,7 @@ class ForceLoop:
         self._body = RigidBody(arm)
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
-        self._admission = CommandAdmission()
+        self._admission = CommandAdmission(arm.joints)
         self._position = ContactPosition()
         self._contact_rejected = False
         self._measurement = ForceMeasurement(self._body)
@@ -160,7 +160,7 @@ class ForceLoop:
         if not self._joints or not any(joints.effort):
             self._reset(joints.position)
         self._joints = tuple(joints.position)
-        commands = self._admission.step(own, joints.position, command, command_age, posture, torque)
+        commands = self._admission.step(own, joints.position, command, command_age, posture, torque, dt)
         self.refused += len(commands.refusals)
         self.refusals, self.fallback = commands.refusals, ""
         self._measurement.step(own, sensors, external)
@@ -173,7 +173,7 @@ class ForceLoop:
 
     def _reset(self, q: Sequence[float]) -> None:
         """Hold this posture and forget what was before."""
-        self._admission.hold(q)
+        self._admission.restart(q)
         self._transfer.reset()
         self._begin("")
 

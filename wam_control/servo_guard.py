@@ -58,7 +58,7 @@ class Mechanism(NamedTuple):
 
 
 class ServoGuard:
-    """Judges gains of the velocity loop on one arm.
+    """Assesses gains of the velocity loop on one arm.
 
     Parameters
     ----------

@@ -45,16 +45,16 @@ class GuardParameters:
         live=True,
     )
     contact_stiffness: float = parameter(
-        "stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0, live=True
+        "stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0, high=1e9, live=True
     )
     posture: tuple[float, ...] = parameter(
-        "joint angles at which parameters are assessed before the arm moves", "rad", live=True
+        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0, live=True
     )
     stability_fraction: float = parameter(
         "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0, live=True
     )
     feedback_lag: float = parameter(
-        "time constant of the estimate with feedback contact_estimate", "s", low=0.0, live=True
+        "time constant of the estimate with feedback contact_estimate", "s", low=0.0, high=10.0, live=True
     )
     extra_delay: int = parameter(
         "inner periods by which a command may be later than timing.outer_delay, as in real time",
@@ -66,6 +66,7 @@ class GuardParameters:
         "shortest time between two assessments while pose, force direction or contact position change",
         "s",
         low=0.01,
+        high=3600.0,
         live=True,
     )
 
