@@ -387,6 +387,7 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
             Wrench("base", (1.0, 0.0, 0.0), zero),
             Wrench("hand", (1.0, 0.0, 0.0), zero),
             Wrench("outer_link", (math.nan, 0.0, 0.0), zero),
+            Wrench("outer_link", (501.0, 0.0, 0.0), zero),
         ]
     ):
         publisher.publish(wrench_stamped(hand.driver.stamp, wrench))

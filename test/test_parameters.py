@@ -93,6 +93,13 @@ def test_a_set_with_something_wrong_is_refused_by_name(change: dict[str, Any], t
         build(Example, flat)
 
 
+@pytest.mark.parametrize("node", ["", *NODES])
+def test_every_number_has_a_finite_range(node: str) -> None:
+    numbers = [field for field in fields(own_class(node) if node else Shared) if field.kind in (int, float)]
+    endless = [field.name for field in numbers if not -1e18 < field.low <= field.high < 1e18]
+    assert not endless, "give each a low and a high that an arm can have; 1e308 is a value, too"
+
+
 def own_class(node: str) -> Any:
     """The parameter class of a node."""
     return declared(node).parameter_class
@@ -172,15 +179,13 @@ def change(ros: Any, node: str, **given: Any) -> Any:
 
 def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
     node = make(ros, "velocity_loop")
-    doubled, halved = [0.03, 0.03, 0.03, 0.02], [0.4, 0.4, 0.4, 0.25]
-    assert change(
-        ros, "velocity_loop", **{"servo.proportional_gain": doubled, "servo.integral_gain": halved}
-    ).successful
-    assert node.node._loop._kp == tuple(doubled)
+    raised, halved = [0.016, 0.016, 0.016, 0.011], [0.4, 0.4, 0.4, 0.25]
+    assert change(ros, "velocity_loop", **{"servo.proportional_gain": raised, "servo.integral_gain": halved}).successful
+    assert node.node._loop._kp == tuple(raised)
     assert node.node._loop._ki == tuple(halved)
     request = GetParameters.Request(names=["servo.proportional_gain", "servo.integral_gain"])
     answer = call(ros, GetParameters, "velocity_loop/get_parameters", request)
-    assert [list(value.double_array_value) for value in answer.values] == [doubled, halved]
+    assert [list(value.double_array_value) for value in answer.values] == [raised, halved]
 
 
 @pytest.mark.parametrize(
@@ -214,6 +219,29 @@ def test_servo_gains_are_live_at_the_velocity_loop_alone(ros: Any) -> None:
     result = change(ros, "gravity", **{"servo.proportional_gain": [0.01] * 4})
     assert not result.successful
     assert "servo.proportional_gain" in result.reason
+
+
+@pytest.mark.parametrize(
+    ("node", "given", "text"),
+    [
+        ("velocity_loop", {"servo.proportional_gain": [1e308] * 4}, "allowed: 0 to 1e+09"),
+        ("velocity_loop", {"servo.proportional_gain": [0.3] * 4}, "allowed: servo.proportional_gain up to ["),
+        ("force_loop", {"force_limit": 1e308}, "force_limit"),
+        ("force_loop", {"joint_speed_limit": 1e308}, "joint_speed_limit"),
+        ("force_loop", {"command_timeout": 1e308}, "command_timeout"),
+        ("force_loop", {"contact_position": 0.9}, "contact_position is 0.9 m; allowed: 0 to 0.4064, on outer_link"),
+    ],
+)
+def test_a_live_value_that_the_arm_cannot_bear_is_refused(
+    ros: Any, node: str, given: dict[str, Any], text: str
+) -> None:
+    there = make(ros, node)
+    (name,) = given
+    before = there.get_parameter(name).value
+    result = change(ros, node, **given)
+    assert not result.successful
+    assert text in result.reason
+    assert there.get_parameter(name).value == before
 
 
 def test_gains_of_a_wrong_number_are_refused_over_ros(ros: Any) -> None:

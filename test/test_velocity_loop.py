@@ -4,7 +4,9 @@ import cmath
 
 import pytest
 
-from wam_control.velocity_loop import VelocityLoop
+from wam_control.dither import DitherParameters
+from wam_control.servo_guard import ServoGuardParameters
+from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Motors, Servo
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
@@ -12,7 +14,10 @@ from wam_description.parameters import ParameterError
 INERTIA, CONSTANT, PEAK = 4.0e-5, 0.25, 4.0
 KP, KI = 0.015, 0.8
 ONE = Motors(("motor1",), (INERTIA,), (CONSTANT,), (PEAK,), (1.0,), (0.0,), (0.0,), (0.0,))
+STILL = DitherParameters(0.0, (0.0,))
 SERVO = Servo((KP,), (KI,))
+OFF = ServoGuardParameters("off", 1.0, 0, False)
+OWN = VelocityLoopParameters(STILL, OFF, 1e12, 1e12)
 DT = 1e-3
 
 
@@ -20,7 +25,7 @@ class Rotor:
     """Inertia under the torque of a motor and a constant load; the loop closed around it."""
 
     def __init__(self, load: float = 0.0, dt: float = DT, law: "VelocityLoop | Naive | None" = None) -> None:
-        self.loop = law or VelocityLoop(ONE, SERVO)
+        self.loop = law or VelocityLoop(ONE, SERVO, OWN)
         self.load, self.dt = load, dt
         self.speed = self.torque = 0.0
         self.blocked = False
@@ -79,7 +84,7 @@ def test_feedforward_that_equals_the_load_keeps_the_rotor_at_rest() -> None:
 
 def test_a_blocked_motor_does_not_wind_up_and_recovers_at_once() -> None:
     speeds = []
-    for law in (VelocityLoop(ONE, SERVO), Naive()):
+    for law in (VelocityLoop(ONE, SERVO, OWN), Naive()):
         rotor = Rotor(law=law)
         rotor.blocked = True
         for _ in range(500):
@@ -98,7 +103,7 @@ def test_a_blocked_motor_does_not_wind_up_and_recovers_at_once() -> None:
 
 def test_a_motor_that_creeps_into_its_limit_leaves_it_when_the_error_turns() -> None:
     torques = []
-    for law in (VelocityLoop(ONE, SERVO), Naive()):
+    for law in (VelocityLoop(ONE, SERVO, OWN), Naive()):
         rotor = Rotor(law=law)
         rotor.blocked = True
         for _ in range(500):
@@ -112,7 +117,7 @@ def test_a_motor_that_creeps_into_its_limit_leaves_it_when_the_error_turns() -> 
 
 
 def test_torque_commanded_against_the_brakes_is_forgotten_when_they_release() -> None:
-    braked, flowing = VelocityLoop(ONE, SERVO), VelocityLoop(ONE, SERVO)
+    braked, flowing = VelocityLoop(ONE, SERVO, OWN), VelocityLoop(ONE, SERVO, OWN)
     torque = 0.0
     for _ in range(1000):
         braked.step([0.0], [0.0], [2.0], [0.1], DT)  # commanded, but no current flows
@@ -136,7 +141,7 @@ def test_an_empty_command_is_torque_only_and_forgets_the_integral() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_current_is_clipped_to_the_peak(sign: float) -> None:
-    loop = VelocityLoop(ONE, SERVO)
+    loop = VelocityLoop(ONE, SERVO, OWN)
     assert loop.step([0.0], [0.0], [], [sign * 100.0], DT) == [sign * PEAK / CONSTANT]
     assert loop.step([0.0], [0.0], [sign * 1e6], [0.0], DT) == [sign * PEAK / CONSTANT]
 
@@ -144,7 +149,7 @@ def test_current_is_clipped_to_the_peak(sign: float) -> None:
 def test_motors_do_not_mix() -> None:
     motors = Configuration.load(packaged("wam")).shared.arm.motors
     kp, ki = (0.01, 0.02, 0.03, 0.04), (0.1, 0.2, 0.3, 0.4)
-    loop = VelocityLoop(motors, Servo(kp, ki))
+    loop = VelocityLoop(motors, Servo(kp, ki), OWN)
     command, speed, feed = [1.0, 2.0, 3.0, 4.0], [0.5, -0.5, 0.0, 8.0], [0.1, 0.0, -0.1, 0.2]
     currents = loop.step(speed, [0.0] * 4, command, feed, DT)
     expected = [
@@ -162,7 +167,7 @@ def test_gains_change_without_a_jump_of_the_integral() -> None:
     rotor.step([0.0])
     before = rotor.step([0.0])
     assert before == pytest.approx(0.8)
-    rotor.loop.tune(Servo((0.1,), (8.0,)))  # type: ignore[union-attr]
+    rotor.loop.tune(Servo((0.1,), (8.0,)), OWN)  # type: ignore[union-attr]
     assert rotor.step([0.0]) == before
     assert rotor.step([1.0]) == pytest.approx(before + 0.1 + 8.0 * DT)
 
@@ -178,10 +183,34 @@ def test_gains_of_a_wrong_number_are_refused(
     proportional: tuple[float, ...], integral: tuple[float, ...], text: str
 ) -> None:
     with pytest.raises(ParameterError, match=text):
-        VelocityLoop(ONE, Servo(proportional, integral))
-    loop = VelocityLoop(ONE, SERVO)
+        VelocityLoop(ONE, Servo(proportional, integral), OWN)
+    loop = VelocityLoop(ONE, SERVO, OWN)
     with pytest.raises(ParameterError, match=text):
-        loop.tune(Servo(proportional, integral))
-    assert loop.step([0.0], [0.0], [1.0], [0.0], DT) == VelocityLoop(ONE, SERVO).step([0.0], [0.0], [1.0], [0.0], DT), (
-        "the gains in use stay"
-    )
+        loop.tune(Servo(proportional, integral), OWN)
+    assert loop.step([0.0], [0.0], [1.0], [0.0], DT) == VelocityLoop(ONE, SERVO, OWN).step(
+        [0.0], [0.0], [1.0], [0.0], DT
+    ), "the gains in use stay"
+
+
+def test_commanded_velocity_and_feedforward_change_no_faster_than_their_limits() -> None:
+    slow = VelocityLoop(ONE, Servo((KP,), (0.0,)), VelocityLoopParameters(STILL, OFF, 500.0, 200.0))
+    fast = VelocityLoop(ONE, Servo((KP,), (0.0,)), OWN)
+
+    def torque(loop: VelocityLoop, command: list[float], feedforward: float) -> float:
+        (current,) = loop.step([0.0], [1.0], command, [feedforward], DT)
+        return current * CONSTANT
+
+    assert torque(fast, [2.0], 1.0) == pytest.approx(KP * 2.0 + 1.0)
+    rising = [torque(slow, [2.0], 1.0) for _ in range(7)]
+    steps = [min(0.5 * k, 2.0) * KP + min(0.2 * k, 1.0) for k in range(1, 8)]
+    assert rising == pytest.approx(steps)
+    assert torque(slow, [2.1], 1.1) == pytest.approx(KP * 2.1 + 1.1), "a command within the limits is taken as it is"
+    assert torque(slow, [], 1.1) == pytest.approx(1.1)
+    assert torque(slow, [2.0], 1.1) == pytest.approx(KP * 0.5 + 1.1), "it begins at the measured velocity, 0"
+
+
+def test_commanded_velocity_begins_at_the_measured_one_when_the_brakes_are_released() -> None:
+    loop = VelocityLoop(ONE, Servo((KP,), (0.0,)), VelocityLoopParameters(STILL, OFF, 500.0, 1e12))
+    for _ in range(10):  # braked: the commanded torque does not act
+        (current,) = loop.step([0.0], [0.0], [2.0], [0.0], DT)
+    assert current * CONSTANT == pytest.approx(KP * 0.5)

@@ -6,6 +6,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ================================  ==============================================================================
 ``transform``                     motor states to joint states, joint commands to motor commands, (A.5)
 ``velocity_loop``                 inner loop: PI control of each motor's velocity, torque feed-forward
+``servo_guard``                   which gains of the velocity loop are stable on the arm
 ``dither``                        alternating motor torque against stiction, for contact detection at rest
 ``force_loop``                    outer loop: force along a direction, posture elsewhere, or joint torques
 ``force_command``                 - which commands are admitted: limits and age

@@ -26,8 +26,8 @@ class ContactEstimatorParameters:
     observer: ObserverParameters
     inference: InferenceParameters
     use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
-    detect: float = parameter("r^T S^-1 r of the external torques above which a contact is detected", low=0.0)
-    release: float = parameter("the same, below which the contact has ended", low=0.0)
+    detect: float = parameter("r^T S^-1 r of the external torques above which a contact is detected", low=0.0, high=1e6)
+    release: float = parameter("the same, below which the contact has ended", low=0.0, high=1e6)
 
     def __post_init__(self) -> None:
         require(

@@ -43,7 +43,7 @@ class InferenceParameters:
     weights: tuple[float, ...] = parameter(
         "relative frequency of contacts on each cover; the outer one sweeps more", low=1e-3, high=1e3
     )
-    force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1)
+    force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
     moment_arm_offset: float = parameter(
         "sd of the distance between the line of the force and the tube's axis, per radius", low=0.0, high=2.0
     )
@@ -52,7 +52,7 @@ class InferenceParameters:
     identification_threshold: float = parameter(
         "probability from which the link in contact is identified", low=0.5, high=1.0
     )
-    largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", low=0.0)
+    largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", low=0.0, high=1e6)
 
 
 class Hypothesis(NamedTuple):

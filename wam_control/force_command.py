@@ -5,7 +5,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_description.arm import Joints
 from wam_description.signals import ForceCommand
+
+NO_FORCE = ForceCommand("", (0.0, 0.0, 0.0))
 
 
 class Commands(NamedTuple):
@@ -26,10 +29,13 @@ class Commands(NamedTuple):
 
 
 class CommandAdmission:
-    """Keeps the last good command in place of one above the limits; where a command ends, the arm stays where it is.
+    """Keeps the last good command in place of one beyond the limits; where a command ends, the arm stays where it is.
+
+    Force and torque follow their commands no faster than their rate limits; a force in another frame begins at zero.
 
     Parameters
     ----------
+    joints : of the arm, with their limits.
     command_age : time for which the last good command counts while others are refused, s.
 
     Attributes
@@ -37,10 +43,12 @@ class CommandAdmission:
     posture : joint angles to hold (n,), rad; empty before the first state.
     """
 
-    def __init__(self, command_age: float) -> None:
-        self._command_age = command_age
+    def __init__(self, joints: Joints, command_age: float) -> None:
+        self._joints, self._command_age = joints, command_age
         self._force_age = self._torque_age = 0.0
         self.posture: list[float] = []
+        self._present = NO_FORCE
+        self._present_torque: Sequence[float] = [0.0] * len(joints.names)
         self._force: ForceCommand | None = None
         self._torque: Sequence[float] | None = None
         self._is_moved = self._has_lapsed = False
@@ -49,6 +57,8 @@ class CommandAdmission:
         """Hold these joint angles (n,), rad, until another posture is commanded; forget every command."""
         self._force = self._torque = None
         self._is_moved = self._has_lapsed = False
+        self._rising_force(None, 0.0)
+        self._rising_torque(None, 0.0)
         self.posture = list(q)
 
     def step(
@@ -79,6 +89,9 @@ class CommandAdmission:
                 self._torque = None
         else:
             self._torque, self._torque_age = torque, 0.0
+        if posture is not None and (beyond := self._beyond(posture)):
+            refusals["joint_posture_command"] = beyond
+            posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
         has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
         if posture is not None and not self._has_lapsed:
@@ -86,7 +99,46 @@ class CommandAdmission:
         elif has_ended or self._is_moved:
             self.posture = list(q)
         self._is_moved = posture is not None and not self._has_lapsed
-        return Commands(self._force, self._torque, self.posture, refusals)
+        return Commands(
+            self._rising_force(self._force, parameters.force_rate_limit * dt),
+            self._rising_torque(self._torque, parameters.torque_rate_limit * dt),
+            self.posture,
+            refusals,
+        )
+
+    def _beyond(self, posture: Sequence[float]) -> str:
+        """Why a posture is refused: the first joint beyond its limits; '' if there is none."""
+        joints = self._joints
+        for name, angle, low, high in zip(joints.names, posture, joints.lower, joints.upper, strict=True):
+            if not low <= angle <= high:
+                return (
+                    f"{name} is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad; "
+                    "the last good posture remains in force"
+                )
+        return ""
+
+    def _rising_force(self, wanted: ForceCommand | None, most: float) -> ForceCommand | None:
+        if wanted is None:
+            self._present = NO_FORCE
+            return None
+        present = self._present.force if self._present.frame == wanted.frame else (0.0, 0.0, 0.0)
+        change = [a - b for a, b in zip(wanted.force, present, strict=True)]
+        size = math.hypot(*change)
+        if size > most:
+            x, y, z = (b + most / size * step for b, step in zip(present, change, strict=True))
+            wanted = ForceCommand(wanted.frame, (x, y, z))
+        self._present = wanted
+        return wanted
+
+    def _rising_torque(self, wanted: Sequence[float] | None, most: float) -> Sequence[float] | None:
+        if wanted is None:
+            self._present_torque = [0.0] * len(self._joints.names)
+            return None
+        present = self._present_torque
+        if any(abs(a - b) > most for a, b in zip(wanted, present, strict=True)):
+            wanted = [b + min(max(a - b, -most), most) for a, b in zip(wanted, present, strict=True)]
+        self._present_torque = wanted
+        return wanted
 
 
 def _refusal(commanded: float, name: str, limit: float, unit: str) -> str:

@@ -78,7 +78,7 @@ class ForceLoop:
         self._body = RigidBody(arm)
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
-        self._admission = CommandAdmission(command_age)
+        self._admission = CommandAdmission(arm.joints, command_age)
         self._position = ContactPosition()
         self._contact_rejected = False
         self._measurement = ForceMeasurement(self._body)

@@ -29,50 +29,75 @@ class ForceLoopParameters:
         "G_I of each axis x y z of the force command's frame, or one for all: velocity per force error",
         "m/s/N",
         low=0.0,
+        high=100.0,
         live=True,
     )
     force_proportional_gain: tuple[float, ...] = parameter(
-        "G_P of each axis (5.23), or one for all: displacement per force error", "m/N", low=0.0, live=True
+        "G_P of each axis (5.23), or one for all: displacement per force error", "m/N", low=0.0, high=100.0, live=True
     )
     force_error_limit: tuple[float, ...] = parameter(
-        "saturation of F_error of each axis, or one for all; above the deadband", "N", low=0.0, live=True
+        "saturation of F_error of each axis, or one for all; above the deadband", "N", low=0.0, high=1e9, live=True
     )
     force_deadband: tuple[float, ...] = parameter(
-        "deadband at the input of G_I of each axis (5.7), or one for all", "N", low=0.0, live=True
+        "deadband at the input of G_I of each axis (5.7), or one for all", "N", low=0.0, high=1e3, live=True
     )
-    force_limit: float = parameter("largest force that may be commanded", "N", low=0.0, live=True)
+    force_limit: float = parameter("largest force that may be commanded", "N", low=0.0, high=1e3, live=True)
+    force_rate_limit: float = parameter(
+        "largest rate at which the desired force follows its command", "N/s", low=1.0, high=1e9, live=True, before=1e9
+    )
     torque_gain: tuple[float, ...] = parameter(
-        "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", low=0.0, live=True
+        "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", low=0.0, high=100.0, live=True
     )
     torque_proportional_gain: tuple[float, ...] = parameter(
-        "G_P of each joint, or one for all", "rad/(N m)", low=0.0, live=True
+        "G_P of each joint, or one for all", "rad/(N m)", low=0.0, high=100.0, live=True
     )
     torque_error_limit: tuple[float, ...] = parameter(
-        "saturation of the torque error of each joint, or one for all; above the deadband", "N m", low=0.0, live=True
+        "saturation of the torque error of each joint, or one for all; above the deadband",
+        "N m",
+        low=0.0,
+        high=1e9,
+        live=True,
     )
     torque_deadband: tuple[float, ...] = parameter(
-        "deadband at the input of each joint's G_I, or one for all", "N m", low=0.0, live=True
+        "deadband at the input of each joint's G_I, or one for all", "N m", low=0.0, high=1e3, live=True
     )
-    torque_limit: float = parameter("largest joint torque that may be commanded", "N m", low=0.0, live=True)
+    torque_limit: float = parameter("largest joint torque that may be commanded", "N m", low=0.0, high=1e3, live=True)
+    torque_rate_limit: float = parameter(
+        "largest rate at which the desired torque of a joint follows its command",
+        "N m/s",
+        low=1.0,
+        high=1e9,
+        live=True,
+        before=1e9,
+    )
     delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
     blend_time: float = parameter(
         "time constant of the bumpless transfer of the velocity when a command begins or ends, the mode or a gain is "
         "changed, or the motors start; zero for none",
         "s",
         low=0.0,
+        high=60.0,
         live=True,
     )
-    posture_gain: float = parameter("joint velocity per posture error", "1/s", low=0.0, live=True)
+    posture_gain: float = parameter("joint velocity per posture error", "1/s", low=0.0, high=1e3, live=True)
     joint_speed_limit: float = parameter(
-        "largest joint speed due to the posture and to the force", "rad/s", low=0.0, live=True
+        "largest joint speed due to the posture and to the force", "rad/s", low=0.0, high=1e3, live=True
     )
-    force_filter: float = parameter("time constant of the low pass on the measured force", "s", low=0.0, live=True)
+    force_filter: float = parameter(
+        "time constant of the low pass on the measured force", "s", low=0.0, high=10.0, live=True
+    )
     spring_stiffness: tuple[float, ...] = parameter(
-        "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad", low=0.0, live=True
+        "stiffness of a known spring at each joint, for the feedback joint_position",
+        "N m/rad",
+        low=0.0,
+        high=1e9,
+        live=True,
     )
-    spring_rest: tuple[float, ...] = parameter("joint angle at which that spring is relaxed", "rad", live=True)
+    spring_rest: tuple[float, ...] = parameter(
+        "joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0, live=True
+    )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
-    contact_position: float = parameter("contact position assumed along it", "m", live=True)
+    contact_position: float = parameter("contact position assumed along it", "m", low=0.0, high=3.0, live=True)
     schedule: str = parameter(
         "off: the gains stay; position: the gains follow the estimated contact position so that the stability margin "
         "stays the one at contact_position; where the estimate is not certain, the worst position of the cover counts",
@@ -80,7 +105,7 @@ class ForceLoopParameters:
         live=True,
     )
     position_uncertainty_limit: float = parameter(
-        "largest standard deviation of an estimated contact position that is used", "m", low=0.0, live=True
+        "largest standard deviation of an estimated contact position that is used", "m", low=0.0, high=10.0, live=True
     )
     link_probability_limit: float = parameter(
         "least probability of the estimated link with which its contact position is used", low=0.0, high=1.0, live=True
@@ -99,6 +124,18 @@ def require_fit(parameters: ForceLoopParameters, arm: Arm) -> None:
     require(
         parameters.contact_cover in covers,
         f"contact_cover is '{parameters.contact_cover}'; allowed: {', '.join(covers)}",
+    )
+    length = arm.covers.length[covers.index(parameters.contact_cover)]
+    require(
+        parameters.contact_position <= length,
+        f"contact_position is {parameters.contact_position:g} m; allowed: 0 to {length:g}, "
+        f"on {parameters.contact_cover}",
+    )
+    slowest = min(arm.joints.speed_limit)
+    require(
+        parameters.joint_speed_limit <= slowest or parameters.guard.mode in ("off", "warn"),
+        f"joint_speed_limit is {parameters.joint_speed_limit:g} rad/s; the driver stops the arm at "
+        f"arm.joints.speed_limit; allowed: 0 to {slowest:g}",
     )
     require(
         parameters.feedback == "contact_estimate" or arm.joint_sensors,

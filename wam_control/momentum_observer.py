@@ -39,13 +39,17 @@ class ObserverParameters:
     rest_uncertainty: float = parameter(
         "sd of the friction of a shaft at rest, per static friction", low=0.0, high=10.0
     )
-    motor_rest_velocity: float = parameter("motor speed above which Coulomb friction is full", "rad/s", low=1e-6)
-    joint_rest_velocity: float = parameter("joint speed above which Coulomb friction is full", "rad/s", low=1e-6)
+    motor_rest_velocity: float = parameter(
+        "motor speed above which Coulomb friction is full", "rad/s", low=1e-6, high=100.0
+    )
+    joint_rest_velocity: float = parameter(
+        "joint speed above which Coulomb friction is full", "rad/s", low=1e-6, high=100.0
+    )
     friction_memory: float = parameter(
         "time constant with which the friction of a shaft that came to rest becomes unknown", "s", low=1e-4, high=1.0
     )
-    motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6)
-    joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6)
+    motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6, high=100.0)
+    joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6, high=100.0)
     payload: tuple[float, ...] = parameter(
         "smallest and largest mass that the tool may carry", "kg", low=0.0, high=50.0
     )

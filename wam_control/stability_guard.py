@@ -45,16 +45,16 @@ class GuardParameters:
         live=True,
     )
     contact_stiffness: float = parameter(
-        "stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0, live=True
+        "stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0, high=1e9, live=True
     )
     posture: tuple[float, ...] = parameter(
-        "joint angles at which parameters are assessed before the arm moves", "rad", live=True
+        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0, live=True
     )
     stability_fraction: float = parameter(
         "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0, live=True
     )
     feedback_lag: float = parameter(
-        "time constant of the estimate with feedback contact_estimate", "s", low=0.0, live=True
+        "time constant of the estimate with feedback contact_estimate", "s", low=0.0, high=10.0, live=True
     )
     extra_delay: int = parameter(
         "inner periods by which a command may be later than timing.outer_delay, as in real time",
@@ -66,6 +66,7 @@ class GuardParameters:
         "shortest time between two assessments while pose, force direction or contact position change",
         "s",
         low=0.01,
+        high=3600.0,
         live=True,
     )
 
@@ -247,11 +248,9 @@ class StabilityGuard:
         if max(law.error_limit) <= error:
             return found
         most = (1.0 - SLACK) * share * found.scale
-        allowed = f"{group}_gain up to {_list([_rounded_down(most * gain) for gain in law.gain])}"
+        allowed = f"{group}_gain up to {_list([rounded_down(most * gain) for gain in law.gain])}"
         if error:
-            allowed += (
-                f", or {group}_error_limit up to {_rounded_down(error):g} at this gain (guard.mode limit sets it)"
-            )
+            allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
         reason = (
             f"{group}_gain {_list(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
             f"one (axis {found.where}, contact up to {self.parameters.contact_stiffness:g} N/m), "
@@ -321,7 +320,7 @@ def _lags(feedback: Feedback) -> list[Feedback]:
     return [feedback._replace(lag=lag) for lag in sorted({0.0, feedback.lag if feedback.kind == ESTIMATE else 0.0})]
 
 
-def _rounded_down(value: float) -> float:
+def rounded_down(value: float) -> float:
     """To three digits, never up: a value that is named as allowed has to be accepted."""
     if not value:
         return 0.0

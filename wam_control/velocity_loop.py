@@ -1,18 +1,27 @@
 """The inner loop: a velocity servo on each motor, with torque feed-forward (section 5.1.2)."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wam_control.dither import DitherParameters
+from wam_control.servo_guard import ServoGuardParameters
 from wam_description.arm import Motors, Servo
-from wam_description.parameters import lengths
+from wam_description.parameters import lengths, parameter
 
 
 @dataclass(frozen=True)
 class VelocityLoopParameters:
-    """Dither of the velocity loop; its gains are `wam_description.arm.Servo`."""
+    """Dither, guard and limits of the velocity loop; its gains are `wam_description.arm.Servo`."""
 
     dither: DitherParameters
+    guard: ServoGuardParameters
+    acceleration_limit: float = parameter(
+        "largest rate at which the commanded motor velocity changes", "rad/s^2", low=1.0, high=1e12, before=1e12
+    )
+    torque_rate_limit: float = parameter(
+        "largest rate at which the feed-forward torque of a motor changes", "N m/s", low=1.0, high=1e12, before=1e12
+    )
 
 
 class VelocityLoop:
@@ -21,18 +30,21 @@ class VelocityLoop:
     tau = K_p e + K_i integral(e) + tau_ff, e = commanded minus measured velocity, clipped to the
     peak torque; i = tau/k_t.  The integral is frozen where it would only push further into a limit
     (anti-windup), and reset where the commanded torque does not act at all (brakes, fault), so that
-    an enabled arm starts without a jolt.
+    an enabled arm starts without a jolt.  Commanded velocity and feed-forward follow their commands no faster than
+    their rate limits, from the measured velocity and from zero.
     """
 
-    def __init__(self, motors: Motors, servo: Servo) -> None:
+    def __init__(self, motors: Motors, servo: Servo, parameters: VelocityLoopParameters) -> None:
         self._motors = motors
         self._peak = motors.peak_torque
         self._constant = motors.torque_constant
         self._integral = [0.0] * len(self._peak)
         self._commanded = [0.0] * len(self._peak)
-        self.tune(servo)
+        self._velocity = [0.0] * len(self._peak)
+        self._feedforward = [0.0] * len(self._peak)
+        self.tune(servo, parameters)
 
-    def tune(self, servo: Servo) -> None:
+    def tune(self, servo: Servo, parameters: VelocityLoopParameters) -> None:
         """Take new gains; the integral, kept as a torque, does not jump.
 
         Raises
@@ -42,6 +54,7 @@ class VelocityLoop:
         """
         lengths("servo", self._motors.names, vars(servo))
         self._kp, self._ki = servo.proportional_gain, servo.integral_gain
+        self._acceleration, self._torque_rate = parameters.acceleration_limit, parameters.torque_rate_limit
 
     def step(
         self,
@@ -67,15 +80,20 @@ class VelocityLoop:
             currents (n,), A.
         """
         currents = []
+        faster, stronger = self._acceleration * dt, self._torque_rate * dt
         for i, peak in enumerate(self._peak):
+            carried = self._feedforward[i] = _toward(feedforward[i], self._feedforward[i], stronger)
             if not command:
                 self._integral[i] = 0.0
-                torque = feedforward[i]
+                self._velocity[i] = thetad[i]
+                torque = carried
             else:
                 if tau_motor[i] == 0.0 and self._commanded[i] != 0.0:
                     self._integral[i] = 0.0
-                error = command[i] - thetad[i]
-                torque = self._kp[i] * error + self._integral[i] + feedforward[i]
+                    self._velocity[i] = thetad[i]
+                velocity = self._velocity[i] = _toward(command[i], self._velocity[i], faster)
+                error = velocity - thetad[i]
+                torque = self._kp[i] * error + self._integral[i] + carried
                 growth = self._ki[i] * error * dt
                 if abs(torque) < peak or torque * growth < 0.0:
                     self._integral[i] += growth
@@ -84,3 +102,8 @@ class VelocityLoop:
             self._commanded[i] = torque
             currents.append(torque / self._constant[i])
         return currents
+
+
+def _toward(wanted: float, present: float, most: float) -> float:
+    """The wanted value, or as near to it as a change of at most `most` allows."""
+    return wanted if abs(wanted - present) <= most else present + math.copysign(most, wanted - present)

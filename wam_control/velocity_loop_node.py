@@ -1,6 +1,7 @@
 """Node `velocity_loop`: the inner loop, motor states in, motor currents out."""
 
 from wam_control.dither import Dither
+from wam_control.servo_guard import ServoGuard
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Servo, Shared
 from wam_description.signals import State
@@ -16,7 +17,10 @@ class VelocityLoopNode:
     owns = "servo"
 
     def __init__(self, shared: Shared, own: VelocityLoopParameters) -> None:
-        self._loop = VelocityLoop(shared.arm.motors, shared.servo)
+        self._own = own
+        self._guard = ServoGuard(shared.arm, shared.timing, own.guard)
+        self._guard.require_stable(shared.servo)
+        self._loop = VelocityLoop(shared.arm.motors, shared.servo, own)
         self._dither = Dither(shared.arm, shared.timing, own.dither)
         self._cost = self._dither.cost(shared.arm.joints.start)
         zero = [0.0] * len(shared.arm.motors.names)
@@ -43,8 +47,9 @@ class VelocityLoopNode:
         return {"motor_current_command": State([], [], currents)}
 
     def retune(self, servo: Servo) -> None:
-        """Take new gains while the arm moves."""
-        self._loop.tune(servo)
+        """Take new gains while the arm moves, or refuse them."""
+        self._guard.require_stable(servo)
+        self._loop.tune(servo, self._own)
 
     def diagnostics(self) -> dict[str, str]:
         """What the dither costs, where it is on."""

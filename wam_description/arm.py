@@ -4,11 +4,15 @@ Arrays run over motors, joints, links or covers in the order of the `names` of t
 arrays are flattened row by row because ROS parameters cannot be nested.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from wam_description.cables import Cables, Circuit, circuits
 from wam_description.parameters import lengths, parameter, require
+from wam_description.units import STANDARD_GRAVITY
 
 
 def _distinct(group: str, names: tuple[str, ...]) -> None:
@@ -21,15 +25,15 @@ class Motors:
     """The motors, one per cable circuit."""
 
     names: tuple[str, ...] = parameter("motor names, as in JointState messages")
-    inertia: tuple[float, ...] = parameter("rotor inertia", "kg m^2", low=1e-9)
-    torque_constant: tuple[float, ...] = parameter("torque per current", "N m/A", low=1e-6)
-    peak_torque: tuple[float, ...] = parameter("peak torque, at which the amplifier clips", "N m", low=0.0)
-    continuous_torque: tuple[float, ...] = parameter("rated (continuous) torque", "N m", low=1e-6)
+    inertia: tuple[float, ...] = parameter("rotor inertia", "kg m^2", low=1e-9, high=1e5)
+    torque_constant: tuple[float, ...] = parameter("torque per current", "N m/A", low=1e-6, high=100.0)
+    peak_torque: tuple[float, ...] = parameter("peak torque, at which the amplifier clips", "N m", low=0.0, high=1e9)
+    continuous_torque: tuple[float, ...] = parameter("rated (continuous) torque", "N m", low=1e-6, high=1e9)
     static_friction: tuple[float, ...] = parameter(
-        "static friction F_s (breakaway torque) of rotor and first pinion", "N m", low=0.0
+        "static friction F_s (breakaway torque) of rotor and first pinion", "N m", low=0.0, high=100.0
     )
-    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion", "N m", low=0.0)
-    viscous_friction: tuple[float, ...] = parameter("viscous friction", "N m s/rad", low=0.0)
+    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion", "N m", low=0.0, high=100.0)
+    viscous_friction: tuple[float, ...] = parameter("viscous friction", "N m s/rad", low=0.0, high=10.0)
 
     def __post_init__(self) -> None:
         _distinct("arm.motors", self.names)
@@ -47,19 +51,23 @@ class Joints:
     """The joints in Craig's Denavit-Hartenberg convention (A.4)."""
 
     names: tuple[str, ...] = parameter("joint names, as in JointState messages")
-    twist: tuple[float, ...] = parameter("alpha_(i-1), link twist before the joint", "rad")
-    length: tuple[float, ...] = parameter("a_(i-1), link length before the joint", "m")
-    offset: tuple[float, ...] = parameter("d_i, link offset along the joint axis", "m")
-    lower: tuple[float, ...] = parameter("lower stop", "rad")
-    upper: tuple[float, ...] = parameter("upper stop", "rad")
-    start: tuple[float, ...] = parameter("angle at power-up, brakes on", "rad")
-    armature: tuple[float, ...] = parameter("inertia of the pulleys that turn with the joint", "kg m^2", low=0.0)
-    static_friction: tuple[float, ...] = parameter(
-        "static friction F_s (breakaway torque) at the joint", "N m", low=0.0
+    twist: tuple[float, ...] = parameter("alpha_(i-1), link twist before the joint", "rad", low=-6.3, high=6.3)
+    length: tuple[float, ...] = parameter("a_(i-1), link length before the joint", "m", low=-3.0, high=3.0)
+    offset: tuple[float, ...] = parameter("d_i, link offset along the joint axis", "m", low=-3.0, high=3.0)
+    lower: tuple[float, ...] = parameter("lower stop", "rad", low=-13.0, high=13.0)
+    upper: tuple[float, ...] = parameter("upper stop", "rad", low=-13.0, high=13.0)
+    start: tuple[float, ...] = parameter("angle at power-up, brakes on", "rad", low=-13.0, high=13.0)
+    armature: tuple[float, ...] = parameter(
+        "inertia of the pulleys that turn with the joint", "kg m^2", low=0.0, high=1e3
     )
-    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion, at the joint", "N m", low=0.0)
-    viscous_friction: tuple[float, ...] = parameter("viscous friction at the joint", "N m s/rad", low=0.0)
-    speed_limit: tuple[float, ...] = parameter("speed above which there is a fault", "rad/s", low=0.0)
+    static_friction: tuple[float, ...] = parameter(
+        "static friction F_s (breakaway torque) at the joint", "N m", low=0.0, high=1e3
+    )
+    dynamic_friction: tuple[float, ...] = parameter(
+        "dynamic friction F_d in motion, at the joint", "N m", low=0.0, high=1e3
+    )
+    viscous_friction: tuple[float, ...] = parameter("viscous friction at the joint", "N m s/rad", low=0.0, high=1e3)
+    speed_limit: tuple[float, ...] = parameter("speed above which there is a fault", "rad/s", low=0.0, high=100.0)
 
     def __post_init__(self) -> None:
         _distinct("arm.joints", self.names)
@@ -83,9 +91,13 @@ class Links:
     """The rigid links; link i moves with joint i, its frame is frame i of (A.4)."""
 
     names: tuple[str, ...] = parameter("link names, one per joint, as in frame ids")
-    mass: tuple[float, ...] = parameter("mass", "kg", low=1e-6)
-    centre: tuple[float, ...] = parameter("centre of mass in the link's frame, x y z of each link", "m")
-    inertia: tuple[float, ...] = parameter("principal inertia about the centre of mass, x y z", "kg m^2", low=0.0)
+    mass: tuple[float, ...] = parameter("mass", "kg", low=1e-6, high=500.0)
+    centre: tuple[float, ...] = parameter(
+        "centre of mass in the link's frame, x y z of each link", "m", low=-3.0, high=3.0
+    )
+    inertia: tuple[float, ...] = parameter(
+        "principal inertia about the centre of mass, x y z", "kg m^2", low=0.0, high=100.0
+    )
 
     def __post_init__(self) -> None:
         _distinct("arm.links", self.names)
@@ -104,12 +116,18 @@ class Covers:
 
     names: tuple[str, ...] = parameter("cover names; contacts and pushes use them as frame ids")
     links: tuple[str, ...] = parameter("link that carries the cover")
-    origin: tuple[float, ...] = parameter("origin of the cover's frame in its link's frame, x y z", "m")
-    rotation: tuple[float, ...] = parameter("rotation from the link's axes to the cover's, roll pitch yaw", "rad")
-    length: tuple[float, ...] = parameter("length of the kinematic link, along x", "m", low=0.0)
-    start: tuple[float, ...] = parameter("start of the tube's axis in the cover's frame, x y z", "m")
-    end: tuple[float, ...] = parameter("end of the tube's axis in the cover's frame, x y z", "m")
-    radius: tuple[float, ...] = parameter("outer radius of the tube, rounded ends", "m", low=1e-4)
+    origin: tuple[float, ...] = parameter(
+        "origin of the cover's frame in its link's frame, x y z", "m", low=-3.0, high=3.0
+    )
+    rotation: tuple[float, ...] = parameter(
+        "rotation from the link's axes to the cover's, roll pitch yaw", "rad", low=-6.3, high=6.3
+    )
+    length: tuple[float, ...] = parameter("length of the kinematic link, along x", "m", low=0.0, high=3.0)
+    start: tuple[float, ...] = parameter(
+        "start of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0
+    )
+    end: tuple[float, ...] = parameter("end of the tube's axis in the cover's frame, x y z", "m", low=-3.0, high=3.0)
+    radius: tuple[float, ...] = parameter("outer radius of the tube, rounded ends", "m", low=1e-4, high=0.5)
 
     def __post_init__(self) -> None:
         _distinct("arm.covers", self.names)
@@ -135,9 +153,13 @@ class Arm:
     links: Links
     covers: Covers
     name: str = parameter("name of the arm, also of its URDF and MJCF")
-    joint_from_motor: tuple[float, ...] = parameter("matrix M of (A.5), q = M theta, row by row")
-    tool: tuple[float, ...] = parameter("origin of the tool frame in the last link's frame, x y z", "m")
-    gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2")
+    joint_from_motor: tuple[float, ...] = parameter(
+        "matrix M of (A.5), q = M theta, row by row", low=-100.0, high=100.0
+    )
+    tool: tuple[float, ...] = parameter(
+        "origin of the tool frame in the last link's frame, x y z", "m", low=-3.0, high=3.0
+    )
+    gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2", low=-20.0, high=20.0)
     joint_sensors: bool = parameter("true if joint-side encoders and strain gauges are mounted")
 
     def __post_init__(self) -> None:
@@ -158,6 +180,44 @@ class Arm:
             require(len(vector) == 3, f"parameter 'arm.{name}' has {len(vector)} values; it needs x y z")
         for link in self.covers.links:
             require(link in self.links.names, f"arm.covers.links names '{link}'; links: {', '.join(self.links.names)}")
+
+        self._require_plausible()
+
+    def _require_plausible(self) -> None:
+        """Refuse links that this arm cannot have, such as values in other units."""
+        joints, links = self.joints, self.links
+        spans = [abs(a) + abs(d) for a, d in zip(joints.length, joints.offset, strict=True)]
+        size = sum(spans) + math.hypot(*self.tool)
+        for i, name in enumerate(links.names):
+            centre, inertia = math.hypot(*links.centre[3 * i : 3 * i + 3]), max(links.inertia[3 * i : 3 * i + 3])
+            require(
+                centre <= size,
+                f"{name}: arm.links.centre is {centre:.3g} m from the link's frame; the whole arm is {size:.3g} m long",
+            )
+            require(
+                math.sqrt(inertia / links.mass[i]) <= size,
+                f"{name}: arm.links.inertia {inertia:.3g} kg m^2 is more than {links.mass[i]:.3g} kg have at the ends "
+                f"of an arm of {size:.3g} m, {links.mass[i] * size * size:.3g} kg m^2",
+            )
+        require(
+            self.gravity[2] <= 0.0,
+            f"arm.gravity points upwards in the base frame: z is {self.gravity[2]:g} m/s^2; write it negative; "
+            "for an arm that hangs from a ceiling turn its base: arm.joints.twist of the first joint plus pi",
+        )
+        inverse = np.linalg.inv(np.reshape(self.joint_from_motor, (len(spans), len(spans))))
+        strength = (np.abs(inverse).T @ self.motors.peak_torque).tolist()
+        for i, joint in enumerate(joints.names):
+            torque = STANDARD_GRAVITY * sum(
+                mass * (sum(spans[i + 1 : j + 1]) + math.hypot(*links.centre[3 * j : 3 * j + 3]))
+                for j, mass in enumerate(links.mass)
+                if j >= i
+            )
+            require(
+                torque <= strength[i],
+                f"the motors cannot carry the links beyond {joint}: they weigh up to {torque:.3g} N m there, "
+                f"the peak torque is {strength[i]:.3g} N m; check arm.links.mass, arm.links.centre, "
+                "arm.joints.length and offset",
+            )
 
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
@@ -181,7 +241,7 @@ class Timing:
     niceness: int = parameter(
         "scheduling priority of driver and velocity_loop in realtime, if the system grants it", low=-20, high=0
     )
-    timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1)
+    timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1, high=3600.0)
     dither_cycle: int = parameter(
         "inner periods in one cycle of the dither of the motor torques, which detects contact at rest; 0: none",
         low=0,
@@ -221,8 +281,10 @@ class Timing:
 class Servo:
     """Gains of the velocity loop of each motor; the velocity loop uses them, the stability guard relies on them."""
 
-    proportional_gain: tuple[float, ...] = parameter("torque per velocity error", "N m s/rad", low=0.0, live=True)
-    integral_gain: tuple[float, ...] = parameter("torque per angle error", "N m/rad", low=0.0, live=True)
+    proportional_gain: tuple[float, ...] = parameter(
+        "torque per velocity error", "N m s/rad", low=0.0, high=1e9, live=True
+    )
+    integral_gain: tuple[float, ...] = parameter("torque per angle error", "N m/rad", low=0.0, high=1e9, live=True)
 
 
 def seconds(nanoseconds: int) -> float:

@@ -15,10 +15,10 @@ class Ripples:
     """
 
     shafts: tuple[str, ...] = parameter("motor or joint of each ripple, directly or geared")
-    ratio: tuple[float, ...] = parameter("turns of the pulley per turn of that shaft")
-    amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley; 0: none", "N m", low=0.0)
-    cycles: tuple[int, ...] = parameter("cycles per turn of the pulley", low=1)
-    phase: tuple[float, ...] = parameter("phase at angle zero", "rad")
+    ratio: tuple[float, ...] = parameter("turns of the pulley per turn of that shaft", low=-1000.0, high=1e3)
+    amplitude: tuple[float, ...] = parameter("torque amplitude at the pulley; 0: none", "N m", low=0.0, high=100.0)
+    cycles: tuple[int, ...] = parameter("cycles per turn of the pulley", low=1, high=1e4)
+    phase: tuple[float, ...] = parameter("phase at angle zero", "rad", low=-6.3, high=6.3)
 
     def __post_init__(self) -> None:
         keys = ("ratio", "amplitude", "cycles", "phase")
@@ -36,9 +36,14 @@ class Effects:
         "friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
         "N m/N",
         low=0.0,
+        high=1.0,
     )
     added_coulomb_friction: tuple[float, ...] = parameter(
-        "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", low=0.0, live=True
+        "added Coulomb friction at each joint, like the Teflon rod of section 5.6",
+        "N m",
+        low=0.0,
+        high=100.0,
+        live=True,
     )
 
 

@@ -21,7 +21,7 @@ class ModelMismatch:
     motor_friction: tuple[float, ...] = parameter("factor on the friction of each motor", low=0.0, high=10.0)
     joint_friction: tuple[float, ...] = parameter("factor on the friction of each joint", low=0.0, high=10.0)
     stiffness: tuple[float, ...] = parameter("factor on the stiffness of each cable circuit", low=0.01, high=100.0)
-    payload: float = parameter("unmodelled payload at the tool", "kg", low=0.0)
+    payload: float = parameter("unmodelled payload at the tool", "kg", low=0.0, high=100.0)
 
 
 def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:

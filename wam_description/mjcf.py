@@ -111,7 +111,8 @@ def _add_solver(root: ElementTree.Element, arm: Arm, step: float) -> None:
         noslip_iterations="4",
         noslip_tolerance="0",
     )
-    _add(option, "flag", diagexact="enable", eulerdamp="disable")
+    # without autoreset MuJoCo does not put a diverging arm back to zero by itself; the driver stops it instead
+    _add(option, "flag", diagexact="enable", eulerdamp="disable", autoreset="disable")
     default = _add(root, "default")
     # a stiff friction constraint: with MuJoCo's own values a stuck joint creeps at about 1 rad/s
     _add(

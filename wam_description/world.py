@@ -13,15 +13,22 @@ class Obstacles:
 
     names: tuple[str, ...] = parameter("names of the obstacles")
     shapes: tuple[str, ...] = parameter("shape of each", choices=tuple(SHAPES))
-    positions: tuple[float, ...] = parameter("centre in the base frame, x y z of each", "m")
-    rotations: tuple[float, ...] = parameter("rotation from the base frame, roll pitch yaw of each", "rad")
-    sizes: tuple[float, ...] = parameter(
-        "three numbers each: box half lengths; cylinder radius, half length, 0; plane half lengths, 0", "m", low=0.0
+    positions: tuple[float, ...] = parameter("centre in the base frame, x y z of each", "m", low=-100.0, high=100.0)
+    rotations: tuple[float, ...] = parameter(
+        "rotation from the base frame, roll pitch yaw of each", "rad", low=-6.3, high=6.3
     )
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
-    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0)
-    hardening: tuple[float, ...] = parameter("h of F = k_c x (1 + h x) with depth x; 0: linear surface", "1/m", low=0.0)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0)
+    sizes: tuple[float, ...] = parameter(
+        "three numbers each: box half lengths; cylinder radius, half length, 0; plane half lengths, 0",
+        "m",
+        low=0.0,
+        high=100.0,
+    )
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0, high=1e9)
+    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0, high=1e6)
+    hardening: tuple[float, ...] = parameter(
+        "h of F = k_c x (1 + h x) with depth x; 0: linear surface", "1/m", low=0.0, high=1e6
+    )
+    friction: tuple[float, ...] = parameter("coefficient of friction against the covers", low=0.0, high=10.0)
 
     def __post_init__(self) -> None:
         one = ("shapes", "stiffness", "damping", "hardening", "friction")
@@ -48,9 +55,9 @@ class Springs:
     """Springs that push on the lever of a joint, like the one under the tip of the testbed (section 5.6)."""
 
     joints: tuple[str, ...] = parameter("joint of each spring")
-    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m", low=0.0)
-    lever: tuple[float, ...] = parameter("distance of the spring from the joint's axis", "m", low=1e-3)
-    rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad")
+    stiffness: tuple[float, ...] = parameter("k_c at the end of the lever; 0: no spring", "N/m", low=0.0, high=1e9)
+    lever: tuple[float, ...] = parameter("distance of the spring from the joint's axis", "m", low=1e-3, high=3.0)
+    rest: tuple[float, ...] = parameter("joint angle at which the spring has no force", "rad", low=-13.0, high=13.0)
     bilateral: tuple[bool, ...] = parameter("true if it also pulls; otherwise it only pushes towards larger angles")
 
     def __post_init__(self) -> None:
@@ -79,20 +86,27 @@ class Pushers:
         "three numbers each: sphere radius, 0, 0; box half lengths along the link, across it and along the force",
         "m",
         low=0.0,
+        high=10.0,
     )
     covers: tuple[str, ...] = parameter("cover that each presses on")
-    positions: tuple[float, ...] = parameter("position along the cover where each touches first", "m", low=0.0)
-    angles: tuple[float, ...] = parameter("direction of the force about the cover, from its y to its z axis", "rad")
-    force: tuple[float, ...] = parameter("force at right angles to the link; 0: no pusher", "N", low=0.0)
-    begin: tuple[float, ...] = parameter("time of first contact, since power-up", "s", low=0.0)
-    end: tuple[float, ...] = parameter("time of release, since power-up", "s", low=0.0)
-    rise: tuple[float, ...] = parameter("time in which the force rises and falls", "s", low=1e-3)
-    clearance: tuple[float, ...] = parameter("distance from the link before and after contact", "m", low=1e-3)
-    slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s")
-    turn: tuple[float, ...] = parameter("speed at which each moves about the link", "rad/s")
-    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0)
-    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0)
-    friction: tuple[float, ...] = parameter("coefficient of friction against the cover", low=0.0)
+    positions: tuple[float, ...] = parameter(
+        "position along the cover where each touches first", "m", low=0.0, high=3.0
+    )
+    angles: tuple[float, ...] = parameter(
+        "direction of the force about the cover, from its y to its z axis", "rad", low=-6.3, high=6.3
+    )
+    force: tuple[float, ...] = parameter("force at right angles to the link; 0: no pusher", "N", low=0.0, high=1e3)
+    begin: tuple[float, ...] = parameter("time of first contact, since power-up", "s", low=0.0, high=1e6)
+    end: tuple[float, ...] = parameter("time of release, since power-up", "s", low=0.0, high=1e6)
+    rise: tuple[float, ...] = parameter("time in which the force rises and falls", "s", low=1e-3, high=1e3)
+    clearance: tuple[float, ...] = parameter(
+        "distance from the link before and after contact", "m", low=1e-3, high=10.0
+    )
+    slide: tuple[float, ...] = parameter("speed at which each slides along the link", "m/s", low=-10.0, high=10.0)
+    turn: tuple[float, ...] = parameter("speed at which each moves about the link", "rad/s", low=-100.0, high=100.0)
+    stiffness: tuple[float, ...] = parameter("k_c of the surface, at the contact", "N/m", low=1.0, high=1e9)
+    damping: tuple[float, ...] = parameter("damping of the surface, at the contact", "N s/m", low=0.0, high=1e6)
+    friction: tuple[float, ...] = parameter("coefficient of friction against the cover", low=0.0, high=10.0)
 
     def __post_init__(self) -> None:
         single = {key: value for key, value in vars(self).items() if key not in ("names", "sizes")}

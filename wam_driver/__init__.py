@@ -4,9 +4,11 @@
 - interface: what every driver of the arm takes and gives
 - driver_node: the driver as a ROS node
 - safety: braked, enabled, fault
+- limit_watch: speeds, travel, currents and tensions against their limits
 - amplifier: clipping, I2t, deadband, ripple and noise of the motor currents
 - sensors: resolution and noise of encoders and strain gauges
 - plant: the arm in MuJoCo, stepped with motor torques
+- step_size: which step fits the plant's stiffest mode
 - friction: laws of dry friction at motors and joints
 - circuits: creep, slack, torque and tension of the cable circuits
 - surfaces: contact forces of obstacles and pushers

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,17 +12,14 @@ from wam_description.arm import Shared
 from wam_description.effects import Effects
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import lengths, parameter
-from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_LOAD, Answer, Load, State
-from wam_description.transmission_map import TransmissionMap
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier, AmplifierParameters
 from wam_driver.friction import FrictionParameters
+from wam_driver.limit_watch import WARNING, LimitWatch
 from wam_driver.plant import Plant
 from wam_driver.safety import Mode, Safety
 from wam_driver.sensors import SensorParameters, Sensors
-
-WARNING = 0.9  # of a limit
 
 
 @dataclass(frozen=True)
@@ -35,12 +32,18 @@ class DriverParameters:
     friction: FrictionParameters
     amplifier: AmplifierParameters
     sensors: SensorParameters
-    seed: int = parameter("seed of the random numbers of all noise", low=0)
+    seed: int = parameter("seed of the random numbers of all noise", low=0, high=2**53)
     watchdog: float = parameter("age of the last command that is a fault", "s", low=0.002, high=0.05)
     elbow_speed_limit: float = parameter(
-        "speed of the last joint's origin above which there is a fault", "m/s", low=0.0
+        "speed of the last joint's origin above which there is a fault", "m/s", low=0.0, high=100.0
     )
-    tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0)
+    tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0, high=100.0)
+    disturbance_force_limit: float = parameter(
+        "largest force of a push of sim/disturbance", "N", low=0.0, high=1e4, before=1e4
+    )
+    disturbance_torque_limit: float = parameter(
+        "largest torque of a push of sim/disturbance about the cover's origin", "N m", low=0.0, high=1e4, before=1e4
+    )
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
 
@@ -53,15 +56,6 @@ class DriverSample(NamedTuple):
     thetad: list[float]
     commanded: list[float]
     actual: list[float]
-
-
-class WatchedLimit(NamedTuple):
-    """A quantity that is a fault above its limit and a warning near it."""
-
-    quantity: str
-    value: float
-    limit: float
-    unit: str
 
 
 class Driver:
@@ -94,8 +88,7 @@ class Driver:
         self.recent: deque[DriverSample] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str]
         self._arm, self._timing, self._parameters = arm, timing, parameters
-        self._map = TransmissionMap.of(arm)
-        self._body = RigidBody(arm)
+        self._watch = LimitWatch(arm, parameters.elbow_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
         self._tick = 1
         self._release()
@@ -153,6 +146,14 @@ class Driver:
         torque = self.amplifier.torque(self.currents, self.plant.theta)
         for _ in range(self._timing.substeps):
             self.plant.step(torque)
+        if trouble := self.plant.trouble:
+            self.plant.recover()
+            self._trip(
+                f"the simulation of the arm failed: {trouble}; the arm is where it was before; "
+                "press or command less, or lower timing.period"
+            )
+            enabled = False
+        self.plant.keep()
         self._tick += 1
         self._measure()
         if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
@@ -166,39 +167,17 @@ class Driver:
 
     def _watch_limits(self) -> None:
         """Trip on the first quantity above its limit; warn of those near it."""
-        watched = [*self._speeds(), *self._tensions()]
+        watched = list(self._watch.watched(self.plant.theta, self.plant.thetad, self.currents, self._tightest))
         self._tightest = self._zero
-        self.warnings = [
-            f"{what} {value:.2f} {unit} is near its limit {limit:g}"
-            for what, value, limit, unit in watched
-            if value > WARNING * limit
-        ]
+        self.warnings = [limit.warning for limit in watched if limit.is_near]
         self.warnings += [
             f"{name} is hot: {heat:.0%} of its thermal (I2t) limit"
             for name, heat in zip(self._arm.motors.names, self.amplifier.heat, strict=True)
             if heat > WARNING
         ]
-        for what, value, limit, unit in watched:
-            if value > limit:
-                self._trip(f"{what} {value:.2f} {unit} is above its limit {limit:g}; command less")
-                return
-
-    def _speeds(self) -> Iterator[WatchedLimit]:
-        """Speeds of elbow, tip and joints, from the motors."""
-        parameters, joints = self._parameters, self._arm.joints
-        q = self._map.joint_positions(self.plant.theta)
-        qd = self._map.joint_velocities(self.plant.thetad)
-        elbow = self._body.point_jacobian(q, self._arm.covers.names[-1], (0.0, 0.0, 0.0)) @ qd
-        tip = self._body.tool_jacobian(q) @ qd
-        yield WatchedLimit("speed of the elbow", math.hypot(*elbow), parameters.elbow_speed_limit, "m/s")
-        yield WatchedLimit("speed of the tip", math.hypot(*tip), parameters.tip_speed_limit, "m/s")
-        for name, speed, limit in zip(joints.names, qd, joints.speed_limit, strict=True):
-            yield WatchedLimit(f"speed of {name}", abs(speed), limit, "rad/s")
-
-    def _tensions(self) -> Iterator[WatchedLimit]:
-        """Largest tension of each cable since the last check."""
-        for name, tension, circuit in zip(self._arm.motors.names, self._tightest, self._arm.circuits, strict=True):
-            yield WatchedLimit(f"cable tension of {name}", tension, circuit.breaking_strength, "N")
+        fault = next(filter(None, (limit.fault for limit in watched)), "")
+        if fault:
+            self._trip(fault)
 
     def _trip(self, reason: str) -> None:
         self.safety.trip(reason)
@@ -207,6 +186,26 @@ class Driver:
     def fault(self, reason: str) -> None:
         """Stop for a reason that is known outside the driver; brakes on, latched."""
         self._trip(reason)
+
+    def push(self, cover: str, force: Sequence[float], torque: Sequence[float]) -> None:
+        """Push on a cover until the next push on it, see `Plant.push`.
+
+        Raises
+        ------
+        ValueError
+            for a cover that the arm does not have, or more than the configured largest force or torque.
+        """
+        own = self._parameters
+        for what, vector, name, limit, unit in (
+            ("force", force, "disturbance_force_limit", own.disturbance_force_limit, "N"),
+            ("torque", torque, "disturbance_torque_limit", own.disturbance_torque_limit, "N m"),
+        ):
+            size = math.hypot(*vector)
+            if not size <= limit:
+                raise ValueError(
+                    f"{what} is {size:.4g} {unit}; allowed: up to {name}, {limit:g} {unit}; the last push remains"
+                )
+        self.plant.push(cover, np.array(force), np.array(torque))
 
     def set_added_friction(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of the joints, (n,), N m, like the Teflon rod of section 5.6."""
@@ -220,6 +219,7 @@ class Driver:
         answer = self.safety.enable(obstacle)
         if answer.success:
             self._release()
+            self._watch.begin(self.plant.theta)
         return answer
 
     def disable(self) -> Answer:

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
@@ -157,11 +156,17 @@ class DriverNode(TolerantNode):
             if any(wrench.force):
                 raise Refused(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
             self.driver.plant.release()
-        else:
-            self.driver.plant.push(wrench.frame, np.array(wrench.force), np.array(wrench.torque))
+        refusal = ""
+        if wrench.frame != BASE:
+            try:
+                self.driver.push(wrench.frame, wrench.force, wrench.torque)
+            except ValueError as error:
+                refusal = str(error)
         self._push_stamp = stamp
         if self._timing.mode == "lockstep":
-            self._go_on()
+            self._go_on()  # also after a refused push: the state has its answer
+        if refusal:
+            raise Refused(refusal)
 
     # lockstep
 

@@ -154,10 +154,10 @@ class FrictionParameters:
         before="coulomb_stiction",
     )
     motor_stribeck_velocity: tuple[float, ...] = parameter(
-        "v_s of each motor (law stribeck)", "rad/s", low=1e-6, before=(1.0,)
+        "v_s of each motor (law stribeck)", "rad/s", low=1e-6, high=1e3, before=(1.0,)
     )
     joint_stribeck_velocity: tuple[float, ...] = parameter(
-        "v_s of each joint (law stribeck)", "rad/s", low=1e-6, before=(1.0,)
+        "v_s of each joint (law stribeck)", "rad/s", low=1e-6, high=1e3, before=(1.0,)
     )
     stribeck_exponent: float = parameter("delta of exp(-(v/v_s)^delta) (law stribeck)", low=0.1, high=10.0, before=2.0)
     motor_asymmetry: tuple[float, ...] = parameter(
@@ -175,10 +175,11 @@ class FrictionParameters:
         "elastic stiffness of each motor's friction before it slides; 0: it sticks rigidly",
         "N m/rad",
         low=0.0,
+        high=1e9,
         before=(0.0,),
     )
     joint_presliding_stiffness: tuple[float, ...] = parameter(
-        "the same of each joint", "N m/rad", low=0.0, before=(0.0,)
+        "the same of each joint", "N m/rad", low=0.0, high=1e9, before=(0.0,)
     )
 
 

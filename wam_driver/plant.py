@@ -25,8 +25,18 @@ from wam_driver.circuits import CableCircuits
 from wam_driver.friction import COULOMB_STICTION, DryFriction, FrictionParameters
 from wam_driver.loads import CoverLoads
 from wam_driver.pusher import pushers
+from wam_driver.step_size import require_fitting_step
 from wam_driver.surfaces import Surfaces
 
+WARNINGS = {
+    "inertia": "its inertia matrix is singular",
+    "contactfull": "it has too many contacts",
+    "cnstrfull": "it has too many constraints",
+    "badqpos": "an angle is not finite or huge",
+    "badqvel": "a velocity is not finite or huge",
+    "badqacc": "an acceleration is not finite or huge",
+    "badctrl": "a torque is not finite",
+}  # what MuJoCo's warnings say of the arm
 BRAKE_TORQUE = 1e3  # N m at a rotor, far above any cable
 
 
@@ -40,6 +50,11 @@ class Plant:
     effects : which effects of the transmission are on.
     step : length of a step, s.
     friction : law of the dry friction.
+
+    Raises
+    ------
+    ParameterError
+        if the step is too long for the stiffest mode.
     """
 
     def __init__(
@@ -52,6 +67,7 @@ class Plant:
     ) -> None:
         self.model = mujoco.MjModel.from_xml_string(mjcf(arm, step, world, effects))
         self.data = mujoco.MjData(self.model)
+        mujoco.set_mju_user_warning(_unheard)
         n = len(arm.motors.names)
         self._n = n
         self._start = arm.joints.start
@@ -70,7 +86,10 @@ class Plant:
         self._qdd, self._joint_damping, self._armature = data.qacc[n:], model.dof_damping[n:], model.dof_armature[n:]
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
         self._frictionloss = self.model.dof_frictionloss
+        self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
         self._rest()
+        self.keep()
+        require_fitting_step(self.model, arm, world, step)
 
     def _rest(self) -> None:
         """Put the arm at its start pose, braked, with the cables stretched so that they carry the links."""
@@ -85,6 +104,11 @@ class Plant:
             _stretch(tau, circuit, self._slack)
             for tau, circuit in zip(torque.tolist(), self._arm.circuits, strict=True)
         ]
+        self._begin()
+
+    def _begin(self) -> None:
+        """Prepare the first step of an arm at rest: braked, its contacts and velocities computed."""
+        data = self.data
         self._friction.reset()
         self._circuits.reset()
         self._braked = True
@@ -99,6 +123,29 @@ class Plant:
         """Return to power-up: start pose, at rest, brakes on, no pushes."""
         self.release()
         self._rest()
+
+    @property
+    def trouble(self) -> str:
+        """Why the simulation of the arm cannot go on, '' if it can."""
+        if any(self._warnings.tolist()):
+            names = [name for name, count in zip(WARNINGS, self._warnings.tolist(), strict=True) if count]
+            return " and ".join(WARNINGS[name] for name in names)
+        if not math.isfinite(sum(self._qvel.tolist()) + sum(self._position.tolist())):
+            return WARNINGS["badqvel"]
+        return ""
+
+    def keep(self) -> None:
+        """Remember the present angles for `recover`."""
+        self._kept = self._position.copy(), self._plastic.copy()
+
+    def recover(self) -> None:
+        """Put the arm, braked and at rest, where it was when it was last remembered; end every push."""
+        self.release()
+        time = self.data.time
+        mujoco.mj_resetData(self.model, self.data)
+        self._position[:], self._plastic[:] = self._kept
+        self.data.time = time
+        self._begin()
 
     def brake(self, on: bool) -> None:
         """Put on or release the brakes, which hold the rotors."""
@@ -234,6 +281,10 @@ class Plant:
     def loads(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
         return self._loads.measure()
+
+
+def _unheard(_: str) -> None:
+    """In place of MuJoCo's own report of a warning, which writes a file; `Plant.trouble` tells of it."""
 
 
 def _stretch(torque: float, circuit: Circuit, slack: bool) -> float:

@@ -18,10 +18,13 @@ class SensorParameters:
         "resolution of the motor angle; if it is not zero, the velocity is the difference over one period",
         "rad",
         low=0.0,
+        high=1.0,
     )
-    encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", low=0.0)
-    joint_encoder_noise: tuple[float, ...] = parameter("standard deviation of the joint angle", "rad", low=0.0)
-    strain_noise: tuple[float, ...] = parameter("standard deviation of the strain torque", "N m", low=0.0)
+    encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", low=0.0, high=1.0)
+    joint_encoder_noise: tuple[float, ...] = parameter(
+        "standard deviation of the joint angle", "rad", low=0.0, high=1.0
+    )
+    strain_noise: tuple[float, ...] = parameter("standard deviation of the strain torque", "N m", low=0.0, high=100.0)
 
 
 class Encoders:

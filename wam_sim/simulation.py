@@ -9,8 +9,6 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from wam_control.contact_estimator import ContactEstimate
 from wam_control.scenario import Scenario, ScenarioStep
 from wam_description.arm import Shared
@@ -186,7 +184,7 @@ class Simulation:
         if wrench.frame == BASE:
             self.driver.plant.release()
         else:
-            self.driver.plant.push(wrench.frame, np.array(wrench.force), np.array(wrench.torque))
+            self.driver.push(wrench.frame, wrench.force, wrench.torque)
 
     def _make_all(self, requests: list[Call | SetParameters]) -> str:
         """Carry out what a node requests of others; returns why one is refused, '' where none is."""

@@ -1,0 +1,122 @@
+"""Which step of the plant fits its stiffest mode: rotors on their cables, links on a surface.
+
+MuJoCo steps v' = v - h M^-1 (K x + C v), x' = x + h v'.  Without damping that is stable up to h = 2/w of the fastest
+mode, with damping c on a mass m up to h = 2 m/c.  A contact begins and ends between two steps, which gives energy,
+the more the larger h w is.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.arm import Arm
+from wam_description.parameters import ParameterError
+from wam_description.world import World
+
+Array = NDArray[np.float64]
+FRACTION = 0.5  # of the longest step that is stable without damping, that is accepted
+DAMPED = 0.8  # of the longest step that is stable with damping, that is accepted
+HARDENED_AT = 200.0  # N; the force at which the stiffness of a hardening surface counts
+ON_THE_CIRCLE = 1e-6  # growth of a mode in one step that counts as none
+
+
+class Linearised(NamedTuple):
+    """A linear model of the plant near one state: inertia, stiffness and damping, (m, m), and where it is."""
+
+    inertia: Array
+    stiffness: Array
+    damping: Array
+    where: str
+
+
+def require_fitting_step(model: Any, arm: Arm, world: World, step: float) -> None:
+    """Refuse a step that is too long for the plant.
+
+    Raises
+    ------
+    ParameterError
+        names what is too stiff, and the longest step allowed.
+    """
+    modes = [mode for mode in _modes(model, arm, world) if _is_too_long(mode, step)]
+    if not modes:
+        return
+    longest, where = min(longest_step(mode, step) for mode in modes), modes[0].where  # the arm alone comes first
+    raise ParameterError(
+        f"the plant's step, timing.period/timing.substeps, is {step:g} s, too long for {where}; "
+        f"allowed: up to {longest:.3g} s; multiply timing.substeps by {math.ceil(step / longest)} or more, "
+        "or lower the stiffness or damping there"
+    )
+
+
+def longest_step(mode: Linearised, step: float) -> float:
+    """Longest step accepted for a mode that `step`, s, is too long for; rounded down to three digits."""
+    below, above = 0.0, step
+    while above - below > 1e-4 * above:
+        middle = 0.5 * (below + above)
+        below, above = (below, middle) if _is_too_long(mode, middle) else (middle, above)
+    digit = 10.0 ** (math.floor(math.log10(above)) - 2)
+    return math.floor(below / digit) * digit
+
+
+def _is_too_long(mode: Linearised, step: float) -> bool:
+    kick, drag = np.linalg.solve(mode.inertia, np.stack([mode.stiffness, mode.damping]))
+    return _grows(kick, 0.0 * drag, step / FRACTION) or _grows(kick, drag, step / DAMPED)
+
+
+def _grows(kick: Array, drag: Array, step: float) -> bool:
+    """Whether a motion with the acceleration -kick x - drag v grows from step to step."""
+    one = np.eye(len(kick))
+    velocity = np.hstack([-step * kick, one - step * drag])
+    position = np.hstack([one, np.zeros_like(one)]) + step * velocity
+    return bool(np.abs(np.linalg.eigvals(np.vstack([position, velocity]))).max() > 1.0 + ON_THE_CIRCLE)
+
+
+def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
+    """The arm alone, then with each cover pressed on each surface, at the start and with all joints at 0."""
+    n = len(arm.joints.names)
+    data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    cables = np.hstack([np.eye(n), -np.linalg.inv(np.reshape(arm.joint_from_motor, (n, n)))])
+    stiffness = cables.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ cables
+    damping = cables.T @ np.diag([circuit.damping for circuit in arm.circuits]) @ cables + np.diag(model.dof_damping)
+    for joint, k, lever in zip(world.springs.joints, world.springs.stiffness, world.springs.lever, strict=True):
+        at = n + arm.joints.names.index(joint)
+        stiffness[at, at] += k * lever * lever
+    for q in (arm.joints.start, (0.0,) * n):
+        data.qpos[n:] = q
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, inertia)
+        yield Linearised(inertia.copy(), stiffness, damping, "cables, rotors and springs")
+        for reach, k, b, where in _contacts(model, data, arm, world):
+            square = np.outer(reach, reach)
+            yield Linearised(inertia.copy(), stiffness + k * square, damping + b * square, where)
+
+
+def _contacts(model: Any, data: Any, arm: Arm, world: World) -> Iterator[tuple[Array, float, float, str]]:
+    """Velocity of both ends of each cover per joint velocity, (m,), along each axis, and the surface there."""
+    obstacles, pushers = world.obstacles, world.pushers
+    surfaces = [
+        (k * math.sqrt(1.0 + 4.0 * h * HARDENED_AT / k), b, f"obstacle '{name}'", arm.covers.names)
+        for name, k, b, h in zip(
+            obstacles.names, obstacles.stiffness, obstacles.damping, obstacles.hardening, strict=True
+        )
+    ]
+    surfaces += [
+        (k, b, f"pusher '{name}'", (cover,))
+        for name, k, b, cover, force in zip(
+            pushers.names, pushers.stiffness, pushers.damping, pushers.covers, pushers.force, strict=True
+        )
+        if force > 0.0
+    ]
+    jacobian = np.zeros((3, model.nv))
+    for i, (cover, link) in enumerate(zip(arm.covers.names, arm.covers.links, strict=True)):
+        site = model.site(f"{cover}_frame").id
+        rotation, origin = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
+        for end in (arm.covers.start[3 * i : 3 * i + 3], arm.covers.end[3 * i : 3 * i + 3]):
+            mujoco.mj_jac(model, data, jacobian, None, origin + rotation @ np.array(end), model.body(link).id)
+            for axis, (k, b, what, covers) in ((a, s) for a in range(3) for s in surfaces):
+                if cover in covers:
+                    yield rotation[:, axis] @ jacobian, k, b, f"{what} on {cover}"
