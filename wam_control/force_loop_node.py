@@ -41,10 +41,8 @@ class ForceLoopNode:
     )
     def step(self, inputs: Inputs) -> Outputs:
         """One outer period."""
-        command, external, posture, torque = (
-            inputs[topic]
-            for topic in ("force_command", "external_joint_torques", "joint_posture_command", "joint_torque_command")
-        )
+        command, external = inputs["force_command"], inputs["external_joint_torques"]
+        posture, torque = inputs["joint_posture_command"], inputs["joint_torque_command"]
         out = self._loop.step(
             inputs["joint_states"],
             inputs["joint_sensors"],

@@ -77,21 +77,20 @@ class VelocityLoop:
         """
         if command_age > self._timeout:
             command = [0.0] * len(self._peak)
-        currents = []
+        currents, integral, commanded = [], self._integral, self._commanded
         for i, peak in enumerate(self._peak):
             if not command:
-                self._integral[i] = 0.0
+                integral[i] = 0.0
                 torque = feedforward[i]
             else:
-                if tau_motor[i] == 0.0 and self._commanded[i] != 0.0:
-                    self._integral[i] = 0.0
+                if tau_motor[i] == 0.0 and commanded[i] != 0.0:
+                    integral[i] = 0.0
                 error = command[i] - thetad[i]
-                torque = self._kp[i] * error + self._integral[i] + feedforward[i]
+                torque = self._kp[i] * error + integral[i] + feedforward[i]
                 growth = self._ki[i] * error * dt
                 if abs(torque) < peak or torque * growth < 0.0:
-                    self._integral[i] += growth
+                    integral[i] += growth
                     torque += growth
-            torque = min(max(torque, -peak), peak)
-            self._commanded[i] = torque
+            commanded[i] = torque = min(max(torque, -peak), peak)
             currents.append(torque / self._constant[i])
         return currents

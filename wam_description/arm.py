@@ -205,12 +205,11 @@ class Timing:
 
     def outer_stamp(self, stamp: int) -> int:
         """Stamp of the outer period that `stamp` falls into, ns; the first period, tick 1, is an outer one."""
-        period, divisor = self.period_ns, self.outer_divisor
-        return (1 + (stamp // period - 1) // divisor * divisor) * period
+        return stamp - (stamp - self.period_ns) % self.outer_period_ns
 
     def is_outer(self, stamp: int) -> bool:
         """Whether the joint side works on the state of this stamp, ns."""
-        return self.outer_stamp(stamp) == stamp
+        return (stamp - self.period_ns) % self.outer_period_ns == 0
 
     def is_display(self, stamp: int) -> bool:
         """Whether messages at the display rate are due at this stamp, ns."""

@@ -6,10 +6,12 @@ nanoseconds, no ROS.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wam_description.arm import Timing, seconds
+
+Taken = tuple[int, Any]  # stamp, ns, and value of an input
 
 
 class InputSpec(NamedTuple):
@@ -38,7 +40,7 @@ class Inputs:
 
     __slots__ = ("_taken", "dt", "stamp")
 
-    def __init__(self, stamp: int, dt: float, taken: Mapping[str, tuple[int, Any] | None]) -> None:
+    def __init__(self, stamp: int, dt: float, taken: Mapping[str, Taken | None]) -> None:
         self.stamp, self.dt, self._taken = stamp, dt, taken
 
     def __getitem__(self, topic: str) -> Any:
@@ -53,7 +55,11 @@ class Inputs:
 
     def age(self, topic: str) -> float:
         """Time from the state that caused an input to the trigger, s; 0 where there is none."""
-        return seconds(self.stamp - self.stamp_of(topic))
+        found = self._taken.get(topic)
+        return seconds(self.stamp - found[0]) if found is not None else 0.0
+
+
+Inlet = Callable[[int, Any], Sequence[Inputs]]
 
 
 class Synchroniser:
@@ -81,20 +87,15 @@ class Synchroniser:
         self._period = timing.outer_period_ns if outer else timing.period_ns
         waits = timing.mode == "lockstep"
         waited = {topic: spec for topic, spec in inputs.items() if waits and spec.streamed}
-        self._kept: dict[str, dict[int, Any]] = {topic: {} for topic in waited}
-        self._newest: dict[str, tuple[int, Any] | None] = {topic: None for topic in inputs if topic not in waited}
-        self._groups = [
-            _Group(
-                spec.outer,
-                spec.delay * timing.period_ns,
-                spec.outer == outer and not spec.delay,
-                [(t, self._kept[t]) for t in waited if waited[t] == spec],
-            )
-            for spec in dict.fromkeys(waited.values())
-        ]
-        self._is_alone = not inputs  # a trigger is all there is to a step
-        self._triggers: deque[tuple[int, Any]] = deque()
+        self._newest: dict[str, Taken | None] = {topic: None for topic in inputs if topic not in waited}
+        groups = {spec: _Group(timing, spec) for spec in waited.values()}
+        self._groups = list(groups.values())
+        self._triggers: deque[Taken] = deque()
         self._last = self._last_done = 0
+        self._inlets = {trigger: self._start} | {topic: self._newest_inlet(topic) for topic in self._newest}
+        for topic, spec in waited.items():
+            groups[spec].topics.append(topic)
+            self._inlets[topic] = self._waited_inlet(topic, groups[spec])
 
     def accepts(self, topic: str, stamp: int) -> bool:
         """Whether a message of this stamp can be part of a step; if not, it need not be decoded."""
@@ -104,75 +105,102 @@ class Synchroniser:
 
     def put(self, topic: str, stamp: int, value: Any) -> Sequence[Inputs]:
         """Take an input; returns the inputs of each step that is now complete, in the order of their stamps."""
-        if topic == self._trigger:
-            if stamp <= self._last or (self._thinned and not self._timing.is_outer(stamp)):
-                return ()
-            self._last = stamp
-            self._triggers.append((stamp, value))
-        elif topic in self._newest:
-            self._newest[topic] = (stamp, value)
-        elif not self._outer or self._timing.is_outer(stamp):
-            self._kept[topic][stamp] = value
-        if not self._triggers:
-            return ()
-        if self._is_alone:
-            self._triggers.clear()
-            return (self._step(stamp, {topic: (stamp, value)}),)
-        complete: list[Inputs] = []
-        while self._triggers and (taken := self._taken(self._triggers[0][0])) is not None:
-            stamp, value = self._triggers.popleft()
-            taken[self._trigger] = (stamp, value)
-            complete.append(self._step(stamp, taken))
-        return complete
+        return self._inlets[topic](stamp, value)
 
-    def _step(self, stamp: int, taken: Mapping[str, tuple[int, Any] | None]) -> Inputs:
-        """The inputs of a step that is complete, with the time since the one before."""
-        dt = stamp - self._last_done if self._last_done else self._period
-        self._last_done = stamp
-        return Inputs(stamp, seconds(dt), taken)
+    def inlet(self, topic: str) -> Inlet:
+        """What `put` does with the inputs of one topic, as a function of stamp and value."""
+        return self._inlets[topic]
+
+    def _start(self, stamp: int, value: Any) -> Sequence[Inputs]:
+        if stamp <= self._last or (self._thinned and not self._timing.is_outer(stamp)):
+            return ()
+        self._last = stamp
+        self._triggers.append((stamp, value))
+        return self._complete()
+
+    def _newest_inlet(self, topic: str) -> Inlet:
+        def take(stamp: int, value: Any) -> Sequence[Inputs]:
+            self._newest[topic] = (stamp, value)
+            return self._complete() if self._triggers else ()
+
+        return take
+
+    def _waited_inlet(self, topic: str, group: "_Group") -> Inlet:
+        is_outer, first, outer_period = self._outer, self._timing.period_ns, self._timing.outer_period_ns
+        kept, topics, triggers = group.kept, group.topics, self._triggers
+
+        def take(stamp: int, value: Any) -> Sequence[Inputs]:
+            if is_outer and (stamp - first) % outer_period:  # no step of this period
+                return ()
+            if stamp in kept:
+                kept[stamp][topic] = (stamp, value)
+            else:
+                kept[stamp] = {topic: (stamp, value)}
+            return self._complete() if triggers and len(kept[stamp]) == len(topics) else ()
+
+        return take
+
+    def _complete(self) -> Sequence[Inputs]:
+        """The inputs of each step that has them all."""
+        complete: list[Inputs] = []
+        while self._triggers:
+            stamp, taken = self._triggers[0][0], self._newest.copy()
+            for group in self._groups:
+                if not group.hold(stamp):
+                    return complete
+                taken.update(group.held)
+            taken[self._trigger] = self._triggers.popleft()
+            dt = stamp - self._last_done if self._last_done else self._period
+            self._last_done = stamp
+            complete.append(Inputs(stamp, seconds(dt), taken))
+        return complete
 
     def missing(self, stamp: int) -> list[str]:
         """Topics whose message the step of this stamp still waits for."""
-        return [
-            topic
-            for group in self._groups
-            if (cause := self._cause(group, stamp))
-            for topic, kept in group.members
-            if cause not in kept
-        ]
-
-    def _cause(self, group: "_Group", stamp: int) -> int:
-        """Stamp of the inputs that belong to a step, 0 where none can have come yet."""
-        cause = stamp - group.delay_ns
-        if cause <= 0:
-            return 0
-        return self._timing.outer_stamp(cause) if group.outer else cause
-
-    def _taken(self, stamp: int) -> dict[str, tuple[int, Any] | None] | None:
-        """The inputs of a step, None where it still waits for one; older ones are forgotten."""
-        taken = self._newest.copy()
-        for group in self._groups:
-            cause = self._cause(group, stamp)
-            for topic, kept in group.members:
-                if cause in kept:
-                    taken[topic] = (cause, kept[cause])
-                elif cause:
-                    return None
-        for group in self._groups:
-            for topic, kept in group.members:
-                if len(kept) > 1:
-                    found = taken.get(topic)
-                    for old in [known for known in kept if found and known < found[0]]:
-                        del kept[old]
-                if group.once:
-                    kept.pop(stamp, None)
-        return taken
+        return [topic for group in self._groups for topic in group.missing(stamp)]
 
 
-class _Group(NamedTuple):
-    """Inputs that belong to a step by the same rule, each with the values kept by stamp."""
+class _Group:
+    """Inputs of the same specification, which a step takes by the same stamp: their cause.
 
-    outer: bool
-    delay_ns: int
-    once: bool  # each value is used by one step, that of its own stamp
-    members: list[tuple[str, dict[int, Any]]]
+    Attributes
+    ----------
+    topics : of these inputs.
+    kept : stamp and value by topic, by stamp, for steps to come.
+    held : those of the newest cause that a step had; empty before there can be one.
+    """
+
+    __slots__ = ("_cause", "_delay", "_first", "_outer_period", "held", "kept", "topics")
+
+    def __init__(self, timing: Timing, spec: InputSpec) -> None:
+        self._delay = spec.delay * timing.period_ns
+        self._first, self._outer_period = timing.period_ns, timing.outer_period_ns if spec.outer else 1
+        self._cause = 0
+        self.topics: list[str] = []
+        self.kept: dict[int, dict[str, Taken]] = {}
+        self.held: dict[str, Taken] = {}
+
+    def hold(self, stamp: int) -> bool:
+        """Whether every input of a step is there; they are `held` then."""
+        cause = self._cause_of(stamp)
+        if cause <= self._cause:
+            return True
+        kept = self.kept
+        if cause not in kept or len(kept[cause]) < len(self.topics):
+            return False
+        self._cause, self.held = cause, kept.pop(cause)
+        if kept:
+            for old in [known for known in kept if known < cause]:
+                del kept[old]
+        return True
+
+    def missing(self, stamp: int) -> list[str]:
+        """Topics that the step of a stamp still waits for."""
+        cause = self._cause_of(stamp)
+        found = self.kept.get(cause, {}) if cause > self._cause else self.topics
+        return [topic for topic in self.topics if topic not in found]
+
+    def _cause_of(self, stamp: int) -> int:
+        """Stamp of the inputs that belong to a step; 0 or less where none can have come yet."""
+        cause = stamp - self._delay
+        return cause - (cause - self._first) % self._outer_period

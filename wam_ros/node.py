@@ -3,8 +3,7 @@
 import importlib
 import sys
 from collections import deque
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +14,12 @@ from rclpy.parameter import Parameter
 from rclpy.timer import Timer
 from std_srvs.srv import SetBool, Trigger
 
-from wam_description.interface import Interface, declared
+from wam_description.interface import Feed, Interface, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import Level, NodeStatus
-from wam_description.synchroniser import Inputs, Synchroniser
+from wam_description.synchroniser import Inputs
 from wam_description.topics import STATUS
-from wam_description.wiring import Call, Declaration, Followed, Outputs, Reaction, SetParameters
+from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
 from wam_ros.parameters import declare, follow, follow_other
 from wam_ros.ports import SECOND, Ports
 from wam_ros.run import raise_priority, run
@@ -61,7 +60,6 @@ class AdaptedNode(Node):
             follow_other(self, followed.node, group, self.node.retune, f"{followed.group}.", self._warn)
         interface = Interface(shared, started_by_hand=declaration)
         self._ports = Ports(self, declaration, shared, interface)
-        self._requests: list[Call | SetParameters] = getattr(self.node, "requests", [])
         self._waiting: deque[Callable[[], None]] = deque()  # what follows a request that is under way
         self._asking = False
         self._service_clients: dict[tuple[str, str], Any] = {}
@@ -70,8 +68,8 @@ class AdaptedNode(Node):
         take_status = getattr(self.node, "take_status", None)
         if take_status or self._starts_with_all:
             self._ports.watch_peers(take_status)
-        for reaction in declaration.reactions:
-            self._connect(reaction, interface)
+        for topic, feeds in interface.feeds(declaration, self.node).items():
+            self._connect(topic, feeds)
         for name in getattr(self.node, "services", ()):
             self.create_service(Trigger, f"~/{name}", _answering(getattr(self.node, name)))
 
@@ -90,25 +88,22 @@ class AdaptedNode(Node):
         self._ports.wait_for_delivery()
         super().destroy_node()
 
-    def _connect(self, reaction: Reaction, interface: Interface) -> None:
-        unused = getattr(self.node, "unused", ())
-        topics, synchroniser = interface.synchroniser(reaction, unused)
-        work = getattr(self.node, reaction.method)
-        for item in (reaction.trigger, *reaction.inputs):
-            if item.topic in topics:
-                accepts = partial(synchroniser.accepts, item.topic)
-                self._ports.feed(item.topic, self._taking(synchroniser, item.topic, work), item.arrays, accepts)
-            elif item.topic in interface.topics:  # its publisher waits until all its listeners are there
-                self._ports.listen(item.topic, lambda data: None, raw=True)
+    def _connect(self, topic: str, feeds: Sequence[Feed]) -> None:
+        """Subscribe once; all reactions to a message work in the order of their declaration."""
+        if not feeds:  # its publisher waits until all its listeners are there
+            self._ports.listen(topic, lambda data: None, raw=True)
+            return
+        reactions = [(feed.synchroniser, mask(feed.arrays), feed.work) for feed in feeds]
 
-    def _taking(
-        self, synchroniser: Synchroniser, topic: str, work: Callable[[Inputs], Outputs]
-    ) -> Callable[[int, Any], None]:
         def take(stamp: int, value: Any) -> None:
-            for inputs in synchroniser.put(topic, stamp, value):
-                self._step(inputs, work)
+            for synchroniser, masked, work in reactions:
+                for inputs in synchroniser.put(topic, stamp, masked(value) if masked and len(feeds) > 1 else value):
+                    self._step(inputs, work)
 
-        return take
+        def accepts(stamp: int) -> bool:
+            return any(feed.synchroniser.accepts(topic, stamp) for feed in feeds)
+
+        self._ports.feed(topic, take, needed_arrays([feed.arrays for feed in feeds]), accepts)
 
     def _step(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
         ports = self._ports
@@ -117,9 +112,10 @@ class AdaptedNode(Node):
         ports.counts["steps"] += 1
         outputs = work(inputs)
         self._report_refusals(inputs)
-        if self._requests or self._asking:
-            self._waiting.extend([*map(self._making, self._requests), lambda: self._publish(inputs.stamp, outputs)])
-            self._requests.clear()
+        requests: list[Call | SetParameters] = getattr(self.node, "requests", [])
+        if requests or self._asking:
+            self._waiting.extend([*map(self._making, requests), lambda: self._publish(inputs.stamp, outputs)])
+            requests.clear()
             self._go_on()
         else:
             self._publish(inputs.stamp, outputs)
