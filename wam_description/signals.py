@@ -112,7 +112,7 @@ class NodeStatus(NamedTuple):
     fault : why the driver has stopped, '' where it has not.
     step : of the scenario, '' for other nodes.
     stamp : time of the arm that the status belongs to, ns, 0 where it has none.
-    facts : further values for people, by name.
+    facts : further values for people, by name; a number is written as text.
     """
 
     level: Level

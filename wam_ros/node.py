@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,9 +21,11 @@ from wam_description.signals import Level, NodeStatus
 from wam_description.synchroniser import Inputs
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
-from wam_ros.parameters import declare, follow, follow_other
+from wam_ros.parameters import declare, follow_other, follow_together
 from wam_ros.ports import SECOND, Ports
 from wam_ros.run import raise_priority, run
+
+PATIENCE = 2.0  # s, after which a request reports that it still waits for its service
 
 
 class AdaptedNode(Node):
@@ -50,10 +53,10 @@ class AdaptedNode(Node):
         self._is_realtime = shared.timing.mode == "realtime"
         if self._is_realtime and getattr(self.node, "high_priority", False):
             raise_priority(shared.timing.niceness)
-        if tune := getattr(self.node, "tune", None):
-            follow(self, own, tune)
+        live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
         if owned:
-            follow(self, getattr(shared, owned), self.node.retune, f"{owned}.")
+            live.append((getattr(shared, owned), self.node.retune, f"{owned}."))
+        follow_together(self, live)
         followed: Followed | None = getattr(self.node, "follows", None)
         if followed:
             group = getattr(shared, followed.group)
@@ -174,9 +177,16 @@ class AdaptedNode(Node):
             client = self._client(request.node, request.service, Trigger if request.data is None else SetBool)
             message = Trigger.Request() if request.data is None else SetBool.Request(data=request.data)
         self._asking = True
+        began, is_reported = time.monotonic(), False
         timer: Timer
 
         def ask_when_found() -> None:
+            nonlocal is_reported
+            if not is_reported and time.monotonic() - began > PATIENCE:
+                is_reported = True
+                self.get_logger().warning(
+                    f"waiting for the service {client.srv_name}; start the node '{request.node}', or request another"
+                )
             if client.service_is_ready():  # before, the request would be lost
                 timer.cancel()
                 self.destroy_timer(timer)

@@ -53,8 +53,9 @@ class Bus:
         for topic, found in feeds.items():
             reactions = [(feed.synchroniser.inlet(topic), mask(feed.arrays), feed.work) for feed in found]
             if len(reactions) > 1:
-                reactions = [(_together(reactions), None, _outputs)]
-            self._routes[topic].takers.extend(_Taker(*reaction, outlets) for reaction in reactions)
+                self._routes[topic].takers.append(_Taker(_together(reactions), None, _outputs, outlets))
+            else:
+                self._routes[topic].takers.extend(_Taker(*reaction, outlets) for reaction in reactions)
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value of a stamp, ns, and what the nodes publish in turn."""
