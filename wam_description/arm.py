@@ -203,12 +203,8 @@ class Timing:
         """Step of the plant in seconds."""
         return self.period / self.substeps
 
-    def outer_stamp(self, stamp: int) -> int:
-        """Stamp of the outer period that `stamp` falls into, ns; the first period, tick 1, is an outer one."""
-        return stamp - (stamp - self.period_ns) % self.outer_period_ns
-
     def is_outer(self, stamp: int) -> bool:
-        """Whether the joint side works on the state of this stamp, ns."""
+        """Whether the joint side works on the state of this stamp, ns; the first period, tick 1, is an outer one."""
         return (stamp - self.period_ns) % self.outer_period_ns == 0
 
     def is_display(self, stamp: int) -> bool:
