@@ -28,8 +28,8 @@ from wam_sim.simulation import Simulation
 class ImpedanceParameters:
     """Spring and damper at the tip, in the base frame."""
 
-    stiffness: tuple[float, ...] = parameter("stiffness along x y z", "N/m", low=0.0, high=2000.0, live=True)
-    damping: tuple[float, ...] = parameter("damping along x y z", "N s/m", low=0.0, high=100.0, live=True)
+    stiffness: tuple[float, ...] = parameter("stiffness along x y z", "N/m", low=0.0, high=2000.0, live=True, length=3)
+    damping: tuple[float, ...] = parameter("damping along x y z", "N s/m", low=0.0, high=100.0, live=True, length=3)
 
 
 class Impedance:

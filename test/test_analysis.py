@@ -555,3 +555,13 @@ def test_the_look_sees_what_runs_over_what_is_missing_and_what_is_fetched(tmp_pa
     assert seen["scroll"] > 390
     assert seen["pictures"] == [False]
     assert seen["requests"] == ["http://127.0.0.1:9/x.png"]
+
+
+@pytest.mark.slow
+def test_no_efficiency_is_reported_where_more_work_comes_out_than_goes_in(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["analyse", str(Path(__file__).parents[1] / "bags" / "sample" / "testbed-5.6")])
+    said = capsys.readouterr().out
+    assert "The efficiency was not measured" in said
+    assert "efficiency, " not in said
+    assert "came back" not in said

@@ -116,6 +116,7 @@ def test_inner_link_shows_moment_and_bound_but_no_place(x: float, phi: float) ->
     assert math.isnan(found.place)
     assert math.isnan(found.position_sd)
     assert "the shoulder measures only the moment" in found.reason
+    assert found.reasons & 1 << contact_inference.REASONS.index(contact_inference.MOMENT_ONLY)
     assert found.is_lower_bound
     bound = x * 8 / L3
     assert np.linalg.norm(found.force) == pytest.approx(bound, rel=0.03)

@@ -439,15 +439,20 @@ def test_creep_runs_over_topics_and_is_judged_again_from_its_bag(tmp_path: Path,
     assert "all quantities are within their bounds" in said.out
     assert "creep 1/1 out_and_back: done" in said.err
     assert (tmp_path / "mine" / "result.png").is_file()
-    assert run_command("creep", "--evaluate", str(tmp_path / "mine")) == 0
-    assert capfd.readouterr().out == said.out
-    assert run_command("creep", "--evaluate", str(tmp_path / "mine" / "out_and_back")) == 0
+    (tmp_path / "mine" / "result.png").unlink()
+    again = ("--directory", str(tmp_path / "again"), "--evaluate")
+    assert run_command("creep", *again, str(tmp_path / "mine")) == 0
+    picture = tmp_path / "again" / "creep.png"
+    assert capfd.readouterr().out == said.out.replace(str(tmp_path / "mine" / "result.png"), str(picture))
+    assert picture.is_file()
+    assert not (tmp_path / "mine" / "result.png").exists(), "an evaluation leaves the recording as it is"
+    assert run_command("creep", *again, str(tmp_path / "mine" / "out_and_back")) == 0
     capfd.readouterr()
     # a bound that is missed: the same bag for an experiment in which the driver should have stopped the arm
     other = tmp_path / "creep.yaml"
     text = packaged("experiments/creep").read_text()
     other.write_text(text.replace("  - name: out_and_back\n", "  - name: out_and_back\n    stops: true\n"))
-    assert run_command(str(other), "--evaluate", str(tmp_path / "mine")) == 1
+    assert run_command(str(other), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 1
     assert "stops the arm  does not stop" in capfd.readouterr().out
 
 
@@ -484,14 +489,14 @@ def test_an_interrupted_run_is_stopped_and_is_not_judged(tmp_path: Path, domain_
     file = tmp_path / "short.yaml"  # an experiment of this one run
     whole = yaml.safe_load(packaged("experiments/stiction-limit-cycle").read_text())
     file.write_text(yaml.safe_dump({**whole, "runs": whole["runs"][:1]}))
-    assert run_command(str(file), "--evaluate", str(tmp_path / "mine")) == 1
+    assert run_command(str(file), "--directory", str(tmp_path), "--evaluate", str(tmp_path / "mine")) == 1
     said = capfd.readouterr().err
     assert "run 'without_deadband' ended in step 'press', 0 of 1 steps finished; " in said
     assert "repeat 'wam experiment short'" in said
 
 
 def test_bags_that_are_missing_are_named(tmp_path: Path, capfd) -> None:
-    assert run_command("wam-slide", "--evaluate", str(tmp_path)) == 1
+    assert run_command("wam-slide", "--directory", str(tmp_path), "--evaluate", str(tmp_path)) == 1
     assert "has no bag of slide; run 'wam experiment wam-slide'" in capfd.readouterr().err
     with pytest.raises(BagError):
         recorded(load("creep"), 0, {}, (), tmp_path).step("out")

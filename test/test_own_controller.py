@@ -15,11 +15,11 @@ from wam_control.scenario import load
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface, declared
-from wam_description.parameters import Nothing, ParameterError
-from wam_description.signals import State
+from wam_description.parameters import Nothing, ParameterError, build
+from wam_description.signals import Level, NodeStatus, State
 from wam_description.synchroniser import Inputs
 from wam_description.topics import JOINT_STATE, Topic
-from wam_description.wiring import Input, Outputs, declaration, reaction
+from wam_description.wiring import Call, Input, Outputs, declaration, reaction
 from wam_sim.replay import replay
 from wam_sim.simulation import Simulation
 
@@ -201,3 +201,140 @@ def test_currents_that_are_not_finite_are_refused_by_name(configured: Configurat
     run = Simulation(configured._replace(sections=own), steps, {"velocity_loop": Broken})
     with pytest.raises(ValueError, match=r"motor_current_command of 1000000 ns is .*nan.* 4 finite numbers"):
         run.play()
+
+
+class Requesting(Echo):
+    """Requests what nobody serves, or what the test gives it, with a new list of requests every time."""
+
+    name, topics = "requesting", ()
+    given: tuple[Call, ...] = (Call("nobody", "help"),)
+
+    def __init__(self, shared: Shared, own: Nothing) -> None:
+        self.requests: list[Call] = []
+
+    @reaction(Input("gravity_effort", "effort"), outputs=("joint_torque_command",))
+    def step(self, inputs: Inputs) -> Outputs:
+        self.requests = list(self.given)
+        return {"joint_torque_command": inputs["gravity_effort"]}
+
+
+def test_without_an_answer_to_refusals_a_refused_step_publishes_nothing(
+    configured: Configuration, tmp_path: Path
+) -> None:
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"requesting": Requesting})
+    for _ in range(20):
+        run.step()
+    assert len(run.rows["gravity_effort"]) == 4
+    assert "joint_torque_command" not in run.rows
+
+
+def test_requests_in_a_new_list_are_made(configured: Configuration, tmp_path: Path) -> None:
+    class Stopping(Requesting):
+        given = (Call("driver", "estop"),)
+
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"requesting": Stopping})
+    run.step()
+    assert run.driver.safety.fault == "emergency stop"
+
+
+class Twice:
+    """Two reactions to one topic; what each does is noted, with numbers where text is usual."""
+
+    name, parameters = "twice", Nothing
+    topics = (Topic("first", JOINT_STATE, "outer", "position, rad", "joints"),)
+
+    def __init__(self, shared: Shared, own: Nothing) -> None:
+        self.done: list[str] = []
+
+    @reaction(Input("joint_states", "position"), outputs=("first",))
+    def one(self, inputs: Inputs) -> Outputs:
+        self.done.append(f"one {[len(array) for array in inputs['joint_states']]}")
+        return {
+            "first": State(inputs["joint_states"].position, [], []),
+            "status": NodeStatus(Level.OK, "at work", facts={"steps": len(self.done)}),  # type: ignore[dict-item]
+        }
+
+    @reaction(Input("joint_states", "velocity"), outputs=())
+    def two(self, inputs: Inputs) -> Outputs:
+        self.done.append(f"two {[len(array) for array in inputs['joint_states']]}")
+        return {}
+
+    @reaction(Input("first", "position"), outputs=())
+    def three(self, inputs: Inputs) -> Outputs:
+        self.done.append("three")
+        return {}
+
+    def diagnostics(self) -> dict[str, float]:
+        return {"steps": len(self.done) / 2.0}
+
+
+def test_reactions_to_one_topic_work_in_the_order_of_their_declaration_everywhere(
+    configured: Configuration, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"twice": Twice})
+    for _ in range(11):
+        run.step()
+    order = ["one [4, 0, 0]", "two [0, 4, 0]", "three"]
+    assert run.nodes["twice"].done == 3 * order
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    over_topics = configured.with_values({"nodes": [*configured.shared.nodes, "own_nodes:Twice"]})
+    with Composition(over_topics, domain_id=domain_id) as composition:
+        twice: Any = composition.nodes["twice"]
+        composition.spin(lambda: len(twice.node.done) >= 30)
+        subscribed = [subscription.topic_name for subscription in twice.subscriptions]
+    done = [word for word in twice.node.done if word != "three"]
+    assert done == (order[:2] * len(done))[: len(done)]
+    assert subscribed.count("/wam/joint_states") == 1
+
+
+def test_a_list_of_another_length_is_refused_by_name(configured: Configuration) -> None:
+    with pytest.raises(ParameterError, match="parameter 'stiffness' has 2 values; it needs 3"):
+        build(declared("impedance:Impedance").parameter_class, {"stiffness": [1.0, 2.0], "damping": [1.0, 2.0, 3.0]})
+
+
+def test_a_request_to_a_node_that_does_not_exist_says_what_it_waits_for(
+    configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    from wam_ros import node as adapter
+    from wam_ros.bring_up import Composition
+
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    monkeypatch.setattr(adapter, "PATIENCE", 0.0)
+    over_topics = configured.with_values({"nodes": [*configured.shared.nodes, "own_nodes:Requesting"]})
+    said = []
+    with Composition(over_topics, domain_id=domain_id) as composition:
+        composition.spin(lambda: bool(said.append(capfd.readouterr().err) or "nobody/help" in "".join(said)))
+    assert "waiting for the service nobody/help; start the node 'nobody'" in "".join(said)
+
+
+def test_topics_that_answer_each_other_in_a_circle_are_not_streamed(configured: Configuration) -> None:
+    ping = Topic("ping", JOINT_STATE, "outer", "torque, N m", "joints")
+    pong = ping._replace(name="pong")
+
+    class Ping(Echo):
+        name, topics = "ping", (ping, pong)
+
+        @reaction(Input("pong", "effort"), outputs=("ping",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    class Pong(Echo):
+        name, topics = "pong", ()
+
+        @reaction(Input("ping", "effort"), outputs=("pong",))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    class Started(Pong):
+        @reaction(Input("gravity_effort", "effort"), outputs=("pong",))
+        def begin(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    circle = Interface(configured.shared, {"ping": Ping, "pong": Pong})
+    assert not circle.is_streamed("ping")
+    assert not circle.is_streamed("pong")
+    started = Interface(configured.shared, {"ping": Ping, "pong": Started})
+    assert started.is_streamed("ping")
+    assert started.is_streamed("pong")

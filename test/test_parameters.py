@@ -14,12 +14,14 @@ from conftest import LONG
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 
-from wam_description.arm import Shared
-from wam_description.configuration import Configuration, packaged
+from wam_description.arm import Servo, Shared
+from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build, fields, parameter, require, values
-from wam_ros.node import make_node
+from wam_description.synchroniser import Inputs
+from wam_description.wiring import Input, Outputs, declaration, reaction
+from wam_ros.node import AdaptedNode, make_node
 
 ROOT = Path(__file__).parents[1]
 WAM = Configuration.load(packaged("wam"))
@@ -250,6 +252,36 @@ def test_gains_of_a_wrong_number_are_refused_over_ros(ros: Any) -> None:
     result = change(ros, "velocity_loop", **{"servo.proportional_gain": [0.1] * 3, "servo.integral_gain": [0.1] * 3})
     assert result.reason == "parameter 'servo.proportional_gain' has 3 values; 4 names need 4"
     assert node.node._loop._kp == before
+
+
+def test_own_and_shared_parameters_of_a_node_are_one_set(ros: Any) -> None:
+    class Both:
+        name, parameters, owns = "velocity_loop", Gains, "servo"
+
+        def __init__(self, shared: Shared, own: Gains) -> None:
+            self.gain, self.servo = own.gain, shared.servo
+
+        @reaction(Input("motor_states"), outputs=())
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+        def tune(self, own: Gains) -> None:
+            self.gain = own.gain
+
+        def retune(self, servo: Servo) -> None:
+            require(servo.integral_gain[0] < 100.0, "integral gain is too large")
+            self.servo = servo
+
+    own: dict[str, Any] = {"gain": 1.0, "names": ["a"], "weights": [1.0]}
+    given = {**WAM.sections[SHARED], **own}
+    overrides = [Parameter(name, value=list(v) if isinstance(v, tuple) else v) for name, v in given.items()]
+    node = ros.add(AdaptedNode(declaration(Both), namespace="/wam", context=ros.context, parameter_overrides=overrides))
+    before = node.node.servo
+    refused = change(ros, "velocity_loop", gain=2.0, **{"servo.integral_gain": [200.0] * 4})
+    assert refused.reason == "integral gain is too large"
+    assert (node.node.gain, node.node.servo) == (1.0, before)
+    assert change(ros, "velocity_loop", gain=1.5, **{"servo.integral_gain": [3.0] * 4}).successful
+    assert (node.node.gain, node.node.servo.integral_gain) == (1.5, (3.0,) * 4)
 
 
 def test_a_parameter_that_is_not_live_cannot_be_set_while_running(ros: Any) -> None:

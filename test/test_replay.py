@@ -46,7 +46,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory, domain_id: int) -> Path:
     return RECORDED[0]
 
 
-def recorded(folder: Path, domain_id: int) -> Path:
+def recorded(folder: Path, domain_id: int, **values: object) -> Path:
     from wam_ros.bring_up import Composition
 
     script = folder / "script.yaml"
@@ -60,6 +60,7 @@ def recorded(folder: Path, domain_id: int) -> Path:
             "scenario:script": str(script),
             "recorder:directory": str(folder),
             "recorder:name": "bag",
+            **values,
         }
     )
     with Composition(configuration, domain_id=domain_id) as composition:
@@ -98,6 +99,21 @@ def test_a_lockstep_recording_replays_bit_for_bit(bag: Path, node: str) -> None:
     assert counts <= {501, 101}
     assert counts
     assert done.is_same
+
+
+def test_an_arm_without_joint_sensors_replays_too(tmp_path: Path, domain_id: int) -> None:
+    without = {
+        "arm.joint_sensors": False,
+        "force_loop:feedback": "contact_estimate",
+        "force_loop:force_gain": [0.01],
+        "contact_estimator:use_joint_sensors": False,
+    }
+    bag = recorded(tmp_path, domain_id, **without)
+    assert "/wam/joint_sensors" not in read(bag).topics
+    for node in ("velocity_loop", "force_loop", "contact_estimator"):
+        done = replay(bag, node)
+        assert [topic.topic for topic in done.topics if not topic.is_same] == []
+        assert sum(topic.compared for topic in done.topics) > 500
 
 
 def test_the_pushed_arm_says_something(bag: Path) -> None:

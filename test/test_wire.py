@@ -120,3 +120,14 @@ def test_what_is_no_message_is_refused(data: bytes) -> None:
         with pytest.raises(Refused):
             decoder(topic, SHARED, "effort")(data)
         assert isinstance(stamp_of(data), int)
+
+
+@pytest.mark.parametrize("topic", [next(t for t in NUMBERS if t.type == kind) for kind in (JOINT_STATE, WRENCH, TABLE)])
+@pytest.mark.parametrize("options", [b"\0\3", b"\x80\0"])
+def test_option_bits_of_the_encapsulation_do_not_change_the_value(topic: Topic, options: bytes) -> None:
+    """The last two count padding at the end; the others are reserved."""
+    value = value_of(topic, random.Random(SEED))
+    data = encoder(topic, SHARED)(STAMP, value)
+    decode = decoder(topic, SHARED, "position? velocity? effort?")
+    assert repr(decode(data[:2] + options + data[4:])) == repr(decode(data)) == repr(value)
+    assert stamp_of(data[:2] + options + data[4:]) == STAMP

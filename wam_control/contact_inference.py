@@ -74,7 +74,8 @@ class Hypothesis(NamedTuple):
     direction_sd : rad.
     moment : (3,), N m, of the force about the origin of the cover's frame, in that frame.
     residual : chi^2 that the contact does not explain.
-    reason : why the position is unknown or the estimate not reliable, '' where neither.
+    reason : why the position is unknown or the estimate not reliable, in words, '' where neither.
+    reasons : the same as bits, in the order of `REASONS`.
     """
 
     cover: str
@@ -91,6 +92,7 @@ class Hypothesis(NamedTuple):
     moment: Triple
     residual: float
     reason: str
+    reasons: int
 
 
 class _Cover(NamedTuple):
@@ -194,13 +196,19 @@ class ContactInference:
             direction_sd=fit.direction_sd,
             moment=_cross(point, force),
             residual=fit.residual,
-            reason="; ".join(reasons),
+            reason="; ".join(self._in_words(reason, cover) for reason in reasons),
+            reasons=sum(2 ** REASONS.index(reason) for reason in reasons),
         )
+
+    def _in_words(self, reason: str, cover: _Cover) -> str:
+        if reason != MOMENT_ONLY:
+            return reason
+        joint = "the shoulder" if self._is_wam else "the only joint" if cover.joints == 1 else "the pivot"
+        return f"{joint} {reason}"
 
     def _why_unknown(self, q: Sequence[float], cover: _Cover, fit: Fit) -> str:
         if cover.is_moment_only:
-            joint = "the shoulder" if self._is_wam else "the only joint" if cover.joints == 1 else "the pivot"
-            return f"{joint} {MOMENT_ONLY}"
+            return MOMENT_ONLY
         if not self._is_wam:
             return WEAK
         in_plane, straight, bent = self._elbow(q, cover, fit)

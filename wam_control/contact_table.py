@@ -28,7 +28,7 @@ def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) ->
             h.direction_sd,
             *h.moment,
             h.residual,
-            float(sum(2**i for i, reason in enumerate(REASONS) if reason in h.reason)),
+            float(h.reasons),
         )
         for h in hypotheses
     )
@@ -75,4 +75,5 @@ def _hypothesis(row: Sequence[float], covers: Sequence[str]) -> Hypothesis:
         moment=vector("moment"),
         residual=value["residual"],
         reason="; ".join(reasons_of(row)),
+        reasons=int(value["reasons"]),
     )

@@ -179,11 +179,11 @@ class MomentumObserver:
         torques = self._map.joint_torques(tau_motor)
         return _Torques(q, qd, torques, friction, motor_sliding + joint_sliding, motor_resting + joint_resting)
 
-    def _update(self, now: "_Torques", dt: float) -> bool:
-        body, (q, qd, tau, friction, sliding, resting) = self._body, now
+    def _update(self, sample: "_Torques", dt: float) -> bool:
+        body, (q, qd, tau, friction, sliding, resting) = self._body, sample
         momentum = ((body.mass_matrix(q) + self._carried) @ np.array(qd)).tolist()
         bias = (body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)).tolist()
-        known = [bias[i] - friction[i] for i in range(self._n)]
+        known = [b - f for b, f in zip(bias, friction, strict=True)]
         before, span = self._momentum, dt + self._gap
         keep = math.exp(-span / self._parameters.time_constant)
         residual, model = self._residual, self._model_torque
@@ -191,19 +191,23 @@ class MomentumObserver:
             model, keep = [-torque for torque in bias], 0.0
         elif span <= self._parameters.time_constant:
             take = 1.0 - keep
-            rate = [(momentum[i] - before[i]) / span for i in range(self._n)]
+            rate = [(now - then) / span for now, then in zip(momentum, before, strict=True)]
             residual = [
-                keep * residual[i] + take * (rate[i] - 0.5 * (known[i] + self._known[i]) - tau[i])
-                for i in range(self._n)
+                keep * r + take * (p - 0.5 * (new + old) - torque)
+                for r, p, new, old, torque in zip(residual, rate, known, self._known, tau, strict=True)
             ]
-            model = [keep * model[i] + take * (rate[i] - 0.5 * (bias[i] + self._bias[i])) for i in range(self._n)]
+            model = [
+                keep * m + take * (p - 0.5 * (new + old))
+                for m, p, new, old in zip(model, rate, bias, self._bias, strict=True)
+            ]
         # else the torques in so long a gap are unknown: continue from here
         if not math.isfinite(sum(momentum) + sum(known) + sum(residual) + sum(model)):
             self._gap += dt
             return False
-        take = 1.0 - keep
-        self._sliding = [keep * a + take * b for a, b in zip(self._sliding, sliding, strict=True)]
-        self._resting = [keep * a + take * b for a, b in zip(self._resting, resting, strict=True)]
+        if not self._link_side:  # strain gauges lie behind the friction
+            take = 1.0 - keep
+            self._sliding = [keep * a + take * b for a, b in zip(self._sliding, sliding, strict=True)]
+            self._resting = [keep * a + take * b for a, b in zip(self._resting, resting, strict=True)]
         if self._load is not None:
             self._load.observe(q, qd, span, keep)
         self.q, self._residual, self._model_torque = q, residual, model

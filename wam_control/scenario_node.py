@@ -53,7 +53,8 @@ class ScenarioNode:
             return self._end(f"the driver stopped in step '{self._step}': {self._fault}")
         contact = contact_of(inputs["contact/hypotheses"], self._covers)
         out = self._scenario.step(inputs["joint_states"].position, contact, inputs.dt)
-        self._request(out)
+        if out.request or out.settings or out.done:
+            self._request(out)
         force = out.force
         outputs: dict[str, Any] = {
             "joint_posture_command": State(out.posture, [], []),

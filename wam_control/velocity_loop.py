@@ -79,27 +79,26 @@ class VelocityLoop:
         list of float
             currents (n,), A.
         """
-        currents = []
+        currents, integral, commanded = [], self._integral, self._commanded
         faster, stronger = self._acceleration * dt, self._torque_rate * dt
         for i, peak in enumerate(self._peak):
             carried = self._feedforward[i] = _toward(feedforward[i], self._feedforward[i], stronger)
             if not command:
-                self._integral[i] = 0.0
+                integral[i] = 0.0
                 self._velocity[i] = thetad[i]
                 torque = carried
             else:
-                if tau_motor[i] == 0.0 and self._commanded[i] != 0.0:
-                    self._integral[i] = 0.0
+                if tau_motor[i] == 0.0 and commanded[i] != 0.0:
+                    integral[i] = 0.0
                     self._velocity[i] = thetad[i]
                 velocity = self._velocity[i] = _toward(command[i], self._velocity[i], faster)
                 error = velocity - thetad[i]
-                torque = self._kp[i] * error + self._integral[i] + carried
+                torque = self._kp[i] * error + integral[i] + carried
                 growth = self._ki[i] * error * dt
                 if abs(torque) < peak or torque * growth < 0.0:
-                    self._integral[i] += growth
+                    integral[i] += growth
                     torque += growth
-            torque = min(max(torque, -peak), peak)
-            self._commanded[i] = torque
+            commanded[i] = torque = min(max(torque, -peak), peak)
             currents.append(torque / self._constant[i])
         return currents
 

@@ -269,8 +269,8 @@ class Timing:
         return (1 + (stamp // period - 1) // divisor * divisor) * period
 
     def is_outer(self, stamp: int) -> bool:
-        """Whether the joint side works on the state of this stamp, ns."""
-        return self.outer_stamp(stamp) == stamp
+        """Whether the joint side works on the state of this stamp, ns; the first period, tick 1, is an outer one."""
+        return (stamp - self.period_ns) % self.outer_period_ns == 0
 
     def is_display(self, stamp: int) -> bool:
         """Whether messages at the display rate are due at this stamp, ns."""

@@ -1,16 +1,16 @@
 """The interface of a bring-up: who publishes and who takes each topic, from the declarations of its nodes."""
 
 import importlib
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError
-from wam_description.synchroniser import InputSpec, Synchroniser
+from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
-from wam_description.wiring import Declaration, Input, Reaction, declaration
+from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration
 
 
 @cache
@@ -114,22 +114,34 @@ class Interface:
             for reaction in one.reactions
         )
 
-    def synchroniser(self, reaction: Reaction, unused: Collection[str] = ()) -> tuple[list[str], Synchroniser]:
-        """The topics that a reaction takes, and their synchroniser.
+    def feeds(self, declaration: Declaration, node: Any) -> dict[str, list["Feed"]]:
+        """What a node does with each topic that it listens to on this arm.
+
+        The reactions of a topic come in the order of their declaration; there is none where the node does not use
+        the topic as it is configured, though its publisher waits for the subscription.
 
         Parameters
         ----------
-        reaction : of one of the nodes.
-        unused : topics that the node does not use as it is configured; topics that this arm lacks are left out, too.
+        node : the declared node.
         """
+        feeds: dict[str, list[Feed]] = {topic: [] for topic in declaration.inputs if topic in self.topics}
+        unused = getattr(node, "unused", ())
+        for reaction in declaration.reactions:
+            used = [item for item in reaction.inputs if item.topic in self.topics and item.topic not in unused]
+            synchroniser = self._synchroniser(reaction, used)
+            for item in (reaction.trigger, *used):
+                arrays = item.arrays if self.topics[item.topic].side else WHOLE
+                work, essential = getattr(node, reaction.method), self.essential(reaction)
+                feeds[item.topic].append(Feed(synchroniser, arrays, work, essential))
+        return feeds
+
+    def _synchroniser(self, reaction: Reaction, used: list[Input]) -> Synchroniser:
         trigger = reaction.trigger.topic
-        used = [item for item in reaction.inputs if item.topic in self.topics and item.topic not in unused]
-        specs = {item.topic: self._spec(item) for item in used}
         is_outer = reaction.thinned or self.topics[trigger].rate != "inner"
-        return [trigger, *specs], Synchroniser(self._timing, trigger, specs, is_outer, reaction.thinned)
+        specs = {item.topic: self._spec(item) for item in used}
+        return Synchroniser(self._timing, trigger, specs, is_outer, reaction.thinned)
 
     def _spec(self, item: Input) -> InputSpec:
-
         delay = self._timing.outer_delay if item.delayed else 0
         limit = self._ages.limit_ns(item.age)
         is_outer, is_streamed = self.topics[item.topic].rate != "inner", self.is_streamed(item.topic)
@@ -177,6 +189,23 @@ class Interface:
                     raise ParameterError(
                         f"topic '{topic}' has {len(others)} publishers, {', '.join(others)}; list only one in 'nodes'"
                     )
+
+
+class Feed(NamedTuple):
+    """What one reaction of a node does with the messages of one topic.
+
+    Attributes
+    ----------
+    synchroniser : of all inputs of the reaction.
+    arrays : of a JointState, the arrays that it takes.
+    work : the step.
+    essential : inputs of the reaction without which the driver has to brake.
+    """
+
+    synchroniser: Synchroniser
+    arrays: str
+    work: Callable[[Inputs], Outputs]
+    essential: frozenset[str] = frozenset()
 
 
 @cache

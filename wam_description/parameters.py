@@ -31,6 +31,7 @@ class Field(NamedTuple):
     choices: tuple[str, ...]
     live: bool
     before: Value | Callable[[Mapping[str, Any]], Value] | None
+    length: int
 
     @property
     def allowed(self) -> str:
@@ -54,6 +55,7 @@ def parameter(
     choices: tuple[str, ...] = (),
     live: bool = False,
     before: Value | Callable[[Mapping[str, Any]], Value] | None = None,
+    length: int = 0,
 ) -> Any:
     """Declare a field of a parameter class.
 
@@ -66,10 +68,12 @@ def parameter(
     live : True if a running node may take a new value.
     before : the value that a recording without this parameter had in effect, or a function of the node's
         other parameters, see `one_each`.  Only recordings may lack a parameter; a configuration has to give it.
+    length : of a list, the number of values that it must have, 0 where that is checked elsewhere.
     """
     return dataclasses.field(
         metadata={
             "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live, "before": before,
+            "length": length,
         }
     )  # fmt: skip
 
@@ -173,6 +177,8 @@ def _checked(field: Field, value: Any) -> Value:
     if field.is_array:
         if isinstance(value, str) or not hasattr(value, "__iter__"):
             raise ParameterError(f"parameter '{field.name}' is {value!r}; it must be a list of {field.kind.__name__}")
+        if field.length and len(value) != field.length:
+            raise ParameterError(f"parameter '{field.name}' has {len(value)} values; it needs {field.length}")
         return tuple(_checked_scalar(field, element) for element in value)
     return _checked_scalar(field, value)
 

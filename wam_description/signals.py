@@ -114,7 +114,7 @@ class NodeStatus(NamedTuple):
     session : of the driver, its number; of another node, the one that it follows; 0 where it has none.
     since : of the driver, the time from which commands count, ns: the brakes were switched then.
     stamp : time of the arm that the status belongs to, ns, 0 where it has none.
-    facts : further values for people, by name.
+    facts : further values for people, by name; a number is written as text.
     """
 
     level: Level

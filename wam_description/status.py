@@ -8,12 +8,12 @@ _CONNECTED = ("waiting", "connected")
 
 
 def pairs(status: NodeStatus) -> list[tuple[str, str]]:
-    """The fields of a status that are not empty, then its facts, as (key, value)."""
+    """The fields of a status that are not empty, then its facts, as (key, value) in text."""
     own = {"peers": _CONNECTED[status.connected], "mode": status.mode, "fault": status.fault, "step": status.step}
     found = [(key, value) for key, value in own.items() if value]
     numbers = {"session": status.session, "since": status.since, "stamp": status.stamp}
     found += [(key, str(value)) for key, value in numbers.items() if value]
-    return [*found, *status.facts.items()]
+    return [*found, *((key, str(value)) for key, value in status.facts.items())]
 
 
 def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]]) -> NodeStatus:

@@ -15,7 +15,8 @@ Nothing is used that is from the future, too old, or from before the driver's se
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from wam_description.arm import Timing, seconds
@@ -76,6 +77,9 @@ class Inputs:
     def age(self, topic: str) -> float:
         """Time from the state that caused an input to the trigger, s; 0 where there is none."""
         return seconds(self.stamp - self.stamp_of(topic))
+
+
+Inlet = Callable[[int, Any], Sequence[Inputs]]
 
 
 class Synchroniser:
@@ -181,6 +185,10 @@ class Synchroniser:
             taken[self._trigger] = (stamp, value)
             complete.append(self._step(stamp, taken))
         return complete
+
+    def inlet(self, topic: str) -> Inlet:
+        """What `put` does with the inputs of one topic, as a function of stamp and value."""
+        return partial(self.put, topic)
 
     def _keep(self, topic: str, stamp: int, value: Any) -> None:
         """Keep an input that is not the trigger."""

@@ -22,11 +22,11 @@ owns : name of a group of shared parameters that are live at this node, taken by
 follows : a `Followed` group of shared parameters of another node; changes come to ``retune(group)``, too.
 take_status(status) : called with the `NodeStatus` that any other node reports.
 services : by name, the method that answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
-requests : list of `Call` and `SetParameters`, made once and filled by steps; they are made, in order, before the
-    outputs of the step are published.  A refusal goes to ``refused(message)``, which returns outputs.
+requests : list of `Call` and `SetParameters`, filled by steps; they are made, in order, before the outputs of the
+    step are published.  If one is refused, the outputs are those of ``refused(message)``, none without it.
 refusals : by topic, why the present input is not used; reported once for each message.
 needs : of the inputs with absent='brake' those that the node relies on as it is tuned now; all where it has none.
-diagnostics() : further values for /diagnostics, by name.
+diagnostics() : further values for /diagnostics, by name, as text or numbers.
 done, failure : the node has finished, and why it failed ('' where it did not).
 high_priority : ask the system for a higher priority in realtime.
 starts_with_all : in realtime, do nothing before all nodes of the bring-up are connected.
@@ -34,7 +34,7 @@ topics : rows of the table of topics that this node adds.
 """
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from wam_description.arm import Shared
@@ -167,12 +167,21 @@ class Declaration(NamedTuple):
         return tuple(dict.fromkeys([*self.listens, *taken]))
 
 
-def masked(value: Any, arrays: str) -> Any:
-    """A value with the arrays of a JointState that an input does not take left empty, as on topics."""
-    if not isinstance(value, State):
-        return value
-    taken = arrays.replace("?", "").split()
-    return State(*(array if name in taken else [] for name, array in zip(State._fields, value, strict=True)))
+def mask(arrays: str) -> Callable[[State], State] | None:
+    """What leaves those arrays of a JointState empty that an input does not take, None where it takes them all."""
+    position, velocity, effort = (name in arrays.replace("?", "").split() for name in State._fields)
+    if position and velocity and effort:
+        return None
+    return lambda value: State(
+        value.position if position else [], value.velocity if velocity else [], value.effort if effort else []
+    )
+
+
+def needed_arrays(inputs: Sequence[str]) -> str:
+    """The arrays of a JointState that several inputs of one topic take, with a '?' where none of them needs it."""
+    taken = [arrays.split() for arrays in inputs]
+    names = [name for name in State._fields if any(name in one or f"{name}?" in one for one in taken)]
+    return " ".join(name if any(name in one for one in taken) else f"{name}?" for name in names)
 
 
 def reaction(

@@ -2,9 +2,9 @@
 
 import importlib
 import sys
+import time
 from collections import deque
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +15,19 @@ from rclpy.parameter import Parameter
 from rclpy.timer import Timer
 from std_srvs.srv import SetBool, Trigger
 
-from wam_description.interface import Interface, declared
+from wam_description.interface import Feed, Interface, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import Level, NodeStatus
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
-from wam_description.wiring import Call, Declaration, Followed, Outputs, Reaction, SetParameters
+from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
 from wam_ros.messages import Refused
-from wam_ros.parameters import declare, follow, follow_other
+from wam_ros.parameters import declare, follow_other, follow_together
 from wam_ros.ports import SECOND, Ports
 from wam_ros.run import raise_priority, run
 from wam_ros.tolerance import TolerantNode
+
+PATIENCE = 2.0  # s, after which a request reports that it still waits for its service
 
 
 class AdaptedNode(TolerantNode):
@@ -53,27 +55,26 @@ class AdaptedNode(TolerantNode):
         self._is_realtime = shared.timing.mode == "realtime"
         if self._is_realtime and getattr(self.node, "high_priority", False):
             raise_priority(shared.timing.niceness)
-        if tune := getattr(self.node, "tune", None):
-            follow(self, own, tune)
+        live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
         if owned:
-            follow(self, getattr(shared, owned), self.node.retune, f"{owned}.")
+            live.append((getattr(shared, owned), self.node.retune, f"{owned}."))
+        follow_together(self, live)
         followed: Followed | None = getattr(self.node, "follows", None)
         if followed:
             group = getattr(shared, followed.group)
             follow_other(self, followed.node, group, self.node.retune, f"{followed.group}.", self._warn)
         interface = Interface(shared, started_by_hand=declaration)
         self._ports = Ports(self, declaration, shared, interface)
-        self._requests: list[Call | SetParameters] = getattr(self.node, "requests", [])
         self._waiting: deque[Callable[[], None]] = deque()  # what follows a request that is under way
         self._asking = False
         self._service_clients: dict[tuple[str, str], Any] = {}
         self._refused: dict[str, int] = {}
         self._starts_with_all = getattr(self.node, "starts_with_all", False)
         self._interface, self._since, self._is_enabled = interface, 0, False
-        self._synchronisers: list[Synchroniser] = []
+        self._synchronisers: set[Synchroniser] = set()
         self._ports.watch_peers(self._take_status)
-        for reaction in declaration.reactions:
-            self._connect(reaction, interface)
+        for topic, feeds in interface.feeds(declaration, self.node).items():
+            self._connect(topic, feeds)
         for name in getattr(self.node, "services", ()):
             self.create_service(Trigger, f"~/{name}", _answering(getattr(self.node, name)))
 
@@ -96,42 +97,37 @@ class AdaptedNode(TolerantNode):
         self._ports.wait_for_delivery()
         super().destroy_node()
 
-    def _connect(self, reaction: Reaction, interface: Interface) -> None:
-        unused = getattr(self.node, "unused", ())
-        topics, synchroniser = interface.synchroniser(reaction, unused)
-        self._synchronisers.append(synchroniser)
-        work = getattr(self.node, reaction.method)
-        essential = interface.essential(reaction) if self._is_realtime else frozenset()
-        for item in (reaction.trigger, *reaction.inputs):
-            if item.topic in topics:
-                accepts = partial(synchroniser.accepts, item.topic)
-                self._ports.feed(
-                    item.topic, self._taking(synchroniser, item.topic, work, essential), item.arrays, accepts
-                )
-            elif item.topic in interface.topics:  # its publisher waits until all its listeners are there
-                self._ports.listen(item.topic, lambda data: None, raw=True)
+    def _connect(self, topic: str, feeds: Sequence[Feed]) -> None:
+        """Subscribe once; all reactions to a message work in the order of their declaration."""
+        if not feeds:  # its publisher waits until all its listeners are there
+            self._ports.listen(topic, lambda data: None, raw=True)
+            return
+        self._synchronisers.update(feed.synchroniser for feed in feeds)
+        reactions = [(feed, mask(feed.arrays) if len(feeds) > 1 else None) for feed in feeds]
 
-    def _taking(
-        self,
-        synchroniser: Synchroniser,
-        topic: str,
-        work: Callable[[Inputs], Outputs],
-        essential: frozenset[str],
-    ) -> Callable[[int, Any], None]:
         def take(stamp: int, value: Any) -> None:
-            strays = synchroniser.strays
-            try:
-                complete = synchroniser.put(topic, stamp, value)
-            except OutOfTime as reason:
-                raise Refused(str(reason)) from None
-            for inputs in complete:
-                self._step(inputs, work)
-                if essential:
-                    self._watch(synchroniser, essential)
-            if synchroniser.strays != strays:
-                self._ports.claims.stray(topic)
+            for feed, masked in reactions:
+                self._take(feed, topic, stamp, masked(value) if masked else value)
 
-        return take
+        def accepts(stamp: int) -> bool:
+            return any(feed.synchroniser.accepts(topic, stamp) for feed in feeds)
+
+        self._ports.feed(topic, take, needed_arrays([feed.arrays for feed in feeds]), accepts)
+
+    def _take(self, feed: Feed, topic: str, stamp: int, value: Any) -> None:
+        """Hand an input to a reaction; what does not fit the time is refused, or counted as a stray message."""
+        synchroniser = feed.synchroniser
+        strays = synchroniser.strays
+        try:
+            complete = synchroniser.put(topic, stamp, value)
+        except OutOfTime as reason:
+            raise Refused(str(reason)) from None
+        for inputs in complete:
+            self._step(inputs, feed.work)
+            if feed.essential and self._is_realtime:
+                self._watch(synchroniser, feed.essential)
+        if synchroniser.strays != strays:
+            self._ports.claims.stray(topic)
 
     def _watch(self, synchroniser: Synchroniser, essential: frozenset[str]) -> None:
         """Let the driver brake where an input has stopped to come without which the node cannot control."""
@@ -174,9 +170,10 @@ class AdaptedNode(TolerantNode):
         ports.counts["steps"] += 1
         outputs = work(inputs)
         self._report_refusals(inputs)
-        if self._requests or self._asking:
-            self._waiting.extend([*map(self._making, self._requests), lambda: self._publish(inputs.stamp, outputs)])
-            self._requests.clear()
+        requests: list[Call | SetParameters] = getattr(self.node, "requests", [])
+        if requests or self._asking:
+            self._waiting.extend([*map(self._making, requests), lambda: self._publish(inputs.stamp, outputs)])
+            requests.clear()
             self._go_on()
         else:
             self._publish(inputs.stamp, outputs)
@@ -235,9 +232,16 @@ class AdaptedNode(TolerantNode):
             client = self._client(request.node, request.service, Trigger if request.data is None else SetBool)
             message = Trigger.Request() if request.data is None else SetBool.Request(data=request.data)
         self._asking = True
+        began, is_reported = time.monotonic(), False
         timer: Timer
 
         def ask_when_found() -> None:
+            nonlocal is_reported
+            if not is_reported and time.monotonic() - began > PATIENCE:
+                is_reported = True
+                self.get_logger().warning(
+                    f"waiting for the service {client.srv_name}; start the node '{request.node}', or request another"
+                )
             if client.service_is_ready():  # before, the request would be lost
                 timer.cancel()
                 self.destroy_timer(timer)

@@ -1,6 +1,6 @@
 """ROS parameters from parameter classes: declared, described, checked as a set."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
@@ -91,13 +91,29 @@ def follow(node: Node, own: T, take: Any, prefix: str = "") -> None:
     take : called with the new parameter object; it may raise ParameterError to refuse the set.
     prefix : what the names of these parameters begin with.
     """
-    state = {"own": own}
+    follow_together(node, [(own, take, prefix)])
+
+
+def follow_together(node: Node, parts: Sequence[tuple[Any, Any, str]]) -> None:
+    """Let live parameters of several parts change as one set: where one part refuses, all of them keep their values.
+
+    Parameters
+    ----------
+    parts : own, take and prefix of each part, as `follow` takes them.
+    """
+    present = [own for own, _, _ in parts]
 
     def changed(parameters: list[Parameter]) -> SetParametersResult:
         given = {parameter.name: _plain(parameter) for parameter in parameters}
+        before = present.copy()
         try:
-            state["own"] = _updated(state["own"], given, prefix, take)
+            for i, (_, take, prefix) in enumerate(parts):
+                present[i] = _updated(present[i], given, prefix, take)
         except ParameterError as error:
+            for i, (_, take, _) in enumerate(parts):
+                if present[i] is not before[i]:
+                    present[i] = before[i]
+                    take(before[i])
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 

@@ -25,9 +25,9 @@ from wam_description.parameters import ParameterError, build_part
 from wam_description.signals import Point, State, Table, Wrench
 from wam_description.synchroniser import OutOfTime
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
-from wam_description.wiring import Declaration, masked
+from wam_description.wiring import Declaration, mask
+from wam_sim.bus import TopicValue, flat
 from wam_sim.recording import RecordedRun, recorded_run
-from wam_sim.simulation import TopicValue, flat
 
 _AXES = ("x", "y", "z")
 Numbers = JointColumns | WrenchColumns | PointColumns | TableColumns
@@ -137,7 +137,7 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
     for topic in outputs:
         columns = bag.topics.get(f"{namespace}/{topic}")
         order = names.get(rows[topic].side, [])
-        recorded = _rows(columns, order) if columns is not None else []
+        recorded = _rows(rows[topic], columns, order) if columns is not None else []
         compared.append(_compare(rows[topic], recorded, published.get(topic, []), order, _units(topic, columns)))
     mode = shared.timing.mode if run.mode == "unknown" else run.mode
     gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
@@ -189,28 +189,24 @@ def _run(
     changes: list[tuple[int, Any]],
 ) -> dict[str, list[TopicValue]]:
     interface, node = Interface(shared, started_by_hand=declaration), declaration.node(shared, own)
-    unused = getattr(node, "unused", ())
-    steps = []
-    for reaction in declaration.reactions:
-        topics, synchroniser = interface.synchroniser(reaction, unused)
-        arrays = {item.topic: item.arrays for item in (reaction.trigger, *reaction.inputs) if item.topic in topics}
-        steps.append((arrays, synchroniser, getattr(node, reaction.method)))
+    feeds = {
+        topic: [(feed.synchroniser.put, mask(feed.arrays), feed.work) for feed in found]
+        for topic, found in interface.feeds(declaration, node).items()
+    }
     published: dict[str, list[TopicValue]] = {}
-    rows = [interface.topics[topic] for topic in declaration.inputs if topic in interface.topics]
+    rows = [interface.topics[topic] for topic in feeds]
     for topic, stamp, value in _messages(bag, namespace, rows, shared):
         while changes and changes[0][0] <= stamp:
             node.tune(changes.pop(0)[1])
-        for arrays, synchroniser, work in steps:
-            if topic not in arrays:
-                continue
+        for put, taken, work in feeds[topic]:
             try:
-                complete = synchroniser.put(topic, stamp, masked(value, arrays[topic]))
+                complete = put(topic, stamp, taken(value) if taken else value)
             except OutOfTime:  # as the node did, which went on
                 continue
             for inputs in complete:
                 for name, output in work(inputs).items():
                     if name in interface.topics and interface.topics[name].is_numbers:
-                        published.setdefault(name, []).append(flat(inputs.stamp, output))
+                        published.setdefault(name, []).append(flat(interface.topics[name], inputs.stamp, output))
     return published
 
 
@@ -268,11 +264,11 @@ def _array(columns: JointColumns, field: str, names: Sequence[str]) -> list[list
     return [[] if math.isnan(row[0]) else row for row in ordered.tolist()]
 
 
-def _rows(columns: Columns, names: Sequence[str]) -> list[TopicValue]:
+def _rows(topic: Topic, columns: Columns, names: Sequence[str]) -> list[TopicValue]:
     """Recorded messages as the simulation keeps them."""
     assert isinstance(columns, Numbers)
     values = _values(columns, names)
-    return [flat(stamp, value) for stamp, value in zip(columns.stamp_ns.tolist(), values, strict=True)]
+    return [flat(topic, stamp, value) for stamp, value in zip(columns.stamp_ns.tolist(), values, strict=True)]
 
 
 def _compare(

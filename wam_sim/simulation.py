@@ -5,9 +5,8 @@ topic goes through the input synchroniser of every reaction that takes it.
 """
 
 import math
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from wam_control.contact_estimator import ContactEstimate
 from wam_control.scenario import Scenario, ScenarioStep
@@ -15,22 +14,11 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, build
-from wam_description.signals import BASE, Level, NodeStatus, Point, State, Table, Wrench
+from wam_description.signals import BASE, Level, NodeStatus, Point, State, Wrench
 from wam_description.synchroniser import Inputs, Synchroniser
-from wam_description.topics import EVERY_NODE
-from wam_description.wiring import WHOLE, Call, Declaration, Outputs, SetParameters, masked
+from wam_description.wiring import Call, Declaration, Outputs, SetParameters
 from wam_driver.driver import Driver, DriverParameters
-
-
-class TopicValue(NamedTuple):
-    """One message: time and numbers; the frame where there is one."""
-
-    stamp: int  # ns
-    values: tuple[float, ...]
-    frame: str = ""
-
-
-Rows = dict[str, list[TopicValue]]
+from wam_sim.bus import Bus, Rows
 
 
 class Simulation:
@@ -44,7 +32,6 @@ class Simulation:
 
     Attributes
     ----------
-    rows : what was published on each topic of numbers; a JointState as position, velocity and effort.
     driver : the driver, for a look at the plant.
     nodes : the other nodes by name.
     scenario : the scenario, for its failure.
@@ -65,19 +52,19 @@ class Simulation:
         self.driver = Driver(shared, configuration.node("driver", DriverParameters))
         self._interface = Interface(shared, dict(controllers or {}))
         self._settings = {"driver": dict(configuration.sections["driver"])}
-        self.rows: Rows = defaultdict(list)
-        self._listeners: dict[str, list[Listener]] = defaultdict(list)
+        self._bus = Bus(self._interface.topics)
+        self._bus.listen("motor_current_command", self._command)
+        self._bus.listen("sim/disturbance", self._push)
+        self._publish = self._bus.publish
         self._currents: tuple[int, list[float]] = (0, [])
         self._fault = ""
         self.nodes: dict[str, Any] = {}
-        self._synchronisers: list[Synchroniser] = []
+        self._synchronisers: set[Synchroniser] = set()
         for name, declaration in self._interface.declarations.items():
             if name != "driver":
                 self._connect(name, declaration, shared, configuration, steps)
         self._motors = len(shared.arm.motors.names)
-        self._known = {*EVERY_NODE, *(t for one in self._interface.declarations.values() for t in one.outputs)}
         self._has_sensors = "joint_sensors" in self._interface.topics
-        self._kept = {name for name, topic in self._interface.topics.items() if topic.is_numbers}
 
     def _connect(
         self,
@@ -92,23 +79,27 @@ class Simulation:
         node = declaration.node(shared, own, Scenario(steps)) if name == "scenario" else declaration.node(shared, own)
         self.nodes[name] = node
         self._settings[name] = dict(configuration.sections.get(name, {}))
-        unused = getattr(node, "unused", ())
-        for reaction in declaration.reactions:
-            topics, synchroniser = self._interface.synchroniser(reaction, unused)
-            self._synchronisers.append(synchroniser)
-            listener = Listener(
-                synchroniser.put,
-                getattr(node, reaction.method),
-                reaction.thinned,
-                getattr(node, "requests", None),
-                getattr(node, "refused", None),
-                declaration,
-                "",
-            )
-            arrays = {item.topic: item.arrays for item in (reaction.trigger, *reaction.inputs)}
-            for topic in topics:
-                is_whole = arrays[topic] == WHOLE or self._interface.topics[topic].side == ""
-                self._listeners[topic].append(listener._replace(arrays="" if is_whole else arrays[topic]))
+        feeds = self._interface.feeds(declaration, node)
+        self._synchronisers.update(feed.synchroniser for found in feeds.values() for feed in found)
+        if hasattr(node, "requests"):
+            feeds = {t: [feed._replace(work=self._requesting(node, feed.work)) for feed in feeds[t]] for t in feeds}
+        self._bus.connect(declaration, feeds)
+
+    def _requesting(self, node: Any, work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
+        """The step of a node together with its requests to others."""
+
+        def step(inputs: Inputs) -> Outputs:
+            outputs = work(inputs)
+            if node.requests and (refusal := self._make_all(node.requests)):
+                outputs = node.refused(refusal) if hasattr(node, "refused") else {}
+            return outputs
+
+        return step
+
+    @property
+    def rows(self) -> Rows:
+        """What was published on each topic of numbers so far; a JointState as position, velocity and effort."""
+        return self._bus.rows
 
     @property
     def scenario(self) -> Any:
@@ -131,8 +122,7 @@ class Simulation:
     def step(self) -> bool:
         """One inner period; True where the scenario is over."""
         driver, stamp = self.driver, self.driver.stamp
-        self._is_outer = driver.is_outer
-        if self._is_outer:
+        if driver.is_outer:
             self._publish_truth(stamp)
         if self._has_sensors:
             self._publish("joint_sensors", stamp, driver.joint_sensors)
@@ -152,35 +142,15 @@ class Simulation:
         self._publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
         self._publish("sim/contact/point", stamp, Point(frame, (load.place, 0.0, 0.0)))
 
-    def _publish(self, topic: str, stamp: int, value: Any) -> None:
-        """Keep a message, and let everybody who listens work on it."""
-        if topic in self._kept:
-            self.rows[topic].append(flat(stamp, value))
-        if topic == "motor_current_command":
-            self._command(stamp, value.effort)
-        elif topic == "sim/disturbance":
-            self._push(value)
-        for listener in self._listeners[topic]:
-            if listener.thinned and not self._is_outer:
-                continue
-            taken = masked(value, listener.arrays) if listener.arrays else value
-            for inputs in listener.put(topic, stamp, taken):
-                outputs = listener.work(inputs)
-                if listener.requests and (refusal := self._make_all(listener.requests)):
-                    outputs = listener.refused(refusal)
-                for name, output in outputs.items():
-                    if name not in self._known:
-                        listener.declaration.require_declared(outputs)
-                    self._publish(name, inputs.stamp, output)
-
-    def _command(self, stamp: int, currents: list[float]) -> None:
+    def _command(self, stamp: int, command: State) -> None:
+        currents = command.effort
         if len(currents) != self._motors or not all(map(math.isfinite, currents)):
             raise ValueError(
                 f"motor_current_command of {stamp} ns is {currents}; it needs {self._motors} finite numbers, A"
             )
         self._currents = (stamp, currents)
 
-    def _push(self, wrench: Wrench) -> None:
+    def _push(self, stamp: int, wrench: Wrench) -> None:
         if wrench.frame == BASE:
             self.driver.plant.release()
         else:
@@ -235,27 +205,3 @@ class Simulation:
         for node in self.nodes.values():
             if hasattr(node, "take_status"):
                 node.take_status(status)
-
-
-class Listener(NamedTuple):
-    """A reaction of a node behind its input synchroniser."""
-
-    put: Callable[[str, int, Any], Iterable[Inputs]]
-    work: Callable[[Inputs], Outputs]
-    thinned: bool
-    requests: list[Call | SetParameters] | None
-    refused: Any  # called with the reason where a request is refused
-    declaration: Declaration
-    arrays: str  # of a JointState that the reaction takes, '' for all of the value
-
-
-def flat(stamp: int, value: State | Wrench | Point | Table) -> TopicValue:
-    """A value as one row of numbers."""
-    if isinstance(value, State):
-        position, velocity, effort = value
-        return TopicValue(stamp, (*position, *velocity, *effort))
-    if isinstance(value, Wrench):
-        return TopicValue(stamp, (*value.force, *value.torque), value.frame)
-    if isinstance(value, Point):
-        return TopicValue(stamp, value.position, value.frame)
-    return TopicValue(stamp, tuple(number for row in value.rows for number in row), value.frame)

@@ -286,7 +286,13 @@ def _power_section(
     sentences, findings = [], []
     if np.any(known):
         found = efficiency(signals.time[known], motor[known], joint[known])
-        if found.forward_put > LEAST_WORK:
+        is_measured = not (found.forward > 1.0 or found.back > 1.0)
+        if not is_measured:
+            sentences.append(
+                "The efficiency was not measured: by these signals the transmission gave more work than it took. "
+                "The work that rotors and cables store is larger here than what is lost."
+            )
+        elif found.forward_put > LEAST_WORK:
             rows = known & (motor > 0.0) & (joint > 0.0)
             expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
             expected = max(expected, 0.0)
@@ -298,7 +304,7 @@ def _power_section(
                 f"configured friction and creep {100.0 * expected:.0f} % are predicted at the speeds and loads of this "
                 "recording."
             )
-        if found.back_put > LEAST_WORK:
+        if is_measured and found.back_put > LEAST_WORK:
             findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="backdriven"))
             sentences.append(f"Backdriven: {100.0 * found.back:.0f} % of {shown(found.back_put, 'J')} came back.")
     findings += _backdrive(arm, friction, joints)

@@ -24,8 +24,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("experiment", nargs="?", help="name, or path of a YAML file; --list prints the names")
     parser.add_argument("--list", action="store_true", help="print the name of every experiment")
     parser.add_argument("--all", action="store_true", help="run every experiment")
-    parser.add_argument("--evaluate", metavar="DIRECTORY", help="evaluate the bags in this directory and run nothing")
-    parser.add_argument("--directory", default="bags", help="directory for the bags; default: bags")
+    parser.add_argument(
+        "--evaluate",
+        metavar="DIRECTORY",
+        help="evaluate the bags in this directory and run nothing; the picture goes to --directory",
+    )
+    parser.add_argument("--directory", default="bags", help="directory for bags and pictures; default: bags")
     parser.add_argument("--name", default="", help="subdirectory; default: the experiment, date and time")
     parser.add_argument("--write", metavar="PAGE", help="also write tables and pictures into this documentation page")
 
@@ -38,23 +42,25 @@ def run(given: argparse.Namespace) -> int:
         return 0
     if bool(given.experiment) == given.all:
         raise ValueError("name one experiment, or give --all; --list prints the names")
-    if not given.evaluate:
-        writable_directory("--directory", Path(given.directory))
+    writable_directory("--directory", Path(given.directory))
     if given.write:
         writable_file("--write", Path(given.write))
     results: dict[str, tuple[Experiment, Result, Path]] = {}
     for experiment in map(load, names() if given.all else [given.experiment]):
         if given.evaluate:
             directory = Path(given.evaluate) / experiment.name if given.all else Path(given.evaluate)
+            picture = Path(given.directory) / f"{experiment.name}.png"
         else:
             name = given.name or f"{experiment.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
             directory = Path(given.directory) / (f"{name}/{experiment.name}" if given.all and given.name else name)
+            picture = directory / PICTURE
             if not _record(experiment, directory):
                 return 130
         result = evaluate(experiment, directory)
-        draw(experiment, result, directory / PICTURE)
-        print(f"{text(experiment, result)}\nbags     {directory}\npicture  {directory / PICTURE}\n", flush=True)
-        results[experiment.name] = (experiment, result, directory / PICTURE)
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        draw(experiment, result, picture)
+        print(f"{text(experiment, result)}\nbags     {directory}\npicture  {picture}\n", flush=True)
+        results[experiment.name] = (experiment, result, picture)
     if given.write:
         write(Path(given.write), list(results.values()))
     return 0 if all(result.agrees for _, result, _ in results.values()) else 1

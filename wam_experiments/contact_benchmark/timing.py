@@ -125,7 +125,3 @@ def section(found: EstimatorTimes) -> str:
         "Compare computers by the ratio; the microseconds are those of this computer, under other load.",
     ]
     return "\n".join(lines)
-
-
-def _microseconds(limit: float) -> str:
-    return "" if math.isnan(limit) else f"{1e6 * limit:.0f}"

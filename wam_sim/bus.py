@@ -1,0 +1,147 @@
+"""The topics of a simulation: a message goes at once to every reaction that takes it, and its numbers are kept."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from wam_description.interface import Feed
+from wam_description.signals import State
+from wam_description.synchroniser import Inlet, Inputs
+from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
+from wam_description.wiring import Declaration, Outputs, mask
+
+
+class TopicValue(NamedTuple):
+    """One message: time and numbers; the frame where there is one."""
+
+    stamp: int  # ns
+    values: tuple[float, ...]
+    frame: str = ""
+
+
+Rows = dict[str, list[TopicValue]]
+
+
+Row = tuple[int, tuple[float, ...], str]  # a TopicValue; plain tuples of numbers cost the garbage collector nothing
+
+
+class Bus:
+    """Hands messages on, in the order of the declared nodes.
+
+    Parameters
+    ----------
+    topics : those that exist, by name.
+    """
+
+    def __init__(self, topics: Mapping[str, Topic]) -> None:
+        self._routes = {name: _Route(_FLAT.get(topic.type), [], []) for name, topic in topics.items()}
+        self._rows: Rows = {}
+
+    def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
+        """Call a function with stamp, ns, and value of each message of a topic."""
+
+        def inlet(stamp: int, value: Any) -> tuple[()]:
+            take(stamp, value)
+            return ()
+
+        self._routes[topic].takers.append(_Taker(inlet, None, _nothing, {}))
+
+    def connect(self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]]) -> None:
+        """Connect the reactions of a node; when several take one topic, all work before the first publishes."""
+        outlets = _Outlets(declaration)
+        for name in (*declaration.outputs, *EVERY_NODE):
+            outlets[name] = self._routes.setdefault(name, _Route(None, [], []))
+        for topic, found in feeds.items():
+            reactions = [(feed.synchroniser.inlet(topic), mask(feed.arrays), feed.work) for feed in found]
+            if len(reactions) > 1:
+                self._routes[topic].takers.append(_Taker(_together(reactions), None, _outputs, outlets))
+            else:
+                self._routes[topic].takers.extend(_Taker(*reaction, outlets) for reaction in reactions)
+
+    def publish(self, topic: str, stamp: int, value: Any) -> None:
+        """Publish a value of a stamp, ns, and what the nodes publish in turn."""
+        self._deliver(self._routes[topic], stamp, value)
+
+    def _deliver(self, route: "_Route", stamp: int, value: Any) -> None:
+        flat, new, takers = route
+        if flat:
+            new.append(flat(stamp, value))
+        for inlet, masked, work, outlets in takers:
+            for inputs in inlet(stamp, masked(value) if masked else value):
+                for name, output in work(inputs).items():
+                    self._deliver(outlets[name], inputs.stamp, output)
+
+    @property
+    def rows(self) -> Rows:
+        """What was published on each topic of numbers so far; a JointState as position, velocity and effort."""
+        for name, (_, new, _) in self._routes.items():
+            if new:
+                self._rows.setdefault(name, []).extend(map(TopicValue._make, new))
+                new.clear()
+        return self._rows
+
+
+class _Route(NamedTuple):
+    """One topic: how its numbers are kept, those that are not yet in `rows`, and who takes it."""
+
+    flat: Callable[[int, Any], Row] | None
+    new: list[Row]
+    takers: list["_Taker"]
+
+
+class _Taker(NamedTuple):
+    """A reaction: where its inputs go, what it takes of a JointState, its step, the topics that it may publish."""
+
+    inlet: Callable[[int, Any], Sequence[Any]]
+    masked: Callable[[State], State] | None
+    work: Callable[[Any], Outputs]
+    outlets: Mapping[str, _Route]
+
+
+class _Outlets(dict[str, _Route]):
+    """The topics that a node declares."""
+
+    def __init__(self, declaration: Declaration) -> None:
+        super().__init__()
+        self._declaration = declaration
+
+    def __missing__(self, topic: str) -> _Route:
+        self._declaration.require_declared({topic: None})
+        raise KeyError(topic)
+
+
+class _Done(NamedTuple):
+    """A step that was done before others of the same node."""
+
+    stamp: int
+    outputs: Outputs
+
+
+def _together(
+    reactions: Sequence[tuple[Inlet, Callable[[State], State] | None, Callable[[Inputs], Outputs]]],
+) -> Callable[[int, Any], list[_Done]]:
+    return lambda stamp, value: [
+        _Done(inputs.stamp, work(inputs))
+        for inlet, masked, work in reactions
+        for inputs in inlet(stamp, masked(value) if masked else value)
+    ]
+
+
+def _outputs(done: _Done) -> Outputs:
+    return done.outputs
+
+
+def _nothing(_: Any) -> Outputs:
+    return {}
+
+
+_FLAT: dict[str, Callable[[int, Any], Row]] = {
+    JOINT_STATE: lambda stamp, value: (stamp, (*value.position, *value.velocity, *value.effort), ""),
+    WRENCH: lambda stamp, value: (stamp, (*value.force, *value.torque), value.frame),
+    POINT: lambda stamp, value: (stamp, value.position, value.frame),
+    TABLE: lambda stamp, value: (stamp, tuple([number for row in value.rows for number in row]), value.frame),
+}
+
+
+def flat(topic: Topic, stamp: int, value: Any) -> TopicValue:
+    """A value of a topic of numbers as one row."""
+    return TopicValue(*_FLAT[topic.type](stamp, value))
