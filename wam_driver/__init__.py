@@ -4,6 +4,7 @@
 - interface: what every driver of the arm takes and gives
 - driver_node: the driver as a ROS node
 - safety: braked, enabled, fault
+- session: which run of the driver the nodes follow, and since when commands count
 - limit_watch: speeds, travel, currents and tensions against their limits
 - amplifier: clipping, I2t, deadband, ripple and noise of the motor currents
 - sensors: resolution and noise of encoders and strain gauges

@@ -132,7 +132,7 @@ class DriverNode(TolerantNode):
     def _take_status(self, status: NodeStatus) -> None:
         """Brake where another node reports a fault; go on where all follow the session."""
         self._session.hear(status)
-        if status.level is Level.ERROR and status.fault and self.driver.safety.mode is Mode.ENABLED:
+        if status.level is Level.ERROR and status.fault and status.node != "driver":
             self._fault(f"{status.node}: {status.fault}")
         if self._is_resuming and not self._session.silent:
             self._is_resuming = False
@@ -367,9 +367,7 @@ class DriverNode(TolerantNode):
         obstacle = ""
         if self.driver.safety.mode is Mode.ENABLED:
             return self.driver.enable("")
-        others = {
-            node: fault for node, fault in sorted(self._ports.faults.items()) if fault and node != self.get_name()
-        }
+        others = {node: fault for node, fault in sorted(self._ports.faults.items()) if fault and node != "driver"}
         if problem := self._ports.problem:
             obstacle = problem
         elif self.count_publishers("motor_states") > 1:
