@@ -177,11 +177,11 @@ class Intruder:
     def send(self, topic: str, stamp: int, value: Any) -> int:
         """Give a message to every listener; how many refused it."""
         refused = 0
-        for listener in self.run._listeners[topic]:
+        for inlet, masked, work, _ in self.run._bus._routes[topic].takers:
             try:
-                for inputs in listener.put(topic, stamp, value):
-                    for name, output in listener.work(inputs).items():
-                        self.run._publish(name, inputs.stamp, output)
+                for inputs in inlet(stamp, masked(value) if masked else value):
+                    for name, output in work(inputs).items():
+                        self.run._bus.publish(name, inputs.stamp, output)
             except OutOfTime:
                 refused += 1
         return refused

@@ -58,7 +58,7 @@ class SampledPlant:
         loop = VelocityLoop(self.arm.motors, servo, self._own)
         loop._integral = integral.tolist()
         speed = (mechanism[:n] - before) / self._timing.period if self._by_difference else mechanism[2 * n : 3 * n]
-        currents = loop.step(speed.tolist(), [1.0] * n, [0.0] * n, 0.0, [0.0] * n, self._timing.period)
+        currents = loop.step(speed.tolist(), [1.0] * n, [0.0] * n, [0.0] * n, self._timing.period)
         torques = [*late, np.array(currents) * self.arm.motors.torque_constant]
         for _ in range(self._substeps):
             self.plant.step(torques[0].tolist())

@@ -73,7 +73,12 @@ def servo_period(
 
 
 def is_stable(period_map: Array) -> bool:
-    """Whether no mode of a map from period to period grows."""
+    """Whether no mode grows from period to period.
+
+    Parameters
+    ----------
+    period_map : (m, m), state after a period from the state before it.
+    """
     return bool(np.abs(np.linalg.eigvals(period_map)).max() <= 1.0 + ON_THE_CIRCLE)
 
 
