@@ -68,9 +68,9 @@ class AdaptedNode(TolerantNode):
         self._service_clients: dict[tuple[str, str], Any] = {}
         self._refused: dict[str, int] = {}
         self._starts_with_all = getattr(self.node, "starts_with_all", False)
-        take_status = getattr(self.node, "take_status", None)
-        if take_status or self._starts_with_all:
-            self._ports.watch_peers(take_status)
+        takes_status = hasattr(self.node, "take_status")
+        if takes_status or self._starts_with_all:
+            self._ports.watch_peers(self._take_status if takes_status else None)
         for reaction in declaration.reactions:
             self._connect(reaction, interface)
         for name in getattr(self.node, "services", ()):
@@ -128,6 +128,14 @@ class AdaptedNode(TolerantNode):
             self._go_on()
         else:
             self._publish(inputs.stamp, outputs)
+
+    def _take_status(self, status: NodeStatus) -> None:
+        """Hand it over; a node that ends for it gives up its requests, as nobody may be there to answer."""
+        if outputs := self.node.take_status(status):
+            self._publish(status.stamp, outputs)
+            if getattr(self.node, "done", False):
+                self._waiting.clear()
+                self._asking = False
 
     def _publish(self, stamp: int, outputs: Outputs) -> None:
         for topic, value in outputs.items():
@@ -221,20 +229,25 @@ def _answering(method: Callable[[], Any]) -> Callable[[Any, Any], Any]:
     return serve
 
 
-def make_node(entry: str, **ros: Any) -> Node:
-    """The ROS node of an entry of the parameter `nodes`.
+def node_factory(entry: str) -> Callable[..., Node]:
+    """What makes the ROS node of an entry of the parameter `nodes`, with all that it needs imported.
 
     Parameters
     ----------
     entry : name in the table of nodes, or 'module:Class' of a node of your own.
-    ros : context, namespace and so on, as rclpy's Node takes them.
     """
     declaration = declared(entry)
+    declaration.parameter_class  # noqa: B018 - imports it
     if not declaration.ros_node:
-        return AdaptedNode(declaration, **ros)
+        return partial(AdaptedNode, declaration)
     module, _, name = declaration.ros_node.partition(":")
-    node: Node = getattr(importlib.import_module(module), name)(**ros)
+    node: Callable[..., Node] = getattr(importlib.import_module(module), name)
     return node
+
+
+def make_node(entry: str, **ros: Any) -> Node:
+    """The ROS node of an entry of the parameter `nodes`; `ros` is what rclpy's Node takes."""
+    return node_factory(entry)(**ros)
 
 
 def main() -> None:

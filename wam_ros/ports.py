@@ -21,6 +21,7 @@ from wam_description.wiring import Declaration
 from wam_ros.header import header
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
 from wam_ros.qos import DEPTH, qos
+from wam_ros.run import end_of_delivery
 from wam_ros.wire import decoder, encoder, stamp_of
 
 DIAGNOSTICS = "/diagnostics"
@@ -29,7 +30,6 @@ WAITING = NodeStatus(Level.WARN, "waiting for its peers")
 LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
-LONGEST_DELIVERY = 4.0  # s, for all topics of a node together; the middleware repeats what was lost every 3 s
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
 
@@ -174,10 +174,12 @@ class Ports:
     def wait_for_delivery(self) -> None:
         """Report how much was published, then wait until the recorder and all others have the last messages.
 
+        No longer than `wam_ros.run.end_of_delivery`.
+
         What a process leaves behind unacknowledged ends with it: on a loaded machine that was the last second of a bag.
         """
         self._report(**{ENDED: "yes"})
-        end = time.monotonic() + LONGEST_DELIVERY
+        end = end_of_delivery(self.node.context)
         late = [
             topic
             for topic, publisher in self._publishers.items()
