@@ -29,7 +29,7 @@ class Feeder:
             name: self.node.create_publisher(message_type(BY_NAME[name]), name, qos(BY_NAME[name]))
             for name in ("joint_states", "joint_sensors", "force_command")
         }
-        self.loop = start(ros, folder, ["force_loop"])["force_loop"]
+        self.loop = start(ros, folder, ["force_loop"], timing__mode="realtime")["force_loop"]
         self.heard = Listener(ros, "status", "force_error", "/diagnostics")
         ros.wait(lambda: all(p.get_subscription_count() for p in self._publishers.values()))
 
@@ -98,7 +98,7 @@ def test_a_force_above_the_limit_is_counted_and_the_last_good_one_remains_in_for
 def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: Any, tmp_path: Path) -> None:
     feeder = Feeder(ros, tmp_path)
     feeder.feed_until(lambda: any("domain" in m.message for m in feeder.heard.seen["status"]))
-    start(ros, tmp_path, ["velocity_loop"])
+    start(ros, tmp_path, ["velocity_loop"], timing__mode="realtime")
     client = feeder.node.create_client(SetParametersAtomically, "velocity_loop/set_parameters_atomically")
     ros.wait(client.service_is_ready, what="the parameter service")
 

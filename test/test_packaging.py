@@ -1,5 +1,6 @@
 """The package installs twice from one tree: with pip into a prefix, with colcon into a workspace."""
 
+import argparse
 import importlib.metadata
 import os
 import re
@@ -21,6 +22,7 @@ from conftest import LONG
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from wam_cli.commands import up
 from wam_description.nodes import NODES as TABLE
 
 pytestmark = pytest.mark.ros
@@ -216,11 +218,12 @@ def test_a_sourced_colcon_workspace_starts_a_node(workspace, ros, tmp_path):
 
 def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(prefix, monkeypatch):
     # the module `launch` on PyPI is another program, so the few names that the file takes stand in for it
-    given = {"config": "wam", "namespace": "left", "mode": "lockstep", "record": "true"}
+    given = {"config": "wam", "namespace": "left", "mode": "lockstep", "processes": "true", "record": "true"}
     for module, names in {
         "launch": {"LaunchContext": object, "LaunchDescription": list},
         "launch.actions": {
             "DeclareLaunchArgument": lambda name, **_: name,
+            "ExecuteProcess": SimpleNamespace,
             "OpaqueFunction": SimpleNamespace,
         },
         "launch.substitutions": {
@@ -244,6 +247,15 @@ def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(pr
     for node in nodes:
         assert node.parameters == [str(share / "config" / "wam.yaml"), {"timing.mode": "lockstep"}]
     assert len(start.function({**given, "record": "false"})) == len(nodes) - 1
+    assert len(start.function({**given, "mode": "realtime", "processes": "false"})) == len(nodes)
+    (whole,) = start.function({**given, "processes": "false"})
+    assert whole.cmd[1:4] == ["-m", "wam_cli.main", "up"]
+    options = argparse.ArgumentParser()
+    up.arguments(options)
+    chosen = options.parse_args(whole.cmd[4:])
+    assert (chosen.config, chosen.namespace) == (str(share / "config" / "wam.yaml"), "left")
+    assert (chosen.mode, chosen.record) == ("lockstep", True)
+    assert whole.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}, "it ends with the launch"
     with pytest.raises(ValueError, match=r"config:=nowhere is no file and none of: .*wam"):
         start.function({**given, "config": "nowhere"})
 

@@ -549,6 +549,7 @@ def test_every_message_that_the_stack_publishes_is_in_the_bag(
         {
             "nodes": [*base.shared.nodes, "scenario", "recorder"],
             "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "scenario:script": str(script),
             "recorder:directory": str(tmp_path),

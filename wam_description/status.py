@@ -4,6 +4,9 @@ from collections.abc import Iterable
 
 from wam_description.signals import Level, NodeStatus
 
+REAL_TIME_FACTOR, BEHIND, SLIPS = "real-time factor", "behind [ms]", "slips"
+WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
+
 _CONNECTED = ("waiting", "connected")
 
 

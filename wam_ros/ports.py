@@ -22,6 +22,7 @@ from wam_ros.claims import Claims
 from wam_ros.header import header
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
 from wam_ros.qos import DEPTH, qos
+from wam_ros.run import end_of_delivery
 from wam_ros.wire import decoder, encoder, stamp_of
 
 DIAGNOSTICS = "/diagnostics"
@@ -31,7 +32,7 @@ LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
 CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
-LONGEST_DELIVERY = 4.0  # s, for all topics of a node together; the middleware repeats what was lost every 3 s
+LONGEST_NEWS = 1.0  # s, until all listeners know of a status that another one replaces
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
 
@@ -185,7 +186,7 @@ class Ports:
         self.session = session
         self.claims.restart()
         if self.ready:
-            self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_DELIVERY))  # only the last one is kept
+            self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_NEWS))  # only the last one is kept
             self.publish_status(self._plain._replace(connected=True))
 
     def _look_for_rivals(self) -> None:
@@ -213,10 +214,12 @@ class Ports:
     def wait_for_delivery(self) -> None:
         """Report how much was published, then wait until the recorder and all others have the last messages.
 
+        No longer than `wam_ros.run.end_of_delivery`.
+
         What a process leaves behind unacknowledged ends with it: on a loaded machine that was the last second of a bag.
         """
         self._report(**{ENDED: "yes"})
-        end = time.monotonic() + LONGEST_DELIVERY
+        end = end_of_delivery(self.node.context)
         late = [
             topic
             for topic, publisher in self._publishers.items()

@@ -7,9 +7,11 @@ import signal
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy would start a thread a core for 4x4 matrices
 
@@ -24,6 +26,8 @@ from wam_description.parameters import ParameterError
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
 LONGEST_END = 0.5  # s, for what has arrived before the end
+# s, for the last messages of all nodes of this process together; the middleware repeats what was lost every 3 s
+LONGEST_DELIVERY = 4.0
 PR_SET_PDEATHSIG = 1
 MakeNode = Callable[..., Node]
 
@@ -55,6 +59,17 @@ def make_executor(context: Context) -> Any:
     except ImportError:
         return SingleThreadedExecutor(context=context)
     return EventsExecutor(context=context)
+
+
+_ENDS: WeakKeyDictionary[Context, float] = WeakKeyDictionary()
+
+
+def end_of_delivery(context: Context) -> float:
+    """When the nodes of a context that end now stop waiting for others to take their messages, s, monotonic.
+
+    There is one deadline for all of them: a listener that is frozen would hold up each node in turn.
+    """
+    return _ENDS.get(context, time.monotonic() + LONGEST_DELIVERY)
 
 
 class Stop:
@@ -132,6 +147,7 @@ class Connection:
 
     def close(self, order: Callable[[Node], int] = lambda node: 0) -> None:
         """Destroy the nodes, lowest order first, and leave the network."""
+        _ENDS[self.context] = time.monotonic() + LONGEST_DELIVERY
         for node in sorted(self._nodes, key=order):
             self.executor.remove_node(node)
             node.destroy_node()

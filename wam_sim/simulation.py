@@ -236,7 +236,8 @@ class Simulation:
         status = NodeStatus(level, message, "driver", mode=safety.mode.value, fault=safety.fault)
         for node in self.nodes.values():
             if hasattr(node, "take_status"):
-                node.take_status(status)
+                for name, output in (node.take_status(status) or {}).items():
+                    self._publish(name, status.stamp, output)
 
 
 class Listener(NamedTuple):
