@@ -36,7 +36,7 @@ setup(
     maintainer=package.findtext("maintainer"),
     maintainer_email=package.find("maintainer").get("email"),
     packages=find_packages(include=["wam_*"]),
-    package_data={"": ["py.typed"]},
+    package_data={"": ["py.typed"], "wam_ros": ["this_machine.xml"]},
     python_requires=">=3.11",
     install_requires=[
         "lz4",

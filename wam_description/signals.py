@@ -97,6 +97,7 @@ class Level(IntEnum):
     OK = 0
     WARN = 1
     ERROR = 2
+    STALE = 3  # nothing new is known
 
 
 class NodeStatus(NamedTuple):

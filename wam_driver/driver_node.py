@@ -18,6 +18,7 @@ from wam_description.urdf import urdf
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.safety import Mode
 from wam_ros.messages import Refused
+from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
 from wam_ros.run import raise_priority
@@ -33,6 +34,7 @@ class DriverNode(TolerantNode):
 
     def __init__(self, **ros: Any) -> None:
         super().__init__("driver", **ros)
+        self._place = take_place(self, "driver")
         shared, own = declare(self, DriverParameters)
         self.driver = Driver(shared, own)
         follow(self, own, lambda new: self.driver.set_added_friction(new.effects.added_coulomb_friction))
@@ -89,6 +91,7 @@ class DriverNode(TolerantNode):
         self._announce()
         self._ports.wait_for_delivery()
         super().destroy_node()
+        self._place.close()
 
     def take_fault(self, reason: str) -> None:
         """Brake where a callback raised."""

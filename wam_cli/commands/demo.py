@@ -8,7 +8,8 @@ from typing import Any
 
 from wam_cli.commands import configuration_of, take_configuration, writable_directory
 from wam_ros.bring_up import Composition, Processes
-from wam_ros.run import Stop
+from wam_ros.network import move_to_free_domain
+from wam_ros.run import NAMESPACE, Stop
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,6 +34,8 @@ def run(given: argparse.Namespace) -> int:
     directory = Path(str(configuration.sections["recorder"]["directory"]))
     writable_directory("recorder:directory in the file of --config, or run it elsewhere", directory)
     bag = directory / name
+    if moved := move_to_free_domain(NAMESPACE):
+        print(moved, flush=True)
     if given.lockstep:
         with Composition(configuration) as composition:
             scenario: Any = composition.nodes["scenario"]
