@@ -156,8 +156,8 @@ def test_an_ordinary_ros_program_of_this_machine_finds_the_stack(
     assert "reached" in said(programs("-c", STRANGER, str(LONG), **plain))
 
 
-def ip(*arguments: str) -> None:
-    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
+def ip(*arguments: str) -> str:
+    return subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True).stdout
 
 
 @pytest.fixture
@@ -176,6 +176,10 @@ def hosts() -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
                 ip("-n", name, "addr", "add", f"10.99.0.{number}/24", "dev", "there")
                 for device in ("lo", "there"):
                     ip("-n", name, "link", "set", device, "up")
+            end = time.monotonic() + LONG
+            while not all("state UP" in ip("-n", name, "-o", "link", "show", "there") for name in names):
+                assert time.monotonic() < end  # the middleware looks for its interfaces once, when it starts
+                time.sleep(0.05)
         except subprocess.CalledProcessError as error:
             pytest.skip(f"no two network namespaces here: {error.stderr.strip()}")
         # a host has a shared memory of its own

@@ -48,6 +48,7 @@ class ForceCommand(NamedTuple):
 
     frame: str
     force: Triple  # N
+    torque: Triple = ZERO  # N m; refused unless it is zero
 
 
 class Contact(NamedTuple):
