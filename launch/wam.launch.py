@@ -25,8 +25,7 @@ ARGUMENTS = {  # name: default, description, allowed values
     "namespace": ("wam", "namespace of the arm; a second arm on this machine needs another one", None),
     "mode": (
         CONFIGURED,
-        "timing: lockstep waits for every command, realtime runs on the steady clock; configured: timing.mode of the "
-        "configuration",
+        "lockstep waits for every command, realtime runs on the steady clock, configured is what the file says",
         [CONFIGURED, "realtime", "lockstep"],
     ),
     "record": (

@@ -205,8 +205,8 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
     """Flat sections of a parameter file; `whole` where it must have the shared one, as its last."""
     if isinstance(tree, dict) and SCENARIO_KEY in tree:
         raise ParameterError(
-            f"{path} is a scenario, no configuration; play it with 'wam up --scenario {path.stem}', or give its name to "
-            "the parameter scenario:script"
+            f"{path} is a scenario, no configuration; play it with 'wam up --scenario {path.stem}', "
+            "or give its name to the parameter scenario:script"
         )
     if not isinstance(tree, dict) or (whole and SHARED not in tree):
         raise ParameterError(f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top")

@@ -243,6 +243,8 @@ class DriverNode(TolerantNode):
         is_new_fault = bool(safety.fault) and message != self._reported[0]
         self._reported = (message, self._connected)
         level = Level.ERROR if safety.fault else Level.WARN if warnings else Level.OK
+        if is_new_fault:
+            self.get_logger().error(message)
         self._ports.publish_status(
             NodeStatus(
                 level,
@@ -254,7 +256,6 @@ class DriverNode(TolerantNode):
             )
         )
         if is_new_fault:
-            self.get_logger().error(message)
             self._write_post_mortem()
 
     def _write_post_mortem(self) -> None:

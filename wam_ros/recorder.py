@@ -294,7 +294,7 @@ def _node_name(data: bytes, position: int) -> str:
         return "?"
     end = position + 3 + min(length, _LONGEST_NAME)
     name = printable(data[position + 4 : end].decode("utf-8", "replace").strip("/"))
-    return name.split(":")[0].split("/")[0].strip() or "?"
+    return name.rpartition(": ")[2].split(":")[0].split("/")[0].strip() or "?"  # ours are 'wam: driver'
 
 
 def _aligned(position: int) -> int:
