@@ -76,6 +76,6 @@ setup(
         (f"share/{name}/launch", sorted(glob("launch/*.launch.py"))),
         (f"lib/{name}", launchers),
     ],
-    entry_points={"console_scripts": ["wam = wam_cli.main:program", *console_scripts]},
+    entry_points={"console_scripts": ["wam = wam_cli.program:main", *console_scripts]},
     zip_safe=False,
 )
