@@ -72,7 +72,7 @@ class RecorderNode(TolerantNode):
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
         offered = {full_name: qos(topic) for full_name, topic in chosen.items()}
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
-        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender)
+        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender, self.get_namespace())
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription
         self._inlets = {name: self._listen(name, topic) for name, topic in topics.items()}
         own_name = RecorderInterface.name
