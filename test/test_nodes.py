@@ -512,6 +512,9 @@ def test_two_arms_in_two_namespaces_do_not_mix(ros: Any, tmp_path: Path) -> None
         assert all(list(m.position) == pytest.approx(pose, abs=0.05) for m in states)
         assert heard[namespace].stamps("joint_states") == sorted(set(heard[namespace].stamps("joint_states")))
         assert {m.hardware_id for m in heard[namespace].seen["status"]} == {namespace[1:]}
+        clocks = heard[namespace].node.get_publishers_info_by_topic(f"{namespace}/clock")
+        assert {info.node_namespace for info in clocks} == {namespace}, "a clock of its own"
+        assert not heard[namespace].node.get_publishers_info_by_topic("/clock")
         for topic in TOPICS:
             if not topic.name.startswith("/"):
                 publishers = heard[namespace].node.get_publishers_info_by_topic(f"{namespace}/{topic.name}")
@@ -571,4 +574,4 @@ def test_every_node_says_that_it_is_ready_and_reports_every_second(whole: Compos
     node.create_subscription(message_type(diagnostics), diagnostics.name, seen.append, qos(diagnostics))
     whole.spin(lambda: whole.nodes["driver"].driver.stamp > 1100 * MS)  # type: ignore[attr-defined]
     whole.spin(lambda: ready == set(NODES))
-    assert {m.status[0].name for m in seen} >= set(NODES) - {"recorder"}
+    assert {m.status[0].name for m in seen} >= {f"wam: {name}" for name in NODES if name != "recorder"}

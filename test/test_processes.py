@@ -273,6 +273,20 @@ def test_a_signal_during_start_up_ends_all_silently(
     assert "Traceback" not in stack.said()
 
 
+def test_the_command_ends_silently_from_its_first_import_on() -> None:
+    interrupted = (
+        "import os, signal, sys\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'argparse': os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+        "from wam_cli.program import main\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", interrupted], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + signal.SIGINT, "", "")
+
+
 def has_loaded(stack: Stack, library: str) -> bool:
     """Whether a program has begun to load a library, by the files that it has mapped."""
     with contextlib.suppress(OSError):

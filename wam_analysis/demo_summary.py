@@ -10,7 +10,7 @@ from wam_analysis.measures.runs import runs
 from wam_bag.bag import Bag, TableColumns
 from wam_bag.losses import RECORDING, losses
 from wam_control.contact_table import reasons_of
-from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
+from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS, diagnosed_name
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 from wam_sim.replay import tables
 
@@ -305,7 +305,7 @@ def _loop(run: RecordedRun) -> LoopReport:
         status.facts
         for array in messages_of(run.bag, "/diagnostics")
         for status in map(status_of, array.status)
-        if status.node == "driver"
+        if status.node in ("driver", diagnosed_name(run.namespace, "driver"))  # the first in bags of old
     ]
     timed = [facts for facts in reports if "rate [Hz]" in facts]
     mode = "realtime" if run.mode == "unknown" and timed else run.mode

@@ -94,7 +94,7 @@ class ScenarioNode:
 
 def script_file(script: str) -> Path:
     """The file of a scenario: a path that ends in '.yaml', or the name of one that comes with the package."""
-    return Path(script) if script.endswith(".yaml") else packaged(script)
+    return Path(script) if script.endswith(".yaml") else packaged(script, "scenario")
 
 
 def _plain(setting: Setting) -> Any:

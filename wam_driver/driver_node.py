@@ -20,6 +20,7 @@ from wam_driver.realtime import Realtime
 from wam_driver.safety import Mode
 from wam_driver.session import Session
 from wam_ros.messages import Refused
+from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
 from wam_ros.run import raise_priority
@@ -33,6 +34,7 @@ class DriverNode(TolerantNode):
 
     def __init__(self, **ros: Any) -> None:
         super().__init__("driver", **ros)
+        self._place = take_place(self, "driver")
         shared, own = declare(self, DriverParameters)
         self.driver = Driver(shared, own)
         follow(self, own, lambda new: self.driver.set_added_friction(new.effects.added_coulomb_friction))
@@ -98,6 +100,7 @@ class DriverNode(TolerantNode):
         self.get_logger().info(f"{self._timing.mode}: {self.time.summary}")
         self._ports.wait_for_delivery()
         super().destroy_node()
+        self._place.close()
 
     def take_fault(self, reason: str) -> None:
         """Brake where a callback raised."""
@@ -214,6 +217,8 @@ class DriverNode(TolerantNode):
         is_new_fault = bool(safety.fault) and message != self._reported[0]
         self._reported = reported
         level = Level.ERROR if safety.fault or problem else Level.WARN if warnings else Level.OK
+        if is_new_fault:
+            self.get_logger().error(message)
         self._ports.publish_status(
             NodeStatus(
                 level,
@@ -227,7 +232,6 @@ class DriverNode(TolerantNode):
             )
         )
         if is_new_fault:
-            self.get_logger().error(message)
             self._write_post_mortem()
 
     def _write_post_mortem(self) -> None:

@@ -17,6 +17,7 @@ from rclpy.node import Node
 
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
+from wam_ros.network import require_places
 from wam_ros.node import make_node
 from wam_ros.run import NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
@@ -78,6 +79,7 @@ class Processes:
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
         names = node_names(configuration)
+        require_places(names.values(), namespace)
         prepare_logging_directory()
         self.killed: list[str] = []
         self._stack = ExitStack()

@@ -22,6 +22,7 @@ from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Followed, Outputs, Reaction, SetParameters
 from wam_ros.messages import Refused
+from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow, follow_other
 from wam_ros.ports import SECOND, Ports
 from wam_ros.run import raise_priority, run
@@ -43,6 +44,7 @@ class AdaptedNode(TolerantNode):
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
         super().__init__(declaration.name, **ros)
+        self._place = take_place(self, declaration.name)
         owned: str | None = getattr(declaration.node, "owns", None)
         shared, own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
         try:
@@ -95,6 +97,7 @@ class AdaptedNode(TolerantNode):
         """End only when the others have what was published."""
         self._ports.wait_for_delivery()
         super().destroy_node()
+        self._place.close()
 
     def _connect(self, reaction: Reaction, interface: Interface) -> None:
         unused = getattr(self.node, "unused", ())

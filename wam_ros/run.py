@@ -16,12 +16,14 @@ from weakref import WeakKeyDictionary
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy would start a thread a core for 4x4 matrices
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from wam_description.parameters import ParameterError
+from wam_ros.network import limit_to_this_machine
 
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
@@ -129,6 +131,7 @@ class Connection:
     """
 
     def __init__(self, arguments: Sequence[str] = (), domain_id: int | None = None) -> None:
+        limit_to_this_machine()
         prepare_logging_directory()
         self.context = Context()
         rclpy.init(
@@ -174,6 +177,8 @@ def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv if arguments is None else arguments)
     try:
         connection = Connection(given)
+    except ParameterError as error:
+        raise SystemExit(f"error: {error}") from None
     except RuntimeError as error:
         reason = str(error).split(", at /")[0]
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
@@ -184,6 +189,8 @@ def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
         spin(connection.executor, lambda: stop.is_set or getattr(node, "done", False), lambda: stop.is_set and end())
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
+    except RCLError as error:  # for example security that is enforced where the middleware has none
+        raise SystemExit(f"error: {str(error).split(', at /')[0]}") from None
     finally:
         connection.close()
     if failure := getattr(node, "failure", ""):

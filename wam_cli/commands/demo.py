@@ -10,8 +10,9 @@ from wam_bag.errors import BagError
 from wam_cli.commands import configuration_of, take_configuration, writable_directory
 from wam_cli.commands.up import import_nodes, runs_apart, take_time, timed
 from wam_ros.bring_up import start
+from wam_ros.network import move_to_free_domain
 from wam_ros.program import end_at_once_on_signals
-from wam_ros.run import Stop
+from wam_ros.run import NAMESPACE, Stop
 
 LONGEST_START = 120.0  # s, until all nodes are connected, on a machine that is busy
 
@@ -34,6 +35,8 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()
     import_nodes(configuration, given)
     stop = Stop()
+    if moved := move_to_free_domain(NAMESPACE):
+        print(moved, flush=True)
     late = time.monotonic() + LONGEST_START
     with start(configuration, runs_apart(configuration, given), lambda: stop.is_set) as stack:
         driver: Any = getattr(stack, "nodes", {}).get("driver")
