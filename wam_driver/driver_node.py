@@ -128,7 +128,7 @@ class DriverNode(TolerantNode):
     def _take_status(self, status: NodeStatus) -> None:
         """Brake where another node reports a fault; note which session it follows."""
         self._session.hear(status)
-        if status.level is Level.ERROR and status.fault and self.driver.safety.mode is Mode.ENABLED:
+        if status.level is Level.ERROR and status.fault:
             self._fault(f"{status.node}: {status.fault}")
 
     def _take_problem(self, reason: str) -> None:

@@ -137,10 +137,10 @@ class AdaptedNode(TolerantNode):
         return take
 
     def _watch(self, synchroniser: Synchroniser, essential: frozenset[str]) -> None:
-        """Let the driver brake where an input has stopped to come without which the node cannot control."""
+        """Let an enabled driver brake where an input has stopped to come without which the node cannot control."""
         needed = essential & getattr(self.node, "needs", essential)
         ages = {topic: age for topic, age in synchroniser.ages().items() if topic in needed}
-        if not ages or max(ages.values()) <= 1.0:
+        if not (self._is_enabled and ages) or max(ages.values()) <= 1.0:
             self._ports.set_problem("inputs", "")
         elif not self._ports.problems.get("inputs"):
             lost = [topic for topic, age in ages.items() if age > 0.5]  # what stopped together is not lost together

@@ -35,7 +35,7 @@ LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
 CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
-LONGEST_NEWS = 1.0  # s, until all listeners know of a status that another one replaces
+LONGEST_ECHO = 0.1  # s, for the status before that of a new session, which replaces it; a frozen node takes nothing
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
 
@@ -203,7 +203,7 @@ class Ports:
         self.session = session
         self.claims.restart()
         if self.ready:
-            self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_NEWS))  # only the last one is kept
+            self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_ECHO))  # only the last one is kept
             self.publish_status(self._plain._replace(connected=True))
 
     def _look_for_rivals(self) -> None:
