@@ -81,6 +81,13 @@ def started(tmp_path: Path) -> Iterator[Callable[..., Stack]]:
         stack.end()
 
 
+def soon_delivered() -> float:
+    """The same for processes: first the driver, then the others wait until listeners have their last messages."""
+    from wam_ros.run import LONGEST_DELIVERY
+
+    return 2.0 * LONGEST_DELIVERY + soon()
+
+
 def up(started: Callable[..., Stack], *arguments: str) -> Stack:
     """The whole stack and a recorder, running, with a bag that grows."""
     stack = started("-m", "wam_cli.main", "up", "--record", *arguments)
@@ -123,7 +130,7 @@ def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
     stack = up(started, *options)
     enable(ros, stack)
     stack.process.send_signal(number)
-    wait(lambda: stack.process.poll() is not None, f"the end of wam up; {stack.said()}", soon())
+    wait(lambda: stack.process.poll() is not None, f"the end of wam up; {stack.said()}", soon_delivered())
     assert stack.alive() == []
     assert stack.process.returncode == 0
     assert "Traceback" not in stack.said()
@@ -241,7 +248,7 @@ def test_a_node_that_ends_takes_the_stack_with_it(started: Any, tmp_path: Path, 
     stack = up(started, "--processes")
     (victim,) = (pid for pid in stack.alive() if b"velocity_loop" in Path(f"/proc/{pid}/cmdline").read_bytes())
     os.kill(victim, signal.SIGKILL)
-    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon())
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.alive() == []
     assert "node velocity_loop ended with code -9; all were stopped" in stack.said()
     assert stack.process.returncode == 9
@@ -547,6 +554,6 @@ def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: 
     wait(lambda: "wait" in stack.said(), f"the first step; {stack.said()}")
     future = client.call_async(Trigger.Request())
     ros.wait(future.done)
-    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon())
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.process.returncode == 1
     assert "error: the driver stopped in step 'wait': emergency stop" in stack.said()
