@@ -37,7 +37,7 @@ TIDY := rm -rf build/lib build/bdist.* *.egg-info; rmdir build 2>/dev/null || tr
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-12s %s\n", $$1, $$2}' Makefile
 
-demo: $(INSTALLED)  ## run the demonstration: start all nodes, press on a foam box, record, report; ARGS="--lockstep"
+demo: $(INSTALLED)  ## run the demonstration: start all nodes, press on a foam box, record, report; ARGS="--real-time-factor 0"
 	@$(VENV)/bin/wam demo $(ARGS)
 
 install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .venv/bin/wam --help

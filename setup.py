@@ -36,7 +36,7 @@ setup(
     maintainer=package.findtext("maintainer"),
     maintainer_email=package.find("maintainer").get("email"),
     packages=find_packages(include=["wam_*"]),
-    package_data={"": ["py.typed"]},
+    package_data={"": ["py.typed"], "wam_ros": ["this_machine.xml"]},
     python_requires=">=3.11",
     install_requires=[
         "lz4",
@@ -76,6 +76,6 @@ setup(
         (f"share/{name}/launch", sorted(glob("launch/*.launch.py"))),
         (f"lib/{name}", launchers),
     ],
-    entry_points={"console_scripts": ["wam = wam_cli.main:program", *console_scripts]},
+    entry_points={"console_scripts": ["wam = wam_cli.program:main", *console_scripts]},
     zip_safe=False,
 )

@@ -67,6 +67,7 @@ def main() -> None:
         configuration = Configuration.load(packaged("wam")).with_values(
             {
                 "timing.mode": "lockstep",
+                "timing.real_time_factor": 0.0,
                 "scenario:script": str(script),
                 "recorder:directory": folder,
                 "recorder:name": "bag",

@@ -79,6 +79,7 @@ def main() -> None:
         script.write_text(yaml.safe_dump(scenario(1.0 if given.quick else 20.0)))
         values = {
             "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "scenario:script": str(script),
             "recorder:directory": folder,

@@ -102,6 +102,7 @@ def main() -> None:
             {
                 "nodes": [*base.shared.nodes, "scenario", "recorder"],
                 "timing.mode": "lockstep" if given.quick else "realtime",
+                "timing.real_time_factor": 0.0,
                 "scenario:script": str(script),
                 "recorder:directory": folder,
                 "recorder:name": "bag",

@@ -76,7 +76,12 @@ def main() -> None:
         script = Path(folder) / "script.yaml"
         script.write_text(yaml.safe_dump(scenario(2.0 if given.quick else 5.0)), encoding="utf-8")
         configuration = Configuration.load(packaged("wam")).with_values(
-            {"timing.mode": "lockstep", "scenario:script": str(script), "recorder:directory": folder}
+            {
+                "timing.mode": "lockstep",
+                "timing.real_time_factor": 0.0,
+                "scenario:script": str(script),
+                "recorder:directory": folder,
+            }
         )
         for i in range(given.rounds):
             recorded = configuration.with_values({"recorder:name": f"round_{i}"})

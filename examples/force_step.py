@@ -20,6 +20,7 @@ ABOVE = [0.0, -1.8, 0.0, 1.45]  # rad, joint1..joint4, as in config/demo_scenari
 BELOW = [0.0, -2.1, 0.0, 1.45]
 DETECTED = 1.5  # N
 PERIOD = 0.005  # s, of joint_states
+PATIENCE = 10.0  # s, without joint_states
 
 
 class ForceStep(Node):
@@ -39,7 +40,8 @@ class ForceStep(Node):
         self.create_subscription(DiagnosticStatus, "status", self.take_status, latched)
         self.wanted, self.newtons = [0.0] * 4, 0.0
         self.task = self.play()
-        self.is_done = False
+        self.is_enabled = self.is_done = False
+        self.last = time.monotonic()
 
     def take_contact(self, message: WrenchStamped) -> None:
         force = message.wrench.force  # of the world on the link
@@ -47,14 +49,21 @@ class ForceStep(Node):
 
     def take_status(self, message: DiagnosticStatus) -> None:
         facts = {item.key: item.value for item in message.values}
-        if message.name == "driver" and facts.get("fault") and self.q:
+        if message.name != "driver":
+            return
+        if facts["mode"] == "enabled":
+            self.is_enabled = True
+        elif self.is_enabled and facts.get("fault"):
             sys.exit(f"the driver stopped: {facts['fault']}; call reset_fault, then start again")
+        elif self.is_enabled:
+            sys.exit("another program put on the brakes; start again")
 
     def take_measured(self, message: WrenchStamped) -> None:
         self.measured = -message.wrench.force.y  # of the arm on the world
 
     def take_joints(self, message: JointState) -> None:
         position = dict(zip(message.name, message.position, strict=True))
+        self.last = time.monotonic()
         self.q = [position[f"joint{i}"] for i in (1, 2, 3, 4)]  # by name, never by index
         if next(self.task, "done") == "done":
             self.is_done = True
@@ -84,6 +93,7 @@ class ForceStep(Node):
             print(f"commanded {newtons:5.2f} N, measured {sum_of_all:5.2f} N", flush=True)
         self.newtons, self.wanted = 0.0, list(self.q)
         yield from self.move(ABOVE, 2.0)
+        self.is_enabled = False  # what the driver reports next is no surprise
         yield from self.ask(False)
 
     def ask(self, on: bool) -> Iterator[None]:
@@ -108,13 +118,10 @@ class ForceStep(Node):
 def main() -> None:
     rclpy.init()
     node = ForceStep()
-    end = time.monotonic() + 10.0
-    while not node.q:
-        rclpy.spin_once(node, timeout_sec=0.1)
-        if time.monotonic() > end:
-            sys.exit("no /wam/joint_states within 10 s; start the stack first: wam up")
     while not node.is_done:
-        rclpy.spin_once(node)
+        rclpy.spin_once(node, timeout_sec=0.1)
+        if time.monotonic() - node.last > PATIENCE:
+            sys.exit(f"no /wam/joint_states for {PATIENCE:g} s; start the stack first: wam up")
     rclpy.try_shutdown()
 
 

@@ -4,7 +4,7 @@ The tip behaves like a mass on a spring and a damper fixed where the commanded p
 tau = J' (K (x0 - x) - D xd).  Run it in three ways, from this directory:
 
     python3 impedance.py                                   # in one process, without ROS
-    PYTHONPATH=. wam up --config impedance.yaml            # over topics, every node a process
+    PYTHONPATH=. wam up --config impedance.yaml            # over topics
     PYTHONPATH=. wam replay BAG impedance:Impedance        # on the inputs in a bag of the line above with --record
 """
 

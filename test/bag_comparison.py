@@ -9,13 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_bag.bag import Raw, raw
+from wam_description.status import WALL_CLOCK
 
 
 def compare(a: str | Path, b: str | Path, log_times: bool = False, without: tuple[str, ...] = ()) -> list[str]:
     """Differences of two bags, field by field and bit for bit; NaN equals NaN.
 
     Messages of a topic are compared in the order in which each publisher sent them; padding bytes
-    do not count.  Topics of several publishers (status, diagnostics) are compared per node.
+    do not count.  Topics of several publishers (status, diagnostics) are compared per node, without the facts
+    that tell how fast time passed on the wall clock.
 
     Parameters
     ----------
@@ -84,6 +86,8 @@ def _fields(a: Any, b: Any, name: str) -> Iterator[str]:
     if isinstance(a, float) and isinstance(b, float):
         if struct.pack("d", a) != struct.pack("d", b) and not (math.isnan(a) and math.isnan(b)):
             yield f"{name} {a!r} and {b!r}"
+    elif getattr(a, "key", None) in WALL_CLOCK and a.key == getattr(b, "key", None):
+        return
     elif hasattr(a, "_fields"):
         for field in a._fields:
             yield from _fields(getattr(a, field), getattr(b, field), f"{name}.{field}" if name else field)

@@ -14,19 +14,20 @@ from typing import Any
 
 import pytest
 
+from wam_ros.network import SWITCH, is_inhabited, limit_to_this_machine
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 ROOT = Path(__file__).resolve().parents[1]
 # programs that a test starts run this tree too, whatever is installed
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 # a test without the fixture domain_id cannot reach anybody: rclpy.init refuses this
 os.environ["ROS_DOMAIN_ID"] = "tests take the fixture domain_id"
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-for elsewhere in ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOCALHOST_ONLY"):
+for elsewhere in (SWITCH, "ROS_LOCALHOST_ONLY"):
     os.environ.pop(elsewhere, None)
+limit_to_this_machine()
 
 # The tests' own: nobody uses them by default, and their ports lie above those that Linux gives to any program.
 DOMAINS = range(215, 233)
-PORTS = 250  # of each domain, from 7400 on
 LONG = 300.0  # s, for what must happen at all, on a machine as busy as may be
 _COUNTER = itertools.count()
 
@@ -104,19 +105,6 @@ class RosWorld:
             self.remove(node)
         self.executor.shutdown()
         rclpy.try_shutdown(context=self.context)
-
-
-def is_inhabited(number: int, table: str | None = None) -> bool:
-    """Whether a program of this machine takes part in a ROS domain: it has bound UDP ports of the domain.
-
-    Parameters
-    ----------
-    number : the domain.
-    table : sockets as in /proc/net/udp, which is read where None.
-    """
-    first = 7400 + PORTS * number
-    lines = (Path("/proc/net/udp").read_text() if table is None else table).splitlines()[1:]
-    return any(first <= int(line.split()[1].rpartition(":")[2], 16) < first + PORTS for line in lines)
 
 
 @contextmanager

@@ -82,6 +82,7 @@ def cycling(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> 
         {
             "nodes": [*base.shared.nodes, "scenario", "recorder"],
             "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "timing.outer_divisor": 10,
             "scenario:script": str(script),

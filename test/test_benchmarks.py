@@ -12,6 +12,7 @@ from conftest import LONG
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = sorted(path.name for path in ROOT.glob("benchmarks/*.py"))
 ROWS = {
+    "demo_under_load.py": ["0 busy loops", "2 busy loops"],
     "long_bag.py": ["reading", "analysis", "page"],
     "bag_reading.py": [
         "everything against rosbags",

@@ -44,10 +44,10 @@ def test_shared_part_and_nodes_become_parameter_objects(file: Path) -> None:
 
 def test_replaced_values_leave_the_original_alone(file: Path) -> None:
     original = Configuration.load(file)
-    changed = original.with_values({"timing.mode": "lockstep", "loop:gain": 3.0, "loop:names": ("c",)})
-    assert changed.shared.timing.mode == "lockstep"
+    changed = original.with_values({"timing.mode": "realtime", "loop:gain": 3.0, "loop:names": ("c",)})
+    assert changed.shared.timing.mode == "realtime"
     assert changed.node("loop", Loop) == Loop(3.0, ("c",))
-    assert original.shared.timing.mode == "realtime"
+    assert original.shared.timing.mode == "lockstep"
     assert original.node("loop", Loop).gain == 2.5
     assert changed.sha256 != original.sha256
     assert changed.path == original.path
@@ -173,12 +173,12 @@ def test_an_overlay_changes_values_and_adds_sections(tmp_path: Path) -> None:
     overlay = tmp_path / "mine.yaml"
     overlay.write_text(
         "base: wam\n/**/mine: {ros__parameters: {gain: 2.0}}\n/**/driver: {ros__parameters: {watchdog: 0.03}}\n"
-        "/**: {ros__parameters: {timing: {mode: lockstep}, nodes: [driver, 'my_package.mine:Mine']}}\n"
+        "/**: {ros__parameters: {timing: {mode: realtime}, nodes: [driver, 'my_package.mine:Mine']}}\n"
     )
     found, base = Configuration.load(overlay), Configuration.load(packaged("wam"))
     assert found.sections["mine"] == {"gain": 2.0}
     assert found.sections["driver"] == {**base.sections["driver"], "watchdog": 0.03}
-    assert found.shared.timing.mode == "lockstep"
+    assert found.shared.timing.mode == "realtime"
     assert yaml.safe_load(found.text)["/**/driver"]["ros__parameters"]["watchdog"] == 0.03
     assert list(found.sections)[-1] == "/**", "the shared section is the last one, else it would win over -p"
     other = tmp_path / "other.yaml"

@@ -342,7 +342,7 @@ def test_timing_is_that_of_the_driver():
     ]
     recording.recording = {"mode": "realtime", "/a b received": "10", "/a b dropped": "2", "/c d received": "5"}
     summary = recording.summary()
-    assert summary.loop == ("realtime", 998.5, 400.0, 1200.0, 1500.0, 9, 3000)
+    assert summary.loop[:7] == ("realtime", 998.5, 400.0, 1200.0, 1500.0, 9, 3000)
     assert (summary.received, summary.dropped) == (15, 2)
     assert "missed 9 of 3000 periods (0.3 %)" in " ".join(text(summary).split())
     assert "15 recorded, 2 dropped" in text(summary)
@@ -351,7 +351,18 @@ def test_timing_is_that_of_the_driver():
 def test_lockstep_has_no_timing():
     recording = Recording()
     recording.recording = {"mode": "lockstep"}
-    assert "lockstep: the driver waits for every command" in text(recording.summary())
+    said = " ".join(text(recording.summary()).split())
+    assert "lockstep: the driver waits for every command" in said
+    assert "real-time factor" not in said
+
+
+def test_of_a_paced_lockstep_the_report_says_how_fast_it_was():
+    recording = Recording()
+    recording.recording = {"mode": "lockstep"}
+    facts = [("0.000", "0.0", "0"), ("1.000", "4.0", "0"), ("0.500", "20.4", "7"), ("1.000", "1.0", "7")]
+    recording.timing = [{"real-time factor": f, "behind [ms]": b, "slips": n} for f, b, n in facts]
+    said = " ".join(text(recording.summary()).split())
+    assert "real-time factor 0.75, at most 20 ms behind, 7 periods too late to be made up for" in said
 
 
 def test_contact_lies_on_the_surface_of_its_cover_on_the_side_that_is_pushed():

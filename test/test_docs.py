@@ -158,7 +158,7 @@ def record_first_bag(shell: Shell, domain_id: int) -> None:
     configuration = base.with_values(
         {
             "nodes": [*base.shared.nodes, "scenario", "recorder"],
-            "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "scenario:script": str(script),
             "recorder:directory": str(shell.directory / "bags"),
             "recorder:name": "first",
@@ -194,8 +194,7 @@ def test_python_of_the_readme_reads_a_bag(shell: Shell, domain_id: int) -> None:
 
 def test_example_of_a_client_presses_with_the_commanded_force(shell: Shell, started: Any) -> None:
     (block,) = marked("run with the stack")
-    # in lockstep, because no watchdog minds a busy machine there
-    started(["wam up --mode lockstep"], ["driver", "contact_estimator"])
+    started(["wam up"], ["driver", "contact_estimator"])
     said = shell.run("sh", "-e", "-c", block.code)
     pressed = [tuple(map(float, found)) for found in re.findall(r"commanded +(\S+) N, measured +(\S+) N", said)]
     assert [commanded for commanded, _ in pressed] == [5.0, 10.0]
@@ -216,7 +215,7 @@ def test_topics_and_services_named_in_the_handbook_exist(domain_id: int) -> None
     from wam_ros.bring_up import Composition
 
     nodes = [name for name in NODES if name != "recorder"]
-    configuration = Configuration.load(packaged("wam")).with_values({"nodes": nodes, "timing.mode": "lockstep"})
+    configuration = Configuration.load(packaged("wam")).with_values({"nodes": nodes, "timing.real_time_factor": 0.0})
     with Composition(configuration, domain_id=domain_id) as composition:
         services = {service.service_name for node in composition.nodes.values() for service in node.services}
     topics = {name if name.startswith("/") else f"/wam/{name}" for name in BY_NAME}

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
@@ -29,15 +30,16 @@ class Feeder:
             name: self.node.create_publisher(message_type(BY_NAME[name]), name, qos(BY_NAME[name]))
             for name in ("joint_states", "joint_sensors", "force_command")
         }
-        self.loop = start(ros, folder, ["force_loop"])["force_loop"]
+        self.loop = start(ros, folder, ["force_loop"], timing__mode="realtime")["force_loop"]
         self.heard = Listener(ros, "status", "force_error", "/diagnostics")
         ros.wait(lambda: all(p.get_subscription_count() for p in self._publishers.values()))
 
-    def feed(self, newtons: float = 0.0) -> None:
-        """One state, with a force commanded."""
+    def feed(self, newtons: float | None = 0.0, torque: float = 0.0) -> None:
+        """One state, with a force commanded unless it is None."""
         self.stamp += 5 * MS
-        force = wrench_stamped(self.stamp, Wrench("base", (0.0, 0.0, -newtons), (0.0, 0.0, 0.0)))
-        self._publishers["force_command"].publish(force)
+        if newtons is not None:
+            force = wrench_stamped(self.stamp, Wrench("base", (0.0, 0.0, -newtons), (0.0, 0.0, torque)))
+            self._publishers["force_command"].publish(force)
         sensed = State([0.0, -1.8, 0.0, 1.45], [0.0] * 4, CARRYING)
         self._publishers["joint_sensors"].publish(joint_state(self.stamp, ARM.joints.names, sensed))
         state = State([0.0, -1.8, 0.0, 1.45], [0.0] * 4, [1.0] * 4)
@@ -95,10 +97,24 @@ def test_a_force_above_the_limit_is_counted_and_the_last_good_one_remains_in_for
     assert feeder.loop._ports.refusals["force_command"] == 2
 
 
+def test_a_torque_in_a_force_command_is_refused_by_name_once_for_each_message(
+    ros: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    feeder = Feeder(ros, tmp_path)
+    for _ in range(2):
+        feeder.feed(8.0)
+    feeder.feed(8.0, torque=0.5)
+    for _ in range(50):
+        feeder.feed(None)
+    assert feeder.loop._ports.refusals["force_command"] == 1
+    said = capfd.readouterr().err
+    assert said.count("force_command: refused: torque (0.0, 0.0, 0.5) N m is commanded; send zero torque") == 1
+
+
 def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: Any, tmp_path: Path) -> None:
     feeder = Feeder(ros, tmp_path)
     feeder.feed_until(lambda: any("domain" in m.message for m in feeder.heard.seen["status"]))
-    start(ros, tmp_path, ["velocity_loop"])
+    start(ros, tmp_path, ["velocity_loop"], timing__mode="realtime")
     client = feeder.node.create_client(SetParametersAtomically, "velocity_loop/set_parameters_atomically")
     ros.wait(client.service_is_ready, what="the parameter service")
 

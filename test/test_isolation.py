@@ -6,7 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import DOMAINS, PORTS, ROOT, is_inhabited, locked_domain
+from conftest import DOMAINS, ROOT, locked_domain
+
+from wam_ros.network import PORTS, is_inhabited
 
 LINUX_GIVES = range(32768, 61000)  # ports, to any program; /proc/sys/net/ipv4/ip_local_port_range
 

@@ -46,6 +46,7 @@ def configuration(script: Path, directory: Path, name: str, **values: object) ->
         {
             "nodes": [*base.shared.nodes, "scenario", "recorder"],
             "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "scenario:script": str(script),
             "recorder:directory": str(directory),
@@ -168,7 +169,7 @@ def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_p
     assert outputs[0] == outputs[1]
 
 
-TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0)
+TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0)
 
 
 def puts(synchroniser: Synchroniser, topic: str, stamp: int, value: str) -> list[tuple[int, float, str, str | None]]:
@@ -187,6 +188,15 @@ def test_a_step_waits_for_the_command_that_belongs_to_the_state() -> None:
     assert puts(synchroniser, "command", 6 * ms, "c6") == []
     assert puts(synchroniser, "state", 6 * ms, "s6") == [(6 * ms, 0.004, "s6", "c1")]
     assert puts(synchroniser, "state", 7 * ms, "s7") == [(7 * ms, 0.001, "s7", "c6")]
+
+
+def test_a_node_that_begins_late_leaves_out_the_steps_whose_inputs_it_has_missed() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=1)})
+    ms = 1_000_000
+    for tick in (1003, 1004, 1005, 1006):  # they need the command of 1001
+        assert puts(synchroniser, "state", tick * ms, f"s{tick}") == []
+    assert puts(synchroniser, "command", 1006 * ms, "c1006") == []
+    assert puts(synchroniser, "state", 1007 * ms, "s1007") == [(1007 * ms, 0.001, "s1007", "c1006")]
 
 
 def test_in_realtime_a_step_takes_the_newest_and_never_waits() -> None:

@@ -45,6 +45,7 @@ def configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Configuration
         {
             "nodes": [*configuration.shared.nodes, "scenario", "recorder"],
             "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "scenario:script": str(tmp_path / "script.yaml"),
             "recorder:directory": str(tmp_path),

@@ -1,5 +1,6 @@
 """The package installs twice from one tree: with pip into a prefix, with colcon into a workspace."""
 
+import argparse
 import importlib.metadata
 import os
 import re
@@ -21,7 +22,10 @@ from conftest import LONG
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from wam_cli.commands import up
+from wam_description.configuration import packaged
 from wam_description.nodes import NODES as TABLE
+from wam_ros.network import occupant
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[1]
@@ -214,13 +218,15 @@ def test_a_sourced_colcon_workspace_starts_a_node(workspace, ros, tmp_path):
     start_and_stop(command, "velocity_loop", ros, tmp_path, env)
 
 
-def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(prefix, monkeypatch):
+@pytest.fixture
+def launch_file(prefix, monkeypatch):
+    """The installed launch file: its declared arguments and the function that makes its nodes."""
     # the module `launch` on PyPI is another program, so the few names that the file takes stand in for it
-    given = {"config": "wam", "namespace": "left", "mode": "lockstep", "record": "true"}
     for module, names in {
         "launch": {"LaunchContext": object, "LaunchDescription": list},
         "launch.actions": {
-            "DeclareLaunchArgument": lambda name, **_: name,
+            "DeclareLaunchArgument": lambda name, **more: SimpleNamespace(name=name, **more),
+            "ExecuteProcess": SimpleNamespace,
             "OpaqueFunction": SimpleNamespace,
         },
         "launch.substitutions": {
@@ -231,21 +237,99 @@ def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(pr
     }.items():
         monkeypatch.setitem(sys.modules, module, SimpleNamespace(**names))
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
-    share = prefix / "share" / "wam_stack"
+    launch = runpy.run_path(str(prefix / "share" / "wam_stack" / "launch" / "wam.launch.py"))
+    *declared, start = launch["generate_launch_description"]()
+    return {argument.name: argument for argument in declared}, start.function
 
-    *declared, start = runpy.run_path(str(share / "launch" / "wam.launch.py"))["generate_launch_description"]()
-    assert set(declared) == set(given)
-    nodes = start.function(given)
-    config = yaml.safe_load((share / "config" / "wam.yaml").read_text())
+
+CHOSEN = {"config": "wam", "namespace": "left", "mode": "lockstep", "processes": "true", "record": "true"}
+
+
+def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(prefix, launch_file):
+    declared, start = launch_file
+    assert set(declared) == set(CHOSEN)
+    nodes = start(CHOSEN)
+    config = yaml.safe_load((prefix / "share" / "wam_stack" / "config" / "wam.yaml").read_text())
     assert [node.executable for node in nodes] == [*config["/**"]["ros__parameters"]["nodes"], "recorder"]
     assert {node.executable for node in nodes} <= set(NODES)
     assert {node.package for node in nodes} == {"wam_stack"}
     assert {node.namespace for node in nodes} == {"left"}
-    for node in nodes:
-        assert node.parameters == [str(share / "config" / "wam.yaml"), {"timing.mode": "lockstep"}]
-    assert len(start.function({**given, "record": "false"})) == len(nodes) - 1
-    with pytest.raises(ValueError, match=r"config:=nowhere is no file and none of: .*wam"):
-        start.function({**given, "config": "nowhere"})
+    config["/**"]["ros__parameters"]["timing"]["mode"] = "lockstep"
+    assert all(yaml.safe_load(Path(*node.parameters).read_text()) == config for node in nodes)
+    assert len(start({**CHOSEN, "record": "false"})) == len(nodes) - 1
+    assert len(start({**CHOSEN, "mode": "realtime", "processes": "false"})) == len(nodes)
+
+
+def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):
+    _, start = launch_file
+    (whole,) = start({**CHOSEN, "processes": "false"})
+    assert whole.cmd[1:4] == ["-m", "wam_cli.main", "up"]
+    options = argparse.ArgumentParser()
+    up.arguments(options)
+    chosen = options.parse_args(whole.cmd[4:])
+    assert (chosen.namespace, chosen.record) == ("left", True)
+    assert yaml.safe_load(Path(chosen.config).read_text())["/**"]["ros__parameters"]["timing"]["mode"] == "lockstep"
+    assert whole.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
+
+
+def test_every_launch_argument_has_a_description_and_a_default_that_is_allowed(launch_file):
+    declared, start = launch_file
+    for argument in declared.values():
+        assert len(argument.description) > 20
+        assert argument.choices is None or argument.default_value in argument.choices
+    defaults = {name: argument.default_value for name, argument in declared.items()}
+    (whole,) = start(defaults)
+    file = Path(whole.cmd[whole.cmd.index("--config") + 1])
+    assert file.read_text() == packaged("wam").read_text()
+
+
+@pytest.mark.parametrize(
+    ("config", "text"),
+    [
+        ("nowhere", r"no configuration 'nowhere' comes with wam_stack; there are: testbed, wam \("),
+        ("demo_scenario", r"demo_scenario.yaml is a scenario, no configuration; play it with 'wam up --scenario"),
+        ("nowhere.yaml", r"nowhere.yaml is not a file; give the path of a ROS parameter file"),
+    ],
+)
+def test_launch_refuses_what_is_no_configuration_and_says_what_it_is(config, text, launch_file):
+    _, start = launch_file
+    with pytest.raises(ValueError, match=text):
+        start({**CHOSEN, "config": config})
+
+
+def test_launch_takes_a_file_that_changes_a_configuration(launch_file, tmp_path):
+    _, start = launch_file
+    changed = tmp_path / "changed.yaml"
+    changed.write_text("base: wam\n/**: {ros__parameters: {nodes: [driver, velocity_loop]}}\n")
+    nodes = start({**CHOSEN, "config": str(changed), "record": "false"})
+    assert [node.executable for node in nodes] == ["driver", "velocity_loop"]
+
+
+def test_nodes_end_with_the_launch_even_where_it_ends_at_once(launch_file, tmp_path, domain_id):
+    _, start = launch_file
+    node = next(node for node in start(CHOSEN) if node.executable == "gravity")
+    command = [sys.executable, "-P", "-m", "wam_ros.program", "gravity", "--ros-args", "--params-file"]
+    # what `ros2 launch` does with a Node, in a process that SIGTERM ends without another thought
+    code = (
+        "import os, subprocess, sys, time\n"
+        "child = subprocess.Popen(sys.argv[2:], env={**os.environ, sys.argv[1]: str(os.getpid())})\n"
+        "print(child.pid, flush=True); time.sleep(600)"
+    )
+    (name, given), *_ = node.additional_env.items()
+    assert given == str(os.getpid()), "the launch itself"
+    launch = subprocess.Popen(
+        [sys.executable, "-c", code, name, *command, *node.parameters], stdout=subprocess.PIPE, text=True
+    )
+    pid = int(launch.stdout.readline())
+    deadline = time.monotonic() + LONG
+    while occupant(domain_id, "/wam", "gravity") != pid:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    launch.terminate()
+    launch.communicate()
+    while occupant(domain_id, "/wam", "gravity"):
+        assert time.monotonic() < deadline, "an orphan"
+        time.sleep(0.05)
 
 
 def test_package_xml_is_valid_for_ros():
@@ -255,9 +339,20 @@ def test_package_xml_is_valid_for_ros():
     assert warnings == []
     assert package.name == "wam_stack"
     assert package.get_build_type() == "ament_python"
+    assert package.authors, "ros2 pkg xml shows them"
+    assert package.urls
     depends = {dependency.name for dependency in package.exec_depends}
-    name_of_ros = re.compile(r"\b(\w+_msgs|std_srvs|rclpy|ament_index_python)(?:[./]|\s+import)")
-    named = {name for path in ROOT.glob("wam_*/*.py") for name in name_of_ros.findall(path.read_text())}
+    name_of_ros = re.compile(
+        r"\b(\w+_msgs|\w+_interfaces|std_srvs|rclpy|ament_index_python|launch\w*)(?:[./]|\s+import)"
+    )
+    files = [*ROOT.glob("wam_*/*.py"), *ROOT.glob("launch/*.py")]
+    named = {
+        name
+        for path in files
+        for line in path.read_text().splitlines()
+        if line.lstrip().startswith(("from ", "import ")) or "/msg/" in line
+        for name in name_of_ros.findall(line)
+    }
     assert named <= depends
 
 

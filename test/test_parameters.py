@@ -169,7 +169,7 @@ def test_every_parameter_is_described_to_ros(ros: Any) -> None:
     assert by_name["watchdog"].floating_point_range[0].to_value == 0.05
     assert "[s]" in by_name["watchdog"].description
     assert by_name["timing.outer_delay"].integer_range[0].to_value == 1
-    assert by_name["timing.mode"].additional_constraints == "one of realtime, lockstep"
+    assert by_name["timing.mode"].additional_constraints == "one of lockstep, realtime"
 
 
 def change(ros: Any, node: str, **given: Any) -> Any:
@@ -309,7 +309,7 @@ def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
         ("velocity_loop", "integral_gain:", "integral_gian:", "missing parameter 'servo.integral_gain'"),
         ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
         ("force_loop", "force_gain: [1.5e-2]", "force_gain: [0.5]", "times the largest linearly stable one"),
-        ("transform", "mode: realtime", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of realtime"),
+        ("transform", "mode: lockstep", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of lockstep"),
     ],
 )
 def test_a_wrong_parameter_stops_the_process_with_its_name(

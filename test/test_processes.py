@@ -81,11 +81,19 @@ def started(tmp_path: Path) -> Iterator[Callable[..., Stack]]:
         stack.end()
 
 
+def soon_delivered() -> float:
+    """The same for processes: first the driver, then the others wait until listeners have their last messages."""
+    from wam_ros.run import LONGEST_DELIVERY
+
+    return 2.0 * LONGEST_DELIVERY + soon()
+
+
 def up(started: Callable[..., Stack], *arguments: str) -> Stack:
     """The whole stack and a recorder, running, with a bag that grows."""
     stack = started("-m", "wam_cli.main", "up", "--record", *arguments)
     wait(lambda: recorded(stack) > 400_000, f"a bag that grows; {stack.said()}")
-    assert len(stack.alive()) == NODES + 1
+    apart = {"--processes", "--realtime"} & set(arguments)
+    assert len(stack.alive()) == (NODES + 1 if apart else 1)
     return stack
 
 
@@ -114,14 +122,15 @@ def enable(ros: Any, stack: Stack) -> None:
         assert "no motor_current_command comes in" in future.result().message
 
 
+@pytest.mark.parametrize("options", [(), ("--processes",)], ids=["one process", "processes"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
-    number: signal.Signals, started: Any, tmp_path: Path, ros: Any
+    number: signal.Signals, options: tuple[str, ...], started: Any, tmp_path: Path, ros: Any
 ) -> None:
-    stack = up(started, "--mode", "lockstep")  # a busy machine cannot let the watchdog come first
+    stack = up(started, *options)
     enable(ros, stack)
     stack.process.send_signal(number)
-    wait(lambda: stack.process.poll() is not None, f"the end of wam up; {stack.said()}", soon())
+    wait(lambda: stack.process.poll() is not None, f"the end of wam up; {stack.said()}", soon_delivered())
     assert stack.alive() == []
     assert stack.process.returncode == 0
     assert "Traceback" not in stack.said()
@@ -190,7 +199,7 @@ def test_a_shell_without_ros2_asks_the_stack(started: Any, domain_id: int) -> No
     assert code == 1
     assert "no service /wam/driver/enable" in said
     assert "wam up" in said
-    up(started, "--mode", "lockstep")
+    up(started)
     assert call("enable") == (0, "enabled: brakes released\n")
     assert call("tare")[0] == 0
     assert call("estop")[0] == 0
@@ -217,7 +226,7 @@ def test_nodes_that_do_not_exist_are_refused_with_those_that_do(tmp_path: Path, 
 
 
 def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path, domain_id: int) -> None:
-    stack = started("-m", "wam_cli.main", "demo", "--lockstep", "--name", "stopped")
+    stack = started("-m", "wam_cli.main", "demo", "--real-time-factor", "0", "--name", "stopped")
     wait(lambda: recorded(stack) > 100_000, f"a bag that grows; {stack.said()}")
     stack.process.send_signal(signal.SIGINT)
     wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon())
@@ -227,7 +236,7 @@ def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path
 
 
 def test_children_of_a_killed_parent_end_by_themselves(started: Any, tmp_path: Path, domain_id: int) -> None:
-    stack = up(started)
+    stack = up(started, "--processes")
     stack.process.kill()
     stack.process.wait()
     wait(lambda: not stack.alive(), "the end of the children", soon())
@@ -236,10 +245,10 @@ def test_children_of_a_killed_parent_end_by_themselves(started: Any, tmp_path: P
 
 
 def test_a_node_that_ends_takes_the_stack_with_it(started: Any, tmp_path: Path, domain_id: int) -> None:
-    stack = up(started)
+    stack = up(started, "--processes")
     (victim,) = (pid for pid in stack.alive() if b"velocity_loop" in Path(f"/proc/{pid}/cmdline").read_bytes())
     os.kill(victim, signal.SIGKILL)
-    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon())
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.alive() == []
     assert "node velocity_loop ended with code -9; all were stopped" in stack.said()
     assert stack.process.returncode == 9
@@ -269,6 +278,20 @@ def test_a_signal_during_start_up_ends_all_silently(
     assert stack.alive() == []
     assert stack.process.returncode in (0, 128 + number)
     assert "Traceback" not in stack.said()
+
+
+def test_the_command_ends_silently_from_its_first_import_on() -> None:
+    interrupted = (
+        "import os, signal, sys\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'argparse': os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+        "from wam_cli.program import main\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", interrupted], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + signal.SIGINT, "", "")
 
 
 def has_loaded(stack: Stack, library: str) -> bool:
@@ -319,7 +342,7 @@ def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any
     listener = ros.node("listener")
     listener.create_subscription(DiagnosticStatus, "status", lambda m: said.append(m.message), qos(BY_NAME["status"]))
     listener.create_subscription(JointState, "motor_states", states.append, qos(BY_NAME["motor_states"]))
-    stack = started("-m", "wam_cli.main", "node", "driver")
+    stack = started("-m", "wam_cli.main", "node", "driver", "-p", "timing.mode:=realtime")
     ros.wait(lambda: said and len(states) > 100, what="states of a driver that is alone")
     assert said == ["braked"]
     stack.process.terminate()
@@ -454,7 +477,7 @@ def test_a_refused_enable_ends_the_scenario_with_the_reason(tmp_path: Path, doma
     script = tmp_path / "script.yaml"
     script.write_text("steps: [{name: wait, seconds: 0.05}, {name: release, seconds: 100.0, request: enable}]")
     configured = Configuration.load(packaged("wam")).with_values(
-        {"nodes": ["driver", "transform", "scenario"], "scenario:script": str(script)}
+        {"nodes": ["driver", "transform", "scenario"], "timing.mode": "realtime", "scenario:script": str(script)}
     )
     with Composition(configured, domain_id=domain_id) as composition:
         scenario: Any = composition.nodes["scenario"]
@@ -467,7 +490,7 @@ def test_a_refused_enable_ends_the_scenario_with_the_reason(tmp_path: Path, doma
 def test_a_composition_in_lockstep_can_be_left_at_any_moment(domain_id: int) -> None:
     from wam_ros.bring_up import Composition
 
-    configured = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep"})
+    configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
     begin = time.monotonic()
     with Composition(configured, domain_id=domain_id) as composition:
         driver: Any = composition.nodes["driver"]
@@ -478,17 +501,59 @@ def test_a_composition_in_lockstep_can_be_left_at_any_moment(domain_id: int) -> 
         assert time.monotonic() - begin < soon()
 
 
+def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, domain_id: int) -> None:
+    from wam_ros.bring_up import Composition
+
+    script = tmp_path / "script.yaml"
+    script.write_text("steps: [{name: wait, seconds: 100.0}]")
+    base = Configuration.load(packaged("wam"))
+    configured = base.with_values({"nodes": [*base.shared.nodes, "scenario"], "scenario:script": str(script)})
+    with Composition(configured, domain_id=domain_id) as composition:
+        driver: Any = composition.nodes["driver"]
+        begin = time.monotonic()
+        composition.spin(lambda: driver.driver.stamp > 20_000_000 or time.monotonic() - begin > LONG)
+        driver.time.pause(True)
+        composition.spin(lambda: time.monotonic() - begin > 0.1)
+        driver._fault("two publishers send motor_current_command")
+        ended = composition.wait(lambda ended: bool(ended) or time.monotonic() - begin > LONG)
+        assert ended == {"scenario": 1}
+        (failure,) = composition.failures
+        assert failure == "the driver stopped in step 'wait': two publishers send motor_current_command"
+
+
+def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
+    started: Any, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    patience = 4.0  # s; each of the six nodes would wait as long
+    monkeypatch.setattr("wam_ros.run.LONGEST_DELIVERY", patience)
+    configured = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0})
+    listener = started("-m", "wam_cli.main", "record", "--name", "outside")
+    begin = time.monotonic()
+    with Composition(configured, domain_id=domain_id) as composition:
+        composition.spin(lambda: recorded(listener) > 400_000 or time.monotonic() - begin > LONG)
+        assert recorded(listener) > 400_000, listener.said()
+        listener.process.send_signal(signal.SIGSTOP)
+        begin = time.monotonic()
+        composition.spin(lambda: time.monotonic() - begin > 0.1)
+        begin = time.monotonic()
+    took = time.monotonic() - begin
+    listener.process.send_signal(signal.SIGCONT)
+    assert took < patience + min(soon(), 2.0 * patience)
+
+
 def test_a_fault_of_the_driver_ends_the_scenario_in_realtime(started: Any, ros: Any, tmp_path: Path) -> None:
     from std_srvs.srv import Trigger
 
     script = tmp_path / "script.yaml"
     script.write_text("steps: [{name: wait, seconds: 100.0}]")
-    stack = started("-m", "wam_cli.main", "up", "--scenario", str(script))
+    stack = started("-m", "wam_cli.main", "up", "--realtime", "--scenario", str(script))
     client = ros.node("asker").create_client(Trigger, "driver/estop")
     ros.wait(client.service_is_ready)
     wait(lambda: "wait" in stack.said(), f"the first step; {stack.said()}")
     future = client.call_async(Trigger.Request())
     ros.wait(future.done)
-    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon())
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
     assert stack.process.returncode == 1
     assert "error: the driver stopped in step 'wait': emergency stop" in stack.said()

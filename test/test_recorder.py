@@ -351,17 +351,17 @@ def test_gaps_in_the_numbering_are_drops(numbers: list[int], received: int, drop
 
 
 def test_drops_are_told_apart_by_publisher(tmp_path: Path) -> None:
-    def data(node: str) -> bytes:
-        message = DiagnosticArray(header=header(5, "abc"), status=[DiagnosticStatus(name=f"{node}: timing")])
+    def data(name: str) -> bytes:
+        message = DiagnosticArray(header=header(5, "abc"), status=[DiagnosticStatus(name=name)])
         return bytes(serialize_message(message))
 
     row = BY_NAME["/diagnostics"]
     with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: "")
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: "", "/wam")
         for number in (1, 2, 3):
-            machine.receive(row.name, data("driver"), 0, 0, number)
+            machine.receive(row.name, data("driver: timing"), 0, 0, number)
         for number in (1, 9):
-            machine.receive(row.name, data("gravity"), 0, 0, number)
+            machine.receive(row.name, data("wam: gravity"), 0, 0, number)
         assert {c.publisher: (c.received, c.dropped) for c in machine.counts()} == {
             "driver": (3, 0),
             "gravity": (2, 7),
@@ -549,6 +549,7 @@ def test_every_message_that_the_stack_publishes_is_in_the_bag(
         {
             "nodes": [*base.shared.nodes, "scenario", "recorder"],
             "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "scenario:script": str(script),
             "recorder:directory": str(tmp_path),

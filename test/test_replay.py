@@ -55,7 +55,7 @@ def recorded(folder: Path, domain_id: int, **values: object) -> Path:
     configuration = base.with_values(
         {
             "nodes": [*base.shared.nodes, "scenario", "recorder"],
-            "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "scenario:script": str(script),
             "recorder:directory": str(folder),
@@ -131,7 +131,7 @@ def test_the_pushed_arm_says_something(bag: Path) -> None:
     ],
 )
 def test_another_parameter_makes_a_difference_that_is_named(bag: Path, node: str, value: dict, topic: str) -> None:  # type: ignore[type-arg]
-    configuration = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", **value})
+    configuration = Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0, **value})
     nodes = [*configuration.shared.nodes, "scenario"]
     done = replay(bag, node, configuration.with_values({"nodes": nodes}))
     found = {result.topic: result for result in done.topics}[topic]
@@ -140,7 +140,9 @@ def test_another_parameter_makes_a_difference_that_is_named(bag: Path, node: str
     assert found.first is not None
     assert found.largest > 0.0
     assert replay(
-        bag, node, Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", "nodes": nodes})
+        bag,
+        node,
+        Configuration.load(packaged("wam")).with_values({"timing.real_time_factor": 0.0, "nodes": nodes}),
     ).is_same
 
 

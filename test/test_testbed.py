@@ -34,6 +34,7 @@ def configured_testbed(folder: Path, *extra: str, mode: str = "lockstep") -> Con
         {
             "nodes": [*base.shared.nodes, *extra],
             "timing.mode": mode,
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "scenario:script": str(script),
             "recorder:directory": str(folder),

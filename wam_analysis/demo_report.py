@@ -185,7 +185,11 @@ def _false_contacts(summary: DemoSummary) -> str:
 
 def _loop(loop: LoopReport) -> str:
     if loop.mode == "lockstep":
-        return "lockstep: the driver waits for every command, so there is no latency to measure"
+        waits = "lockstep: the driver waits for every command, so there is no latency to measure"
+        if math.isnan(loop.factor):
+            return waits
+        slower = f", {loop.slips} periods too late to be made up for" if loop.slips else ""
+        return f"{waits}; real-time factor {loop.factor:.2f}, at most {1e3 * loop.behind:.0f} ms behind{slower}"
     if math.isnan(loop.rate):
         return "no timing was recorded (status of driver in /diagnostics)"
     percent = 100.0 * loop.missed / max(loop.periods, 1)

@@ -10,6 +10,7 @@ from wam_analysis.measures.runs import runs
 from wam_bag.bag import Bag, TableColumns
 from wam_bag.losses import RECORDING, losses
 from wam_control.contact_table import reasons_of
+from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS, diagnosed_name
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 from wam_sim.replay import tables
 
@@ -67,9 +68,11 @@ class StepContact(NamedTuple):
 
 
 class LoopReport(NamedTuple):
-    """Timing of the driver's loop; NaN if it was not recorded, as in lockstep.
+    """Timing of the driver's loop; NaN if it was not recorded, as latencies in lockstep.
 
-    The driver reports latencies every second: p50 and p99 are medians of these, `worst` is the highest p99.
+    The driver reports latencies every second: p50 and p99 are medians of these, `worst` is the highest p99.  In paced
+    lockstep it reports every second how fast simulated time passed: `factor` is that of the whole run, `behind` the
+    largest delay of a period, s, `slips` the periods that were too late to be made up for.
     """
 
     mode: str
@@ -79,6 +82,9 @@ class LoopReport(NamedTuple):
     worst: float
     missed: int
     periods: int
+    factor: float = NAN
+    behind: float = NAN
+    slips: int = -1
 
 
 class Moment(NamedTuple):
@@ -299,10 +305,15 @@ def _loop(run: RecordedRun) -> LoopReport:
         status.facts
         for array in messages_of(run.bag, "/diagnostics")
         for status in map(status_of, array.status)
-        if status.node == "driver"
+        if status.node in ("driver", diagnosed_name(run.namespace, "driver"))  # the first in bags of old
     ]
     timed = [facts for facts in reports if "rate [Hz]" in facts]
     mode = "realtime" if run.mode == "unknown" and timed else run.mode
+    if paced := [facts for facts in reports if REAL_TIME_FACTOR in facts][1:]:  # the first is of no time
+        factors = np.array([float(facts[REAL_TIME_FACTOR]) for facts in paced])
+        behind = max(float(facts.get(BEHIND, NAN)) for facts in paced) / 1e3
+        factor = 1.0 / float(np.mean(1.0 / np.maximum(factors, 1e-3)))  # each is of a second of the arm
+        return LoopReport(mode, NAN, NAN, NAN, NAN, -1, -1, factor, behind, int(paced[-1].get(SLIPS, -1)))
     if not timed:
         return LoopReport(mode, NAN, NAN, NAN, NAN, -1, -1)
     p50, p99 = (np.array([float(facts.get(f"latency {p} [us]", NAN)) for facts in timed]) for p in ("p50", "p99"))

@@ -76,6 +76,12 @@ class CommandAdmission:
         commanded = math.hypot(*force.force) if force is not None else 0.0
         if commanded > parameters.force_limit:
             refusals["force_command"] = _refusal(commanded, "force_limit", parameters.force_limit, "N")
+        elif force is not None and any(force.torque):
+            refusals["force_command"] = (
+                f"torque {force.torque} N m is commanded; send zero torque: the contact takes a force alone, joint "
+                "torques are commanded on joint_torque_command; the last good command remains in force"
+            )
+        if "force_command" in refusals:
             self._force_age += dt
             if self._force_age > self._command_age:
                 self._force = force = None

@@ -50,7 +50,7 @@ class ForceLoopNode:
             inputs["joint_sensors"],
             contact_of(hypotheses, self._covers) if external and hypotheses else None,
             external.effort if external else None,
-            ForceCommand(command.frame, command.force) if command else None,
+            ForceCommand(command.frame, command.force, command.torque) if command else None,
             posture.position if posture else None,
             torque.effort if torque else None,
             inputs.dt,

@@ -35,7 +35,7 @@ class ScenarioNode:
     def __init__(self, shared: Shared, own: ScenarioParameters, scenario: Scenario | None = None) -> None:
         self._scenario = scenario or Scenario(load(script_file(own.script), shared.arm))
         self._covers = shared.arm.covers.names
-        self._step, self._fault, self._stamp = "", "", 0
+        self._step, self._stamp = "", 0
         self.requests: list[Call | SetParameters] = []
         self.done, self.failure = False, ""
 
@@ -49,8 +49,6 @@ class ScenarioNode:
         if self.done:
             return {}
         self._stamp = inputs.stamp
-        if self._fault:
-            return self._end(f"the driver stopped in step '{self._step}': {self._fault}")
         contact = contact_of(inputs["contact/hypotheses"], self._covers)
         out = self._scenario.step(inputs["joint_states"].position, contact, inputs.dt)
         if out.request or out.settings or out.done:
@@ -82,10 +80,12 @@ class ScenarioNode:
         """End the task where a request is refused."""
         return self._end(f"step '{self._step}': {message}" if self._step else message)
 
-    def take_status(self, status: NodeStatus) -> None:
-        """Remember a fault of the driver."""
-        if status.node == "driver":
-            self._fault = status.fault
+    def take_status(self, status: NodeStatus) -> Outputs:
+        """End the task with a fault of the driver: no step may come any more."""
+        if self.done or status.node != "driver" or not status.fault:
+            return {}
+        when = f"in step '{self._step}'" if self._step else "before the first step"
+        return self._end(f"the driver stopped {when}: {status.fault}")
 
     def _end(self, failure: str) -> Outputs:
         self.done, self.failure = True, self.failure or failure
@@ -95,7 +95,7 @@ class ScenarioNode:
 
 def script_file(script: str) -> Path:
     """The file of a scenario: a path that ends in '.yaml', or the name of one that comes with the package."""
-    return Path(script) if script.endswith(".yaml") else packaged(script)
+    return Path(script) if script.endswith(".yaml") else packaged(script, "scenario")
 
 
 def _plain(setting: Setting) -> Any:

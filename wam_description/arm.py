@@ -230,8 +230,8 @@ class Timing:
     """Timing: the motor side runs every `period`, the joint side every `outer_divisor` periods."""
 
     mode: str = parameter(
-        "realtime: the driver runs on the steady clock; lockstep: it waits for every command",
-        choices=("realtime", "lockstep"),
+        "lockstep: the driver waits for every command; realtime: it runs on the steady clock",
+        choices=("lockstep", "realtime"),
     )
     period: float = parameter("period of the inner loop and of motor_states", "s", low=1e-4, high=0.1)
     substeps: int = parameter("steps of the plant in one period", low=1, high=1000)
@@ -242,6 +242,13 @@ class Timing:
         "scheduling priority of driver and velocity_loop in realtime, if the system grants it", low=-20, high=0
     )
     timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1, high=3600.0)
+    real_time_factor: float = parameter(
+        "simulated time per time of the wall clock in lockstep, which is slower where the machine is; "
+        "0: as fast as it can",
+        low=0.0,
+        high=100.0,
+        before=0.0,
+    )
     dither_cycle: int = parameter(
         "inner periods in one cycle of the dither of the motor torques, which detects contact at rest; 0: none",
         low=0,

@@ -18,6 +18,7 @@ T = TypeVar("T")
 SHARED = "/**"
 BASE = "base"  # key of an overlay that names the configuration it changes
 PARAMETERS = "ros__parameters"
+SCENARIO_KEY = "steps"  # a file with this at its top is a scenario
 
 
 class Configuration(NamedTuple):
@@ -140,8 +141,8 @@ class Configuration(NamedTuple):
             raise ParameterError(f"{self.path}, section '{where}': {error}") from error
 
 
-def packaged(name: str) -> Path:
-    """The file of a configuration that comes with the package, as ``packaged('wam')``.
+def packaged(name: str, kind: str = "configuration") -> Path:
+    """The file of a configuration or scenario that comes with the package, as ``packaged('wam')``.
 
     It is searched next to the packages (source tree), then in ``share/wam_stack/config`` of every folder
     above this file, of the prefixes in AMENT_PREFIX_PATH and of Python's own prefix.
@@ -151,16 +152,21 @@ def packaged(name: str) -> Path:
     ParameterError
         if there is none of this name; the message lists those that exist.
     """
+    wanted = kind == "scenario"
     folders = [folder for folder in dict.fromkeys(_folders()) if folder.is_dir()]
     for folder in folders:
         if (folder / f"{name}.yaml").is_file():
             return folder / f"{name}.yaml"
-    found = sorted({path.stem for folder in folders for path in folder.glob("*.yaml")})
+    found = sorted({path.stem for folder in folders for path in folder.glob("*.yaml") if _is_scenario(path) == wanted})
     raise ParameterError(
-        f"no configuration '{name}' comes with wam_stack; there are: {', '.join(found) or 'none'} "
+        f"no {kind} '{name}' comes with wam_stack; there are: {', '.join(found) or 'none'} "
         f"(looked in {', '.join(map(str, folders)) or 'share/wam_stack/config of every prefix'}); "
         f"give the path of a file of your own"
     )
+
+
+def _is_scenario(path: Path) -> bool:
+    return any(line.startswith(SCENARIO_KEY) for line in path.read_text(encoding="utf-8").splitlines())
 
 
 def _folders() -> Iterator[Path]:
@@ -197,6 +203,11 @@ def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
 
 def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping[str, Any]]:
     """Flat sections of a parameter file; `whole` where it must have the shared one, as its last."""
+    if isinstance(tree, dict) and SCENARIO_KEY in tree:
+        raise ParameterError(
+            f"{path} is a scenario, no configuration; play it with 'wam up --scenario {path.stem}', "
+            "or give its name to the parameter scenario:script"
+        )
     if not isinstance(tree, dict) or (whole and SHARED not in tree):
         raise ParameterError(f"{path} has no section '{SHARED}'; it needs '{SHARED}: {PARAMETERS}: ...' at its top")
     if whole and list(tree)[-1] != SHARED:

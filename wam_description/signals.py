@@ -48,6 +48,7 @@ class ForceCommand(NamedTuple):
 
     frame: str
     force: Triple  # N
+    torque: Triple = ZERO  # N m; refused unless it is zero
 
 
 class Contact(NamedTuple):
@@ -97,6 +98,7 @@ class Level(IntEnum):
     OK = 0
     WARN = 1
     ERROR = 2
+    STALE = 3  # nothing new is known
 
 
 class NodeStatus(NamedTuple):

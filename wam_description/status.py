@@ -1,8 +1,11 @@
 """The status of a node as key-value pairs and back: the one place that knows the keys."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from wam_description.signals import Level, NodeStatus
+
+REAL_TIME_FACTOR, BEHIND, SLIPS = "real-time factor", "behind [ms]", "slips"
+WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 
 _CONNECTED = ("waiting", "connected")
 
@@ -14,6 +17,41 @@ def pairs(status: NodeStatus) -> list[tuple[str, str]]:
     numbers = {"session": status.session, "since": status.since, "stamp": status.stamp}
     found += [(key, str(value)) for key, value in numbers.items() if value]
     return [*found, *((key, str(value)) for key, value in status.facts.items())]
+
+
+def diagnosed_name(namespace: str, node: str) -> str:
+    """The name of a node in /diagnostics, which the nodes of all arms share: 'wam: driver'."""
+    return f"{namespace.strip('/')}: {node}"
+
+
+def guidance(mode: str, before: str, absent: Sequence[str], namespace: str, is_played: bool) -> str:
+    """What the console says of the driver's state, and what to call next.
+
+    Parameters
+    ----------
+    mode, before : the driver's state, and that before it, '' at the start.
+    absent : nodes that are not connected yet.
+    namespace : of the arm.
+    is_played : whether a scenario makes the calls.
+    """
+    if absent:
+        return f"{mode}; not connected yet: {', '.join(absent)}"
+    if mode == "enabled":
+        return "enabled: the brakes are released"
+    if is_played or (mode == "braked" and before == "enabled"):
+        return f"{mode}: the brakes are on"
+    if mode == "braked":
+        call = _call(namespace, "enable", "SetBool '{data: true}'")
+        return f"braked, all nodes are connected; to release the brakes: {call}"
+    return (
+        f"fault, the brakes are on; when its cause is gone: {_call(namespace, 'reset_fault', 'Trigger')}, then enable"
+    )
+
+
+def _call(namespace: str, service: str, request: str) -> str:
+    name = namespace.strip("/")
+    where = "" if name == "wam" else f" --namespace {name}"
+    return f"ros2 service call /{name}/driver/{service} std_srvs/srv/{request} (or: wam call {service}{where})"
 
 
 def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]]) -> NodeStatus:

@@ -144,6 +144,14 @@ class Synchroniser:
         for newest in self._newest.values():
             newest.clear()
 
+    def follow(self, begin: int) -> None:
+        """Another session of the driver begins with this state, ns; what came is forgotten unless its clock goes on.
+
+        It goes on where the driver only asks which nodes run.
+        """
+        if not 0 < self._last <= begin:
+            self.restart(begin)
+
     def discard_commands(self, before: int) -> None:
         """Forget the commands whose stamp is before this time, ns: the brakes have been switched."""
         for newest in self._newest.values():
@@ -180,10 +188,14 @@ class Synchroniser:
             self._triggers.clear()
             return (self._step(stamp, {topic: (stamp, value)}),)
         complete: list[Inputs] = []
-        while self._triggers and (taken := self._taken(self._triggers[0][0])) is not None:
+        while self._triggers:
+            taken = self._taken(self._triggers[0][0])
+            if taken is None and not self._has_missed(self._triggers[0][0]):
+                break
             stamp, value = self._triggers.popleft()
-            taken[self._trigger] = (stamp, value)
-            complete.append(self._step(stamp, taken))
+            if taken is not None:
+                taken[self._trigger] = (stamp, value)
+                complete.append(self._step(stamp, taken))
         return complete
 
     def inlet(self, topic: str) -> Inlet:
@@ -225,6 +237,15 @@ class Synchroniser:
         self.strays += 1
         self._require_present(stamp, self._longest_jump)
         return False
+
+    def _has_missed(self, stamp: int) -> bool:
+        """Whether an input of this step can no longer come, as a later one is there: the node began too late for it."""
+        return any(
+            kept and 0 < cause < max(kept) and cause not in kept
+            for group in self._groups
+            for cause in (self._cause(group, stamp),)
+            for _, kept in group.members
+        )
 
     def _step(self, stamp: int, taken: Mapping[str, tuple[int, Any] | None]) -> Inputs:
         """The inputs of a step that is complete, with the time since the one before."""

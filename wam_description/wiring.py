@@ -20,7 +20,7 @@ parameters in that section, or 'module:Class' where its import takes long.  What
 tune(own) : take new live parameters, or refuse them with ParameterError.
 owns : name of a group of shared parameters that are live at this node, taken by ``retune(group)``.
 follows : a `Followed` group of shared parameters of another node; changes come to ``retune(group)``, too.
-take_status(status) : called with the `NodeStatus` that any other node reports.
+take_status(status) : called with the `NodeStatus` that any other node reports; it may return outputs.
 services : by name, the method that answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
 requests : list of `Call` and `SetParameters`, filled by steps; they are made, in order, before the outputs of the
     step are published.  If one is refused, the outputs are those of ``refused(message)``, none without it.

@@ -3,6 +3,8 @@
 - driver: the driver without ROS: commands, watchdog, limits, states; its parameters
 - interface: what every driver of the arm takes and gives
 - driver_node: the driver as a ROS node
+- lockstep, realtime: the two ways in which its time passes
+- pacer: simulated time no faster than the wall clock
 - safety: braked, enabled, fault
 - session: which run of the driver the nodes follow, and since when commands count
 - limit_watch: speeds, travel, currents and tensions against their limits

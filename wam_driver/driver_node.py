@@ -1,10 +1,8 @@
 """Node `driver`: the arm's hardware as the stack sees it, simulated."""
 
-import math
 import tempfile
 import time
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +13,13 @@ from wam_description.interface import Interface, declared
 from wam_description.signals import BASE, Answer, Level, NodeStatus, Point, State, Wrench
 from wam_description.urdf import urdf
 from wam_driver.driver import Driver, DriverParameters
+from wam_driver.lockstep import WATCH, Lockstep
+from wam_driver.pacer import Pacer
+from wam_driver.realtime import Realtime
 from wam_driver.safety import Mode
 from wam_driver.session import Session
 from wam_ros.messages import Refused
+from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
 from wam_ros.run import raise_priority
@@ -27,14 +29,11 @@ ROLL_CALL = 0.4  # s before the time-out in which the nodes say that they run
 
 
 class DriverNode(TolerantNode):
-    """Publishes the state of the arm and takes currents.
-
-    realtime: a period of the steady clock is a period of the arm; the last command is held.
-    lockstep: the arm goes on when the answer to its present state has come.
-    """
+    """Publishes the state of the arm and takes currents; `Lockstep` or `Realtime` advances its time."""
 
     def __init__(self, **ros: Any) -> None:
         super().__init__("driver", **ros)
+        self._place = take_place(self, "driver")
         shared, own = declare(self, DriverParameters)
         self.driver = Driver(shared, own)
         follow(self, own, lambda new: self.driver.set_added_friction(new.effects.added_coulomb_friction))
@@ -43,103 +42,93 @@ class DriverNode(TolerantNode):
         self._directory = own.post_mortem_directory
         self._motors = list(shared.arm.motors.names)
         self._frames = (BASE, *shared.arm.covers.names)
-        self._currents: tuple[int, list[float]] = (0, [])
-        self._push_stamp = 0
-        self._paused = False
         self._reported = ("", False, 0, 0)
-        self._connected = False
-        self._command_came = -math.inf
-        self._watchdog = own.watchdog
-        interface = ports.interface
-        self._chain = [name for name, one in interface.declarations.items() if one.reactions]
-        is_live = shared.timing.mode == "realtime"
-        self._session = Session(self._chain, int(time.time() * 1e3) if is_live else 0)  # ms: no driver before had it
+        self._connected = self._started = False
+        self._answered = 0  # newest state, ns, that a command has answered
         self._mode = self.driver.safety.mode
-        self._is_resuming, self._stalled = False, ""
+        is_lockstep = shared.timing.mode == "lockstep"
+        chain = [name for name, one in ports.interface.declarations.items() if one.reactions]
+        self._session = Session(chain, 0 if is_lockstep else int(time.time() * 1e3))  # ms: no driver before had it
         ports.takes_problem = self._take_problem
         ports.feed("motor_current_command", self._take_currents, "effort")
         ports.feed("sim/disturbance", self._take_push)
         ports.watch_peers(self._take_status)
+        self.time: Lockstep | Realtime
+        if is_lockstep:
+            self.time = Lockstep(
+                self.driver,
+                shared.timing,
+                self._senders(shared.nodes),
+                self._session,
+                self._publish,
+                self._announce,
+                self._fault,
+                Pacer(shared.timing.real_time_factor, time.perf_counter),
+                time.perf_counter,
+            )
+        else:
+            self.time = Realtime(self.driver, shared.timing, own.watchdog, self._publish, time.perf_counter)
         for name, kind, answer in (
             ("enable", SetBool, self._enable),
             ("pause", SetBool, self._pause),
             ("estop", Trigger, lambda _: self.driver.estop()),
             ("reset_fault", Trigger, lambda _: self.driver.reset_fault()),
             ("reset", Trigger, lambda _: self.driver.reset()),
-            ("step", Trigger, self._step_once),
+            ("step", Trigger, lambda _: self.time.step()),
         ):
             self.create_service(kind, f"~/{name}", self._served(answer))
         ports.publish("robot_description", 0, urdf(shared.arm))
         self._try_post_mortem()
-        if shared.timing.mode == "realtime":  # in lockstep the first status goes to all peers
-            self._announce()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._watching = self.create_timer(0.02, self._look_for_start, clock=steady)
-        self._now = time.perf_counter
-        self._progress = self._now()
-        if shared.timing.mode == "lockstep":
-            self._is_played = "scenario" in shared.nodes
-            self.create_timer(0.1, self._watch_progress, clock=steady)
-            self._started = False
+        if isinstance(self.time, Lockstep):
+            self.create_timer(WATCH, self._watch_lockstep, clock=steady)
+            if factor := shared.timing.real_time_factor:
+                self.create_timer(shared.timing.period / factor, self.time.go_on, clock=steady)
         else:
             raise_priority(shared.timing.niceness)
             self._started = True
-            self._latencies: list[float] = []
-            self._published: deque[tuple[int, float]] = deque(maxlen=100)
-            self._done = self._missed = 0
-            self.create_timer(shared.timing.period, self._tick, clock=steady)
-            # half a period of slack, so that a timer that comes a little early or late misses nothing
-            self._begin = self._now() - 0.5 * shared.timing.period
-            self._publish()
+            self._announce()  # in lockstep the first status goes to all peers
+            self.create_timer(shared.timing.period, self.time.tick, clock=steady)
+            self.time.start()
 
     def destroy_node(self) -> None:
         """Put on the brakes and say so."""
         self.driver.disable()
         self._announce()
+        self.get_logger().info(f"{self._timing.mode}: {self.time.summary}")
         self._ports.wait_for_delivery()
         super().destroy_node()
+        self._place.close()
 
     def take_fault(self, reason: str) -> None:
         """Brake where a callback raised."""
         if reason:
             self._fault(reason)
 
+    def _senders(self, nodes: Sequence[str]) -> dict[str, str]:
+        """Who answers the state of a period in lockstep, by topic."""
+        topics = ["motor_current_command", *(["sim/disturbance"] if "scenario" in nodes else [])]
+        return {topic: " and ".join(self._ports.interface.publishers(topic)) or "its publisher" for topic in topics}
+
     # what comes in
 
     def _take_currents(self, stamp: int, command: State) -> None:
-        currents, now = command.effort, self._now()
         if not 0 < stamp <= self.driver.stamp:
             raise Refused(
                 f"stamp {stamp} ns is not that of a state that was sent, newest {self.driver.stamp} ns; "
                 "answer a state with its own stamp"
             )
-        if stamp <= self._currents[0]:
+        if stamp <= self._answered:
             self._ports.claims.stray("motor_current_command")
-        if self._timing.mode == "realtime":
-            self._currents = (stamp, currents)
-            while self._published and self._published[0][0] < stamp:
-                self._published.popleft()
-            if self._published and self._published[0][0] == stamp:
-                self._latencies.append(now - self._published.popleft()[1])
-            self.driver.command(stamp, currents)
-            self._progress = now
-            self._command_came = now
-            return
-        if stamp > self._currents[0]:
-            self._currents = (stamp, currents)
-            self._go_on()
+        self._answered = stamp
+        self.time.take_currents(stamp, command.effort)
 
     def _take_status(self, status: NodeStatus) -> None:
-        """Brake where another node reports a fault; go on where all follow the session."""
+        """Brake where another node reports a fault; note which session it follows."""
         self._session.hear(status)
-        if status.level is Level.ERROR and status.fault and status.node != "driver":
+        if status.level is Level.ERROR and status.fault:
             self._fault(f"{status.node}: {status.fault}")
-        if self._is_resuming and not self._session.silent:
-            self._is_resuming = False
-            self._end_the_roll_call()
-            self._currents, self._push_stamp = (0, []), 0
-            self._progress = self._now()
-            self._publish()
 
     def _take_problem(self, reason: str) -> None:
         if reason and self.driver.safety.mode is Mode.ENABLED:
@@ -162,13 +151,9 @@ class DriverNode(TolerantNode):
                 self.driver.push(wrench.frame, wrench.force, wrench.torque)
             except ValueError as error:
                 refusal = str(error)
-        self._push_stamp = stamp
-        if self._timing.mode == "lockstep":
-            self._go_on()  # also after a refused push: the state has its answer
+        self.time.take_push(stamp)  # also after a refused push: the state has its answer
         if refusal:
             raise Refused(refusal)
-
-    # lockstep
 
     def _look_for_start(self) -> None:
         """Say that the peers are connected; in lockstep begin."""
@@ -186,84 +171,20 @@ class DriverNode(TolerantNode):
         self._watching.cancel()
         if not self._started:
             self._started = True
-            self._publish()
-            self._progress = self._now()
+            self.time.start()
 
-    def _missing(self) -> list[str]:
-        stamp = self.driver.stamp
-        missing = [] if self._currents[0] == stamp else ["motor_current_command"]
-        if self._is_played and self.driver.is_outer and self._push_stamp != stamp:
-            missing.append("sim/disturbance")
-        return missing
+    def _watch_lockstep(self) -> None:
+        assert isinstance(self.time, Lockstep)
+        self.time.watch()
+        if self.time.start_overdue:
+            self.get_logger().warning(f"waiting for {self.awaited} to be ready", throttle_duration_sec=5.0)
 
-    def _go_on(self) -> None:
-        if self._started and not self._paused and not self._is_resuming and not self._missing():
-            self._one_period()
-
-    def _one_period(self) -> None:
-        self.driver.command(*self._currents)
-        self.driver.advance(0.0)
-        self._progress = self._now()
-        self._publish()
-        self._announce()
-
-    def _watch_progress(self) -> None:
-        waited = self._now() - self._progress
-        is_due = waited > self._timing.timeout - min(ROLL_CALL, 0.5 * self._timing.timeout)
-        if self._started and not self._paused and not self._is_resuming and is_due:
-            self._call_the_roll(waited)
-        if waited < self._timing.timeout or self._paused or not self._started:
-            if not self._started and waited > self._timing.timeout:
-                absent = ", ".join(self._ports.absent) or "the peers of the driver"
-                self.get_logger().warning(f"waiting for {absent} to be ready", throttle_duration_sec=5.0)
-            return
-        self._end_the_roll_call()
-
-    def _call_the_roll(self, waited: float) -> None:
-        """Begin another session, so that the nodes that run say that they follow it; the arm is braked meanwhile."""
-        if self.driver.safety.mode is Mode.ENABLED:
-            missing = " and ".join(self._missing())
-            self._stalled = f"lockstep: no {missing} for the state of {self.driver.stamp} ns within {waited:.1f} s"
-        self.driver.disable()
-        self._is_resuming = True
-        self._session.begin()
-        self._announce()
-
-    def _end_the_roll_call(self) -> None:
-        """Say why the arm was braked, and which node does not answer."""
-        reason, self._stalled = self._stalled, ""
-        if reason:
-            silent = " and ".join(self._session.silent)
-            self._fault(f"{reason}; {silent} has stopped, start it again, then reset_fault" if silent else reason)
-
-    # realtime
-
-    def _tick(self) -> None:
-        now = self._now()
-        due = int((now - self._begin) / self._timing.period) - self._done
-        if due <= 0:
-            return
-        self._done += due
-        if self._paused:
-            return
-        self._missed += due - 1
-        age = now - self._progress
-        for left in range(due - 1, -1, -1):
-            self.driver.advance(age)
-            if left == 0 or self.driver.is_outer:
-                self._publish()
-        self._announce()
-
-    def _timing_facts(self) -> dict[str, str]:
-        latencies = sorted(self._latencies) or [float("nan")]
-        self._latencies = []
-        return {
-            "latency p50 [us]": f"{latencies[len(latencies) // 2] * 1e6:.0f}",
-            "latency p99 [us]": f"{latencies[int(len(latencies) * 0.99)] * 1e6:.0f}",
-            "missed periods": str(self._missed),
-            "periods": str(self._done),
-            "rate [Hz]": f"{(self._done - self._missed) / (self._now() - self._begin):.1f}",
-        }
+    @property
+    def awaited(self) -> str:
+        """Nodes without which lockstep does not start, '' once it has."""
+        if self._started:
+            return ""
+        return ", ".join(self._ports.absent or self._session.silent) or "the peers of the driver"
 
     # what goes out
 
@@ -272,8 +193,6 @@ class DriverNode(TolerantNode):
         stamp = driver.stamp
         if self._arm.joint_sensors:
             ports.publish("joint_sensors", stamp, driver.joint_sensors)
-        if self._timing.mode == "realtime":
-            self._published.append((stamp, self._now()))
         ports.publish("motor_states", stamp, driver.motor_state)
         ports.counts["steps"] += 1
         if driver.is_outer:
@@ -284,9 +203,10 @@ class DriverNode(TolerantNode):
             ports.publish("sim/joint_states", stamp, driver.true_joint_state)
             ports.publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
             ports.publish("sim/contact/point", stamp, Point(frame, (load.place, 0.0, 0.0)))
-        if self._timing.mode == "realtime" and ports.report_due(stamp):
-            ports.facts |= self._timing_facts()
+        if ports.report_due(stamp):
+            ports.facts |= self.time.facts()
         ports.report(stamp)
+        self._announce()
 
     def _announce(self) -> None:
         """Publish the status where it has changed."""
@@ -302,6 +222,8 @@ class DriverNode(TolerantNode):
         is_new_fault = bool(safety.fault) and message != self._reported[0]
         self._reported = reported
         level = Level.ERROR if safety.fault or problem else Level.WARN if warnings else Level.OK
+        if is_new_fault:
+            self.get_logger().error(message)
         self._ports.publish_status(
             NodeStatus(
                 level,
@@ -315,7 +237,6 @@ class DriverNode(TolerantNode):
             )
         )
         if is_new_fault:
-            self.get_logger().error(message)
             self._write_post_mortem()
 
     def _write_post_mortem(self) -> None:
@@ -363,40 +284,22 @@ class DriverNode(TolerantNode):
     def _enable(self, request: SetBool.Request) -> Answer:
         if not request.data:
             return self.driver.disable()
-        now = self._now()
-        obstacle = ""
         if self.driver.safety.mode is Mode.ENABLED:
             return self.driver.enable("")
-        others = {node: fault for node, fault in sorted(self._ports.faults.items()) if fault and node != "driver"}
+        faults = {node: fault for node, fault in sorted(self._ports.faults.items()) if fault}
         if problem := self._ports.problem:
             obstacle = problem
         elif self.count_publishers("motor_states") > 1:
             obstacle = TWO_DRIVERS
-        elif others:
-            obstacle = "; ".join(f"{node}: {fault}" for node, fault in others.items())
-        elif self._timing.mode == "realtime" and now - self._command_came > self._watchdog:
-            obstacle = "no motor_current_command comes in; start velocity_loop and its peers, then enable"
-        self._progress = now
+        elif faults:
+            obstacle = "; ".join(f"{node}: {fault}" for node, fault in faults.items())
+        else:
+            obstacle = self.time.obstacle()
         return self.driver.enable(obstacle)
 
     def _pause(self, request: SetBool.Request) -> Answer:
-        self._paused = bool(request.data)
-        self._progress = self._now()
-        if not self._paused and self._timing.mode == "lockstep":
-            self._go_on()
-        return Answer(True, "paused" if self._paused else "running")
-
-    def _step_once(self, _: Trigger.Request) -> Answer:
-        if not self._paused:
-            return Answer(False, "refused: the driver is running; call pause first")
-        if self._timing.mode == "lockstep":
-            if missing := self._missing():
-                return Answer(False, f"refused: still waiting for {' and '.join(missing)}")
-            self._one_period()
-        else:
-            self.driver.advance(0.0)
-            self._publish()
-        return Answer(True, f"at {self.driver.stamp} ns")
+        self.time.pause(bool(request.data))
+        return Answer(True, "paused" if request.data else "running")
 
     def _fault(self, reason: str) -> None:
         self.driver.fault(reason)

@@ -11,4 +11,5 @@
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals
 - program: ends a program quietly whose imports are interrupted
 - call: one request to a service
+- network: limits ROS to this machine; one node of a name in each place
 """

@@ -10,13 +10,14 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Final
+from typing import Any, Final
 
 from rclpy.logging import get_logger
 from rclpy.node import Node
 
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
+from wam_ros.network import require_places
 from wam_ros.node import make_node
 from wam_ros.run import NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
@@ -26,6 +27,21 @@ LAST: Final = "recorder"  # to be stopped: it closes the bag
 PATIENCE: Final = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
 RECORDER_PATIENCE: Final = 30.0  # s without any sign of work, before a recorder that does not end is killed
 TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
+
+
+def start(
+    configuration: Configuration, apart: bool, is_stopped: Callable[[], bool], namespace: str = NAMESPACE
+) -> "Composition | Processes":
+    """Start the nodes of a configuration.
+
+    Parameters
+    ----------
+    configuration : values for all nodes; its `shared.nodes` says which ones are started.
+    apart : a process for each node; otherwise all in this one.
+    is_stopped : whether the start is to be broken off.
+    namespace : namespace of the nodes.
+    """
+    return Processes(configuration, namespace) if apart else Composition(configuration, namespace, None, is_stopped)
 
 
 def node_names(configuration: Configuration) -> dict[str, str]:
@@ -63,6 +79,7 @@ class Processes:
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
         names = node_names(configuration)
+        require_places(names.values(), namespace)
         prepare_logging_directory()
         self.killed: list[str] = []
         self._stack = ExitStack()
@@ -88,6 +105,11 @@ class Processes:
         while not until(ended := self.ended()):
             time.sleep(0.05)
         return ended
+
+    @property
+    def failures(self) -> list[str]:
+        """Nodes that have ended and should not have; why, they have printed themselves."""
+        return [f"node {name} ended with code {code}" for name, code in self.ended().items() if code]
 
     def stop(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
@@ -164,29 +186,41 @@ def _work_of(pid: int) -> tuple[str, ...]:
 
 
 class Composition:
-    """Nodes in this process, in one executor: for tests, and for lockstep at full speed.
+    """Nodes in this process, in one executor; leaving the context destroys them, brakes first, bag last.
 
     Parameters
     ----------
     configuration : values for all nodes; its `shared.nodes` says which ones are made.
     namespace : namespace of the nodes.
     domain_id : ROS domain, the one of the environment where None.
+    is_stopped : no further node is made once it is true.
 
     Attributes
     ----------
     nodes : the nodes by name.
     context, executor : of this connection, for further nodes.
+    killed : none, as nodes of this process end by themselves.
     """
 
-    def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, domain_id: int | None = None) -> None:
+    killed: tuple[str, ...] = ()
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        namespace: str = NAMESPACE,
+        domain_id: int | None = None,
+        is_stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
         names = node_names(configuration)
         self._connection = Connection(domain_id=domain_id)
         self.context, self.executor = self._connection.context, self._connection.executor
         self.nodes: dict[str, Node] = {}
+        self._may_end: dict[str, Any] = {}
         try:
             with parameter_file(configuration) as parameters:
                 for entry, name in names.items():
-                    self._make(entry, name, namespace, parameters)
+                    if not is_stopped():
+                        self._make(entry, name, namespace, parameters)
         except BaseException:
             self.close()
             raise
@@ -201,12 +235,28 @@ class Composition:
         )
         self.nodes[name] = node
         self._connection.add(node)
+        if hasattr(getattr(node, "node", node), "done"):
+            self._may_end[name] = node
 
     def __enter__(self) -> "Composition":
         return self
 
     def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
         self.close()
+
+    def ended(self) -> dict[str, int]:
+        """Exit codes of the nodes that have ended, by name, as if they were processes."""
+        return {name: int(bool(node.failure)) for name, node in self._may_end.items() if node.done}
+
+    @property
+    def failures(self) -> list[str]:
+        """Why nodes have ended that should not have."""
+        return [node.failure for node in self._may_end.values() if node.done and node.failure]
+
+    def wait(self, until: Callable[[dict[str, int]], bool]) -> dict[str, int]:
+        """Spin until the exit codes seen so far satisfy a condition; returns them."""
+        self.spin(lambda: until(self.ended()))
+        return self.ended()
 
     def spin(self, until: Callable[[], bool]) -> None:
         """Spin until a condition holds."""

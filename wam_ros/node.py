@@ -5,6 +5,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Followed, Outputs, SetParameters, mask, needed_arrays
 from wam_ros.messages import Refused
+from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow_other, follow_together
 from wam_ros.ports import SECOND, Ports
 from wam_ros.run import raise_priority, run
@@ -45,6 +47,7 @@ class AdaptedNode(TolerantNode):
 
     def __init__(self, declaration: Declaration, **ros: Any) -> None:
         super().__init__(declaration.name, **ros)
+        self._place = take_place(self, declaration.name)
         owned: str | None = getattr(declaration.node, "owns", None)
         shared, own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
         try:
@@ -96,6 +99,7 @@ class AdaptedNode(TolerantNode):
         """End only when the others have what was published."""
         self._ports.wait_for_delivery()
         super().destroy_node()
+        self._place.close()
 
     def _connect(self, topic: str, feeds: Sequence[Feed]) -> None:
         """Subscribe once; all reactions to a message work in the order of their declaration."""
@@ -149,14 +153,18 @@ class AdaptedNode(TolerantNode):
             self._is_enabled = status.mode == "enabled"
             if status.session and status.session != self._ports.session:
                 for synchroniser in self._synchronisers:
-                    synchroniser.restart(status.stamp)
+                    synchroniser.follow(status.stamp)
                 self._ports.follow(status.session)
             if status.since != self._since:
                 self._since = status.since
                 for synchroniser in self._synchronisers:
                     synchroniser.discard_commands(status.since)
-        if take_status := getattr(self.node, "take_status", None):
-            take_status(status)
+        take_status = getattr(self.node, "take_status", None)
+        if take_status and (outputs := take_status(status)):
+            self._publish(status.stamp, outputs)
+            if getattr(self.node, "done", False):  # nobody may be there to answer its requests
+                self._waiting.clear()
+                self._asking = False
 
     def end(self) -> None:
         """Say at once that this node ends, so that an enabled arm is braked before its commands cease."""
@@ -277,20 +285,25 @@ def _answering(method: Callable[[], Any]) -> Callable[[Any, Any], Any]:
     return serve
 
 
-def make_node(entry: str, **ros: Any) -> Node:
-    """The ROS node of an entry of the parameter `nodes`.
+def node_factory(entry: str) -> Callable[..., Node]:
+    """What makes the ROS node of an entry of the parameter `nodes`, with all that it needs imported.
 
     Parameters
     ----------
     entry : name in the table of nodes, or 'module:Class' of a node of your own.
-    ros : context, namespace and so on, as rclpy's Node takes them.
     """
     declaration = declared(entry)
+    declaration.parameter_class  # noqa: B018 - imports it
     if not declaration.ros_node:
-        return AdaptedNode(declaration, **ros)
+        return partial(AdaptedNode, declaration)
     module, _, name = declaration.ros_node.partition(":")
-    node: Node = getattr(importlib.import_module(module), name)(**ros)
+    node: Callable[..., Node] = getattr(importlib.import_module(module), name)
     return node
+
+
+def make_node(entry: str, **ros: Any) -> Node:
+    """The ROS node of an entry of the parameter `nodes`; `ros` is what rclpy's Node takes."""
+    return node_factory(entry)(**ros)
 
 
 def main() -> None:

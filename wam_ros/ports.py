@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -16,24 +16,37 @@ from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.interface import Interface
 from wam_description.signals import Level, NodeStatus
-from wam_description.topics import STATUS
+from wam_description.status import diagnosed_name, guidance
+from wam_description.topics import STATUS, Topic
 from wam_description.wiring import Declaration
 from wam_ros.claims import Claims
 from wam_ros.header import header
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
 from wam_ros.qos import DEPTH, qos
+from wam_ros.run import NAMESPACE, end_of_delivery
 from wam_ros.wire import decoder, encoder, stamp_of
 
 DIAGNOSTICS = "/diagnostics"
 READY = NodeStatus(Level.OK, "ready", connected=True)
 WAITING = NodeStatus(Level.WARN, "waiting for its peers")
+CLOCK = "/clock"
+STALE_AFTER = 5  # s without a step, as long as aggregators of diagnostics wait
 LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
 CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
 LONGEST_ECHO = 0.1  # s, for the status before that of a new session, which replaces it; a frozen node takes nothing
-LONGEST_DELIVERY = 4.0  # s, for all topics of a node together; the middleware repeats what was lost every 3 s
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
+
+
+def topic_name(node: Node, topic: Topic) -> str:
+    """The name of a topic at a node: two arms have two clocks, and tools know only one as /clock.
+
+    It is that of the arm in the default namespace; another arm's is 'clock' in its own.
+    """
+    if topic.name == CLOCK and node.get_namespace() != f"/{NAMESPACE}":
+        return CLOCK.strip("/")
+    return topic.name
 
 
 class Ports:
@@ -79,14 +92,17 @@ class Ports:
         rows = [interface.topics[topic] for topic in declaration.outputs if topic in interface.topics]
         own = [interface.topics[topic] for topic in (STATUS, DIAGNOSTICS)]
         self._publishers: dict[str, Publisher] = {
-            row.name: node.create_publisher(message_type(row), row.name, qos(row)) for row in [*rows, *own]
+            row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in [*rows, *own]
         }
         self._published = dict.fromkeys(self._publishers, 0)
-        self._full = {topic: node.resolve_topic_name(topic) for topic in self._publishers}
+        self._full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in [*rows, *own]}
         self._encoders = {row.name: encoder(row, shared) for row in rows}
+        self._last_steps = self._seconds_without_step = 0
+        self._told = ("", True)  # mode of the driver, whether nodes are missing
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._readiness = node.create_timer(0.02, self._look_for_peers, clock=steady)
         node.create_timer(CLAIM_PERIOD, self._look_for_rivals, clock=steady)
+        node.create_timer(1.0, self._report_standstill, clock=steady)
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
@@ -147,7 +163,8 @@ class Ports:
         elif self.shared.timing.mode == "realtime":
             profile.depth = NEWEST  # a late node works on the newest state
         kind = message_type(row)
-        self._subscriptions[topic] = self.node.create_subscription(kind, topic, receive, profile, raw=raw)
+        name = topic_name(self.node, row)
+        self._subscriptions[topic] = self.node.create_subscription(kind, name, receive, profile, raw=raw)
 
     def publisher_count(self, topic: str) -> int:
         """How many publishers feed a topic that this node listens to."""
@@ -210,14 +227,26 @@ class Ports:
         if status != self._status:
             self._status = status
             self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
+            self._tell()
+
+    def _tell(self) -> None:
+        """Say on the console what the driver's state is and what to call next, where that has changed."""
+        state = (self._status.mode, bool(self._absent))
+        if not self._status.mode or state == self._told:
+            return
+        before, self._told = self._told[0], state
+        is_played = "scenario" in self.shared.nodes
+        self.node.get_logger().info(guidance(state[0], before, self.absent, self.node.get_namespace(), is_played))
 
     def wait_for_delivery(self) -> None:
         """Report how much was published, then wait until the recorder and all others have the last messages.
 
+        No longer than `wam_ros.run.end_of_delivery`.
+
         What a process leaves behind unacknowledged ends with it: on a loaded machine that was the last second of a bag.
         """
         self._report(**{ENDED: "yes"})
-        end = time.monotonic() + LONGEST_DELIVERY
+        end = end_of_delivery(self.node.context)
         late = [
             topic
             for topic, publisher in self._publishers.items()
@@ -236,6 +265,7 @@ class Ports:
             status = read_status(message)
             if status.connected:
                 self._absent.discard(status.node)
+                self._tell()
             if status.node in self.interface.declarations and status.node != self._name:
                 self.faults[status.node] = status.fault
                 if take is not None:
@@ -279,14 +309,30 @@ class Ports:
     def _report(self, **more: str) -> None:
         """Publish the diagnostics, with how many messages were published on each topic, this one included."""
         total = sum(self.refusals.values())
-        refused = {f"refused on {topic}": str(count) for topic, count in sorted(self.refusals.items())}
         level = max(self._status.level, Level.WARN if total > self._refusals_reported else Level.OK)
         self._refusals_reported = total
+        self._publish_report(level, self._status.message, more)
+
+    def _report_standstill(self) -> None:
+        """Once in a second of the wall clock: report where the node has had nothing to do for long.
+
+        In lockstep a node that waits for its start is silent: how long that takes is not the arm's time.
+        """
+        steps = self.counts["steps"]
+        self._seconds_without_step = 0 if steps != self._last_steps else self._seconds_without_step + 1
+        self._last_steps = steps
+        if self._seconds_without_step >= STALE_AFTER and (steps or self.shared.timing.mode == "realtime"):
+            reason = f"no step for {self._seconds_without_step} s" if self.ready else self._status.message
+            self._publish_report(Level.STALE, reason, {})
+
+    def _publish_report(self, level: Level, text: str, more: Mapping[str, str]) -> None:
+        refused = {f"refused on {topic}": str(count) for topic, count in sorted(self.refusals.items())}
         counts = {key: str(count) for key, count in sorted(self.counts.items())}
         totals = {**self._published, DIAGNOSTICS: self._published[DIAGNOSTICS] + 1}
         published = {f"{PUBLISHED}{self._full[topic]}": str(count) for topic, count in totals.items()}
         own = {NODE: self.node.get_fully_qualified_name(), **published}
-        facts = {**counts, **refused, **own, **self.facts}
-        status = NodeStatus(level, self._status.message, self._name, fault=self._status.fault, facts={**facts, **more})
+        facts = {**counts, **refused, **own, **self.facts, **more}
+        name = diagnosed_name(self.node.get_namespace(), self._name)
+        status = NodeStatus(level, text, name, fault=self._status.fault, facts=facts)
         message = diagnostic_status(status._replace(connected=self.ready), self.shared.arm.name)
         self._send(DIAGNOSTICS, DiagnosticArray(header=header(self._last_report), status=[message]))

@@ -10,6 +10,7 @@ from wam_bag.bag_writer import BagWriter, RecordingError
 from wam_bag.losses import LOST_AT_END, UNFINISHED
 from wam_bag.message_layout import stamp_reader
 from wam_bag.printable import printable
+from wam_description.status import diagnosed_name
 from wam_description.topics import EVERY_NODE, Topic
 
 _MOST_STREAMS: Final = 8  # numberings tracked for one topic and publisher
@@ -77,10 +78,10 @@ class Numbering:
 class _Channel:
     """One topic on its way into the bag."""
 
-    def __init__(self, topic: Topic, name: str, sender: Callable[[str], str]) -> None:
+    def __init__(self, topic: Topic, name: str, sender: Callable[[str], str], arm: str) -> None:
         self.topic = topic
         self.name = name
-        self.publisher_of = _publisher_reader(topic, partial(sender, name))
+        self.publisher_of = _publisher_reader(topic, partial(sender, name), arm)
         self.stamp_of = stamp_reader(topic.type)
         self.publishers: OrderedDict[str, Numbering] = OrderedDict()
         self.totals: dict[str, int] = {}  # published by each node that has announced it
@@ -121,6 +122,8 @@ class Recorder:
         clock.  'lockstep': both are the stamp in the message, or for a message without one the
         last stamp of the same publisher (0 before its first), so that no wall clock is in the bag.
     qos : what each topic's publishers offer, by full name.
+    sender : finds the only publisher of a topic.
+    namespace : of the arm, '' where its nodes are not named by it in /diagnostics.
     """
 
     def __init__(
@@ -130,6 +133,7 @@ class Recorder:
         mode: str,
         qos: Mapping[str, object],
         sender: Callable[[str], str],
+        namespace: str = "",
     ) -> None:
         self.failure = ""
         self._received = 0
@@ -139,7 +143,7 @@ class Recorder:
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, qos[name])
-            self._channels[name] = _Channel(topic, name, sender)
+            self._channels[name] = _Channel(topic, name, sender, diagnosed_name(namespace, "") if namespace else "")
 
     def announce(self, node: str, name: str, total: int) -> None:
         """Take the number of messages that a node says it has published on a topic, by its full name."""
@@ -260,33 +264,34 @@ def _counts(channel: _Channel) -> Iterator[Count]:
             yield Count(channel.name, node, 0, 0, 0, count)
 
 
-def _publisher_reader(topic: Topic, sender: Callable[[], str]) -> Callable[[bytes], str]:
+def _publisher_reader(topic: Topic, sender: Callable[[], str], arm: str) -> Callable[[bytes], str]:
     """A function that finds the node that sent a message, which rclpy does not report.
 
     Parameters
     ----------
     topic : row of the table of topics; one that every node publishes carries the node's name, up to a ':' or '/'.
+    arm : what the names of this arm's nodes begin with in /diagnostics.
     sender : finds the only publisher of any other topic, once a message has come.
     """
     if topic.type == _NODE_STATUS:
         return lambda data: _node_name(data, 5)
     if topic.type == _NODE_DIAGNOSTICS:
-        return _first_status_name
+        return lambda data: _first_status_name(data, arm)
     found = cache(sender)
     return lambda data: found()
 
 
-def _first_status_name(data: bytes) -> str:
+def _first_status_name(data: bytes, arm: str) -> str:
     try:
         (frame,) = struct.unpack_from("<I", data, 12)
         position = _aligned(16 + frame)
         (count,) = struct.unpack_from("<I", data, position)
     except struct.error:
         return "?"
-    return _node_name(data, position + 5) if count else "?"
+    return _node_name(data, position + 5, arm) if count else "?"
 
 
-def _node_name(data: bytes, position: int) -> str:
+def _node_name(data: bytes, position: int, arm: str = "") -> str:
     try:
         position = _aligned(position)
         (length,) = struct.unpack_from("<I", data, position)
@@ -294,7 +299,7 @@ def _node_name(data: bytes, position: int) -> str:
         return "?"
     end = position + 3 + min(length, _LONGEST_NAME)
     name = printable(data[position + 4 : end].decode("utf-8", "replace").strip("/"))
-    return name.split(":")[0].split("/")[0].strip() or "?"
+    return name.removeprefix(arm).split(":")[0].split("/")[0].strip() or "?"
 
 
 def _aligned(position: int) -> int:

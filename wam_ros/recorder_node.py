@@ -16,10 +16,12 @@ from wam_bag.bag_writer import BagWriter, RecordingError, Split
 from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, parameter, values
 from wam_description.signals import Level, NodeStatus
+from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, Topic
 from wam_ros.messages import diagnostic_status, message_type, read_status
+from wam_ros.network import require_name
 from wam_ros.parameters import declare
-from wam_ros.ports import DIAGNOSTICS, ENDED, NODE, PUBLISHED, READY
+from wam_ros.ports import DIAGNOSTICS, ENDED, NODE, PUBLISHED, READY, topic_name
 from wam_ros.qos import DEPTH, qos
 from wam_ros.recorder import Recorder, summary
 from wam_ros.recorder_interface import RecorderInterface
@@ -55,6 +57,7 @@ class RecorderNode(TolerantNode):
 
     def __init__(self, **ros: Any) -> None:
         super().__init__("recorder", **ros)
+        require_name(self, "recorder")
         shared, own = declare(self, RecorderParameters)
         self._own_parameters = {**values(shared), **values(own)}
         self._arm = shared.arm.name
@@ -65,11 +68,11 @@ class RecorderNode(TolerantNode):
         except RecordingError as error:
             raise ParameterError(f"node 'recorder': {error} (parameters 'directory' and 'name')") from None
         interface = Interface(shared)
-        topics = {self.resolve_topic_name(topic.name): topic for topic in interface.topics.values()}
+        topics = {self.resolve_topic_name(topic_name(self, topic)): topic for topic in interface.topics.values()}
         chosen = {name: topic for name, topic in topics.items() if {topic.name, EVERY} & set(own.topics)}
         offered = {full_name: qos(topic) for full_name, topic in chosen.items()}
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
-        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender)
+        self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender, self.get_namespace())
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription
         self._inlets = {name: self._listen(name, topic) for name, topic in topics.items()}
         own_name = RecorderInterface.name
@@ -171,7 +174,9 @@ class RecorderNode(TolerantNode):
             self.get_logger().warning(f"the recorder was too slow: {summary(so_far)}")
 
     def _report(self) -> None:
-        message = DiagnosticArray(status=[self._state("recording")])
+        state = self._state("recording")
+        state.name = diagnosed_name(self.get_namespace(), state.name)
+        message = DiagnosticArray(status=[state])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 

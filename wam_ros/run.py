@@ -7,23 +7,29 @@ import signal
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy would start a thread a core for 4x4 matrices
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from wam_description.parameters import ParameterError
+from wam_ros.network import limit_to_this_machine
 
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
 LONGEST_END = 0.5  # s, for what has arrived before the end
+# s, for the last messages of all nodes of this process together; the middleware repeats what was lost every 3 s
+LONGEST_DELIVERY = 4.0
 PR_SET_PDEATHSIG = 1
 MakeNode = Callable[..., Node]
 
@@ -55,6 +61,17 @@ def make_executor(context: Context) -> Any:
     except ImportError:
         return SingleThreadedExecutor(context=context)
     return EventsExecutor(context=context)
+
+
+_ENDS: WeakKeyDictionary[Context, float] = WeakKeyDictionary()
+
+
+def end_of_delivery(context: Context) -> float:
+    """When the nodes of a context that end now stop waiting for others to take their messages, s, monotonic.
+
+    There is one deadline for all of them: a listener that is frozen would hold up each node in turn.
+    """
+    return _ENDS.get(context, time.monotonic() + LONGEST_DELIVERY)
 
 
 class Stop:
@@ -114,6 +131,7 @@ class Connection:
     """
 
     def __init__(self, arguments: Sequence[str] = (), domain_id: int | None = None) -> None:
+        limit_to_this_machine()
         prepare_logging_directory()
         self.context = Context()
         rclpy.init(
@@ -132,6 +150,7 @@ class Connection:
 
     def close(self, order: Callable[[Node], int] = lambda node: 0) -> None:
         """Destroy the nodes, lowest order first, and leave the network."""
+        _ENDS[self.context] = time.monotonic() + LONGEST_DELIVERY
         for node in sorted(self._nodes, key=order):
             self.executor.remove_node(node)
             node.destroy_node()
@@ -158,6 +177,8 @@ def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv if arguments is None else arguments)
     try:
         connection = Connection(given)
+    except ParameterError as error:
+        raise SystemExit(f"error: {error}") from None
     except RuntimeError as error:
         reason = str(error).split(", at /")[0]
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
@@ -168,6 +189,8 @@ def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
         spin(connection.executor, lambda: stop.is_set or getattr(node, "done", False), lambda: stop.is_set and end())
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
+    except RCLError as error:  # for example security that is enforced where the middleware has none
+        raise SystemExit(f"error: {str(error).split(', at /')[0]}") from None
     finally:
         connection.close()
     if failure := getattr(node, "failure", ""):

@@ -204,4 +204,5 @@ class Simulation:
         status = NodeStatus(level, message, "driver", mode=safety.mode.value, fault=safety.fault)
         for node in self.nodes.values():
             if hasattr(node, "take_status"):
-                node.take_status(status)
+                for name, output in (node.take_status(status) or {}).items():
+                    self._bus.publish(name, status.stamp, output)

@@ -47,6 +47,7 @@ def play_over_topics(configuration: Configuration, scenario: BenchmarkScenario, 
         own = {
             "nodes": [*shared.nodes, "scenario", "recorder"],
             "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "timing.timeout": 60.0,
             "timing.display_divisor": 1,
             "scenario:script": str(steps),

@@ -1,34 +1,93 @@
-"""`wam up`: the nodes, until Ctrl-C."""
+"""`wam up`: the nodes, until Ctrl-C; and the options of time, which `wam demo` has, too."""
 
 import argparse
 import sys
 
 from wam_cli.commands import configuration_of, take_configuration
-from wam_ros.bring_up import Processes
-from wam_ros.run import Stop
+from wam_description.configuration import Configuration
+from wam_ros.bring_up import start
+from wam_ros.node import node_factory
+from wam_ros.program import end_at_once_on_signals
+from wam_ros.run import NAMESPACE, Stop, die_with_parent
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("--mode", choices=("realtime", "lockstep"), help="timing, instead of that of the configuration")
+    take_time(parser)
+    parser.add_argument("--mode", choices=("realtime", "lockstep"), help=argparse.SUPPRESS)  # what it was called before
     parser.add_argument("--scenario", default="", help="play this scenario: a YAML file, or demo_scenario")
     parser.add_argument("--record", action="store_true", help="record every topic")
+    parser.add_argument("--namespace", default=NAMESPACE, help="namespace of the nodes; default: %(default)s")
     take_configuration(parser)
 
 
+def take_time(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options that say how time passes."""
+    parser.add_argument("--processes", action="store_true", help="a process for each node; default: all in one process")
+    parser.add_argument(
+        "--realtime",
+        action="store_true",
+        help="do not wait for commands, as a real driver; a process for each node; default: timing.mode, lockstep",
+    )
+    parser.add_argument(
+        "--real-time-factor",
+        type=float,
+        metavar="FACTOR",
+        help="speed of lockstep: 1 as the wall clock, 0 as fast as it can; default: timing.real_time_factor",
+    )
+    parser.add_argument("--lockstep", action="store_true", help=argparse.SUPPRESS)  # what factor 0 was called before
+
+
+def timed(configuration: Configuration, given: argparse.Namespace) -> Configuration:
+    """The configuration with what the options say about time.
+
+    Raises
+    ------
+    ValueError
+        where options exclude each other.
+    """
+    mode = "realtime" if given.realtime else "lockstep" if given.lockstep else getattr(given, "mode", None)
+    factor = 0.0 if given.lockstep else given.real_time_factor
+    values = {"timing.mode": mode, "timing.real_time_factor": factor}
+    timed = configuration.with_values({name: value for name, value in values.items() if value is not None})
+    if factor is not None and timed.shared.timing.mode == "realtime":
+        raise ValueError("--real-time-factor is for lockstep; leave out --realtime")
+    return timed
+
+
+def runs_apart(configuration: Configuration, given: argparse.Namespace) -> bool:
+    """Whether each node gets a process of its own."""
+    return given.processes or configuration.shared.timing.mode == "realtime"
+
+
+def import_nodes(configuration: Configuration, given: argparse.Namespace) -> None:
+    """Import what the nodes need, while a signal may still end the program at once."""
+    if not runs_apart(configuration, given):
+        for entry in configuration.shared.nodes:
+            node_factory(entry)
+
+
 def run(given: argparse.Namespace) -> int:
-    """Start the processes and wait for the first to end."""
-    stop = Stop()
-    configuration = configuration_of(given)
+    """Start the nodes and wait for the first to end."""
+    die_with_parent()
+    configuration = timed(configuration_of(given), given)
     extra = ["scenario"] * bool(given.scenario) + ["recorder"] * given.record
     configuration = configuration.with_values({"nodes": [*configuration.shared.nodes, *extra]})
-    if given.mode:
-        configuration = configuration.with_values({"timing.mode": given.mode})
     if given.scenario:
         configuration = configuration.with_values({"scenario:script": given.scenario})
-    with Processes(configuration) as processes:
-        print(f"{len(configuration.shared.nodes)} nodes started; Ctrl-C stops them", flush=True)
-        ended = processes.wait(lambda ended: stop.is_set or bool(ended))
+    end_at_once_on_signals()
+    import_nodes(configuration, given)
+    stop = Stop()
+    apart = runs_apart(configuration, given)
+    with start(configuration, apart, lambda: stop.is_set, given.namespace) as stack:
+        if not stop.is_set:
+            where = "processes of their own" if apart else "this process"
+            print(f"{len(configuration.shared.nodes)} nodes started in {where}; Ctrl-C stops them", flush=True)
+        ended = stack.wait(lambda ended: stop.is_set or bool(ended))
+        failures = stack.failures
     for node, code in ended.items():
-        print(f"node {node} ended with code {code}; all were stopped", file=sys.stderr)
-    return max([abs(code) for code in ended.values()], default=0) or int(bool(processes.killed))
+        if not code:
+            print(f"node {node} has ended; all were stopped")
+    for failure in failures:
+        print(f"error: {failure}; all were stopped", file=sys.stderr)
+    return max([abs(code) for code in ended.values()], default=0) or int(bool(stack.killed))

@@ -129,6 +129,7 @@ def configured(experiment: Experiment, run: Run, directory: Path) -> Configurati
             **run.values,
             "nodes": [*nodes, "scenario", "recorder"],
             "timing.mode": "lockstep",
+            "timing.real_time_factor": 0.0,
             "scenario:script": str(script),
             "recorder:directory": str(directory),
             "recorder:name": run.name,

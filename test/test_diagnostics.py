@@ -1,0 +1,100 @@
+"""What /diagnostics and the console report: the present state, of which arm, and what to do next."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from test_nodes import Hand, Listener, bad
+
+from wam_description.status import guidance
+from wam_ros.ports import STALE_AFTER
+
+MS = 1_000_000
+
+
+def reports(heard: Listener, node: str = "wam: driver") -> list[Any]:
+    """Reports of one node, oldest first."""
+    every = [status for array in heard.seen["/diagnostics"] for status in array.status]
+    return [status for status in every if status.name == node]
+
+
+def next_report(hand: Hand, heard: Listener) -> Any:
+    """The report of the next full second."""
+    count = len(reports(heard))
+    hand.ros.wait(lambda: len(reports(heard)) > count)
+    return reports(heard)[-1]
+
+
+@pytest.fixture
+def hand(ros: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Hand:
+    return Hand(ros, tmp_path, "lockstep")
+
+
+def test_diagnostics_have_the_level_of_the_state_while_it_lasts(hand: Hand) -> None:
+    heard = Listener(hand.ros, "/diagnostics")
+    hand.enable()
+    next_report(hand, heard)
+    assert next_report(hand, heard).level == DiagnosticStatus.OK
+    hand.ask("estop")
+    report = next_report(hand, heard)
+    assert report.level == DiagnosticStatus.ERROR
+    assert "emergency stop" in report.message
+    hand.ask("reset_fault")
+    next_report(hand, heard)
+    assert next_report(hand, heard).level == DiagnosticStatus.OK
+
+
+def test_a_refused_message_is_a_warning_in_one_report_and_stays_counted(hand: Hand) -> None:
+    heard = Listener(hand.ros, "/diagnostics")
+    hand.enable()
+    hand.extra = [bad(effort=[])]
+    key, counts = "refused on motor_current_command", hand.node._ports.refusals
+    hand.ros.wait(lambda: counts["motor_current_command"] == 1)
+    first = next_report(hand, heard)
+    second = next_report(hand, heard)
+    assert [report.level for report in (first, second)] == [DiagnosticStatus.WARN, DiagnosticStatus.OK]
+    assert all({pair.key: pair.value for pair in one.values}[key] == "1" for one in (first, second))
+
+
+def test_a_paused_arm_is_stale_until_it_goes_on(hand: Hand) -> None:
+    heard = Listener(hand.ros, "/diagnostics")
+    hand.enable()
+    next_report(hand, heard)
+    hand.ask("pause", True)
+    report = next_report(hand, heard)
+    assert report.level == DiagnosticStatus.STALE
+    assert report.message == f"no step for {STALE_AFTER} s"
+    hand.ask("pause", False)
+    while reports(heard)[-1].level == DiagnosticStatus.STALE:
+        next_report(hand, heard)
+    assert reports(heard)[-1].level == DiagnosticStatus.OK
+
+
+def test_the_console_says_the_state_and_what_to_call_next(hand: Hand, capfd: pytest.CaptureFixture[str]) -> None:
+    connected = capfd.readouterr().err
+    hand.enable()
+    for request, data in (("estop", None), ("reset_fault", None), ("enable", True), ("enable", False)):
+        hand.ask(request, data)
+    hand.wait_periods(1)
+    release = (
+        "braked, all nodes are connected; to release the brakes: ros2 service call /wam/driver/enable "
+        "std_srvs/srv/SetBool '{data: true}' (or: wam call enable)"
+    )
+    fault = (
+        "fault, the brakes are on; when its cause is gone: ros2 service call /wam/driver/reset_fault "
+        "std_srvs/srv/Trigger (or: wam call reset_fault), then enable"
+    )
+    released = "enabled: the brakes are released"
+    lines = [line.split("]: ")[1] for line in capfd.readouterr().err.splitlines() if "[INFO]" in line]
+    assert lines == [released, fault, release, released, "braked: the brakes are on"]
+    assert release in connected
+
+
+def test_the_console_names_the_nodes_that_are_missing_and_the_arm_that_is_called() -> None:
+    assert guidance("braked", "", ["gravity"], "/wam", False) == "braked; not connected yet: gravity"
+    assert guidance("braked", "", [], "/left", False).endswith(
+        "ros2 service call /left/driver/enable std_srvs/srv/SetBool '{data: true}' "
+        "(or: wam call enable --namespace left)"
+    )
+    assert guidance("braked", "", [], "/wam", True) == "braked: the brakes are on"

@@ -1,0 +1,314 @@
+"""Who reaches the stack, and whom it disturbs: this machine alone, and nobody."""
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from conftest import LONG, ROOT
+
+from wam_description.parameters import ParameterError
+from wam_ros.network import (
+    FIRST_PORT,
+    OPEN,
+    PORTS,
+    PROFILE,
+    SWITCH,
+    THIS_MACHINE,
+    Place,
+    limit_to_this_machine,
+    move_to_free_domain,
+    occupant,
+    require_places,
+)
+
+WIDE_OPEN = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_STATIC_PEERS": "192.0.2.77"}
+PARAMETERS = ("--ros-args", "--params-file", str(ROOT / "config" / "wam.yaml"))
+DRIVER = ("-m", "wam_ros.program", "driver", *PARAMETERS)
+LOOPBACK = "0100007F"  # as in /proc/net/udp
+UNLIMITED = {"FASTRTPS_DEFAULT_PROFILES_FILE": "", "SKIP_DEFAULT_XML_FILE": ""}  # as before the tests limit themselves
+
+# what any ROS program can do, `ros2` for one: it has nothing of ours
+STRANGER = """
+import sys, time
+import rclpy
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+rclpy.init()
+node = Node("stranger")
+estop = node.create_client(Trigger, "/wam/driver/estop")
+end = time.monotonic() + float(sys.argv[1])
+while time.monotonic() < end and not estop.service_is_ready():
+    rclpy.spin_once(node, timeout_sec=0.05)
+if estop.service_is_ready():
+    answer = estop.call_async(Trigger.Request())
+    rclpy.spin_until_future_complete(node, answer, timeout_sec=10.0)
+    print("reached" if answer.done() and answer.result().success else "no answer")
+print("saw", [name for name in node.get_node_names() if name != "stranger"])
+rclpy.shutdown()
+"""
+
+
+@pytest.fixture
+def programs() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Start programs of this Python, which end with the test; an empty variable of their environment is left out."""
+    running: list[subprocess.Popen[str]] = []
+
+    def start(*command: str, before: tuple[str, ...] = (), **environment: str) -> subprocess.Popen[str]:
+        everything = {name: value for name, value in {**os.environ, **environment}.items() if value}
+        process = subprocess.Popen(
+            [*before, sys.executable, "-P", *command],
+            env=everything,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        running.append(process)
+        return process
+
+    yield start
+    for process in running:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+
+
+def said(process: subprocess.Popen[str]) -> str:
+    """The output of a program that ends by itself."""
+    return process.communicate(timeout=LONG)[0]
+
+
+def wait_for_place(domain: int, namespace: str, name: str, process: subprocess.Popen[str]) -> None:
+    end = time.monotonic() + LONG
+    while not occupant(domain, namespace, name):
+        assert process.poll() is None, said(process)
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def bound(domain: int) -> list[tuple[str, int]]:
+    """Address and port of each UDP socket that listens for a ROS domain."""
+    lines = Path("/proc/net/udp").read_text().splitlines()[1:]
+    found = [line.split()[1].split(":") for line in lines]
+    ports = range(FIRST_PORT + PORTS * domain, FIRST_PORT + PORTS * (domain + 1))
+    return [(address, int(port, 16)) for address, port in found if int(port, 16) in ports]
+
+
+def test_ros_is_limited_to_this_machine_whatever_the_shell_has_set() -> None:
+    environment = {**WIDE_OPEN, "ROS_DISCOVERY_SERVER": "192.0.2.77:11811", "ROS_DOMAIN_ID": "5"}
+    limit_to_this_machine(environment)
+    assert environment == {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(PROFILE),
+        "SKIP_DEFAULT_XML_FILE": "1",
+        "ROS_DOMAIN_ID": "5",
+    }
+    assert PROFILE.is_file()
+
+
+def test_it_is_opened_on_purpose_only_and_by_one_switch() -> None:
+    environment = {**WIDE_OPEN, SWITCH: OPEN}
+    limit_to_this_machine(environment)
+    assert environment == {**WIDE_OPEN, SWITCH: OPEN}
+    with pytest.raises(ParameterError, match=rf"{SWITCH} is 'yes'; allowed: {THIS_MACHINE}, {OPEN}"):
+        limit_to_this_machine({SWITCH: "yes"})
+    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
+    limit_to_this_machine(environment)
+    assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "OFF", "narrower than asked"
+
+
+@pytest.mark.parametrize(
+    "command", [DRIVER, ("-m", "wam_cli.main", "node", "driver"), ("-m", "wam_cli.main", "up")], ids=" ".join
+)
+def test_every_program_listens_on_the_loopback_interface_alone(
+    command: tuple[str, ...], programs: Callable[..., subprocess.Popen[str]], domain_id: int
+) -> None:
+    process = programs(*command, **WIDE_OPEN)
+    wait_for_place(domain_id, "/wam", "driver", process)
+    assert {address for address, _ in bound(domain_id)} == {LOOPBACK}
+
+
+@pytest.mark.parametrize(("switch", "addresses"), [(OPEN, {"00000000"}), ("shut", set())])
+def test_the_switch_opens_a_program_and_a_wrong_one_ends_it_in_one_sentence(
+    switch: str, addresses: set[str], programs: Callable[..., subprocess.Popen[str]], domain_id: int
+) -> None:
+    process = programs(*DRIVER, **UNLIMITED, **{SWITCH: switch})
+    if addresses:
+        wait_for_place(domain_id, "/wam", "driver", process)
+        assert {address for address, _ in bound(domain_id)} == addresses
+    else:
+        assert said(process) == f"error: environment variable {SWITCH} is 'shut'; allowed: {THIS_MACHINE}, {OPEN}\n"
+
+
+def test_an_ordinary_ros_program_of_this_machine_finds_the_stack(
+    programs: Callable[..., subprocess.Popen[str]], domain_id: int
+) -> None:
+    wait_for_place(domain_id, "/wam", "driver", programs(*DRIVER))
+    plain = {**UNLIMITED, "ROS_AUTOMATIC_DISCOVERY_RANGE": ""}
+    assert "reached" in said(programs("-c", STRANGER, str(LONG), **plain))
+
+
+def ip(*arguments: str) -> str:
+    return subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True).stdout
+
+
+@pytest.fixture
+def hosts() -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Two hosts on one network: what to put before a command that shall run there."""
+    if not (shutil.which("ip") and shutil.which("unshare")):
+        pytest.skip("no two network namespaces here: the programs ip (iproute2) and unshare are missing")
+    names = [f"wam{os.getpid()}{letter}" for letter in "ab"]
+    holders: list[subprocess.Popen[str]] = []
+    try:
+        try:
+            for name in names:
+                ip("netns", "add", name)
+            ip("link", "add", "there", "netns", names[0], "type", "veth", "peer", "name", "there", "netns", names[1])
+            for number, name in enumerate(names, 1):
+                ip("-n", name, "addr", "add", f"10.99.0.{number}/24", "dev", "there")
+                for device in ("lo", "there"):
+                    ip("-n", name, "link", "set", device, "up")
+            end = time.monotonic() + LONG
+            while not all("state UP" in ip("-n", name, "-o", "link", "show", "there") for name in names):
+                assert time.monotonic() < end  # the middleware looks for its interfaces once, when it starts
+                time.sleep(0.05)
+        except subprocess.CalledProcessError as error:
+            pytest.skip(f"no two network namespaces here: {error.stderr.strip()}")
+        # a host has a shared memory of its own
+        private = ("unshare", "-m", "sh", "-c", "mount -t tmpfs none /dev/shm && echo mounted && exec cat")
+        for name in names:
+            holders.append(
+                subprocess.Popen(
+                    ["ip", "netns", "exec", name, *private], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+                )
+            )
+            if "mounted" not in next(iter(holders[-1].stdout or []), ""):
+                pytest.skip("no two network namespaces here: no /dev/shm of their own")
+        first, second = (("nsenter", "-t", str(holder.pid), "-m", "-n") for holder in holders)
+        yield first, second
+    finally:
+        for holder in holders:
+            holder.communicate()
+        for name in names:
+            subprocess.run(["ip", "netns", "del", name], check=False, capture_output=True)
+
+
+@pytest.mark.parametrize("invited", [False, True])
+def test_another_host_reaches_the_stack_only_where_it_was_invited(
+    invited: bool, programs: Callable[..., subprocess.Popen[str]], domain_id: int, hosts: tuple[tuple[str, ...], ...]
+) -> None:
+    here, elsewhere = hosts
+    driver = programs(*DRIVER, before=here, **UNLIMITED, **({SWITCH: OPEN} if invited else {}))
+    plain = {**UNLIMITED, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    if not invited:  # once a stranger on the same host has reached it, it is there
+        local = said(programs("-c", STRANGER, str(20.0), before=here, **plain))
+        assert "reached" in local, said(driver)
+    stranger = programs(
+        "-c", STRANGER, str(20.0 if invited else 3.0), before=elsewhere, ROS_STATIC_PEERS="10.99.0.1", **plain
+    )
+    answer = said(stranger)
+    assert "reached" in answer if invited else answer == "saw []\n", (answer, domain_id, driver.poll())
+    assert driver.poll() is None, said(driver)
+
+
+def test_a_place_is_taken_once_and_free_again_when_it_is_closed() -> None:
+    place = Place(230, "/left", "driver")
+    assert occupant(230, "/left", "driver") == os.getpid()
+    assert not occupant(230, "/right", "driver")
+    assert not occupant(229, "/left", "driver")
+    for refuse in (lambda: Place(230, "/left", "driver"), lambda: Place(230, "/left", "driver").close()):
+        with pytest.raises(
+            ParameterError, match=rf"runs already in namespace /left of ROS domain 230 \(process {os.getpid()}"
+        ):
+            refuse()
+    place.close()
+    Place(230, "/left", "driver").close()
+    long = Place(230, "/left" * 100, "driver")
+    assert occupant(230, "/left" * 100, "driver")
+    long.close()
+
+
+def test_a_second_stack_is_refused_in_one_sentence_before_it_starts_anything(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], domain_id: int
+) -> None:
+    from wam_cli.main import main
+
+    place = Place(domain_id, "/wam", "velocity_loop")
+    with pytest.raises(SystemExit) as ended:
+        main(["up"])
+    place.close()
+    assert ended.value.code == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert (
+        f"node 'velocity_loop' runs already in namespace /wam of ROS domain {domain_id} (process {os.getpid()})" in line
+    )
+    assert "stop it, or take another ROS_DOMAIN_ID" in line
+    require_places(["velocity_loop"], "wam")
+
+
+def test_a_node_that_runs_already_is_refused_and_the_first_one_does_not_notice(
+    programs: Callable[..., subprocess.Popen[str]], domain_id: int
+) -> None:
+    first = programs(*DRIVER)
+    wait_for_place(domain_id, "/wam", "driver", first)
+    second = programs(*DRIVER)
+    text = said(second)
+    assert second.returncode == 1
+    assert re.fullmatch(
+        rf"error: node 'driver' runs already in namespace /wam .* \(process {first.pid}\); stop it.*\n", text
+    )
+    first.send_signal(signal.SIGINT)
+    assert "another driver" not in said(first)
+    assert first.returncode == 0
+
+
+def test_a_demonstration_next_to_another_arm_takes_a_domain_of_its_own(domain_id: int) -> None:
+    environment = {"ROS_DOMAIN_ID": str(domain_id)}
+    assert move_to_free_domain("wam", environment) == ""
+    place = Place(domain_id, "/wam", "driver")
+    said = move_to_free_domain("wam", environment)
+    place.close()
+    own = environment["ROS_DOMAIN_ID"]
+    assert own != str(domain_id)
+    assert said == (
+        f"another arm runs in ROS domain {domain_id} (process {os.getpid()}), so this one runs in ROS_DOMAIN_ID={own}"
+    )
+
+
+@pytest.mark.parametrize("name", ["driver", "velocity_loop", "recorder"])
+def test_a_renamed_node_is_refused_with_what_to_do_instead(
+    name: str, programs: Callable[..., subprocess.Popen[str]], domain_id: int
+) -> None:
+    process = programs("-m", "wam_ros.program", name, *PARAMETERS, "-r", "__node:=other")
+    text = said(process)
+    assert process.returncode == 1
+    assert text.startswith(
+        f"error: node '{name}' was renamed 'other'; its peers and its parameters know it as '{name}'"
+    )
+    assert "give the nodes of a second arm a namespace instead: -r __ns:=/other" in text
+
+
+def test_enforced_security_without_the_middleware_s_part_for_it_ends_a_node_in_one_line(
+    programs: Callable[..., subprocess.Popen[str]], domain_id: int, tmp_path: Path
+) -> None:
+    enclave = tmp_path / "enclaves" / "wam"
+    enclave.mkdir(parents=True)
+    settings = {
+        "ROS_SECURITY_ENABLE": "true",
+        "ROS_SECURITY_STRATEGY": "Enforce",
+        "ROS_SECURITY_KEYSTORE": str(tmp_path),
+        "ROS_SECURITY_ENCLAVE_OVERRIDE": "/wam",
+    }
+    process = programs(*DRIVER, **settings)
+    text = said(process)
+    assert process.returncode == 1
+    assert "Traceback" not in text, text
+    assert "error: error creating node: This Fast DDS version doesn't have the security libraries" in text, text

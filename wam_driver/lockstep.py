@@ -1,0 +1,175 @@
+"""The arm's time in lockstep: a period passes when the present state has been answered and the next one is due."""
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from wam_description.arm import Timing
+from wam_description.signals import Answer
+from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS
+from wam_driver.driver import Driver
+from wam_driver.pacer import Pacer
+from wam_driver.session import Session
+
+WATCH: Final = 0.02  # s between two looks at the progress
+ROLL_CALL: Final = 0.4  # s before the time-out, in which the nodes say that they run
+LONGEST_LOOK: Final = 0.1  # s; a process that was frozen did not wait for longer than that
+
+
+class Lockstep:
+    """Advances the driver with the command that answers its present state, and says when none comes.
+
+    Where no answer comes within `timing.timeout`, there is a fault that names the topic and the node: shortly before,
+    the roll is called with a new session, and a node that does not report that it follows has stopped.  From then on
+    time creeps, a period every `WATCH`, braked: states go out, so that a node that was restarted finds its way in;
+    with the next answer lockstep goes on.
+
+    Parameters
+    ----------
+    driver : to be advanced.
+    timing : periods, pace and time-out.
+    senders : by topic that a state is answered with, the node that sends it; `sim/disturbance` in outer periods only.
+    session : that the nodes follow.
+    publish : called after each period, to publish the new state.
+    announce : called to publish the session.
+    fault : called with the reason, to stop the arm.
+    pacer : says when a period is due; also measures.
+    now : steady clock, s.
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        timing: Timing,
+        senders: Mapping[str, str],
+        session: Session,
+        publish: Callable[[], None],
+        announce: Callable[[], None],
+        fault: Callable[[str], None],
+        pacer: Pacer,
+        now: Callable[[], float],
+    ) -> None:
+        self._driver, self._timing, self._senders = driver, timing, senders
+        self._session, self._announce = session, announce
+        self._publish, self._fault, self._now = publish, fault, now
+        self.pacer = pacer
+        self._currents: tuple[int, list[float]] = (0, [])
+        self._push_stamp = 0
+        self._is_played = "sim/disturbance" in senders
+        self._started = self._paused = False
+        self._patience = timing.timeout
+        self._roll_call = timing.timeout - min(ROLL_CALL, 0.5 * timing.timeout)
+        self._is_called = False
+        self._waited, self._looked = 0.0, now()
+
+    def start(self) -> None:
+        """Publish the first state."""
+        self._started = True
+        self._waited = 0.0
+        self._publish()
+
+    def take_currents(self, stamp: int, currents: list[float]) -> None:
+        """Take the command that answers the state of `stamp`; one that is older than the last is of no use."""
+        if stamp > self._currents[0]:
+            self._currents = (stamp, currents)
+            self.go_on()
+
+    def take_push(self, stamp: int) -> None:
+        """Note that the disturbance of an outer period has come."""
+        self._push_stamp = stamp
+        self.go_on()
+
+    @property
+    def missing(self) -> list[str]:
+        """Topics on which the present state is not answered yet."""
+        stamp = self._driver.stamp
+        missing = [] if self._currents[0] == stamp else ["motor_current_command"]
+        if self._is_played and self._push_stamp != stamp and self._driver.is_outer:
+            missing.append("sim/disturbance")
+        return missing
+
+    def go_on(self) -> None:
+        """Advance by a period if all is there and it is due."""
+        if not self._started or self._paused or self.missing:
+            return
+        if self.pacer.is_due(self._driver.stamp + self._timing.period_ns):
+            self._patience = self._timing.timeout
+            self._is_called = False
+            self._one_period()
+
+    def _one_period(self) -> None:
+        self._driver.command(*self._currents)
+        self._driver.advance(0.0)
+        self._waited = 0.0
+        self._publish()
+
+    def watch(self) -> None:
+        """Look whether an answer is overdue; to be called every `WATCH` seconds."""
+        now = self._now()
+        self._waited += min(now - self._looked, LONGEST_LOOK)
+        self._looked = now
+        if not self._started or self._paused or not (missing := self.missing):
+            return
+        if self._waited >= self._roll_call and not self._is_called:
+            self._is_called = True
+            self._session.begin()
+            self._announce()
+        if self._waited >= self._patience:
+            self._fault(self._overdue(missing))
+            self._patience = 0.5 * WATCH  # at the next look again
+            self.pacer.restart()
+            self._one_period()
+
+    def _overdue(self, missing: list[str]) -> str:
+        silent, senders = " and ".join(self._session.silent), " and ".join(self._senders[topic] for topic in missing)
+        advice = f"{silent} has stopped, start it again, then reset_fault" if silent else f"check that {senders} runs"
+        return (
+            f"lockstep: no {' and '.join(missing)} for the state of {self._driver.stamp} ns within "
+            f"{self._timing.timeout:.1f} s; {advice}"
+        )
+
+    @property
+    def start_overdue(self) -> bool:
+        """Whether the start is awaited for longer than the time-out."""
+        return not self._started and self._waited >= self._timing.timeout
+
+    def obstacle(self) -> str:
+        """What speaks against a release of the brakes now, '' where nothing does."""
+        if self._started and self._patience < self._timing.timeout:
+            topics, nodes = (" and ".join(names) for names in (self._senders, self._senders.values()))
+            return f"no {topics} comes in; start {nodes}, then enable"
+        return ""
+
+    def pause(self, on: bool) -> None:
+        """Stop the time, or let it go on."""
+        self._paused = on
+        self._waited = 0.0
+        self.pacer.restart()
+        self.go_on()
+
+    def step(self) -> Answer:
+        """Advance a paused arm by one period."""
+        if not self._paused:
+            return Answer(False, "refused: the driver is running; call pause first")
+        if missing := self.missing:
+            return Answer(False, f"refused: still waiting for {' and '.join(missing)}")
+        self._one_period()
+        return Answer(True, f"at {self._driver.stamp} ns")
+
+    def facts(self) -> dict[str, str]:
+        """For the diagnostics: the pace, where it is one; without a pace nothing depends on the wall clock."""
+        if not self._timing.real_time_factor:
+            return {}
+        pace = self.pacer.report()
+        return {
+            REAL_TIME_FACTOR: f"{pace.factor:.3f}",
+            BEHIND: f"{pace.behind * 1e3:.1f}",
+            SLIPS: str(pace.slips),
+        }
+
+    @property
+    def summary(self) -> str:
+        """How fast time has passed, for people."""
+        simulated, elapsed = self.pacer.passed
+        if not elapsed:
+            return "the arm's time never passed"
+        return f"{simulated:.1f} s of the arm in {elapsed:.1f} s: real-time factor {simulated / elapsed:.2f}"

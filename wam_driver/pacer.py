@@ -1,0 +1,86 @@
+"""The pace of simulated time: never ahead of the wall clock times a factor, slower where the machine is slower."""
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from wam_description.arm import seconds
+
+SLACK: Final = 0.02  # s of the wall clock that may be made up for; what is later than that is forgotten
+
+
+class Pace(NamedTuple):
+    """How fast simulated time passed since the report before.
+
+    Attributes
+    ----------
+    factor : simulated time per time of the wall clock.
+    behind : largest delay of a period, s of the wall clock.
+    slips : periods, since the start, that were more than `SLACK` late, so that the excess was forgotten.
+    """
+
+    factor: float
+    behind: float
+    slips: int
+
+
+class Pacer:
+    """Says when a period is due, and measures how fast simulated time passes.
+
+    Parameters
+    ----------
+    factor : simulated time per time of the wall clock; 0: every period is due at once.
+    now : the wall clock, s; it must be steady.
+
+    Attributes
+    ----------
+    slips : periods that were more than `SLACK` late.
+    """
+
+    def __init__(self, factor: float, now: Callable[[], float]) -> None:
+        self._factor, self._now = factor, now
+        self.slips = 0
+        self._behind = 0.0
+        self._origin = 0.0  # of the wall clock, when the stamp 0 would have been due
+        self._start: tuple[float, int] | None = None  # of this run: wall clock, stamp
+        self._newest: tuple[float, int] = (0.0, 0)
+        self._before = (0.0, 0.0)  # simulated and elapsed time, s, of the runs before a restart
+        self._reported = (0.0, 0.0)
+
+    def is_due(self, stamp: int) -> bool:
+        """Whether the period that ends with the state of `stamp`, ns, may pass now; call it before each."""
+        now = self._now()
+        simulated = seconds(stamp)
+        if self._start is None:
+            self._start = (now, stamp)
+            if self._factor:
+                self._origin = now - simulated / self._factor
+        elif self._factor:
+            late = now - self._origin - simulated / self._factor
+            if late < 0.0:
+                return False
+            self._behind = max(self._behind, late)
+            if late > SLACK:
+                self._origin += late - SLACK
+                self.slips += 1
+        self._newest = (now, stamp)
+        return True
+
+    def restart(self) -> None:
+        """Time was stopped or stepped by hand: the next period is due at once, and what was missed is not made up."""
+        self._before, self._start = self.passed, None
+
+    @property
+    def passed(self) -> tuple[float, float]:
+        """Simulated time and time of the wall clock while it passed, s; pauses do not count."""
+        simulated, elapsed = self._before
+        if self._start is not None:
+            simulated += seconds(self._newest[1] - self._start[1])
+            elapsed += self._newest[0] - self._start[0]
+        return simulated, elapsed
+
+    def report(self) -> Pace:
+        """The pace since the last report."""
+        simulated, elapsed = (now - then for now, then in zip(self.passed, self._reported, strict=True))
+        pace = Pace(simulated / elapsed if elapsed > 0.0 else 0.0, self._behind, self.slips)
+        self._reported, self._behind = self.passed, 0.0
+        return pace

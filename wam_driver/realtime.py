@@ -1,0 +1,122 @@
+"""The arm's time in realtime: a period of the steady clock is a period of the arm; the last command is held."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+
+from wam_description.arm import Timing
+from wam_description.signals import Answer
+from wam_driver.driver import Driver
+from wam_driver.safety import Mode
+
+
+class Realtime:
+    """Advances the driver by the periods that are due, at most by the time that the watchdog allows.
+
+    Parameters
+    ----------
+    driver : to be advanced.
+    timing : periods.
+    watchdog : age of the last command that is a fault, s.
+    publish : called after a period, to publish the new state.
+    now : steady clock, s.
+
+    Attributes
+    ----------
+    command_came : when the last command came, on that clock.
+    """
+
+    def __init__(
+        self, driver: Driver, timing: Timing, watchdog: float, publish: Callable[[], None], now: Callable[[], float]
+    ) -> None:
+        self._driver, self._timing, self._watchdog = driver, timing, watchdog
+        self._publish, self._now = publish, now
+        self._latencies: list[float] = []
+        self._published: deque[tuple[int, float]] = deque(maxlen=100)
+        self._done = self._missed = 0
+        self._paused = False
+        self.command_came = -math.inf
+
+    def start(self) -> None:
+        """Publish the first state."""
+        # half a period of slack, so that a timer that comes a little early or late misses nothing
+        self._progress = self._now()
+        self._begin = self._progress - 0.5 * self._timing.period
+        self._send()
+
+    def take_currents(self, stamp: int, currents: list[float]) -> None:
+        """Take the command that answers the state of `stamp`."""
+        now = self._now()
+        while self._published and self._published[0][0] < stamp:
+            self._published.popleft()
+        if self._published and self._published[0][0] == stamp:
+            self._latencies.append(now - self._published.popleft()[1])
+        self._driver.command(stamp, currents)
+        self._progress = self.command_came = now
+
+    def take_push(self, stamp: int) -> None:
+        """Note a disturbance: in realtime nothing waits for it."""
+
+    def tick(self) -> None:
+        """Advance by what is due; what is later than the watchdog allows is not made up for, and brakes."""
+        now = self._now()
+        due = int((now - self._begin) / self._timing.period) - self._done
+        if due <= 0:
+            return
+        self._done += due
+        if self._paused:
+            return
+        self._missed += due - 1
+        age = now - self._progress
+        most = max(1, round(self._watchdog / self._timing.period))
+        if due > most and self._driver.safety.mode is Mode.ENABLED:
+            self._driver.fault(
+                f"the driver itself did not run for {due * self._timing.period:.2f} s, allowed "
+                f"{self._watchdog * 1e3:.0f} ms; give it a processor, or use lockstep"
+            )
+        for left in range(min(due, most) - 1, -1, -1):
+            self._driver.advance(age)
+            if left == 0 or self._driver.is_outer:
+                self._send()
+
+    def _send(self) -> None:
+        self._published.append((self._driver.stamp, self._now()))
+        self._publish()
+
+    def obstacle(self) -> str:
+        """What speaks against a release of the brakes now, '' where nothing does."""
+        now = self._now()
+        self._progress = now
+        if now - self.command_came > self._watchdog:
+            return "no motor_current_command comes in; start velocity_loop and its peers, then enable"
+        return ""
+
+    def pause(self, on: bool) -> None:
+        """Stop the time, or let it go on."""
+        self._paused = on
+        self._progress = self._now()
+
+    def step(self) -> Answer:
+        """Advance a paused arm by one period."""
+        if not self._paused:
+            return Answer(False, "refused: the driver is running; call pause first")
+        self._driver.advance(0.0)
+        self._send()
+        return Answer(True, f"at {self._driver.stamp} ns")
+
+    def facts(self) -> dict[str, str]:
+        """For the diagnostics: latencies since the last report, late periods and rate since the start."""
+        latencies = sorted(self._latencies) or [math.nan]
+        self._latencies = []
+        return {
+            "latency p50 [us]": f"{latencies[len(latencies) // 2] * 1e6:.0f}",
+            "latency p99 [us]": f"{latencies[int(len(latencies) * 0.99)] * 1e6:.0f}",
+            "missed periods": str(self._missed),
+            "periods": str(self._done),
+            "rate [Hz]": f"{(self._done - self._missed) / (self._now() - self._begin):.1f}",
+        }
+
+    @property
+    def summary(self) -> str:
+        """How well the periods were kept, for people."""
+        return f"{self._missed} of {self._done} periods late"
