@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from bag_mutations import MEMORY, break_bags, limits
+from bag_mutations import break_bags
 from bag_samples import CLOUD, FOREIGN, OURS, STORE, WAYS, Sample, Way, random_cloud, random_samples, write
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode

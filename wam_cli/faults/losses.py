@@ -1,0 +1,80 @@
+"""Loss of each node: SIGKILL, SIGTERM, SIGSTOP, and its start afterwards, in a chain of real processes."""
+
+import math
+import signal
+import time
+from collections.abc import Iterator
+from random import Random
+from typing import Final
+
+from wam_cli.faults.node_processes import NodeProcesses
+from wam_description.configuration import Configuration
+from wam_experiments.faults.trials import FORCE, MOTION, ZERO_CURRENT, Trial
+
+WAYS: Final = (signal.SIGSTOP, signal.SIGKILL, signal.SIGTERM)
+NOTICED: Final = 5.0  # s of wall time, in which a loss must be reported on a busy machine
+RECOVERED: Final = 20.0  # s of wall time, in which an operator gets an enabled arm again
+FROZEN: Final = (0.2, 1.5)  # s of wall time that a driver is frozen
+
+
+def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+    """Trials `first` to `first + count` of a seed, one loss each."""
+    chain: NodeProcesses | None = None
+    configured = configuration.with_values({"timing.mode": mode, "timing.timeout": 1.0})
+    try:
+        for index in range(first, first + count):
+            chance = Random(f"losses {seed} {index}")
+            chain = chain or NodeProcesses(configured)
+            name = chain.names[index % len(chain.names)]
+            way = WAYS[index // len(chain.names) % len(WAYS)]
+            trial = _trial(chain, name, way, chance, index, mode)
+            yield trial
+            if trial.escapes:
+                chain.__exit__()
+                chain = None
+    finally:
+        if chain is not None:
+            chain.__exit__()
+
+
+def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random, index: int, mode: str) -> Trial:
+    what = f"{name} {way.name}, {mode}"
+    if reason := chain.enabled(RECOVERED):
+        return Trial(index, what, 1, (f"before: {reason}",))
+    chain.wait(lambda: False, chance.uniform(0.0, 0.1))
+    q, chain.force = list(chain.q), 0.0
+    chain.reports.clear()
+    chain.send(name, way)
+    escapes = []
+    delay = math.nan
+    if name == "driver":
+        chain.wait(lambda: False, chance.uniform(*FROZEN) if way == signal.SIGSTOP else 0.2)
+    else:
+        if not chain.wait(lambda: chain.mode == "fault", NOTICED):
+            escapes.append(f"not noticed within {NOTICED:g} s")
+        chain.wait(lambda: False, 0.05)
+        delay = max(0.0, (chain.current_stamp - chain.stamps[name]) * 1e-9)
+        if delay > ZERO_CURRENT:
+            escapes.append(f"current {delay * 1e3:.0f} ms after the loss")
+        fault = chain.statuses["driver"].fault if "driver" in chain.statuses else ""
+        if name not in " ".join(chain.reports):
+            escapes.append(f"not named: '{fault}'")
+    if way == signal.SIGSTOP:
+        chain.send(name, signal.SIGCONT)
+    else:
+        deadline = time.monotonic() + 5.0
+        while name not in chain.ended() and time.monotonic() < deadline:
+            chain.wait(lambda: False, 0.02)
+        chain.end(name)
+        if others := [one for one in chain.ended() if one != name]:
+            escapes.append(f"{', '.join(others)} ended, too")
+        chain.start(name)
+    if reason := chain.enabled(RECOVERED):
+        escapes.append(reason)
+    is_new_arm = name == "driver" and way != signal.SIGSTOP
+    motion = 0.0 if is_new_arm else max(abs(a - b) for a, b in zip(q, chain.q, strict=True))
+    if motion > MOTION:
+        escapes.append(f"the arm moved {motion:.3f} rad")
+    if chain.force > FORCE:
+        escapes.append(f"{chain.force:.0f} N")
+    return Trial(index, what, 1, tuple(escapes), motion, chain.force, delay)

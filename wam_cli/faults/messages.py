@@ -1,0 +1,81 @@
+"""Broken messages on every topic that a node takes, from the topic's own publisher and from a second one."""
+
+from collections.abc import Iterator
+from random import Random
+from typing import Final, NamedTuple
+
+from rclpy.publisher import Publisher
+
+from wam_cli.faults.watched_stack import NodeEndedError, StackSource, WatchedStack
+from wam_description.configuration import Configuration
+from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
+from wam_experiments.faults.trials import Trial
+
+MESSAGES: Final = 10  # of one trial
+BETWEEN: Final = 0.001  # s of the arm's time between two of them
+AFTER: Final = 0.03  # s of the arm's time after the last
+
+
+class MessagePlan(NamedTuple):
+    """What one trial does."""
+
+    topic: str
+    is_foreign: bool
+    fault: MessageFault
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return f"{self.topic}, {'second' if self.is_foreign else 'own'} publisher, {self.fault.name}"
+
+
+def plan(topics: list[str], seed: int, index: int) -> MessagePlan:
+    """Topic, publisher and fault of a trial: all combinations, in an order drawn from the seed, then again."""
+    every = [MessagePlan(topic, foreign, fault) for topic in topics for foreign in (False, True) for fault in MESSAGE_FAULTS]
+    Random(f"messages {seed}").shuffle(every)
+    return every[index % len(every)]
+
+
+def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+    """Trials `first` to `first + count` of a seed, `MESSAGES` messages each, in a mode of `timing.mode`."""
+    with StackSource(configuration.with_values({"timing.mode": mode})) as source:
+        for index in range(first, first + count):
+            stack = source.ready()
+            chance = Random(f"messages {seed} {index}")
+            todo = plan(stack.taken_topics(), seed, index)
+            sent = 0
+            reason = stack.begin()
+            try:
+                if not reason:
+                    sent = _send(stack, todo, chance)
+                    stack.run(AFTER)
+                    escapes = list(stack.escapes)
+                    reason = stack.recover()
+                else:
+                    escapes = []
+            except NodeEndedError as error:
+                escapes, reason = list(stack.escapes), str(error)
+            if reason:
+                source.discard()
+            yield Trial(index, todo.name, max(sent, 1), (*escapes, *filter(None, [reason])), stack.motion, stack.force)
+
+
+def _send(stack: WatchedStack, todo: MessagePlan, chance: Random) -> int:
+    """Publish the broken messages; returns how many there were."""
+    publisher: Publisher | None
+    publisher = stack.foreign_publisher(todo.topic) if todo.is_foreign else stack.own_publisher(todo.topic, chance)
+    sent = 0
+    if publisher is None:
+        return sent
+    for _ in range(MESSAGES):
+        message = stack.newest(todo.topic)
+        if todo.fault.moves:
+            made_effective(todo.topic, message)
+        data = broken(message, todo.fault, chance, stack.stamp(), stack.serialize)
+        if data is not None:
+            stack.inject(publisher, data)
+            sent += 1
+        stack.run(BETWEEN)
+    if todo.is_foreign:
+        stack.remove(publisher)
+    return sent
