@@ -46,6 +46,7 @@ from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC, chunk
 from wam_bag.message_groups import Grouping
 from wam_bag.message_text import definitions
 from wam_bag.repair import repair
+from wam_experiments.faults.bag_faults import MEMORY, limits
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 

@@ -37,8 +37,8 @@ class AnsweredClock:
     @contextmanager
     def of_new_nodes(self) -> Iterator[None]:
         """Nodes that are made in this context keep this clock as their steady clock."""
-        time.perf_counter = self  # type: ignore[assignment]
+        time.perf_counter = self
         try:
             yield
         finally:
-            time.perf_counter = self._steady  # type: ignore[assignment]
+            time.perf_counter = self._steady

@@ -16,6 +16,7 @@ from wam_experiments.faults.trials import Trial
 
 REPORTED: Final = 10.0  # s of wall time, on a busy machine
 ROOM: Final = (0, 3_000, 100_000)  # bytes that a full disk still takes
+Work = Callable[[WatchedStack, Path, Random], None]
 ERROR: Final = b"\x02"
 
 
@@ -33,13 +34,12 @@ def play(configuration: Configuration, seed: int, first: int, count: int) -> Ite
                 "recorder:name": "bag",
                 "driver:post_mortem_directory": "/proc/none" if ways[name] is _fault else "",
             }
-            with WatchedStack(configuration.with_values(values)) as stack:
-                yield _trial(stack, index, name, Path(folder, "bag"), ways[name], chance)
+            yield _trial(configuration.with_values(values), index, name, Path(folder, "bag"), ways[name], chance)
 
 
-def _trial(
-    stack: WatchedStack, index: int, name: str, bag: Path, work: Callable[[WatchedStack, Path, Random], None], chance: Random
-) -> Trial:
+def _trial(configuration: Configuration, index: int, name: str, bag: Path, work: Work, chance: Random) -> Trial:
+    """One trial; the end of the recorder is part of it."""
+    stack = WatchedStack(configuration)
     reason = stack.begin()
     try:
         if not reason:
@@ -48,7 +48,12 @@ def _trial(
             reason = stack.recover()
     except NodeEndedError as error:
         reason = str(error)
-    return Trial(index, name, 1, (*stack.escapes, *filter(None, [reason])), stack.motion, stack.force)
+    try:
+        stack.close()
+    except Exception as error:
+        stack.escapes.append(f"the end of a node: {type(error).__name__}: {error}")
+    escapes = (*stack.escapes, *filter(None, [reason]))
+    return Trial(index, name, escapes=escapes, motion=stack.motion, force=stack.force)
 
 
 def _fill(stack: WatchedStack, bag: Path, chance: Random) -> None:

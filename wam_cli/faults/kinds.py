@@ -13,15 +13,27 @@ def kinds(bag: Path = REPLAYED) -> dict[str, FaultKind]:
     """Every kind by name; `bag` is replayed, and the kind is left out where it is missing."""
     found = [
         FaultKind("messages", "broken messages, lockstep", "messages", 2000, 10, partial(messages.play, "lockstep")),
-        FaultKind("messages-realtime", "the same in realtime", "messages", 2000, 10, partial(messages.play, "realtime")),
+        FaultKind(
+            "messages-realtime", "the same in realtime", "messages", 2000, 10, partial(messages.play, "realtime")
+        ),
         FaultKind("parameters", "sets of live parameters", "sets", 2000, 30, parameter_sets.play),
         FaultKind("losses", "nodes killed and frozen, lockstep", "losses", 108, 0, partial(losses.play, "lockstep")),
         FaultKind("losses-realtime", "the same in realtime", "losses", 108, 0, partial(losses.play, "realtime")),
         FaultKind(
-            "publishers", "second publishers, lockstep", "publishers", 90, 4, partial(second_publishers.play, "lockstep")
+            "publishers",
+            "second publishers, lockstep",
+            "publishers",
+            90,
+            4,
+            partial(second_publishers.play, "lockstep"),
         ),
         FaultKind(
-            "publishers-realtime", "the same in realtime", "publishers", 90, 4, partial(second_publishers.play, "realtime")
+            "publishers-realtime",
+            "the same in realtime",
+            "publishers",
+            90,
+            4,
+            partial(second_publishers.play, "realtime"),
         ),
         FaultKind("disks", "full and removed disks", "disks", 12, 1, disks.play),
         FaultKind("bags", "broken bags read", "bags", 3000, 60, bags.play),

@@ -2,7 +2,6 @@
 
 import math
 import signal
-import time
 from collections.abc import Iterator
 from random import Random
 from typing import Final
@@ -20,7 +19,7 @@ FROZEN: Final = (0.2, 1.5)  # s of wall time that a driver is frozen
 def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
     """Trials `first` to `first + count` of a seed, one loss each."""
     chain: NodeProcesses | None = None
-    configured = configuration.with_values({"timing.mode": mode, "timing.timeout": 1.0})
+    configured = configuration.with_values({"timing.mode": mode, "timing.timeout": 2.0})
     try:
         for index in range(first, first + count):
             chance = Random(f"losses {seed} {index}")
@@ -30,11 +29,11 @@ def play(mode: str, configuration: Configuration, seed: int, first: int, count: 
             trial = _trial(chain, name, way, chance, index, mode)
             yield trial
             if trial.escapes:
-                chain.__exit__()
+                chain.close()
                 chain = None
     finally:
         if chain is not None:
-            chain.__exit__()
+            chain.close()
 
 
 def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random, index: int, mode: str) -> Trial:
@@ -45,29 +44,19 @@ def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random,
     q, chain.force = list(chain.q), 0.0
     chain.reports.clear()
     chain.send(name, way)
-    escapes = []
-    delay = math.nan
+    delay, escapes = math.nan, list[str]()
     if name == "driver":
         chain.wait(lambda: False, chance.uniform(*FROZEN) if way == signal.SIGSTOP else 0.2)
     else:
-        if not chain.wait(lambda: chain.mode == "fault", NOTICED):
-            escapes.append(f"not noticed within {NOTICED:g} s")
-        chain.wait(lambda: False, 0.05)
-        delay = max(0.0, (chain.current_stamp - chain.stamps[name]) * 1e-9)
-        if delay > ZERO_CURRENT:
-            escapes.append(f"current {delay * 1e3:.0f} ms after the loss")
-        fault = chain.statuses["driver"].fault if "driver" in chain.statuses else ""
-        if name not in " ".join(chain.reports):
-            escapes.append(f"not named: '{fault}'")
+        delay = _noticed(chain, name, escapes)
     if way == signal.SIGSTOP:
         chain.send(name, signal.SIGCONT)
     else:
-        deadline = time.monotonic() + 5.0
-        while name not in chain.ended() and time.monotonic() < deadline:
-            chain.wait(lambda: False, 0.02)
+        chain.wait(lambda: name in chain.ended(), NOTICED)
         chain.end(name)
-        if others := [one for one in chain.ended() if one != name]:
-            escapes.append(f"{', '.join(others)} ended, too")
+    if others := [one for one in chain.ended() if one != name]:
+        escapes.append(f"{', '.join(others)} ended, too")
+    if way != signal.SIGSTOP:
         chain.start(name)
     if reason := chain.enabled(RECOVERED):
         escapes.append(reason)
@@ -78,3 +67,17 @@ def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random,
     if chain.force > FORCE:
         escapes.append(f"{chain.force:.0f} N")
     return Trial(index, what, 1, tuple(escapes), motion, chain.force, delay)
+
+
+def _noticed(chain: NodeProcesses, name: str, escapes: list[str]) -> float:
+    """Wait for the fault that names a lost node; returns the time to zero current, s of the arm's time."""
+    if not chain.wait(lambda: chain.mode == "fault", NOTICED):
+        escapes.append(f"not noticed within {NOTICED:g} s")
+    chain.wait(lambda: False, 0.05)
+    delay = max(0.0, (chain.current_stamp - chain.stamps[name]) * 1e-9)
+    if delay > ZERO_CURRENT:
+        escapes.append(f"current {delay * 1e3:.0f} ms after the loss")
+    if name not in " ".join(chain.reports):
+        found = chain.statuses.get("driver")
+        escapes.append(f"not named: '{found.fault if found else ''}'")
+    return delay

@@ -1,12 +1,13 @@
 """Broken messages on every topic that a node takes, from the topic's own publisher and from a second one."""
 
 from collections.abc import Iterator
+from functools import partial
 from random import Random
 from typing import Final, NamedTuple
 
 from rclpy.publisher import Publisher
 
-from wam_cli.faults.watched_stack import NodeEndedError, StackSource, WatchedStack
+from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
 from wam_experiments.faults.trials import Trial
@@ -31,7 +32,9 @@ class MessagePlan(NamedTuple):
 
 def plan(topics: list[str], seed: int, index: int) -> MessagePlan:
     """Topic, publisher and fault of a trial: all combinations, in an order drawn from the seed, then again."""
-    every = [MessagePlan(topic, foreign, fault) for topic in topics for foreign in (False, True) for fault in MESSAGE_FAULTS]
+    every = [
+        MessagePlan(topic, foreign, fault) for topic in topics for foreign in (False, True) for fault in MESSAGE_FAULTS
+    ]
     Random(f"messages {seed}").shuffle(every)
     return every[index % len(every)]
 
@@ -40,33 +43,17 @@ def play(mode: str, configuration: Configuration, seed: int, first: int, count: 
     """Trials `first` to `first + count` of a seed, `MESSAGES` messages each, in a mode of `timing.mode`."""
     with StackSource(configuration.with_values({"timing.mode": mode})) as source:
         for index in range(first, first + count):
-            stack = source.ready()
-            chance = Random(f"messages {seed} {index}")
-            todo = plan(stack.taken_topics(), seed, index)
-            sent = 0
-            reason = stack.begin()
-            try:
-                if not reason:
-                    sent = _send(stack, todo, chance)
-                    stack.run(AFTER)
-                    escapes = list(stack.escapes)
-                    reason = stack.recover()
-                else:
-                    escapes = []
-            except NodeEndedError as error:
-                escapes, reason = list(stack.escapes), str(error)
-            if reason:
-                source.discard()
-            yield Trial(index, todo.name, max(sent, 1), (*escapes, *filter(None, [reason])), stack.motion, stack.force)
+            todo = plan(source.ready().taken_topics(), seed, index)
+            yield source.trial(index, todo.name, partial(_send, todo, Random(f"messages {seed} {index}")))
 
 
-def _send(stack: WatchedStack, todo: MessagePlan, chance: Random) -> int:
+def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     """Publish the broken messages; returns how many there were."""
     publisher: Publisher | None
     publisher = stack.foreign_publisher(todo.topic) if todo.is_foreign else stack.own_publisher(todo.topic, chance)
     sent = 0
     if publisher is None:
-        return sent
+        return 1
     for _ in range(MESSAGES):
         message = stack.newest(todo.topic)
         if todo.fault.moves:
@@ -78,4 +65,5 @@ def _send(stack: WatchedStack, todo: MessagePlan, chance: Random) -> int:
         stack.run(BETWEEN)
     if todo.is_foreign:
         stack.remove(publisher)
-    return sent
+    stack.run(AFTER)
+    return max(sent, 1)

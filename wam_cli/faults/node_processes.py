@@ -22,7 +22,7 @@ from wam_ros.bring_up import parameter_file
 from wam_ros.messages import message_type, read_status
 from wam_ros.qos import qos
 from wam_ros.run import NAMESPACE, Connection
-from wam_ros.wire import decoder, encoder, stamp_of
+from wam_ros.wire import Decode, decoder, encoder, stamp_of
 
 ANSWERS: Final = {  # a topic that each node publishes in every outer period or more often
     "driver": "motor_states",
@@ -32,7 +32,15 @@ ANSWERS: Final = {  # a topic that each node publishes in every outer period or 
     "force_loop": "joint_velocity_command",
     "contact_estimator": "external_joint_torques",
 }
-PRELOADED: Final = ["numpy", "mujoco", "pinocchio", "rclpy", "wam_ros.node", "wam_driver.driver", "wam_control.force_loop"]
+PRELOADED: Final = [
+    "numpy",
+    "mujoco",
+    "pinocchio",
+    "rclpy",
+    "wam_ros.node",
+    "wam_driver.driver",
+    "wam_control.force_loop",
+]
 COMMANDS: Final = ("joint_posture_command", "force_command")
 
 
@@ -69,7 +77,15 @@ class NodeProcesses:
         self.configuration = configuration
         self._stack = ExitStack()
         file = self._stack.enter_context(parameter_file(configuration))
-        self._arguments = ["--ros-args", "--params-file", str(file), "-r", f"__ns:=/{NAMESPACE}", "--log-level", "fatal"]
+        self._arguments = [
+            "--ros-args",
+            "--params-file",
+            str(file),
+            "-r",
+            f"__ns:=/{NAMESPACE}",
+            "--log-level",
+            "fatal",
+        ]
         self._processes: dict[str, Any] = {}
         self._forks = multiprocessing.get_context("forkserver")
         self._forks.set_forkserver_preload(PRELOADED)
@@ -93,7 +109,7 @@ class NodeProcesses:
             )
             for name in COMMANDS
         }
-        watched = {
+        watched: dict[str, tuple[Decode, Callable[[int, Any], None]]] = {
             "motor_currents": (decoder(interface.topics["motor_currents"], shared, "effort"), self._take_currents),
             "sim/joint_states": (decoder(interface.topics["sim/joint_states"], shared, "position"), self._take_angles),
             "sim/contact/wrench": (decoder(interface.topics["sim/contact/wrench"], shared, ""), self._take_force),
@@ -102,7 +118,9 @@ class NodeProcesses:
             row = interface.topics[topic]
             take = self._taking(topic, *watched[topic]) if topic in watched else self._stamping(topic)
             self.node.create_subscription(message_type(row), topic, take, qos(row), raw=True)
-        self.node.create_subscription(DiagnosticStatus, "status", self._take_status, qos(interface.topics["status"]), raw=True)
+        self.node.create_subscription(
+            DiagnosticStatus, "status", self._take_status, qos(interface.topics["status"]), raw=True
+        )
         self._clients = {
             "enable": self.node.create_client(SetBool, "driver/enable"),
             "reset_fault": self.node.create_client(Trigger, "driver/reset_fault"),
@@ -114,6 +132,10 @@ class NodeProcesses:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End all nodes."""
         for name in self.names:
             self.end(name)
         self._connection.close()
@@ -164,7 +186,10 @@ class NodeProcesses:
         return receive
 
     def _command(self, stamp: int) -> None:
-        values = {"joint_posture_command": State(self.hold, [], []), "force_command": Wrench("base", (0.0,) * 3, (0.0,) * 3)}
+        values = {
+            "joint_posture_command": State(self.hold, [], []),
+            "force_command": Wrench("base", (0.0,) * 3, (0.0,) * 3),
+        }
         for topic, value in values.items():
             publisher, encode = self._commands[topic]
             publisher.publish(encode(stamp, value))
@@ -211,17 +236,27 @@ class NodeProcesses:
     def enabled(self, patience: float) -> str:
         """Do what an operator does; returns why the arm cannot be enabled, '' where it is and stays so."""
         end = time.monotonic() + patience
-        message = "no answer"
+        reason = ""
         while time.monotonic() < end:
             self.hold = []
             self.ask("reset_fault")
-            message = self.ask("enable", True)
-            before = dict(self.stamps)
-            if self.wait(lambda: all(self.stamps[name] > before[name] for name in self.names), 1.0):
+            reason = self.ask("enable", True)
+            silent = self._silent()
+            if not silent:
                 self.hold = list(self.q)
                 self.wait(lambda: False, 0.1)
                 if self.mode == "enabled":
                     return ""
-            silent = [name for name in self.names if self.stamps[name] <= before[name]]
-            message = f"{message}; silent: {', '.join(silent) or 'none'}; {self.statuses['driver'].message if 'driver' in self.statuses else ''}"
-        return f"the arm cannot be enabled within {patience:g} s: {message}"
+            found = self.statuses.get("driver")
+            reason += f"; silent: {', '.join(silent) or 'none'}; {found.message if found else 'no status'}"
+        return f"the arm cannot be enabled within {patience:g} s: {reason}"
+
+    def _silent(self) -> list[str]:
+        """Nodes that do not answer within a second."""
+        before = dict(self.stamps)
+
+        def silent() -> list[str]:
+            return [name for name in self.names if self.stamps[name] <= before[name]]
+
+        self.wait(lambda: not silent(), 1.0)
+        return silent()

@@ -1,6 +1,7 @@
 """Parameter sets for every node: refused ones change nothing, accepted ones leave an arm that is stable."""
 
 from collections.abc import Iterator
+from functools import partial
 from random import Random
 from typing import Any, Final
 
@@ -8,7 +9,7 @@ import numpy as np
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 
-from wam_cli.faults.watched_stack import NodeEndedError, StackSource, WatchedStack
+from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
@@ -44,23 +45,13 @@ def play(configuration: Configuration, seed: int, first: int, count: int) -> Ite
     with StackSource(configuration.with_values({"timing.mode": "lockstep"})) as source:
         for index in range(first, first + count):
             stack = source.ready()
-            chance = Random(f"parameters {seed} {index}")
             name = sorted(stack.nodes)[index % len(stack.nodes)]
+            chance = Random(f"parameters {seed} {index}")
             todo = parameter_set(_fields(stack, name), _present(stack, name), chance)
-            reason = stack.begin()
-            escapes: list[str] = []
-            try:
-                if not reason:
-                    _try(stack, name, todo)
-                    escapes = list(stack.escapes)
-                    reason = stack.recover()
-            except NodeEndedError as error:
-                reason = str(error)
-            if reason or escapes:
-                source.discard()
-            yield Trial(
-                index, f"{name}, {todo.name}", 1, (*escapes, *filter(None, [reason])), stack.motion, stack.force
-            )
+            trial = source.trial(index, f"{name}, {todo.name}", partial(_try, name, todo))
+            if trial.escapes:
+                source.discard()  # its parameters may have changed
+            yield trial
 
 
 def _fields(stack: WatchedStack, name: str) -> list[Field]:
@@ -69,8 +60,7 @@ def _fields(stack: WatchedStack, name: str) -> list[Field]:
     owned = getattr(declaration.node, "owns", None)
     own = list(fields(declaration.parameter_class))
     shared = [
-        one._replace(live=one.live and owned is not None and one.name.startswith(f"{owned}."))
-        for one in fields(Shared)
+        one._replace(live=one.live and owned is not None and one.name.startswith(f"{owned}.")) for one in fields(Shared)
     ]
     return [one for one in (*own, *shared) if stack.nodes[name].has_parameter(one.name)]
 
@@ -82,7 +72,7 @@ def _present(stack: WatchedStack, name: str) -> dict[str, Any]:
             for key, value in found.items()}  # fmt: skip
 
 
-def _try(stack: WatchedStack, name: str, todo: ParameterSet) -> None:
+def _try(name: str, todo: ParameterSet, stack: WatchedStack) -> int:
     """Send the set; what is wrong goes to the escapes of the stack."""
     before = _present(stack, name)
     client = stack.node.create_client(SetParametersAtomically, f"{name}/set_parameters_atomically")
@@ -91,7 +81,7 @@ def _try(stack: WatchedStack, name: str, todo: ParameterSet) -> None:
         answer = _answer(stack, client, [message(one) for one in todo.assignments])
         if answer is None:
             stack.escapes.append("no answer to the set")
-            return
+            return 1
         after = _present(stack, name)
         changed = [key for key in before if not _same(before[key], after[key])]
         if not answer.successful and changed:
@@ -110,6 +100,7 @@ def _try(stack: WatchedStack, name: str, todo: ParameterSet) -> None:
         stack.run(0.005)
     finally:
         stack.node.destroy_client(client)
+    return 1
 
 
 def _answer(stack: WatchedStack, client: Any, parameters: list[Parameter]) -> Any:
@@ -126,7 +117,9 @@ def _push(stack: WatchedStack) -> None:
     stack.run(SETTLING)
     speed = max(abs(v) for v in plant.qd)
     if speed > FAST or stack.driver.safety.fault:
-        stack.escapes.append(f"accepted, then unstable: {speed:.1f} rad/s after a push of {PUSH:g} N {stack.driver.safety.fault}")
+        stack.escapes.append(
+            f"accepted, then unstable: {speed:.1f} rad/s after a push of {PUSH:g} N {stack.driver.safety.fault}"
+        )
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -2,15 +2,16 @@
 
 import struct
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from random import Random
-from typing import Any, Final
+from typing import Final
 
 from rclpy.publisher import Publisher
 from std_msgs.msg import Int64, String
 
 from wam_bag.bag import raw
-from wam_cli.faults.watched_stack import NodeEndedError, StackSource, WatchedStack
+from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
 from wam_experiments.faults.trials import Trial
@@ -34,7 +35,7 @@ def play(mode: str, configuration: Configuration, seed: int, first: int, count: 
             topic, is_other_type = topics[index % len(topics)], index // len(topics) % 3 == 2
             name = f"{topic}, {'another type' if is_other_type else 'second publisher'}, {mode}"
             work = _other_type if is_other_type else _stream
-            yield _watched(source, stack, index, name, lambda stack=stack, topic=topic, work=work: work(stack, topic))  # type: ignore[misc]
+            yield source.trial(index, name, partial(work, topic))
 
 
 def replay(bag: Path, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
@@ -51,32 +52,11 @@ def replay(bag: Path, configuration: Configuration, seed: int, first: int, count
             chosen = [commands, feedback, known][index % 3] if index % 2 else [chance.choice(known)]
             stamps = STAMPS[index // 2 % len(STAMPS)]
             what = chosen[0] if len(chosen) == 1 else f"{len(chosen)} topics"
-            messages = {topic: recorded[topic].data for topic in chosen}
-
-            def work(stack: WatchedStack = stack, messages: Any = messages, stamps: str = stamps) -> None:
-                _replay(stack, messages, stamps)
-
-            yield _watched(source, stack, index, f"{what} replayed, stamps {stamps}", work)
+            work = partial(_replay, {topic: recorded[topic].data for topic in chosen}, stamps)
+            yield source.trial(index, f"{what} replayed, stamps {stamps}", work)
 
 
-def _watched(source: StackSource, stack: WatchedStack, index: int, name: str, work: Any) -> Trial:
-    """One trial on an enabled arm."""
-    reason = stack.begin()
-    escapes: list[str] = []
-    try:
-        if not reason:
-            work()
-            stack.run(AFTER)
-            escapes = list(stack.escapes)
-            reason = stack.recover()
-    except NodeEndedError as error:
-        escapes, reason = list(stack.escapes), str(error)
-    if reason:
-        source.discard()
-    return Trial(index, name, 1, (*escapes, *filter(None, [reason])), stack.motion, stack.force)
-
-
-def _stream(stack: WatchedStack, topic: str) -> None:
+def _stream(topic: str, stack: WatchedStack) -> int:
     """Answer every period with a false message that has the right stamp."""
     publisher = stack.foreign_publisher(topic)
     try:
@@ -92,9 +72,10 @@ def _stream(stack: WatchedStack, topic: str) -> None:
             stack.escapes.append(f"no fault names {topic}: '{stack.driver.safety.fault}'")
     finally:
         stack.remove(publisher)
+    return 1
 
 
-def _other_type(stack: WatchedStack, topic: str) -> None:
+def _other_type(topic: str, stack: WatchedStack) -> int:
     """Publish messages of another type under the topic's name."""
     kind = Int64 if stack.type_of(topic) is String else String
     publisher = stack.node.create_publisher(kind, topic, stack.qos_of(topic))
@@ -102,9 +83,10 @@ def _other_type(stack: WatchedStack, topic: str) -> None:
         publisher.publish(kind())
         stack.run(0.002)
     stack.remove(publisher)
+    return 1
 
 
-def _replay(stack: WatchedStack, messages: dict[str, list[bytes]], stamps: str) -> None:
+def _replay(messages: dict[str, list[bytes]], stamps: str, stack: WatchedStack) -> int:
     publishers: dict[str, Publisher] = {topic: stack.foreign_publisher(topic) for topic in messages}
     begin = stack.stamp()
     first = min(stamp_of(data[0]) for data in messages.values())
@@ -115,6 +97,8 @@ def _replay(stack: WatchedStack, messages: dict[str, list[bytes]], stamps: str) 
         stack.run(0.001)
     for publisher in publishers.values():
         stack.remove(publisher)
+    stack.run(AFTER)
+    return 1
 
 
 def _stamped(data: bytes, stamps: str, offset: int) -> bytes:

@@ -20,14 +20,14 @@ from wam_description.interface import Interface
 from wam_description.signals import State, Wrench
 from wam_driver.safety import Mode
 from wam_experiments.faults.message_faults import leaves
-from wam_experiments.faults.trials import FORCE, MOTION
+from wam_experiments.faults.trials import FORCE, MOTION, Trial
 from wam_ros.bring_up import Composition
 from wam_ros.messages import message_type
 from wam_ros.qos import qos
 from wam_ros.run import NAMESPACE
-from wam_ros.wire import encoder, stamp_of
+from wam_ros.wire import Encode, encoder, stamp_of
 
-PATIENCE: Final = 5.0  # s of wall time without progress and without a fault that is a hang
+PATIENCE: Final = 15.0  # s of wall time without progress and without a fault that is a hang
 REST: Final = 0.2  # s of wall time after which the time of an arm in fault is known to be at rest
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
 EVENTS: Final = "/parameter_events"
@@ -57,7 +57,7 @@ class WatchedStack:
     def __init__(self, configuration: Configuration, domain_id: int | None = None) -> None:
         shared = configuration.shared
         self.configuration = configuration
-        configuration = configuration.with_values({"timing.timeout": 1.0})
+        configuration = configuration.with_values({"timing.timeout": 2.0})
         self._clock = AnsweredClock(shared.timing.period)
         is_realtime = configuration.shared.timing.mode == "realtime"
         with self._clock.of_new_nodes() if is_realtime else nullcontext():
@@ -70,7 +70,9 @@ class WatchedStack:
         self.escapes: list[str] = []
         self.motion = self.force = 0.0
         self.allowed_force = FORCE
-        self._peak = [t / k for t, k in zip(shared.arm.motors.peak_torque, shared.arm.motors.torque_constant, strict=True)]
+        self._peak = [
+            t / k for t, k in zip(shared.arm.motors.peak_torque, shared.arm.motors.torque_constant, strict=True)
+        ]
         self._anchor = self._held = list(self.driver.plant.q)
         self._newest: dict[str, bytes] = {}
         self._injected: set[bytes] = set()
@@ -78,7 +80,7 @@ class WatchedStack:
         self.commander = Node("commander", context=self.context, namespace=NAMESPACE)
         for node in (self.node, self.commander):
             self.executor.add_node(node)
-        self._commands = {
+        self._commands: dict[str, tuple[Publisher, Encode]] = {
             name: (self.commander.create_publisher(self.type_of(name), name, qos(self.interface.topics[name])), encode)
             for name in ("joint_posture_command", "force_command", "joint_torque_command", "sim/disturbance")
             if name in self.interface.topics and not self.interface.publishers(name)
@@ -122,7 +124,7 @@ class WatchedStack:
                 return
             try:
                 message = deserialize_message(data, kind)
-            except Exception:  # noqa: BLE001 - rclpy's own kinds; it came from somebody's wrong publisher
+            except Exception:
                 return
             self._newest[topic] = data
             if topic == "motor_current_command" and stamp_of(data) >= self.driver.stamp:
@@ -134,7 +136,9 @@ class WatchedStack:
             bad = [leaf.name for leaf in leaves(message) if _is_wrong(leaf.value, topic in UNKNOWN)]
             if bad:
                 self._escape(f"{topic} has {bad[0]} not finite")
-            if is_bounded and any(abs(i) > peak * 1.000001 for i, peak in zip(message.effort, self._peak, strict=False)):
+            if is_bounded and any(
+                abs(i) > peak * 1.000001 for i, peak in zip(message.effort, self._peak, strict=False)
+            ):
                 self._escape(f"{topic} is above the peak current: {list(message.effort)} A")
 
         return take
@@ -330,6 +334,29 @@ class StackSource:
         if self._stack is not None:
             self._stack.close()
             self._stack = None
+
+    def trial(self, number: int, name: str, work: Callable[[WatchedStack], int]) -> Trial:
+        """A trial on an enabled arm, which an operator must be able to enable afterwards.
+
+        Parameters
+        ----------
+        number, name : of the trial.
+        work : does what is tried; returns how much of it there was.
+        """
+        stack = self.ready()
+        size, escapes = 1, []
+        reason = stack.begin()
+        try:
+            if not reason:
+                size = work(stack)
+                escapes = list(stack.escapes)
+                reason = stack.recover()
+        except NodeEndedError as error:
+            escapes, reason = list(stack.escapes), str(error)
+        if reason:
+            self.discard()
+            escapes.append(reason)
+        return Trial(number, name, size, tuple(escapes), stack.motion, stack.force)
 
     def __enter__(self) -> "StackSource":
         return self

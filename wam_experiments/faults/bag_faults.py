@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from wam_bag.bag import Bag, BagError, read
+from wam_bag.bag import Bag, BagError
 
 MEMORY: Final = 2**31  # bytes that the process may take meanwhile
 PATIENCE: Final = 10  # s, for one bag

@@ -121,7 +121,9 @@ def permuted(message: Message, chance: Random) -> bool:
 def with_integers(message: Message, chance: Random) -> bool:
     """Put an extreme into an integer other than those of a stamp; False where there is none."""
     found = [
-        leaf for leaf in leaves(message) if leaf.kind.startswith(("int", "uint")) and leaf.name not in ("sec", "nanosec")
+        leaf
+        for leaf in leaves(message)
+        if leaf.kind.startswith(("int", "uint")) and leaf.name not in ("sec", "nanosec")
     ]
     if not found:
         return False

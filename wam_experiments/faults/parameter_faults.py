@@ -58,7 +58,9 @@ def parameter_set(fields: Sequence[Field], present: Mapping[str, Any], chance: R
     way = chance.randrange(8)
     if way == 0 and live:
         many = chance.sample(live, chance.randrange(1, len(live) + 1))
-        return ParameterSet("values near the present ones", tuple(_scaled(f, present[f.name], chance) for f in many), False)
+        return ParameterSet(
+            "values near the present ones", tuple(_scaled(f, present[f.name], chance) for f in many), False
+        )
     if way == 1:
         return ParameterSet("no parameter", (), False)
     if way == 2:
@@ -71,15 +73,19 @@ def parameter_set(fields: Sequence[Field], present: Mapping[str, Any], chance: R
         bad = Assignment(field.name, code, [value] if code != kind else value)
         return ParameterSet("another type", _mixed(good, bad, chance), True)
     if way == 4:
-        bad = Assignment(chance.choice(["", "x" * 2000, f"{field.name}.", "\x1b[2J", "qos_overrides"]), DOUBLE, 1.0)
+        bad = Assignment(chance.choice(["x", "x" * 2000, f"{field.name}.", "\x1b[2J", "qos_overrides"]), DOUBLE, 1.0)
         return ParameterSet("an unknown name", _mixed(good, bad, chance), True)
     if way == 5 and field.is_array:
         values = list(present[field.name])
         values = chance.choice([[], values[:-1], [*values, *values[:1]], values * 1000])
         code = ARRAYS[CODES[field.kind]]
-        return ParameterSet("an array of another length", _mixed(good, Assignment(field.name, code, values), chance), False)
+        return ParameterSet(
+            "an array of another length", _mixed(good, Assignment(field.name, code, values), chance), False
+        )
     if way == 6:
-        return ParameterSet("one name twice", tuple(_scaled(field, present[field.name], chance) for _ in range(2)), False)
+        return ParameterSet(
+            "one name twice", tuple(_scaled(field, present[field.name], chance) for _ in range(2)), False
+        )
     bad = _extreme(field, present[field.name], chance)
     is_wrong = not field.live or _is_outside(field, bad.value)
     return ParameterSet("an extreme value", _mixed(good, bad, chance), is_wrong)

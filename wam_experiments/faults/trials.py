@@ -17,18 +17,18 @@ class Trial(NamedTuple):
 
     Attributes
     ----------
-    index : number of the trial among those of its kind and seed.
+    number : of the trial among those of its kind and seed.
     name : the fault, in words.
-    count : messages, sets, losses and so on in it.
+    size : messages, sets, losses and so on in it.
     escapes : what went wrong, '' nowhere.
     motion : rad, largest motion of a joint that nobody had commanded.
     force : N, largest true force on the world.
     delay : s of the arm's time from the loss to zero current, NaN where it does not apply.
     """
 
-    index: int
+    number: int
     name: str
-    count: int = 1
+    size: int = 1
     escapes: tuple[str, ...] = ()
     motion: float = 0.0
     force: float = 0.0
@@ -42,7 +42,7 @@ class FaultKind(NamedTuple):
     ----------
     name : as on the command line.
     doc : what is done, one line.
-    unit : of `Trial.count`, plural.
+    unit : of `Trial.size`, plural.
     full, short : number of trials.
     play : makes trials from a configuration, a seed, the first index and the number.
     """
@@ -67,7 +67,7 @@ class KindResult(NamedTuple):
     @property
     def tried(self) -> int:
         """Number of messages, sets, losses and so on."""
-        return sum(trial.count for trial in self.trials)
+        return sum(trial.size for trial in self.trials)
 
     @property
     def escaped(self) -> list[Trial]:
