@@ -41,6 +41,7 @@ PRELOADED: Final = [
     "wam_driver.driver",
     "wam_control.force_loop",
 ]
+ANSWERED, ATTEMPTS = 0.5, 6  # s; an answer can be lost while the service still discovers who asks
 COMMANDS: Final = ("joint_posture_command", "force_command")
 
 
@@ -230,8 +231,11 @@ class NodeProcesses:
         if not self.wait(client.service_is_ready, 5.0):
             return f"no service {service}"
         request = client.srv_type.Request() if switch is None else client.srv_type.Request(data=switch)
-        future = client.call_async(request)
-        return str(future.result().message) if self.wait(future.done, 2.0) else "no answer"
+        for _ in range(ATTEMPTS):
+            future = client.call_async(request)
+            if self.wait(future.done, ANSWERED):
+                return str(future.result().message)
+        return "no answer"
 
     def enabled(self, patience: float) -> str:
         """Do what an operator does; returns why the arm cannot be enabled, '' where it is and stays so."""

@@ -27,7 +27,9 @@ from wam_ros.qos import qos
 from wam_ros.run import NAMESPACE
 from wam_ros.wire import Encode, encoder, stamp_of
 
+LONGEST_START: Final = 120.0  # s of wall time
 PATIENCE: Final = 15.0  # s of wall time without progress and without a fault that is a hang
+ANSWERED, ATTEMPTS = 0.5, 20  # s; an answer can be lost while the service still discovers who asks
 REST: Final = 0.2  # s of wall time after which the time of an arm in fault is known to be at rest
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
 EVENTS: Final = "/parameter_events"
@@ -95,8 +97,8 @@ class WatchedStack:
             "enable": self.node.create_client(SetBool, "driver/enable"),
             **{name: self.node.create_client(Trigger, f"driver/{name}") for name in ("reset_fault", "reset", "estop")},
         }
-        self._wait(lambda: all(client.service_is_ready() for client in self._clients.values()), "services")
-        self._wait(lambda: self.driver.stamp > 20 * shared.timing.outer_period_ns, "the start of the arm's time")
+        self._start(lambda: all(client.service_is_ready() for client in self._clients.values()), "services")
+        self._start(lambda: self.driver.stamp > 20 * shared.timing.outer_period_ns, "the start of the arm's time")
 
     def _named(self, name: str) -> Any:
         return self._composition.nodes[name]
@@ -189,9 +191,10 @@ class WatchedStack:
                 where = where.tb_next
             raise NodeEndedError(f"a node ended: {type(error).__name__}: {str(error)[:150]} ({names[-1]})") from error
 
-    def _wait(self, until: Callable[[], Any], what: str) -> None:
-        if not self.wait(until):
-            raise TimeoutError(f"no {what} within {PATIENCE:g} s")
+    def _start(self, until: Callable[[], Any], what: str) -> None:
+        if not self.wait(until, LONGEST_START):
+            self.close()
+            raise TimeoutError(f"no {what} within {LONGEST_START:g} s")
 
     def wait(self, until: Callable[[], Any], patience: float = PATIENCE) -> bool:
         """Spin until something is true; False where it is not within `patience`, s of wall time."""
@@ -250,15 +253,18 @@ class WatchedStack:
 
     def _goes_on(self) -> bool:
         before = self.driver.stamp
-        went_on = self.wait(lambda: self.driver.stamp > before + self.configuration.shared.timing.outer_period_ns, 1.0)
+        went_on = self.wait(lambda: self.driver.stamp > before + self.configuration.shared.timing.outer_period_ns, 3.0)
         return went_on and self.driver.safety.mode is Mode.ENABLED
 
     def ask(self, service: str, switch: bool | None = None) -> str:
         """Call a service of the driver; returns its message."""
         client = self._clients[service]
         request = client.srv_type.Request() if switch is None else client.srv_type.Request(data=switch)
-        future = client.call_async(request)
-        return str(future.result().message) if self.wait(future.done, 5.0) else "no answer"
+        for _ in range(ATTEMPTS):
+            future = client.call_async(request)
+            if self.wait(future.done, ANSWERED):
+                return str(future.result().message)
+        return "no answer"
 
     # faults
 
