@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from random import Random
 from typing import Final
 
-from wam_cli.faults.node_processes import NodeProcesses
+from wam_cli.faults.node_processes import ANSWERS, NodeProcesses
 from wam_description.configuration import Configuration
 from wam_experiments.faults.trials import FORCE, MOTION, ZERO_CURRENT, Trial
 
@@ -77,7 +77,8 @@ def _noticed(chain: NodeProcesses, name: str, escapes: list[str]) -> float:
     delay = max(0.0, (chain.current_stamp - chain.stamps[name]) * 1e-9)
     if delay > ZERO_CURRENT:
         escapes.append(f"current {delay * 1e3:.0f} ms after the loss")
-    if name not in " ".join(chain.reports):
+    texts = " ".join(chain.reports)
+    if name not in texts and ANSWERS[name] not in texts:
         found = chain.statuses.get("driver")
         escapes.append(f"not named: '{found.fault if found else ''}'")
     return delay
