@@ -10,12 +10,12 @@ from wam_bag.bag import read
 from wam_cli.faults.watched_stack import WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.bag_faults import PATIENCE, limits, mutated, values, verdict
-from wam_experiments.faults.trials import Trial
+from wam_experiments.faults.trials import FaultTrial
 
 ALLOWED = ("same", "refused", "metadata")  # MCAP has no checksum of metadata records
 
 
-def play(configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+def play(configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count`, a broken file each."""
     with TemporaryDirectory(prefix="wam_faults_") as folder:
         whole = _record(configuration, Path(folder)).read_bytes()
@@ -34,7 +34,7 @@ def play(configuration: Configuration, seed: int, first: int, count: int) -> Ite
                 except Exception as error:
                     found = f"{type(error).__name__}: {error}"
                 signal.alarm(0)
-                yield Trial(index, f"bag, {kind}", 1, () if found in ALLOWED else (f"{found} differs unseen",))
+                yield FaultTrial(index, f"bag, {kind}", 1, () if found in ALLOWED else (f"{found} differs unseen",))
 
 
 def _record(configuration: Configuration, folder: Path) -> Path:

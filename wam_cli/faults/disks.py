@@ -12,7 +12,7 @@ from typing import Final
 from wam_bag.bag import BagError, read
 from wam_cli.faults.watched_stack import NodeEndedError, WatchedStack
 from wam_description.configuration import Configuration
-from wam_experiments.faults.trials import Trial
+from wam_experiments.faults.trials import FaultTrial
 
 REPORTED: Final = 10.0  # s of wall time, on a busy machine
 ROOM: Final = (0, 3_000, 100_000)  # bytes that a full disk still takes
@@ -20,7 +20,7 @@ Work = Callable[[WatchedStack, Path, Random], None]
 ERROR: Final = b"\x02"
 
 
-def play(configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+def play(configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count`, a stack and a bag each."""
     ways = {"full disk": _fill, "directory removed": _remove, "no place for the samples of a fault": _fault}
     for index in range(first, first + count):
@@ -37,7 +37,7 @@ def play(configuration: Configuration, seed: int, first: int, count: int) -> Ite
             yield _trial(configuration.with_values(values), index, name, Path(folder, "bag"), ways[name], chance)
 
 
-def _trial(configuration: Configuration, index: int, name: str, bag: Path, work: Work, chance: Random) -> Trial:
+def _trial(configuration: Configuration, index: int, name: str, bag: Path, work: Work, chance: Random) -> FaultTrial:
     """One trial; the end of the recorder is part of it."""
     stack = WatchedStack(configuration)
     reason = stack.begin()
@@ -53,12 +53,12 @@ def _trial(configuration: Configuration, index: int, name: str, bag: Path, work:
     except Exception as error:
         stack.escapes.append(f"the end of a node: {type(error).__name__}: {error}")
     escapes = (*stack.escapes, *filter(None, [reason]))
-    return Trial(index, name, escapes=escapes, motion=stack.motion, force=stack.force)
+    return FaultTrial(index, name, escapes=escapes, motion=stack.motion, force=stack.force)
 
 
 def _fill(stack: WatchedStack, bag: Path, chance: Random) -> None:
     """No file of this process may grow any more, as on a full disk; what was written must stay readable."""
-    size = sum(file.stat().st_size for file in bag.iterdir())
+    size = max(file.stat().st_size for file in bag.glob("*.mcap"))
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size + chance.choice(ROOM), before[1]))
     try:

@@ -15,21 +15,21 @@ from typing import Final
 from wam_bag.bag import BagError
 from wam_bag.contents import contents
 from wam_cli.faults.soak import lost_in
-from wam_experiments.faults.trials import Trial
+from wam_experiments.faults.trials import FaultTrial
 
 MARK: Final = "WAM_STACK_INTERRUPTED"  # environment variable by which the processes of a trial are found
 STARTING, PLAYING = 4.0, 12.0  # s; one half of the moments is before the first, the other before the second
 LONGEST_END: Final = 30.0  # s, on a busy machine
 
 
-def play(seed: int, first: int, count: int) -> Iterator[Trial]:
+def play(seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count`, a demonstration each."""
     for index in range(first, first + count):
         chance = Random(f"interruptions {seed} {index}")
         moment = chance.uniform(0.0, STARTING if index % 2 else PLAYING)
         with TemporaryDirectory(prefix="wam_faults_") as folder:
             escapes = tuple(_interrupted(Path(folder), moment, f"{os.getpid()}.{index}"))
-        yield Trial(index, f"Ctrl-C after {moment:.2f} s", 1, escapes)
+        yield FaultTrial(index, f"Ctrl-C after {moment:.2f} s", 1, escapes)
 
 
 def _interrupted(folder: Path, moment: float, mark: str) -> Iterator[str]:

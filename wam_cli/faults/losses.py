@@ -8,7 +8,7 @@ from typing import Final
 
 from wam_cli.faults.node_processes import ANSWERS, NodeProcesses
 from wam_description.configuration import Configuration
-from wam_experiments.faults.trials import FORCE, MOTION, ZERO_CURRENT, Trial
+from wam_experiments.faults.trials import FORCE, MOTION, ZERO_CURRENT, FaultTrial
 
 WAYS: Final = (signal.SIGSTOP, signal.SIGKILL, signal.SIGTERM)
 NOTICED: Final = 5.0  # s of wall time, in which a loss must be reported on a busy machine
@@ -16,7 +16,7 @@ RECOVERED: Final = 20.0  # s of wall time, in which an operator gets an enabled 
 FROZEN: Final = (0.2, 1.5)  # s of wall time that a driver is frozen
 
 
-def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count` of a seed, one loss each."""
     chain: NodeProcesses | None = None
     configured = configuration.with_values({"timing.mode": mode, "timing.timeout": 2.0})
@@ -36,10 +36,10 @@ def play(mode: str, configuration: Configuration, seed: int, first: int, count: 
             chain.close()
 
 
-def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random, index: int, mode: str) -> Trial:
+def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random, index: int, mode: str) -> FaultTrial:
     what = f"{name} {way.name}, {mode}"
     if reason := chain.enabled(RECOVERED):
-        return Trial(index, what, 1, (f"before: {reason}",))
+        return FaultTrial(index, what, 1, (f"before: {reason}",))
     chain.wait(lambda: False, chance.uniform(0.0, 0.1))
     q, chain.force = list(chain.q), 0.0
     chain.reports.clear()
@@ -66,7 +66,7 @@ def _trial(chain: NodeProcesses, name: str, way: signal.Signals, chance: Random,
         escapes.append(f"the arm moved {motion:.3f} rad")
     if chain.force > FORCE:
         escapes.append(f"{chain.force:.0f} N")
-    return Trial(index, what, 1, tuple(escapes), motion, chain.force, delay)
+    return FaultTrial(index, what, 1, tuple(escapes), motion, chain.force, delay)
 
 
 def _noticed(chain: NodeProcesses, name: str, escapes: list[str]) -> float:

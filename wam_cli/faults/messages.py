@@ -10,7 +10,7 @@ from rclpy.publisher import Publisher
 from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
-from wam_experiments.faults.trials import Trial
+from wam_experiments.faults.trials import FaultTrial
 
 MESSAGES: Final = 10  # of one trial
 BETWEEN: Final = 0.001  # s of the arm's time between two of them
@@ -39,7 +39,7 @@ def plan(topics: list[str], seed: int, index: int) -> MessagePlan:
     return every[index % len(every)]
 
 
-def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count` of a seed, `MESSAGES` messages each, in a mode of `timing.mode`."""
     with StackSource(configuration.with_values({"timing.mode": mode})) as source:
         for index in range(first, first + count):

@@ -23,7 +23,7 @@ from wam_experiments.faults.parameter_faults import (
     ParameterSet,
     parameter_set,
 )
-from wam_experiments.faults.trials import Trial
+from wam_experiments.faults.trials import FaultTrial
 
 FIELDS: Final = {
     BOOL: "bool_value", INTEGER: "integer_value", DOUBLE: "double_value", STRING: "string_value",
@@ -40,7 +40,7 @@ def message(assignment: Assignment) -> Parameter:
     return Parameter(name=assignment.name, value=value)
 
 
-def play(configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+def play(configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count` of a seed, one set each."""
     with StackSource(configuration.with_values({"timing.mode": "lockstep"})) as source:
         for index in range(first, first + count):

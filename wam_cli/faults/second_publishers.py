@@ -14,7 +14,7 @@ from wam_bag.bag import raw
 from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
-from wam_experiments.faults.trials import Trial
+from wam_experiments.faults.trials import FaultTrial
 from wam_ros.run import NAMESPACE
 from wam_ros.wire import LITTLE_ENDIAN, stamp_of
 
@@ -26,7 +26,7 @@ STAMPS: Final = ("as recorded", "from now on", "of the wall clock")
 GUARDED: Final = tuple(topic for topic in EFFECTIVE if topic != "sim/disturbance")  # a second publisher is a fault
 
 
-def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials with a second publisher: every topic that a node takes, in turn, with messages of its type or another."""
     with StackSource(configuration.with_values({"timing.mode": mode})) as source:
         for index in range(first, first + count):
@@ -38,7 +38,7 @@ def play(mode: str, configuration: Configuration, seed: int, first: int, count: 
             yield source.trial(index, name, partial(work, topic))
 
 
-def replay(bag: Path, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[Trial]:
+def replay(bag: Path, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials with a bag replayed onto the topics of an enabled arm: one topic, or all commands, or all feedback."""
     mode = "realtime"
     recorded = {name.removeprefix(f"/{NAMESPACE}/"): found for name, found in raw(bag).items()}

@@ -20,7 +20,7 @@ from wam_description.interface import Interface
 from wam_description.signals import State, Wrench
 from wam_driver.safety import Mode
 from wam_experiments.faults.message_faults import leaves
-from wam_experiments.faults.trials import FORCE, MOTION, Trial
+from wam_experiments.faults.trials import FORCE, MOTION, FaultTrial
 from wam_ros.bring_up import Composition
 from wam_ros.messages import message_type
 from wam_ros.qos import qos
@@ -32,6 +32,7 @@ PATIENCE: Final = 15.0  # s of wall time without progress and without a fault th
 ANSWERED, ATTEMPTS = 0.5, 20  # s; an answer can be lost while the service still discovers who asks
 REST: Final = 0.2  # s of wall time after which the time of an arm in fault is known to be at rest
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
+UNEXPECTED: Final = "unexpected "  # in the status of a node whose callback raised (wam_ros.tolerance)
 EVENTS: Final = "/parameter_events"
 SECOND: Final = 1_000_000_000
 
@@ -147,6 +148,8 @@ class WatchedStack:
 
     def _take_status(self, message: DiagnosticStatus) -> None:
         self.statuses[message.name] = message
+        if UNEXPECTED in message.message:
+            self._escape(f"{message.name}: {message.message[:200]}")
 
     def _command(self, stamp: int) -> None:
         """Hold the arm where it is, press as commanded, push nothing."""
@@ -341,7 +344,7 @@ class StackSource:
             self._stack.close()
             self._stack = None
 
-    def trial(self, number: int, name: str, work: Callable[[WatchedStack], int]) -> Trial:
+    def trial(self, number: int, name: str, work: Callable[[WatchedStack], int]) -> FaultTrial:
         """A trial on an enabled arm, which an operator must be able to enable afterwards.
 
         Parameters
@@ -362,7 +365,7 @@ class StackSource:
         if reason:
             self.discard()
             escapes.append(reason)
-        return Trial(number, name, size, tuple(escapes), stack.motion, stack.force)
+        return FaultTrial(number, name, size, tuple(escapes), stack.motion, stack.force)
 
     def __enter__(self) -> "StackSource":
         return self

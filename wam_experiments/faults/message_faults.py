@@ -24,7 +24,7 @@ Message = Any
 Stamps = Callable[[Random, int], int]
 
 
-class Leaf(NamedTuple):
+class MessageLeaf(NamedTuple):
     """A field of a message that is no message itself: its owner, name and type."""
 
     owner: Message
@@ -37,7 +37,7 @@ class Leaf(NamedTuple):
         return getattr(self.owner, self.name)
 
 
-def leaves(message: Message) -> Iterator[Leaf]:
+def leaves(message: Message) -> Iterator[MessageLeaf]:
     """Every field that is no message, in order; a sequence of messages by its members."""
     for name, kind in message.get_fields_and_field_types().items():
         value = getattr(message, name)
@@ -47,10 +47,10 @@ def leaves(message: Message) -> Iterator[Leaf]:
             for member in value:
                 yield from leaves(member)
         else:
-            yield Leaf(message, name, kind)
+            yield MessageLeaf(message, name, kind)
 
 
-def _numbers(message: Message) -> list[Leaf]:
+def _numbers(message: Message) -> list[MessageLeaf]:
     return [leaf for leaf in leaves(message) if leaf.kind.removeprefix("sequence<").startswith(("double", "float"))]
 
 

@@ -12,7 +12,7 @@ FORCE = 15.0  # N, of the arm on the world without a legitimate command
 MOST_ESCAPES = 20  # of one kind; then the kind is stopped
 
 
-class Trial(NamedTuple):
+class FaultTrial(NamedTuple):
     """One trial.
 
     Attributes
@@ -42,7 +42,7 @@ class FaultKind(NamedTuple):
     ----------
     name : as on the command line.
     doc : what is done, one line.
-    unit : of `Trial.size`, plural.
+    unit : of `FaultTrial.size`, plural.
     full, short : number of trials.
     play : makes trials from a configuration, a seed, the first index and the number.
     """
@@ -52,7 +52,7 @@ class FaultKind(NamedTuple):
     unit: str
     full: int
     short: int
-    play: Callable[[Configuration, int, int, int], Iterator[Trial]]
+    play: Callable[[Configuration, int, int, int], Iterator[FaultTrial]]
 
 
 class KindResult(NamedTuple):
@@ -61,7 +61,7 @@ class KindResult(NamedTuple):
     kind: str
     unit: str
     seed: int
-    trials: list[Trial]
+    trials: list[FaultTrial]
     seconds: float  # of wall time
 
     @property
@@ -70,7 +70,7 @@ class KindResult(NamedTuple):
         return sum(trial.size for trial in self.trials)
 
     @property
-    def escaped(self) -> list[Trial]:
+    def escaped(self) -> list[FaultTrial]:
         """Trials in which something went wrong."""
         return [trial for trial in self.trials if trial.escapes]
 
@@ -91,7 +91,7 @@ def played(
 ) -> KindResult:
     """Play trials of one kind, at most until `MOST_ESCAPES` have escaped."""
     begin = clock()
-    trials: list[Trial] = []
+    trials: list[FaultTrial] = []
     escaped = 0
     report(0, count)
     for trial in kind.play(configuration, seed, first, count):
