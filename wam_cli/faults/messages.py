@@ -12,7 +12,7 @@ from wam_description.configuration import Configuration
 from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
 from wam_experiments.faults.trials import FaultTrial
 
-MESSAGES: Final = 10  # of one trial
+MESSAGES: Final = 20  # of one trial
 BETWEEN: Final = 0.001  # s of the arm's time between two of them
 AFTER: Final = 0.03  # s of the arm's time after the last
 

@@ -60,7 +60,8 @@ class WatchedStack:
     def __init__(self, configuration: Configuration, domain_id: int | None = None) -> None:
         shared = configuration.shared
         self.configuration = configuration
-        configuration = configuration.with_values({"timing.timeout": 2.0})
+        paced = {"timing.real_time_factor": 0.0} if hasattr(shared.timing, "real_time_factor") else {}
+        configuration = configuration.with_values({"timing.timeout": 2.0, **paced})
         self._clock = AnsweredClock(shared.timing.period)
         is_realtime = configuration.shared.timing.mode == "realtime"
         with self._clock.of_new_nodes() if is_realtime else nullcontext():
