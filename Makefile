@@ -3,6 +3,7 @@
 
 PYTHON ?= python3
 ARGS ?=
+SOAK_SECONDS ?= 600
 
 VENV := .venv
 PY := $(VENV)/bin/python3
@@ -26,7 +27,7 @@ export ROS_LOG_DIR ?= $(CURDIR)/.cache/ros
 export MPLCONFIGDIR ?= $(CURDIR)/.cache/matplotlib
 
 .DEFAULT_GOAL := help
-.PHONY: help demo install check test bench docs constraints clean
+.PHONY: help demo install check test bench soak docs constraints clean
 .DELETE_ON_ERROR:
 # pip must not run twice at once in one .venv
 .NOTPARALLEL:
@@ -60,6 +61,9 @@ endef
 
 bench: $(STAMPS)/test $(INSTALLED)  ## run the benchmarks; they print ratios of one run
 	@for script in benchmarks/*.py; do echo "== $$script"; $(PY) "$$script" $(ARGS) || exit 1; done
+
+soak: $(INSTALLED)  ## run the nodes for SOAK_SECONDS (600): memory, lost messages; the figures go into docs/reliability.md
+	@$(VENV)/bin/wam evaluate soak --seconds $(SOAK_SECONDS) --write docs/reliability.md $(ARGS)
 
 docs: $(STAMPS)/test $(INSTALLED)  ## regenerate the generated pages of docs/
 	@$(PY) docs/generate.py $(ARGS)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from bag_mutations import MEMORY, break_bags, limits
+from bag_mutations import break_bags
 from bag_samples import CLOUD, FOREIGN, OURS, STORE, WAYS, Sample, Way, random_cloud, random_samples, write
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -46,6 +46,7 @@ from wam_bag.mcap_records import LARGEST_ATTACHMENT, LARGEST_CHUNK, MAGIC, chunk
 from wam_bag.message_groups import Grouping
 from wam_bag.message_text import definitions
 from wam_bag.repair import repair
+from wam_experiments.faults.bag_faults import MEMORY, limits
 
 JOINTS, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 

@@ -2,4 +2,5 @@
 
 - main: the command line and the table of commands; program: handles Ctrl-C before main is imported
 - commands: one module per command, and the options that several commands share
+- faults: trials of faults on the nodes, for `wam evaluate faults`
 """

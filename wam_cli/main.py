@@ -31,7 +31,7 @@ COMMANDS = {
     "scorecard": "compare the arm with the requisites of chapter 3",
     "plant": "draw the plant's effects with the theory and print the differences",
     "guard": "validate the stability guard by Monte Carlo simulation",
-    "evaluate": "evaluate a part of the stack in a seeded benchmark: contact",
+    "evaluate": "evaluate a part of the stack in a seeded benchmark: contact, faults, soak",
     "model": "print the arm's model as URDF or MJCF",
 }
 

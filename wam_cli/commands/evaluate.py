@@ -10,6 +10,8 @@ from typing import Any
 import yaml
 
 from wam_cli.commands import at_least, batch_of, configuration_of, take_batch, take_configuration, writable_file
+from wam_cli.commands import evaluate_faults as faults
+from wam_cli.commands import evaluate_soak as soak
 from wam_description.configuration import Configuration
 from wam_experiments.contact_benchmark.evaluation import BenchmarkExtent, BenchmarkResult, evaluate, scenarios
 from wam_experiments.contact_benchmark.figure import figure
@@ -23,7 +25,6 @@ from wam_ros.bring_up import Composition
 from wam_sim.progress import Progress
 
 SEEDS = (1, 2, 3)
-PARTS = ("contact",)
 
 
 def over_topics(
@@ -63,7 +64,13 @@ def play_over_topics(configuration: Configuration, scenario: BenchmarkScenario, 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("part", choices=PARTS, help="contact: contact estimation on the whole arm")
+    parts = parser.add_subparsers(dest="part", required=True, metavar="PART")
+    _contact_arguments(parts.add_parser("contact", help="contact estimation on the whole arm"))
+    faults.arguments(parts.add_parser("faults", help="wrong messages, lost nodes, full disks, Ctrl-C"))
+    soak.arguments(parts.add_parser("soak", help="a long run: memory and lost messages"))
+
+
+def _contact_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, nargs="+", default=list(SEEDS), help="seeds of the scenarios, default 1 2 3"
     )
@@ -100,6 +107,11 @@ def _write(
 
 def run(given: argparse.Namespace) -> int:
     """Evaluate; 1 if a required value is missed."""
+    parts = {"contact": _run_contact, "faults": faults.run, "soak": soak.run}
+    return parts[given.part](given)
+
+
+def _run_contact(given: argparse.Namespace) -> int:
     at_least("--contacts", given.contacts, 1)
     at_least("--resting", given.resting, 0)
     at_least("--free", given.free, 0.0)

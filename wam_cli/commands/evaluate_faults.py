@@ -1,0 +1,85 @@
+"""`wam evaluate faults`: wrong messages, lost nodes, full disks, Ctrl-C."""
+
+import argparse
+import logging
+import os
+import sys
+import time
+from pathlib import Path
+
+from wam_cli.commands import at_least, configuration_of, take_configuration, writable_file
+from wam_cli.faults import interruptions
+from wam_cli.faults.kinds import REPLAYED, kinds
+from wam_experiments.faults.page import faults_section, report, with_section
+from wam_experiments.faults.trials import FaultKind, KindResult, played
+from wam_sim.progress import Progress
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    names = list(kinds(Path("/")))
+    parser.add_argument("--only", nargs="+", choices=names, metavar="KIND", help=f"some kinds: {', '.join(names)}")
+    parser.add_argument("--seed", type=int, default=1, help="seed of all trials, default 1")
+    parser.add_argument("--first", type=int, default=0, help="number of the first trial, default 0")
+    parser.add_argument("--count", type=int, help="trials of each kind; default: those of the page")
+    parser.add_argument("--short", action="store_true", help="a few trials of each kind, half a minute")
+    parser.add_argument("--bag", type=Path, default=REPLAYED, help="recording that is replayed, default %(default)s")
+    parser.add_argument(
+        "--ctrl-c", type=int, metavar="COUNT", help="instead: interrupt so many demonstrations at random moments"
+    )
+    parser.add_argument("--write", type=Path, help="page to update, for example docs/reliability.md")
+    take_configuration(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Play the trials; 1 if any escaped."""
+    at_least("--seed", given.seed, 0)
+    at_least("--first", given.first, 0)
+    if given.count is not None:
+        at_least("--count", given.count, 1)
+    if given.write:
+        writable_file("--write", given.write)
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # nothing broken leaves this machine
+    logging.getLogger().setLevel(logging.ERROR)
+    results = list(_interrupted(given) if given.ctrl_c is not None else _played(given))
+    print(report(results))
+    if given.write:
+        section = "faults" if given.ctrl_c is None else "interruptions"
+        given.write.write_text(
+            with_section(given.write, section, faults_section(results, _command(given))), encoding="utf-8"
+        )
+    return 1 if any(result.escaped for result in results) else 0
+
+
+def _played(given: argparse.Namespace) -> list[KindResult]:
+    configuration = configuration_of(given)
+    results = []
+    for name, kind in kinds(given.bag).items():
+        count = given.count or (kind.short if given.short else kind.full)
+        if (given.only and name not in given.only) or not count:
+            continue
+        progress = Progress(name, sys.stderr)
+        results.append(played(kind, configuration, given.seed, given.first, count, time.monotonic, progress))
+    return results
+
+
+def _interrupted(given: argparse.Namespace) -> list[KindResult]:
+    at_least("--ctrl-c", given.ctrl_c, 1)
+    kind = FaultKind(
+        "interruptions",
+        "Ctrl-C during `wam demo`",
+        "interruptions",
+        100,
+        0,
+        lambda configuration, seed, first, count: interruptions.play(seed, first, count),
+    )
+    progress = Progress(kind.name, sys.stderr)
+    return [played(kind, configuration_of(given), given.seed, given.first, given.ctrl_c, time.monotonic, progress)]
+
+
+def _command(given: argparse.Namespace) -> str:
+    words = ["wam evaluate faults", f"--seed {given.seed}"]
+    words += [f"--first {given.first}"] * bool(given.first) + [f"--count {given.count}"] * bool(given.count)
+    words += [f"--only {' '.join(given.only)}"] * bool(given.only) + ["--short"] * given.short
+    words += [f"--ctrl-c {given.ctrl_c}"] * (given.ctrl_c is not None)
+    return " ".join([*words, f"--write {given.write}"])

@@ -1,0 +1,32 @@
+"""`wam evaluate soak`: a long run of the nodes, its memory and its losses."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from wam_cli.commands import at_least, configuration_of, take_configuration, writable_file
+from wam_cli.faults.soak import soak
+from wam_experiments.faults.page import with_section
+from wam_sim.progress import Progress
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("--seconds", type=float, default=600.0, help="of the arm's time, default 600")
+    parser.add_argument("--write", type=Path, help="page to update, for example docs/reliability.md")
+    take_configuration(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Run; 1 if memory grows or messages are lost."""
+    at_least("--seconds", given.seconds, 2.0)
+    if given.write:
+        writable_file("--write", given.write)
+    found = soak(configuration_of(given), given.seconds, Progress("soak, seconds", sys.stderr))
+    text = found.section(f"wam evaluate soak --seconds {given.seconds:g}")
+    print(text)
+    if given.write:
+        given.write.write_text(with_section(given.write, "soak", text), encoding="utf-8")
+    for reason in found.missed:
+        print(reason, file=sys.stderr)
+    return 1 if found.missed else 0

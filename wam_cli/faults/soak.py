@@ -1,0 +1,122 @@
+"""A long run of the nodes in this process with a moving arm and the recorder: memory and losses."""
+
+import resource
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final, NamedTuple
+
+import yaml
+
+from wam_bag.contents import Contents, contents
+from wam_bag.losses import losses
+from wam_description.configuration import Configuration
+from wam_ros.bring_up import Composition
+
+STEP: Final = 2.0  # s of a move
+POSTURES: Final = ([0.0, -0.8, 0.0, 0.3], [0.3, -1.1, 0.1, 0.7], [-0.3, -0.9, -0.1, 0.9], [0.0, -1.3, 0.0, 1.0])
+PUSH: Final = {"cover": "outer_link", "place": 0.3, "newtons": [0.0, 8.0, 0.0], "begin": 0.5, "end": 1.0}
+GROWTH: Final = 20.0  # MB from a tenth of the run on to its end
+
+
+class Soak(NamedTuple):
+    """What a long run has shown.
+
+    Attributes
+    ----------
+    seconds : of the arm's time.
+    factor : the arm's time by the wall clock's.
+    early, late : MB of resident memory after a tenth of the run, and at its end.
+    messages : in the bag.
+    losses : what the bag lacks, in words.
+    failure : why the scenario stopped, '' where it did not.
+    """
+
+    seconds: float
+    factor: float
+    early: float
+    late: float
+    messages: int
+    losses: tuple[str, ...]
+    failure: str
+
+    @property
+    def missed(self) -> list[str]:
+        """What does not hold."""
+        found = [self.failure] if self.failure else []
+        if self.late - self.early > GROWTH:
+            found.append(f"memory grew by {self.late - self.early:.1f} MB; allowed: {GROWTH:g} MB")
+        return [*found, *self.losses]
+
+    def section(self, command: str) -> str:
+        """The section of docs/reliability.md."""
+        growth = f"{self.early:.0f} MB after a tenth of the run, {self.late:.0f} MB at its end"
+        lost = " ".join(self.losses) or "none"
+        return (
+            f"Written by `{command}`.\n\n"
+            f"| quantity | value |\n| --- | --- |\n| time of the arm | {self.seconds:.0f} s |\n"
+            f"| real-time factor | {self.factor:.3f} |\n| memory | {growth} |\n"
+            f"| recorded messages | {self.messages} |\n| lost messages | {lost} |\n"
+            f"| faults | {self.failure or 'none'} |"
+        )
+
+
+def soak(configuration: Configuration, seconds: float, report: Callable[[int, int], None]) -> Soak:
+    """Run the configured nodes for `seconds` of the arm's time, in the configured mode."""
+    with TemporaryDirectory(prefix="wam_soak_") as folder:
+        script = Path(folder, "scenario.yaml")
+        script.write_text(yaml.safe_dump({"steps": _steps(seconds)}), encoding="utf-8")
+        nodes = [*configuration.shared.nodes, "scenario", "recorder"]
+        own = {"scenario:script": str(script), "recorder:directory": folder, "recorder:name": "soak", "nodes": nodes}
+        memory: list[float] = []
+        with Composition(configuration.with_values(own)) as composition:
+            scenario: Any = composition.nodes["scenario"]
+            driver: Any = composition.nodes["driver"]
+            clock = _Sampler(driver.driver, memory, seconds, report)
+            composition.spin(lambda: clock() or scenario.done)
+            failure = str(scenario.failure)
+        found = contents(Path(folder, "soak"))
+    early, late = memory[len(memory) // 10], memory[-1]
+    count = sum(topic.messages for topic in found.topics.values())
+    return Soak(clock.seconds, clock.factor, early, late, count, tuple(lost_in(found)), failure)
+
+
+def lost_in(found: Contents) -> list[str]:
+    """What a bag lacks, in words."""
+    counts = {name: topic.messages for name, topic in found.topics.items()}
+    return losses(found.path, found.metadata, found.attachments, counts).sentences(found.first)
+
+
+def _steps(seconds: float) -> list[dict[str, Any]]:
+    moves = [
+        {"name": f"move {i}", "seconds": STEP, "posture": POSTURES[i % len(POSTURES)], "push": PUSH}
+        for i in range(max(1, int(seconds / STEP)))
+    ]
+    return [
+        {"name": "release", "seconds": 0.5, "request": "enable"},
+        *moves,
+        {"name": "brake", "seconds": 0.5, "request": "disable"},
+    ]
+
+
+class _Sampler:
+    """Samples memory once in a second of wall time, and the real-time factor; never ends the run."""
+
+    def __init__(self, driver: Any, memory: list[float], seconds: float, report: Callable[[int, int], None]) -> None:
+        self._driver, self._memory, self._seconds, self._report = driver, memory, seconds, report
+        self._next = self._begin = time.monotonic()
+        self._first = driver.stamp * 1e-9
+        self.seconds = self.factor = 0.0
+
+    def __call__(self) -> bool:
+        """False."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + 1.0
+            pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
+            self._memory.append(pages * resource.getpagesize() / 1e6)
+            self.seconds = self._driver.stamp * 1e-9
+            self.factor = (self.seconds - self._first) / max(now - self._begin, 1e-9)
+            self._report(min(int(self.seconds), int(self._seconds)), int(self._seconds))
+        return False
