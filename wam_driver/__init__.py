@@ -5,6 +5,7 @@
 - driver_node: the driver as a ROS node
 - lockstep, realtime: the two ways in which its time passes
 - pacer: simulated time no faster than the wall clock
+- session: which life of the driver the nodes follow
 - safety: braked, enabled, fault
 - amplifier: clipping, I2t, deadband, ripple and noise of the motor currents
 - sensors: resolution and noise of encoders and strain gauges
