@@ -7,7 +7,6 @@
 - pacer: simulated time no faster than the wall clock
 - session: which life of the driver the nodes follow
 - safety: braked, enabled, fault
-- session: which run of the driver the nodes follow, and since when commands count
 - limit_watch: speeds, travel, currents and tensions against their limits
 - amplifier: clipping, I2t, deadband, ripple and noise of the motor currents
 - sensors: resolution and noise of encoders and strain gauges
