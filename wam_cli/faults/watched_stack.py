@@ -233,6 +233,7 @@ class WatchedStack:
     def begin(self) -> str:
         """Start a trial with an enabled arm at rest; returns why that is not possible, '' where it is."""
         self._injected.clear()
+        self.allowed_motion = MOTION
         self.driver.plant.release()
         if reason := self.recover():
             return reason
