@@ -55,8 +55,8 @@ class VelocityLoopNode:
         for name, speed, most in zip(self._motors, velocity, self._fastest, strict=False):
             if abs(speed) > most:
                 self.refusals["motor_velocity_command"] = (
-                    f"{name} is to turn at {speed:.4g} rad/s; allowed: up to {most:.4g} rad/s, from arm.joints.speed_limit; "
-                    "it turns no faster than that"
+                    f"{name} is to turn at {speed:.4g} rad/s; allowed: up to {most:.4g} rad/s, "
+                    "from arm.joints.speed_limit; it turns no faster than that"
                 )
                 return [min(max(v, -m), m) for v, m in zip(velocity, self._fastest, strict=True)]
         if self.refusals:

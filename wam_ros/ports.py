@@ -182,7 +182,7 @@ class Ports:
             self.node.get_logger().warning(f"{topic}: refused: {printable(reason, LONGEST_REASON)}{more}")
 
     def repeat_status(self) -> None:
-        """Publish the present status once more: on a loaded machine a latched message was lost that was the last one."""
+        """Publish the present status once more, as a message may be lost on a loaded machine."""
         self._send(STATUS, diagnostic_status(self._status, self.shared.arm.name))
 
     def set_problem(self, concerned: str, reason: str) -> None:
