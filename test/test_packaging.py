@@ -340,7 +340,6 @@ def test_package_xml_is_valid_for_ros():
     assert package.name == "wam_stack"
     assert package.get_build_type() == "ament_python"
     assert package.authors, "ros2 pkg xml shows them"
-    assert package.urls
     depends = {dependency.name for dependency in package.exec_depends}
     name_of_ros = re.compile(
         r"\b(\w+_msgs|\w+_interfaces|std_srvs|rclpy|ament_index_python|launch\w*)(?:[./]|\s+import)"

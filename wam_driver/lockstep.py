@@ -126,7 +126,7 @@ class Lockstep:
         if silent:
             return (
                 f"lockstep: no {topics} for the state of {stamp} ns within {limit:.1f} s; "
-                f"{silent} has stopped, start it again, then reset_fault"
+                f"{silent} {'have' if ' and ' in silent else 'has'} stopped, start it again, then reset_fault"
             )
         return f"lockstep: no {topics} for the state of {stamp} ns within {limit:.1f} s; check that {senders} runs"
 

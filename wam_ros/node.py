@@ -145,7 +145,8 @@ class AdaptedNode(TolerantNode):
             silent = " and ".join(self._interface.silent(lost, [topic for topic in ages if topic not in lost]))
             self._ports.set_problem(
                 "inputs",
-                f"{silent} has stopped: {' and '.join(lost)} is too old; start {silent} again, then reset_fault",
+                f"{silent} {'have' if ' and ' in silent else 'has'} stopped: {' and '.join(lost)} too old; "
+                f"start {silent} again, then reset_fault",
             )
         elif self._ports.counts["steps"] % REPEATED == 0:
             self._ports.repeat_status()
