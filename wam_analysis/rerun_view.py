@@ -95,7 +95,7 @@ def view(recording: AnalysedRun, save: Path | None) -> str:
     """
     rerun = load_rerun()
     arm = recorded_arm(recording.run.parameters)
-    joints = _joints(recording, arm.arm)
+    joints = joint_motion(recording, arm.arm)
     if joints is None and not any(isinstance(c, JointColumns) for c in recording.bag.topics.values()):
         raise ValueError(f"{recording.bag.path} has no joint states; nothing can be shown")
     stream = rerun.RecordingStream(APPLICATION, recording_id=recording.bag.path.name)
@@ -119,7 +119,7 @@ def view(recording: AnalysedRun, save: Path | None) -> str:
     return f"{poses} poses of the arm, {len(recording.summary.traces.stamp)} instants of its forces"
 
 
-def _joints(recording: AnalysedRun, arm: Arm) -> tuple[Times, Numbers] | None:
+def joint_motion(recording: AnalysedRun, arm: Arm) -> tuple[Times, Numbers] | None:
     """Stamps and angles of the joints, from the best topic in the bag, POSES per second."""
     for name in ("sim/joint_states", "joint_sensors", "joint_states"):
         columns = recording.run.joints(name)

@@ -21,7 +21,7 @@ from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, State
 from wam_description.topics import BY_NAME, STATUS
 from wam_description.wiring import Call, SetParameters
 from wam_description.world import Obstacles
-from wam_live.page import serve
+from wam_live.page import quiet, serve
 from wam_live.panel import SLIDERS, Panel, Press, Request
 from wam_live.scene import RELEASE, Push, Scene
 from wam_live.snapshot import NAN, Snapshot, size
@@ -157,11 +157,19 @@ class LivePage:
     namespace : of the stack.
     port : to listen on.
     say : called with lines for people.
+    domain_id : ROS domain, the one of the environment where None.
+
+    Attributes
+    ----------
+    scene, panel : what the page shows, None before the stack has answered.
     """
 
-    def __init__(self, namespace: str, port: int, say: Callable[[str], None]) -> None:
+    scene: Scene | None = None
+    panel: Panel | None = None
+
+    def __init__(self, namespace: str, port: int, say: Callable[[str], None], domain_id: int | None = None) -> None:
         self._namespace, self._port, self._say = namespace, port, say
-        self._connection = Connection()
+        self._connection = Connection(domain_id=domain_id)
         self._asking = Node("live", context=self._connection.context, namespace=namespace)
         self._connection.add(self._asking)
         self._clients: dict[tuple[str, str], Any] = {}
@@ -182,9 +190,9 @@ class LivePage:
             shared = build(Shared, {k: v for k, v in driver.items() if k.partition(".")[0] in names})
             obstacles = build_part(Obstacles, driver, "world.obstacles.")
             source = StackSource(self._connection.context, self._namespace, shared)
-            scene = Scene(self._server, shared.arm, obstacles, self._take_push)
+            self.scene = scene = Scene(self._server, shared.arm, obstacles, self._take_push)
             self._live = {key: flat[key[0]][key[1]] for key in SLIDERS if key[1] in flat.get(key[0], {})}
-            panel = Panel(self._server, shared.arm, self._live)
+            self.panel = panel = Panel(self._server, shared.arm, self._live)
             self._server.on_client_disconnect(lambda _: scene.let_go())
             self._say(f"live page: http://{self._server.get_host()}:{self._port}")
             self._draw(source, scene, panel, until)
@@ -194,7 +202,7 @@ class LivePage:
     def close(self) -> None:
         """End the server and leave ROS."""
         if self._server is not None:
-            with contextlib.redirect_stdout(io.StringIO()):  # viser says that it ends
+            with quiet():
                 self._server.stop()
             self._server = None
         self._connection.close()
@@ -233,17 +241,20 @@ class LivePage:
         self._push = push
 
     def _send(self, source: StackSource, panel: Panel) -> None:
-        """Stream the force that is pressed with, and the push while a link is dragged."""
+        """Stream the force that is pressed with, and the push until it is released."""
         if any(self._wrench.force) and (
             refusal := source.publish("force_command", Wrench(*self._wrench, (0.0, 0.0, 0.0)))
         ):
             self._wrench = Press(BASE, (0.0, 0.0, 0.0))
             panel.say(f"not pressed: {refusal}", refused=True)
-        if self._push is not None:
-            if refusal := source.publish("sim/disturbance", Wrench(*self._push)):
-                panel.say(f"not pushed: {refusal}", refused=True)
-            if self._push == RELEASE or refusal:
-                self._push = None
+        push = self._push
+        if push is None:
+            return
+        refusal = source.publish("sim/disturbance", Wrench(*push))
+        if refusal:
+            panel.say(f"not pushed: {refusal}", refused=True)
+        if (push is RELEASE or refusal) and self._push is push:  # a newer one may have come from the browser meanwhile
+            self._push = None
 
     def _ask(self, request: Request, panel: Panel) -> None:
         if isinstance(request, Press):

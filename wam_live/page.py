@@ -6,6 +6,7 @@ import io
 import logging
 import socket
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from typing import Any, Final
 
 HOST: Final = "127.0.0.1"
@@ -28,6 +29,11 @@ def port_is_free(port: int) -> bool:
     return True
 
 
+def quiet() -> AbstractContextManager[Any]:
+    """Keep what viser prints when it starts and ends off the terminal."""
+    return contextlib.redirect_stdout(io.StringIO())
+
+
 def serve(port: int) -> Any:
     """Start the server of a page.
 
@@ -48,7 +54,7 @@ def serve(port: int) -> Any:
     if not port_is_free(port):  # viser would silently take the next one
         raise NoPageError(f"port {port} of {HOST} is taken; close the other page, or choose a port with --port")
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a browser that goes away is no news
-    with _only_this_page(server, port), contextlib.redirect_stdout(io.StringIO()):
+    with _only_this_page(server, port), quiet():
         made = viser.ViserServer(host=HOST, port=port, label=TITLE, verbose=False)
     made.initial_camera.position = (1.1, -1.7, 0.5)
     made.initial_camera.look_at = (0.35, 0.0, -0.15)

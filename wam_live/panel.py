@@ -3,7 +3,7 @@
 import html
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from queue import SimpleQueue
 from typing import Any, Final, NamedTuple
 
@@ -58,14 +58,16 @@ class Panel:
     Attributes
     ----------
     requests : what was pressed, oldest first.
+    snapshot : what is shown.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Arm, live: Mapping[tuple[str, str], Any] | None = None) -> None:
         self.requests: SimpleQueue[Request] = SimpleQueue()
         self._gui = gui = server.gui
+        self.snapshot = Snapshot()
         self._samples: deque[tuple[float, ...]] = deque(maxlen=POINTS)
         self._sliders: dict[tuple[str, str], Any] = {}
-        gui.configure_theme(control_layout="collapsible", control_width="medium", show_share_button=False)
+        gui.configure_theme(control_width="medium", show_share_button=False)
         self._status = gui.add_html(status_page(Snapshot(), 0.0))
         self._said = gui.add_html("")
         if live is not None:
@@ -78,6 +80,7 @@ class Panel:
 
     def show(self, snapshot: Snapshot, pushing: float = 0.0) -> None:
         """Show an instant; call it a few times a second."""
+        self.snapshot = snapshot
         self._status.content = status_page(snapshot, pushing)
         if self._samples and snapshot.seconds < self._samples[-1][0]:
             self._samples.clear()  # the arm was started again, or the bag was moved back
@@ -106,6 +109,10 @@ class Panel:
             group.on_click(
                 lambda event, buttons=buttons: [self.requests.put(one) for one in buttons[event.target.value]]
             )
+
+    def _ask(self, requests: Sequence[Request]) -> None:
+        for request in requests:
+            self.requests.put(request)
 
     def _add_press(self, arm: Arm) -> None:
         with self._gui.add_folder("Press", expand_by_default=False):
@@ -211,5 +218,6 @@ def contact_text(snapshot: Snapshot) -> str:
         return "nothing touches the arm"
     place = "somewhere on"
     if math.isfinite(contact.place):
-        place = f"{contact.place * 100:.0f} ± {contact.position_sd * 100:.0f} cm along"
+        spread = f" ± {contact.position_sd * 100:.0f}" if math.isfinite(contact.position_sd) else ""
+        place = f"{contact.place * 100:.0f}{spread} cm along"
     return f"<b>{size(contact.force):.1f} N</b> {place} the {html.escape(contact.cover.replace('_', ' '))}"

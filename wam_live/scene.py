@@ -151,18 +151,18 @@ class Scene:
     # drawn at each instant
 
     def _show_arrow(self, name: str, contact: Contact) -> None:
-        """An arrow whose tip is where the world pushes."""
+        """An arrow from where the world pushes, in the direction in which it pushes the arm."""
         arrow = self._arrows[name]
         length = METRES_PER_NEWTON * size(contact.force)
         known = contact.cover in self.links and math.isfinite(contact.place) and length > 1e-3
         if known:
             pose = self._body.cover_pose(self._q, contact.cover)
-            tip = self.point(contact.cover, contact.place)
-            shown = min(length, LONGEST_ARROW) / length * METRES_PER_NEWTON
-            tail = tip - shown * pose.rotation @ np.array(contact.force)
-            arrow.points = np.array([[tail, tip]], dtype=np.float32)
+            start = self.point(contact.cover, contact.place)
+            scale = min(length, LONGEST_ARROW) / length * METRES_PER_NEWTON
+            end = start + scale * pose.rotation @ np.array(contact.force)
+            arrow.points = np.array([[start, end]], dtype=np.float32)
             if name == "estimated":
-                self._place.position = tip
+                self._place.position = start
         arrow.visible = known
         if name == "estimated":
             self._place.visible = known
