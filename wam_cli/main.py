@@ -22,6 +22,7 @@ COMMANDS = {
     "bag": "print the contents of a bag, or repair a broken bag",
     "report": "print the demo report again",
     "analyse": "analyse a recording and compare it with theory (text, HTML, JSON)",
+    "live": "show a running stack in the browser: watch it, push it, press its buttons",
     "view": "show a recording in the Rerun viewer, or save it as a Rerun file",
     "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
     "experiment": "run an experiment of the thesis, record it and print predicted against measured",
