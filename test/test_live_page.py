@@ -32,7 +32,7 @@ from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
-from wam_live.live_node import LivePage  # noqa: E402
+from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.panel import Panel, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, Push, Scene, band_push  # noqa: E402
@@ -165,7 +165,7 @@ def _other_address() -> str:
 
 
 class Shown:
-    """A page of a running stack, in a thread."""
+    """A page of a running stack, in a thread of this process."""
 
     def __init__(self, domain_id: int) -> None:
         self.port = free_port()
@@ -192,7 +192,7 @@ def running(domain_id: int) -> Iterator[tuple[Any, Shown]]:
     """A stack in lockstep and its page."""
     from wam_ros.bring_up import Composition
 
-    configuration = CONFIGURATION.with_values({"timing.mode": "lockstep", "timing.timeout": LONG})
+    configuration = CONFIGURATION.with_values({"timing.real_time_factor": 0.0, "timing.timeout": LONG})
     with Composition(configuration, domain_id=domain_id) as composition:
         shown = Shown(domain_id)
         try:
@@ -220,7 +220,7 @@ def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> No
         panel.requests.put(Call("driver", "enable", True))
         shown.wait(lambda: mode_of(shown) == "enabled", spin)
         start = panel.snapshot.q
-        scene._push(Push("outer_link", (0.0, 15.0, 0.0), (0.0, 0.0, 0.0)))
+        scene._push(Push("outer_link", (0.0, 15.0, 0.0), (0.0, 0.0, 5.0)))
         shown.wait(lambda: math.dist(panel.snapshot.q, start) > 0.02, spin)
         assert panel.snapshot.true.cover == "outer_link"
         scene._push(RELEASE)

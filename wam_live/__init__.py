@@ -1,9 +1,11 @@
 """The live page: the arm, its contacts and its forces in a browser, from a running stack or from a bag.
 
-snapshot     what the page shows at one instant
-scene        the three-dimensional picture: links, surroundings, contact arrows, dragging a link
-panel        status, buttons, sliders and plots beside it
-page         the web server that holds both, reachable from this machine alone
-live_node    a running stack as the source, and what the page asks of it
-playback     a bag as the source
+- snapshot: what the page shows at one instant
+- scene: the three-dimensional picture: links, surroundings, contact arrows, dragging a link
+- panel: status, buttons, sliders and plots beside it
+- page: the web server that holds both, reachable from this machine alone
+- stack_source: a running stack as the source
+- live_page: the page of a running stack, and what it asks of the stack
+- hold: a topic that is published while somebody drags or presses
+- playback: a bag as the source
 """

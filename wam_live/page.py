@@ -7,11 +7,16 @@ import logging
 import socket
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
+from importlib.util import find_spec
 from typing import Any, Final
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 8080
 TITLE: Final = "WAM"
+NARROW: Final = 576  # px, of a window; below it viser puts the panel under the picture
+CAMERA: Final = (1.1, -1.7, 0.5), (0.35, 0.0, -0.15)  # m, where it is and what it looks at
+NARROW_CAMERA: Final = (1.6, -2.5, 0.3), (0.35, 0.0, -0.55)
+INSTALL: Final = "pip install 'wam_stack[live]'"
 
 
 class NoPageError(OSError):
@@ -27,6 +32,30 @@ def port_is_free(port: int) -> bool:
         except OSError:
             return False
     return True
+
+
+def obstacle(port: int) -> str:
+    """Why there can be no page at a port of this machine, and what to do; '' where there can be one."""
+    if find_spec("viser") is None:
+        return f"the live page needs viser; {INSTALL}"
+    if not port_is_free(port):
+        return f"port {port} of {HOST} is taken; close the other page, or choose a port with --port"
+    return ""
+
+
+@contextlib.contextmanager
+def needing_viser() -> Iterator[None]:
+    """Say what to install where an import of the page's own modules fails.
+
+    Raises
+    ------
+    NoPageError
+        if viser is not installed, or is not the version that is needed.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise NoPageError(f"the live page needs viser ({error}); {INSTALL}") from error
 
 
 def quiet() -> AbstractContextManager[Any]:
@@ -46,19 +75,23 @@ def serve(port: int) -> Any:
     NoPageError
         if viser is not installed or the port is taken; the message says what to do.
     """
-    try:
+    if reason := obstacle(port):  # viser would silently take the next port
+        raise NoPageError(reason)
+    with needing_viser():
         import viser
         from websockets.asyncio import server
-    except ImportError as error:
-        raise NoPageError(f"the live page needs viser ({error}); pip install 'wam_stack[live]'") from error
-    if not port_is_free(port):  # viser would silently take the next one
-        raise NoPageError(f"port {port} of {HOST} is taken; close the other page, or choose a port with --port")
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a browser that goes away is no news
     with _only_this_page(server, port), quiet():
         made = viser.ViserServer(host=HOST, port=port, label=TITLE, verbose=False)
-    made.initial_camera.position = (1.1, -1.7, 0.5)
-    made.initial_camera.look_at = (0.35, 0.0, -0.15)
+    made.initial_camera.position, made.initial_camera.look_at = CAMERA
+    made.on_client_connect(_look_from_a_telephone)
     return made
+
+
+def _look_from_a_telephone(client: Any) -> None:
+    """Where the panel covers the lower half of a narrow window, look from farther away, at a point below the arm."""
+    if client.camera.image_width < NARROW:
+        client.camera.position, client.camera.look_at = NARROW_CAMERA
 
 
 @contextlib.contextmanager

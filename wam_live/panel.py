@@ -13,13 +13,13 @@ from viser import uplot
 
 from wam_analysis.colours import COLOURS
 from wam_description.arm import Arm
-from wam_description.signals import Level, Triple
+from wam_description.signals import BASE, Level, NodeStatus, Triple
 from wam_description.wiring import Call, SetParameters
 from wam_live.snapshot import Snapshot, size
 
 WINDOW: Final = 15.0  # s of the arm's time in the plots
 POINTS: Final = 300  # of a line at most
-BUTTONS: Final = {  # by row: label and what it asks for
+BUTTONS: Final[dict[str, dict[str, tuple[Call, ...]]]] = {  # by row: label and what it asks for
     "arm": {"Enable": (Call("driver", "enable", True),), "Brake": (Call("driver", "enable", False),)},
     "time": {
         "Pause": (Call("driver", "pause", True),),
@@ -43,6 +43,7 @@ class Press(NamedTuple):
     force: Triple  # N
 
 
+NO_PRESS: Final = Press(BASE, (0.0, 0.0, 0.0))
 Request = Call | SetParameters | Press
 
 
@@ -106,9 +107,7 @@ class Panel:
         stop.on_click(lambda _: self.requests.put(Call("driver", "estop")))
         for row, buttons in BUTTONS.items():
             group = self._gui.add_button_group(row, tuple(buttons))
-            group.on_click(
-                lambda event, buttons=buttons: [self.requests.put(one) for one in buttons[event.target.value]]
-            )
+            group.on_click(lambda event, buttons=buttons: self._ask(buttons[event.target.value]))
 
     def _ask(self, requests: Sequence[Request]) -> None:
         for request in requests:
@@ -116,7 +115,7 @@ class Panel:
 
     def _add_press(self, arm: Arm) -> None:
         with self._gui.add_folder("Press", expand_by_default=False):
-            frame = self._gui.add_dropdown("frame", ("base", *arm.covers.names))
+            frame = self._gui.add_dropdown("frame", (BASE, *arm.covers.names))
             axis = self._gui.add_dropdown("direction", ("-z", "+z", "-x", "+x", "-y", "+y"))
             newtons = self._gui.add_slider("force [N]", 0.0, 20.0, 0.5, 5.0)
 
@@ -126,7 +125,7 @@ class Panel:
                 self.requests.put(Press(frame.value, (force[0], force[1], force[2])))
 
             self._gui.add_button("Press").on_click(press)
-            self._gui.add_button("Let go").on_click(lambda _: self.requests.put(Press(frame.value, (0.0, 0.0, 0.0))))
+            self._gui.add_button("Let go").on_click(lambda _: self.requests.put(NO_PRESS))
 
     def _add_sliders(self, live: Mapping[tuple[str, str], Any]) -> None:
         with self._gui.add_folder("Gains", expand_by_default=False):
@@ -187,7 +186,7 @@ def paragraph(text: str, colour: str = "") -> str:
 def status_page(snapshot: Snapshot, pushing: float) -> str:
     """Status as HTML: the driver first, then whoever warns, then the contact."""
     driver = snapshot.statuses.get("driver")
-    mode = driver.mode if driver and driver.mode else "waiting for the stack"
+    mode = mode_of(snapshot.statuses) or "waiting for the stack"
     factor = f" · {snapshot.real_time_factor:.2f} × real time" if math.isfinite(snapshot.real_time_factor) else ""
     lines = [
         paragraph(
@@ -199,11 +198,26 @@ def status_page(snapshot: Snapshot, pushing: float) -> str:
         lines.append(paragraph(html.escape(driver.fault), DOTS[Level.ERROR]))
     for name, status in sorted(snapshot.statuses.items()):
         if name != "driver" and (status.level is not Level.OK or status.step or name == "force_loop"):
-            lines.append(paragraph(f"{dot(status.level)} {html.escape(f'{name}: {status.step or status.message}')}"))
+            text = f"{name}: {status.step or status.message}{margin_text(status.facts)}"
+            lines.append(paragraph(f"{dot(status.level)} {html.escape(text)}"))
     lines.append(paragraph(contact_text(snapshot)))
     if pushing:
         lines.append(paragraph(f"you push with <b>{pushing:.1f} N</b>"))
     return "".join(lines)
+
+
+def mode_of(statuses: Mapping[str, NodeStatus]) -> str:
+    """State of the driver, '' where it is not known."""
+    driver = statuses.get("driver")
+    return driver.mode if driver else ""
+
+
+def margin_text(facts: Mapping[str, str]) -> str:
+    """By how much the gains may be larger, as the guard of the force loop reports it."""
+    if "margin" not in facts:
+        return ""
+    here = facts.get("margin here", facts["margin"])
+    return f" · margin {facts['margin']}" + f" ({here} here)" * (here != facts["margin"])
 
 
 def dot(level: Level | None) -> str:

@@ -7,14 +7,15 @@ from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.rerun_view import load_rerun, view, viewer
 from wam_bag.bag import read
 from wam_cli.commands import writable_file
-from wam_live.page import PORT
+from wam_cli.commands.live import take_port
+from wam_live.page import needing_viser
 from wam_ros.run import Stop
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("bag", type=Path, help="directory of the bag, or its .mcap file")
-    parser.add_argument("--port", type=int, default=PORT, help="of the page on this machine; default: %(default)s")
+    take_port(parser)
     parser.add_argument("--rerun", action="store_true", help="open the Rerun viewer instead of the page")
     parser.add_argument("--save", type=Path, metavar="FILE", help="write this .rrd file for Rerun and open nothing")
     parser.epilog = "The page needs viser, pip install 'wam_stack[live]'; Rerun needs 'wam_stack[view]'."
@@ -31,8 +32,8 @@ def run(given: argparse.Namespace) -> int:
         said = view(analysed_run(read(given.bag)), given.save)
         print(f"{given.save or 'viewer'}: {said}")
         return 0
-    from wam_live.playback import play
-
+    with needing_viser():
+        from wam_live.playback import play
     stop = Stop()
     play(analysed_run(read(given.bag)), given.port, lambda: stop.is_set, lambda line: print(line, flush=True))
     return 0
