@@ -74,8 +74,12 @@ class Panel:
         if live is not None:
             self._add_buttons()
             self._add_press(arm)
-        self._force_plot = self._add_plot("force [N]", ("commanded", "measured", "estimated", "true"), {"min": 0.0})
-        self._place_plot = self._add_plot("position along the link [m]", ("estimated", "true"), {})
+        self._force_plot = self._add_plot(
+            "force [N]", ("commanded", "measured", "estimated", "true"), {"auto": True, "min": 0.0}
+        )
+        self._place_plot = self._add_plot(
+            "position along the link [m]", ("estimated", "true"), {"auto": False, "range": (0.0, max(arm.covers.end))}
+        )
         if live:
             self._add_sliders(live)
 
@@ -143,13 +147,13 @@ class Panel:
         values = value if isinstance(like, float) else [value] * len(like)
         self.requests.put(SetParameters(key[0], {key[1]: values}))
 
-    def _add_plot(self, title: str, names: tuple[str, ...], scale: dict[str, float]) -> Any:
+    def _add_plot(self, title: str, names: tuple[str, ...], scale: dict[str, Any]) -> Any:
         empty = tuple(np.zeros(1) for _ in range(1 + len(names)))
         lines = [uplot.Series(label=name, stroke=COLOURS[name], width=2, spanGaps=False) for name in names]
         return self._gui.add_uplot(
             empty,
             (uplot.Series(label="time [s]"), *lines),
-            scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True, **scale)},
+            scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(**scale)},
             title=title,
             height=170,
         )
