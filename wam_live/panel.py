@@ -3,7 +3,7 @@
 import html
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from queue import SimpleQueue
 from typing import Any, Final, NamedTuple
 
@@ -92,6 +92,11 @@ class Panel:
         if not self._samples or snapshot.seconds > self._samples[-1][0] + WINDOW / POINTS:
             self._samples.append(sample(snapshot))
             self._draw()
+
+    def fill(self, past: Iterable[Snapshot]) -> None:
+        """Take what was before the next instant, oldest first; the plots begin anew with it."""
+        self._samples.clear()
+        self._samples.extend(sample(snapshot) for snapshot in past)
 
     def say(self, text: str, refused: bool = False) -> None:
         """Show the answer to the last request."""

@@ -3,7 +3,7 @@
 import math
 import time
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final
 
 import numpy as np
@@ -13,10 +13,10 @@ from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.rerun_view import joint_motion
 from wam_bag.bag import TableColumns
-from wam_control.contact_table import likely_of
+from wam_control.contact_table import contact_of, likely_of
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, NodeStatus
 from wam_live.page import quiet, serve
-from wam_live.panel import Panel
+from wam_live.panel import POINTS, WINDOW, Panel
 from wam_live.scene import Scene
 from wam_live.snapshot import NAN, Snapshot
 from wam_sim.replay import tables
@@ -52,9 +52,12 @@ class BagSource:
         self._status_stamps = [status.stamp for status in statuses]
         columns = recording.bag.topics.get(f"{recording.namespace}/contact/hypotheses")
         self._likely: list[tuple[LikelyRange, ...]] = []
+        self._estimated: list[Contact] = []
         self._likely_stamps: list[int] = []
         if isinstance(columns, TableColumns):
-            self._likely = [likely_of(table, self._covers) for table in tables(columns)]
+            read = list(tables(columns))
+            self._likely = [likely_of(table, self._covers) for table in read]
+            self._estimated = [contact_of(table, self._covers) for table in read]
             self._likely_stamps = columns.stamp_ns.tolist()
         self.begin, self.end = int(self._stamps[0]), int(self._stamps[-1])
 
@@ -70,12 +73,17 @@ class BagSource:
             stamp=stamp,
             q=tuple(self._angles[at].tolist()),
             true=self._contact(traces.true, row) if known else NO_CONTACT,
-            estimated=self._contact(traces.estimated, row) if known else NO_CONTACT,
+            estimated=self._estimated[estimate] if is_fresh else NO_CONTACT,
             likely=self._likely[estimate] if is_fresh else (),
             commanded=float(traces.commanded.size[row]) if known else NAN,
             measured=float(traces.measured.size[row]) if known else NAN,
             statuses={status.node: status for status in self._statuses[:until]},
         )
+
+    def past(self, stamp: int) -> Iterator[Snapshot]:
+        """What the plots show before a time of the arm, ns, oldest first."""
+        first = max(self.begin, stamp - round(WINDOW * 1e9))
+        return (self.snapshot(int(at)) for at in np.linspace(first, stamp, POINTS, endpoint=False))
 
     @staticmethod
     def _contact(signal: ForceSignal, row: int) -> Contact:
@@ -86,19 +94,30 @@ class BagSource:
         return Contact(str(signal.frame[row]), float(signal.position[row]), (x, y, z))
 
 
-def play(recording: AnalysedRun, port: int, until: Callable[[], bool], say: Callable[[str], None]) -> None:
-    """Serve the page of a bag until a condition holds; the errors are those of `BagSource` and `serve`."""
+def play(
+    recording: AnalysedRun, port: int, at: float | None, until: Callable[[], bool], say: Callable[[str], None]
+) -> None:
+    """Serve the page of a bag until a condition holds; the errors are those of `BagSource` and `serve`.
+
+    Parameters
+    ----------
+    recording : of the bag.
+    port : to listen on.
+    at : time that is shown, s since the first state; None: it plays from there.
+    until : whether it is over.
+    say : called with lines for people.
+    """
     source = BagSource(recording)
     server = serve(port)
     try:
         scene = Scene(server, source.recorded.arm, source.recorded.obstacles, None)
         length = (source.end - source.begin) / 1e9
-        slider = server.gui.add_slider("time [s]", 0.0, max(length, 0.01), 0.01, 0.0)
+        place, then = min(max(at or 0.0, 0.0), length), time.monotonic()
+        slider = server.gui.add_slider("time [s]", 0.0, max(length, 0.01), 0.01, place)
         speed = server.gui.add_dropdown("speed", SPEEDS, initial_value="1")
-        running = server.gui.add_checkbox("play", True)
+        running = server.gui.add_checkbox("play", at is None)
         panel = Panel(server, source.recorded.arm)
         say(f"{recording.bag.path}: http://{server.get_host()}:{port}")
-        place, then = 0.0, time.monotonic()
 
         def moved(event: object) -> None:
             nonlocal place
@@ -116,6 +135,8 @@ def play(recording: AnalysedRun, port: int, until: Callable[[], bool], say: Call
                 slider.value = round(place, 2)
             then = now
             if place != shown:
+                if not 0.0 <= place - shown < 1.0:  # moved by hand, or begun again
+                    panel.fill(source.past(source.begin + round(place * 1e9)))
                 shown = place
                 snapshot = source.snapshot(source.begin + round(place * 1e9))
                 with server.atomic():

@@ -16,6 +16,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("bag", type=Path, help="directory of the bag, or its .mcap file")
     take_port(parser)
+    parser.add_argument("--at", type=float, metavar="SECONDS", help="show this time and do not play")
     parser.add_argument("--rerun", action="store_true", help="open the Rerun viewer instead of the page")
     parser.add_argument("--save", type=Path, metavar="FILE", help="write this .rrd file for Rerun and open nothing")
     parser.epilog = "The page needs viser, pip install 'wam_stack[live]'; Rerun needs 'wam_stack[view]'."
@@ -35,5 +36,5 @@ def run(given: argparse.Namespace) -> int:
     with needing_viser():
         from wam_live.playback import play
     stop = Stop()
-    play(analysed_run(read(given.bag)), given.port, lambda: stop.is_set, lambda line: print(line, flush=True))
+    play(analysed_run(read(given.bag)), given.port, given.at, lambda: stop.is_set, lambda line: print(line, flush=True))
     return 0
