@@ -1,9 +1,11 @@
 """The live page: drawn where the simulator has the arm, harmless to the run, usable in a real browser."""
 
+import argparse
 import base64
 import json
 import math
 import shutil
+import socket
 import subprocess
 import threading
 import time
@@ -19,21 +21,26 @@ import numpy as np
 import pytest
 from bag_comparison import compare
 from browser import browser
-from conftest import LONG
+from conftest import LONG, RosWorld
+from test_lockstep import STEPS, configuration, record_composed
 
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
+from wam_cli.commands.live import page_beside, take_page
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
-from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus
+from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, Wrench
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
+from geometry_msgs.msg import WrenchStamped  # noqa: E402
+
+from wam_live.hold import Hold  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
-from wam_live.panel import Panel, sample, status_page  # noqa: E402
+from wam_live.panel import POINTS, Panel, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, Push, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
@@ -47,8 +54,6 @@ POSE = (0.3, -0.9, 0.2, 0.8)
 
 def free_port() -> int:
     """A port of this machine that nobody listens on."""
-    import socket
-
     with socket.socket() as probe:
         probe.bind((HOST, 0))
         return int(probe.getsockname()[1])
@@ -232,28 +237,34 @@ def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> No
         shown.wait(lambda: mode_of(shown) == "fault", spin)
 
 
-@pytest.mark.slow
-def test_a_page_changes_no_bit_of_a_run(domain_id: int, tmp_path: Path) -> None:
-    from test_lockstep import STEPS, configuration, record_composed
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> Path:
+    """A run that nobody watched."""
+    return recorded(tmp_path_factory.mktemp("alone"), domain_of_module)
 
-    script = tmp_path / "script.yaml"
+
+def recorded(folder: Path, domain_id: int) -> Path:
+    """A short run in lockstep, as a bag."""
+    script = folder / "script.yaml"
     script.write_text(json.dumps({"steps": STEPS}))
-    record_composed(configuration(script, tmp_path, "alone"), domain_id)
+    record_composed(configuration(script, folder, "bag"), domain_id)
+    return folder / "bag"
+
+
+@pytest.mark.slow
+def test_a_page_changes_no_bit_of_a_run(alone: Path, domain_id: int, tmp_path: Path) -> None:
     shown = Shown(domain_id)
     try:
-        record_composed(configuration(script, tmp_path, "watched"), domain_id)
+        watched = recorded(tmp_path, domain_id)
+        assert shown.page.panel is not None
+        assert shown.page.panel.snapshot.q
     finally:
         shown.close()
-    assert compare(tmp_path / "alone", tmp_path / "watched") == []
+    assert compare(alone, watched) == []
 
 
-def test_a_bag_is_played_as_it_was_recorded(domain_id: int, tmp_path: Path) -> None:
-    from test_lockstep import STEPS, configuration, record_composed
-
-    script = tmp_path / "script.yaml"
-    script.write_text(json.dumps({"steps": STEPS}))
-    record_composed(configuration(script, tmp_path, "bag"), domain_id)
-    bag = read(tmp_path / "bag")
+def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
+    bag = read(alone)
     source = BagSource(analysed_run(bag))
     truth = bag.topics["/wam/sim/joint_states"]
     for at in (0, 40, 100):
@@ -262,7 +273,85 @@ def test_a_bag_is_played_as_it_was_recorded(domain_id: int, tmp_path: Path) -> N
     pushed = source.snapshot(400_000_000)
     assert pushed.true.cover == "outer_link"
     assert pushed.true.place == pytest.approx(0.3, abs=1e-6)
+    assert pushed.estimated.position_sd > 0.0
     assert source.snapshot(300_000_000).statuses["driver"].mode == "enabled"
+    assert len(list(source.past(400_000_000))) == POINTS
+
+
+def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: RosWorld) -> None:
+    listener, page = ros.node("listener"), ros.node("page")
+    heard: list[str] = []
+    listener.create_subscription(
+        WrenchStamped, "sim/disturbance", lambda message: heard.append(message.header.frame_id), 10
+    )
+    hold = Hold(page, "sim/disturbance", CONFIGURATION.shared)
+    count = lambda: listener.count_publishers("sim/disturbance")  # noqa: E731
+    push = Wrench("outer_link", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    assert hold.send(1, push) == ""
+    ros.wait(lambda: count() == 1 and (hold.send(1, push), heard)[1])
+    hold.send(1, Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    hold.end()
+    ros.wait(lambda: count() == 0 and BASE in heard)
+    hold.send(1, push)
+    other = ros.node("other").create_publisher(WrenchStamped, "sim/disturbance", 10)
+    ros.wait(lambda: hold.send(1, push), what="the page leaves the topic")
+    assert not hold.is_on
+    assert "another program publishes sim/disturbance" in hold.send(1, push)
+    del other
+
+
+def test_an_arm_goes_on_where_the_page_presses_and_lets_go(domain_id: int) -> None:
+    from wam_description.wiring import Call
+    from wam_live.panel import NO_PRESS, Press
+
+    with running(domain_id) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel, node = shown.page.panel, composition.nodes["driver"]
+        assert panel is not None
+        press = Press("outer_link", (0.0, -2.0, 0.0))
+        panel.requests.put(press)
+        shown.wait(lambda: "enable the arm first" in panel._said.content, spin)
+        panel.requests.put(Call("driver", "enable", True))
+        shown.wait(lambda: mode_of(shown) == "enabled", spin)
+        panel.requests.put(press)
+        shown.wait(lambda: panel.snapshot.commanded == pytest.approx(2.0), spin)
+        panel.requests.put(NO_PRESS)
+        shown.wait(lambda: node.count_publishers("force_command") == 0, spin)
+        shown.wait(lambda: math.isnan(panel.snapshot.commanded), spin)
+        assert mode_of(shown) == "enabled"
+
+
+# beside a stack
+
+
+def options(*given: str) -> Any:
+    parser = argparse.ArgumentParser()
+    take_page(parser, default=None)
+    return parser.parse_args(given)
+
+
+def test_a_page_that_was_asked_for_is_refused_where_there_can_be_none(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as taken:
+        taken.bind((HOST, 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        with (
+            pytest.raises(NoPageError, match=f"port {port} .* --port"),
+            page_beside(options("--live", "--port", port), "wam"),
+        ):
+            pass
+        with page_beside(options("--port", port), "wam"):
+            assert f"no live page: port {port}" in capsys.readouterr().out
+        with page_beside(options("--no-live", "--port", port), "wam"):
+            assert capsys.readouterr().out == ""
+
+
+def test_the_page_runs_beside_the_stack_and_ends_with_it(domain_id: int) -> None:
+    port = free_port()
+    with page_beside(options("--port", str(port)), "wam"):
+        until(lambda: not port_is_free(port))
+    assert port_is_free(port)
 
 
 # a real browser
@@ -277,8 +366,8 @@ FLAGS = (
 class Tab:
     """A page in Chromium, through its debugging protocol."""
 
-    def __init__(self, socket: Any) -> None:
-        self._socket, self._number = socket, 0
+    def __init__(self, tab: Any) -> None:
+        self._socket, self._number = tab, 0
 
     def ask(self, method: str, **values: Any) -> dict[str, Any]:
         """One request and its answer."""
@@ -326,8 +415,8 @@ def opened(address: str, folder: Path) -> Iterator[Tab]:
         port = (profile / "DevToolsActivePort").read_text().split()[0]
         with urllib.request.urlopen(f"http://{HOST}:{port}/json") as answer:
             page = next(tab for tab in json.load(answer) if tab["type"] == "page")
-        with connect(page["webSocketDebuggerUrl"], max_size=2**27) as socket:
-            yield Tab(socket)
+        with connect(page["webSocketDebuggerUrl"], max_size=2**27) as tab:
+            yield Tab(tab)
     finally:
         process.terminate()
         process.wait()

@@ -97,6 +97,8 @@ class Panel:
         """Take what was before the next instant, oldest first; the plots begin anew with it."""
         self._samples.clear()
         self._samples.extend(sample(snapshot) for snapshot in past)
+        if self._samples:
+            self._draw()
 
     def say(self, text: str, refused: bool = False) -> None:
         """Show the answer to the last request."""
