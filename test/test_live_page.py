@@ -38,11 +38,11 @@ from wam_live.page import HOST, NoPageError, port_is_free, serve
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
 from geometry_msgs.msg import WrenchStamped  # noqa: E402
 
-from wam_live.hold import Hold  # noqa: E402
+from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
-from wam_live.panel import POINTS, Panel, sample, status_page  # noqa: E402
+from wam_live.panel import POINTS, Controls, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
-from wam_live.scene import RELEASE, STRONGEST, Push, Scene, band_push  # noqa: E402
+from wam_live.scene import RELEASE, STRONGEST, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
 
 CONFIGURATION = Configuration.load(packaged("wam"))
@@ -133,7 +133,7 @@ def test_the_status_escapes_what_comes_from_topics() -> None:
 
 
 def test_a_slider_that_the_page_moves_asks_for_nothing(server: Any) -> None:
-    panel = Panel(server, ARM, {("force_loop", "posture_gain"): 4.0})
+    panel = Controls(server, ARM, {("force_loop", "posture_gain"): 4.0})
     panel.set_slider("force_loop", "posture_gain", 3.0)
     time.sleep(0.2)
     assert panel.requests.empty()
@@ -226,7 +226,7 @@ def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> No
         panel.requests.put(Call("driver", "enable", True))
         shown.wait(lambda: mode_of(shown) == "enabled", spin)
         start = panel.snapshot.q
-        scene._push(Push("outer_link", (0.0, 30.0, 0.0), (0.0, 0.0, 9.0)))
+        scene._push(LinkPush("outer_link", (0.0, 30.0, 0.0), (0.0, 0.0, 9.0)))
         shown.wait(lambda: math.dist(panel.snapshot.q, start) > MOVED, spin)
         assert panel.snapshot.true.cover == "outer_link"
         scene._push(RELEASE)
@@ -284,7 +284,7 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
     listener.create_subscription(
         WrenchStamped, "sim/disturbance", lambda message: heard.append(message.header.frame_id), 10
     )
-    hold = Hold(page, "sim/disturbance", CONFIGURATION.shared)
+    hold = HeldTopic(page, "sim/disturbance", CONFIGURATION.shared)
     count = lambda: listener.count_publishers("sim/disturbance")  # noqa: E731
     push = Wrench("outer_link", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
     assert hold.send(1, push) == ""

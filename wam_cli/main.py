@@ -23,7 +23,7 @@ COMMANDS = {
     "report": "print the demo report again",
     "analyse": "analyse a recording and compare it with theory (text, HTML, JSON)",
     "live": "show a running stack in the browser: watch it, push it, press its buttons",
-    "view": "show a recording in the Rerun viewer, or save it as a Rerun file",
+    "view": "show a recording in the browser or in the Rerun viewer, or save it as a Rerun file",
     "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
     "experiment": "run an experiment of the thesis, record it and print predicted against measured",
     "samples": "check the sample bags, one of each experiment, or record them again",

@@ -2,7 +2,7 @@
 
 - snapshot: what the page shows at one instant
 - scene: the three-dimensional picture: links, surroundings, contact arrows, dragging a link
-- panel: status, buttons, sliders and plots beside it
+- panel: status, buttons, sliders and plots
 - page: the web server that holds both, reachable from this machine alone
 - stack_source: a running stack as the source
 - live_page: the page of a running stack, and what it asks of the stack

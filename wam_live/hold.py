@@ -1,4 +1,4 @@
-"""A topic that the page publishes for as long as somebody holds on to something, and not beside another program."""
+"""A topic that the page publishes for as long as somebody holds on to something, and never together with another program."""
 
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ from wam_ros.wire import encoder
 DELIVERY: Final = 0.2  # s, in which the last message has arrived
 
 
-class Hold:
+class HeldTopic:
     """A publisher that exists only while it is used.
 
     The nodes take a topic from one program alone, and an enabled arm brakes where there are two.

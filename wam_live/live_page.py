@@ -18,12 +18,12 @@ from wam_description.signals import Wrench
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_description.world import Obstacles
-from wam_live.hold import Hold
+from wam_live.hold import HeldTopic
 from wam_live.page import quiet, serve
-from wam_live.panel import NO_PRESS, SLIDERS, Panel, Press, Request, mode_of
-from wam_live.scene import RELEASE, Push, Scene
+from wam_live.panel import NO_PRESS, SLIDERS, Controls, Press, Request, mode_of
+from wam_live.scene import RELEASE, LinkPush, Scene
 from wam_live.snapshot import size
-from wam_live.stack_source import StackSource
+from wam_live.stack_source import RunningStack
 from wam_ros.messages import message_type
 from wam_ros.qos import qos
 from wam_ros.remote_parameters import RemoteParameters
@@ -50,7 +50,7 @@ class LivePage:
     """
 
     scene: Scene | None = None
-    panel: Panel | None = None
+    panel: Controls | None = None
 
     def __init__(self, namespace: str, port: int, say: Callable[[str], None], domain_id: int | None = None) -> None:
         self._namespace, self._port, self._say = namespace, port, say
@@ -60,8 +60,8 @@ class LivePage:
         self._clients: dict[tuple[str, str], Any] = {}
         self._server: Any = None
         self._press: Press | None = None
-        self._push: Push | None = None
-        self._holds: dict[str, Hold] = {}
+        self._push: LinkPush | None = None
+        self._holds: dict[str, HeldTopic] = {}
         self._states: Any = None  # subscription while somebody presses
         self._live: dict[tuple[str, str], Any] = {}
 
@@ -76,11 +76,11 @@ class LivePage:
             driver = flat["driver"]
             shared = build(Shared, {k: v for k, v in driver.items() if k.partition(".")[0] in names})
             obstacles = build_part(Obstacles, driver, "world.obstacles.")
-            source = StackSource(self._connection.context, self._namespace, shared)
-            self._holds = {name: Hold(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
+            source = RunningStack(self._connection.context, self._namespace, shared)
+            self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
             self.scene = scene = Scene(self._server, shared.arm, obstacles, self._take_push)
             self._live = {key: flat[key[0]][key[1]] for key in SLIDERS if key[1] in flat.get(key[0], {})}
-            self.panel = panel = Panel(self._server, shared.arm, self._live)
+            self.panel = panel = Controls(self._server, shared.arm, self._live)
             self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
             self._say(f"live page: http://{self._server.get_host()}:{self._port}")
             self._draw(source, scene, panel, until)
@@ -107,7 +107,7 @@ class LivePage:
                 return asked.found
         return None
 
-    def _draw(self, source: StackSource, scene: Scene, panel: Panel, until: Callable[[], bool]) -> None:
+    def _draw(self, source: RunningStack, scene: Scene, panel: Controls, until: Callable[[], bool]) -> None:
         count, next_time = 0, time.monotonic()
         while not until():
             next_time = max(next_time + 1.0 / RATE, time.monotonic())
@@ -124,17 +124,17 @@ class LivePage:
             while not panel.requests.empty():
                 self._ask(panel.requests.get(), source, panel)
 
-    # what the page asks for
+    # requests of the page
 
-    def _take_push(self, push: Push) -> None:
+    def _take_push(self, push: LinkPush) -> None:
         self._push = push
 
-    def _let_go(self, scene: Scene, panel: Panel) -> None:
+    def _let_go(self, scene: Scene, panel: Controls) -> None:
         """A browser is gone: nobody holds the link, and nobody sees the force."""
         scene.let_go()
         panel.requests.put(NO_PRESS)
 
-    def _send(self, source: StackSource, panel: Panel) -> None:
+    def _send(self, source: RunningStack, panel: Controls) -> None:
         """Stream the push until it is released; end a force whose arm has stopped."""
         if self._press is not None and mode_of(source.statuses) != "enabled":
             self._end_press()
@@ -150,7 +150,7 @@ class LivePage:
             self._push = None
             hold.end()
 
-    def _start_press(self, press: Press, source: StackSource, panel: Panel) -> None:
+    def _start_press(self, press: Press, source: RunningStack, panel: Controls) -> None:
         """Answer each state with the force from now on."""
         if mode_of(source.statuses) != "enabled":
             panel.say("not pressed: enable the arm first", refused=True)
@@ -163,7 +163,7 @@ class LivePage:
             )
         panel.say(f"pressing with {size(press.force):.1f} N")
 
-    def _answer(self, state: bytes, panel: Panel) -> None:
+    def _answer(self, state: bytes, panel: Controls) -> None:
         if self._press is None:
             return
         refusal = self._holds["force_command"].send(stamp_of(state), Wrench(*self._press, (0.0, 0.0, 0.0)))
@@ -185,7 +185,7 @@ class LivePage:
             hold.send(stamp, Wrench(*RELEASE))
             hold.end()
 
-    def _ask(self, request: Request, source: StackSource, panel: Panel) -> None:
+    def _ask(self, request: Request, source: RunningStack, panel: Controls) -> None:
         if isinstance(request, Press):
             if any(request.force):
                 self._start_press(request, source, panel)
@@ -211,7 +211,7 @@ class LivePage:
             return
         client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result(), panel))
 
-    def _answered(self, request: Call | SetParameters, answer: Any, panel: Panel) -> None:
+    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls) -> None:
         if isinstance(request, Call):
             panel.say(answer.message, refused=not answer.success)
             return

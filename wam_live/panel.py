@@ -19,7 +19,7 @@ from wam_live.snapshot import Snapshot, size
 
 WINDOW: Final = 15.0  # s of the arm's time in the plots
 POINTS: Final = 300  # of a line at most
-BUTTONS: Final[dict[str, dict[str, tuple[Call, ...]]]] = {  # by row: label and what it asks for
+BUTTONS: Final[dict[str, dict[str, tuple[Call, ...]]]] = {  # by row: label and its requests
     "arm": {"Enable": (Call("driver", "enable", True),), "Brake": (Call("driver", "enable", False),)},
     "time": {
         "Pause": (Call("driver", "pause", True),),
@@ -47,7 +47,7 @@ NO_PRESS: Final = Press(BASE, (0.0, 0.0, 0.0))
 Request = Call | SetParameters | Press
 
 
-class Panel:
+class Controls:
     """The controls.
 
     Parameters
@@ -94,7 +94,7 @@ class Panel:
             self._draw()
 
     def fill(self, past: Iterable[Snapshot]) -> None:
-        """Take what was before the next instant, oldest first; the plots begin anew with it."""
+        """Take what was before the next instant, oldest first; the plots begin with it."""
         self._samples.clear()
         self._samples.extend(sample(snapshot) for snapshot in past)
         if self._samples:
@@ -195,7 +195,7 @@ def paragraph(text: str, colour: str = "") -> str:
 
 
 def status_page(snapshot: Snapshot, pushing: float) -> str:
-    """Status as HTML: the driver first, then whoever warns, then the contact."""
+    """Status as HTML: the driver first, then the nodes that warn, then the contact."""
     driver = snapshot.statuses.get("driver")
     mode = mode_of(snapshot.statuses) or "waiting for the stack"
     factor = f" · {snapshot.real_time_factor:.2f} × real time" if math.isfinite(snapshot.real_time_factor) else ""

@@ -16,7 +16,7 @@ from wam_bag.bag import TableColumns
 from wam_control.contact_table import contact_of, likely_of
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, NodeStatus
 from wam_live.page import quiet, serve
-from wam_live.panel import POINTS, WINDOW, Panel
+from wam_live.panel import POINTS, WINDOW, Controls
 from wam_live.scene import Scene
 from wam_live.snapshot import NAN, Snapshot
 from wam_sim.replay import tables
@@ -116,7 +116,7 @@ def play(
         slider = server.gui.add_slider("time [s]", 0.0, max(length, 0.01), 0.01, place)
         speed = server.gui.add_dropdown("speed", SPEEDS, initial_value="1")
         running = server.gui.add_checkbox("play", at is None)
-        panel = Panel(server, source.recorded.arm)
+        panel = Controls(server, source.recorded.arm)
         say(f"{recording.bag.path}: http://{server.get_host()}:{port}")
 
         def moved(event: object) -> None:

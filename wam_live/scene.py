@@ -30,7 +30,7 @@ BANDS = 4  # parts of the 90 % set that are drawn
 Array = NDArray[np.float64]
 
 
-class Push(NamedTuple):
+class LinkPush(NamedTuple):
     """A push on a cover: force at and torque about the origin of its frame, in that frame; zero force releases."""
 
     cover: str
@@ -38,7 +38,7 @@ class Push(NamedTuple):
     torque: Triple  # N m
 
 
-RELEASE = Push(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+RELEASE = LinkPush(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class Scene:
@@ -48,11 +48,11 @@ class Scene:
     ----------
     server : that shows it.
     arm, obstacles : as the driver's parameters have them.
-    push : called with each `Push` of a dragged link, with `RELEASE` at the end; None where nothing can be pushed.
+    push : called with each `LinkPush` of a dragged link, with `RELEASE` at the end; None where nothing can be pushed.
     """
 
     def __init__(
-        self, server: viser.ViserServer, arm: Arm, obstacles: Obstacles, push: Callable[[Push], None] | None
+        self, server: viser.ViserServer, arm: Arm, obstacles: Obstacles, push: Callable[[LinkPush], None] | None
     ) -> None:
         self._scene, self._arm, self._push = server.scene, arm, push
         self._body = RigidBody(arm)
@@ -217,13 +217,13 @@ class Scene:
             self._band.points = np.array([[self._body.point(self._q, cover, point), self._pointer]], dtype=np.float32)
 
 
-def band_push(cover: str, point: Array, pointer: Array) -> Push:
-    """Push of a rubber band between a point of a cover and the pointer, both (3,), m, in the cover's frame."""
+def band_push(cover: str, point: Array, pointer: Array) -> LinkPush:
+    """LinkPush of a rubber band between a point of a cover and the pointer, both (3,), m, in the cover's frame."""
     force = STIFFNESS * (pointer - point)
     force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), 1e-9))
     fx, fy, fz = force.tolist()
     tx, ty, tz = np.cross(point, force).tolist()
-    return Push(cover, (fx, fy, fz), (tx, ty, tz))
+    return LinkPush(cover, (fx, fy, fz), (tx, ty, tz))
 
 
 def quaternion(rotation: Array) -> tuple[float, float, float, float]:

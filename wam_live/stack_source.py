@@ -36,7 +36,7 @@ LATCHED: Final = QoSProfile(
 )
 
 
-class StackSource:
+class RunningStack:
     """The newest of each topic of a running stack.
 
     Parameters

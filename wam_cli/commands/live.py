@@ -1,4 +1,4 @@
-"""`wam live`: the live page of a stack that runs, in a browser; and the page beside `wam up` and `wam demo`."""
+"""`wam live`: the live page of a stack that runs, in a browser; and the page of `wam up` and `wam demo`."""
 
 import argparse
 import os
@@ -41,12 +41,12 @@ def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
 def page_beside(given: argparse.Namespace, namespace: str) -> Iterator[Callable[[], None]]:
     """The page of a stack that is about to start, as its options say; yields what ends it.
 
-    It is to be ended before the stack, which at its end waits for whoever listens.
+    It is to be ended before the stack, which at its end waits for its listeners.
 
     Raises
     ------
     NoPageError
-        if a page was asked for and there can be none.
+        if a page is required and there can be none.
     """
     reason = obstacle(given.port) if given.live is not False else ""
     if reason and given.live:
