@@ -203,6 +203,7 @@ def test_arrows_point_downwards():
         ("wam_driver/motor_utils.py", ""),
         ("wam_control/base.py", ""),
         ("wam_control/unnamed.py", ""),
+        ("wam_live/page.py", "from wam_driver.plant import Plant"),
     ],
 )
 def test_a_planted_fault_is_found(tmp_path, path, source):
@@ -229,6 +230,7 @@ def plant_a_sound_tree(root: Path) -> None:
         "wam_sim/simulation.py": "import wam_driver.plant\nfrom wam_control.gravity import Gravity",
         "wam_analysis/report.py": "import matplotlib\nimport wam_sim.simulation\nimport wam_control.gravity",
         "wam_experiments/press.py": "from wam_analysis import report\nimport wam_driver.plant\nimport wam_sim",
+        "wam_live/page.py": "import viser\nimport rclpy\nfrom wam_ros import messages\nfrom wam_analysis import report",
         "wam_cli/main.py": "import importlib",
         "wam_cli/commands/up.py": "import rclpy\nimport wam_ros.messages\nfrom wam_experiments import press\nprint(1)",
     }

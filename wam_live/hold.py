@@ -1,4 +1,4 @@
-"""A topic that the page publishes for as long as somebody holds on to something, and never together with another program."""
+"""A topic that the page publishes while somebody holds on, and never together with another program."""
 
 from typing import Any, Final
 
