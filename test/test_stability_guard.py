@@ -227,9 +227,7 @@ def test_in_domain_ii_the_saturation_is_held_below_the_stable_error_and_the_test
     assert limited.assessment.stable_error == pytest.approx(error, rel=0.01)
     q, still, driven = [-0.001], [0.0], [1.0]
     command = ForceCommand("base", (0.0, 0.0, -150.0))
-    out = limited.step(
-        State(q, still, driven), State(q, still, driven), NO_CONTACT, None, command, 0.0, None, None, 0.02
-    )
+    out = limited.step(State(q, still, driven), State(q, still, driven), NO_CONTACT, None, command, None, None, 0.02)
     assert math.hypot(*out.limited) == pytest.approx(error, rel=0.01)
     assert press_far(gain, error) < 2.0
     assert press_far(gain, 1000.0) > 20.0
