@@ -70,7 +70,7 @@ docs: $(STAMPS)/test $(INSTALLED)  ## regenerate the generated pages of docs/
 
 constraints: $(STAMPS)/venv  ## pin the newest compatible versions in constraints.txt; then make clean test
 	@mkdir -p .cache
-	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[ros,test,view]'
+	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[ros,live,test,view]'
 	@$(TIDY)
 	@$(PY) -c 'import json, pathlib, re; file = pathlib.Path("constraints.txt"); \
 	head = [line for line in file.read_text().splitlines() if line.startswith("#")]; \
@@ -94,14 +94,14 @@ $(STAMPS)/ros: $(STAMPS)/venv constraints.txt setup.py
 	@echo "Installing into $(VENV): about 1 GB, a minute or two the first time"
 	@$(TIDY)
 	@$(PIP) install -q -c constraints.txt setuptools
-	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[ros]'
+	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[ros,live]'
 	@$(TIDY)
 	@touch $@
 
 $(STAMPS)/test: $(STAMPS)/ros
 	@echo "Installing the tools of the tests"
 	@$(TIDY)
-	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[ros,test]'
+	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[ros,live,test]'
 	@$(TIDY)
 	@touch $@
 

@@ -51,6 +51,8 @@ setup(
     extras_require={
         # maps and benchmarks on many machines: `wam map --dask ADDRESS`
         "dask": ["distributed"],
+        # the live page in the browser: `wam live`, `wam view`; without an upper limit pip takes 0.2, which has no plots
+        "live": ["viser>=1.1,<1.2"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [

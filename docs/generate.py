@@ -347,7 +347,17 @@ def draw_demonstration() -> None:
         configuration = Configuration.load(CONFIGURATION).with_values({"recorder:directory": folder})
         file = Path(folder) / "wam.yaml"
         file.write_text(configuration.text, encoding="utf-8")
-        command = [sys.executable, "-m", "wam_cli.main", "demo", "--real-time-factor", "0", "--name", "demo"]
+        command = [
+            sys.executable,
+            "-m",
+            "wam_cli.main",
+            "demo",
+            "--no-live",
+            "--real-time-factor",
+            "0",
+            "--name",
+            "demo",
+        ]
         done = subprocess.run([*command, "--config", str(file)], stdout=subprocess.PIPE, text=True, check=False)
         if done.returncode:
             raise SystemExit("the demonstration failed, see above; docs/demo.* are unchanged")

@@ -226,7 +226,7 @@ def test_nodes_that_do_not_exist_are_refused_with_those_that_do(tmp_path: Path, 
 
 
 def test_a_signal_ends_a_lockstep_that_never_pauses(started: Any, tmp_path: Path, domain_id: int) -> None:
-    stack = started("-m", "wam_cli.main", "demo", "--real-time-factor", "0", "--name", "stopped")
+    stack = started("-m", "wam_cli.main", "demo", "--no-live", "--real-time-factor", "0", "--name", "stopped")
     wait(lambda: recorded(stack) > 100_000, f"a bag that grows; {stack.said()}")
     stack.process.send_signal(signal.SIGINT)
     wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon())

@@ -53,9 +53,18 @@ def test_without_rerun_the_command_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(SystemExit) as ended:
-        main(["view", str(bag)])
+        main(["view", "--rerun", str(bag)])
     assert ended.value.code == 1
     assert "pip install 'wam_stack[view]'" in capsys.readouterr().err
+
+
+def test_without_viser_the_page_says_what_to_install(
+    bag: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(SystemExit, match="1"):
+        main(["view", str(bag)])
+    assert "pip install 'wam_stack[live]'" in capsys.readouterr().err
 
 
 def test_the_viewer_is_found_beside_this_python_though_its_folder_is_not_on_the_path(

@@ -7,6 +7,7 @@ demo_traces     forces and contacts of a run on one time base
 demo_summary    the demonstration in numbers
 demo_report     its report, as text
 demo_figure     its picture
+colours         one meaning per colour in every picture
 arm_picture     the arm and its obstacles from the side
 arm_render      the process that renders it with MuJoCo
 rerun_view      a bag for the Rerun viewer

@@ -20,6 +20,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
+from wam_analysis.colours import BLOCK_COLOUR, PEDESTAL_COLOUR, TUBE_COLOURS
 from wam_description.arm import Arm
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf, rotation_xyz
@@ -33,9 +34,6 @@ GL = ("egl", "osmesa")
 RENDER_TIMEOUT = 30.0  # s
 PIXELS_PER_METRE = 1500
 PEDESTAL = 0.07  # m, radius; of the drawn base, which is not in the parameters
-TUBE_COLOURS = ("#5d6670", "#87919c")
-BLOCK_COLOUR = "#ecca88"
-PEDESTAL_COLOUR = "#c9ced4"
 OUTLINE = "#3b4148"
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame
 

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from wam_analysis.arm_picture import side_view
-from wam_analysis.demo_figure import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, TRUE
+from wam_analysis.colours import COLOURS, channels
+from wam_analysis.demo_figure import METRES_PER_NEWTON
 from wam_analysis.demo_traces import ForceSignal
 from wam_analysis.findings.analysed_run import AnalysedRun, by_names
 from wam_analysis.findings.timing import STAMPED
@@ -33,12 +33,6 @@ PROGRAM = "rerun"
 TIMELINE = "time"
 DISTANCE = 1.3  # of the eye, in heights of what it sees
 POSES = 100.0  # poses of the arm in a second at most
-COLOURS = {
-    "commanded": COMMANDED,
-    "true": TRUE,
-    "measured": MEASURED,
-    "estimated": ESTIMATED,
-}
 
 
 class NoViewerError(OSError):
@@ -101,7 +95,7 @@ def view(recording: AnalysedRun, save: Path | None) -> str:
     """
     rerun = load_rerun()
     arm = recorded_arm(recording.run.parameters)
-    joints = _joints(recording, arm.arm)
+    joints = joint_motion(recording, arm.arm)
     if joints is None and not any(isinstance(c, JointColumns) for c in recording.bag.topics.values()):
         raise ValueError(f"{recording.bag.path} has no joint states; nothing can be shown")
     stream = rerun.RecordingStream(APPLICATION, recording_id=recording.bag.path.name)
@@ -125,7 +119,7 @@ def view(recording: AnalysedRun, save: Path | None) -> str:
     return f"{poses} poses of the arm, {len(recording.summary.traces.stamp)} instants of its forces"
 
 
-def _joints(recording: AnalysedRun, arm: Arm) -> tuple[Times, Numbers] | None:
+def joint_motion(recording: AnalysedRun, arm: Arm) -> tuple[Times, Numbers] | None:
     """Stamps and angles of the joints, from the best topic in the bag, POSES per second."""
     for name in ("sim/joint_states", "joint_sensors", "joint_states"):
         columns = recording.run.joints(name)
@@ -219,7 +213,7 @@ def _log_contacts(
             if not np.any(vectors):
                 continue
             path = f"arm/{cover}/{name}"
-            stream.log(path, rerun.Arrows3D.from_fields(colors=[_rgb(COLOURS[name])], radii=[0.004]), static=True)
+            stream.log(path, rerun.Arrows3D.from_fields(colors=[channels(COLOURS[name])], radii=[0.004]), static=True)
             columns = rerun.Arrows3D.columns(origins=origins, vectors=vectors)
             stream.send_columns(path, _times(rerun, joints[0], zero), columns)
 
@@ -237,7 +231,7 @@ def _log_plots(rerun: Any, stream: Any, recording: AnalysedRun, zero: int) -> No
     for path, stamps, values in _series(recording):
         if np.any(np.isfinite(values)):  # NaN interrupts the line
             name = path.rsplit("/", 1)[-1]
-            colours = {"colors": [_rgb(COLOURS[name])]} if name in COLOURS else {}
+            colours = {"colors": [channels(COLOURS[name])]} if name in COLOURS else {}
             stream.log(path, rerun.SeriesLines(names=[name], **colours), static=True)
             columns = rerun.Scalars.columns(scalars=values)
             stream.send_columns(path, _times(rerun, stamps, zero), columns)
@@ -266,11 +260,6 @@ def _log_status(rerun: Any, stream: Any, recording: AnalysedRun, zero: int) -> N
         if status.stamp:
             stream.set_time(TIMELINE, duration=max((status.stamp - zero) / 1e9, 0.0))
             stream.log(f"status/{status.node}", rerun.TextLog(status.message))
-
-
-def _rgb(colour: str) -> tuple[int, int, int]:
-    red, green, blue = (round(255.0 * channel) for channel in to_rgb(colour))
-    return red, green, blue
 
 
 def _turn(direction: Numbers) -> tuple[list[float], float]:

@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 
 from wam_control.contact_inference import REASONS, Hypothesis
-from wam_description.signals import BASE, NO_CONTACT, Contact, Table, Triple
+from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table, Triple
 from wam_description.topics import HYPOTHESIS_COLUMNS
 
 _COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
 _LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "place", "position_sd"))
 _FORCE, _DIRECTION_SD, _REASONS = (_COLUMN[name] for name in ("force_x", "direction_sd", "reasons"))
+_LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
 
 
 def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
@@ -42,6 +43,13 @@ def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
     row = table.rows[0]
     x, y, z = row[_FORCE : _FORCE + 3]
     return Contact(covers[int(row[_LINK])], row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD])
+
+
+def likely_of(table: Table | None, covers: Sequence[str]) -> tuple[LikelyRange, ...]:
+    """The parts of covers that hold the contact with 90 % probability in all."""
+    rows = () if table is None else table.rows
+    parts = (LikelyRange(covers[int(row[_LINK])], row[_LOW], row[_HIGH]) for row in rows)
+    return tuple(part for part in parts if part.low < part.high)
 
 
 def reasons_of(row: Sequence[float]) -> tuple[str, ...]:

@@ -13,11 +13,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from wam_analysis import arm_picture
+from wam_analysis.colours import COMMANDED, ESTIMATED, MEASURED, TRUE
 from wam_analysis.demo_figure import (
-    COMMANDED,
-    ESTIMATED,
-    MEASURED,
-    TRUE,
     draw_arm,
     draw_forces,
     draw_positions,

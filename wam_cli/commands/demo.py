@@ -8,6 +8,7 @@ from typing import Any
 
 from wam_bag.errors import BagError
 from wam_cli.commands import configuration_of, take_configuration, writable_directory
+from wam_cli.commands.live import page_beside, take_page
 from wam_cli.commands.up import import_nodes, runs_apart, take_time, timed
 from wam_ros.bring_up import start
 from wam_ros.network import move_to_free_domain
@@ -21,6 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_time(parser)
     parser.add_argument("--name", default="", help="name of the bag; default: demo, date and time")
+    take_page(parser, default=None)
     take_configuration(parser)
 
 
@@ -38,7 +40,10 @@ def run(given: argparse.Namespace) -> int:
     if moved := move_to_free_domain(NAMESPACE):
         print(moved, flush=True)
     late = time.monotonic() + LONGEST_START
-    with start(configuration, runs_apart(configuration, given), lambda: stop.is_set) as stack:
+    with (
+        page_beside(given, NAMESPACE) as close_page,
+        start(configuration, runs_apart(configuration, given), lambda: stop.is_set) as stack,
+    ):
         driver: Any = getattr(stack, "nodes", {}).get("driver")
 
         def is_over(ended: dict[str, int]) -> bool:
@@ -48,6 +53,7 @@ def run(given: argparse.Namespace) -> int:
         failures = stack.failures
         if not ended and not stop.is_set:
             failures = [f"not ready within {LONGEST_START:g} s: {driver.awaited}"]
+        close_page()
     if stop.is_set:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130

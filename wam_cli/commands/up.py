@@ -4,6 +4,7 @@ import argparse
 import sys
 
 from wam_cli.commands import configuration_of, take_configuration
+from wam_cli.commands.live import page_beside, take_page
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import start
 from wam_ros.node import node_factory
@@ -18,6 +19,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", default="", help="play this scenario: a YAML file, or demo_scenario")
     parser.add_argument("--record", action="store_true", help="record every topic")
     parser.add_argument("--namespace", default=NAMESPACE, help="namespace of the nodes; default: %(default)s")
+    take_page(parser, default=False)
     take_configuration(parser)
 
 
@@ -79,12 +81,16 @@ def run(given: argparse.Namespace) -> int:
     import_nodes(configuration, given)
     stop = Stop()
     apart = runs_apart(configuration, given)
-    with start(configuration, apart, lambda: stop.is_set, given.namespace) as stack:
+    with (
+        page_beside(given, given.namespace) as close_page,
+        start(configuration, apart, lambda: stop.is_set, given.namespace) as stack,
+    ):
         if not stop.is_set:
             where = "processes of their own" if apart else "this process"
             print(f"{len(configuration.shared.nodes)} nodes started in {where}; Ctrl-C stops them", flush=True)
         ended = stack.wait(lambda ended: stop.is_set or bool(ended))
         failures = stack.failures
+        close_page()
     for node, code in ended.items():
         if not code:
             print(f"node {node} has ended; all were stopped")

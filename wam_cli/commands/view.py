@@ -1,4 +1,4 @@
-"""`wam view`: a recording in the Rerun viewer."""
+"""`wam view`: a recording in the browser, or in the Rerun viewer."""
 
 import argparse
 from pathlib import Path
@@ -7,22 +7,34 @@ from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.rerun_view import load_rerun, view, viewer
 from wam_bag.bag import read
 from wam_cli.commands import writable_file
+from wam_cli.commands.live import take_port
+from wam_live.page import needing_viser
+from wam_ros.run import Stop
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("bag", type=Path, help="directory of the bag, or its .mcap file")
-    parser.add_argument("--save", type=Path, metavar="FILE", help="write this .rrd file and do not open the viewer")
-    parser.epilog = "Needs Rerun: pip install 'wam_stack[view]'."
+    take_port(parser)
+    parser.add_argument("--at", type=float, metavar="SECONDS", help="show this time and do not play")
+    parser.add_argument("--rerun", action="store_true", help="open the Rerun viewer instead of the page")
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write this .rrd file for Rerun and open nothing")
+    parser.epilog = "The page needs viser, pip install 'wam_stack[live]'; Rerun needs 'wam_stack[view]'."
 
 
 def run(given: argparse.Namespace) -> int:
-    """Log the bag."""
-    load_rerun()  # before the work
-    if given.save:
-        writable_file("--save", given.save)
-    else:
-        viewer()
-    said = view(analysed_run(read(given.bag)), given.save)
-    print(f"{given.save or 'viewer'}: {said}")
+    """Show the bag."""
+    if given.save or given.rerun:
+        load_rerun()  # before the work
+        if given.save:
+            writable_file("--save", given.save)
+        else:
+            viewer()
+        said = view(analysed_run(read(given.bag)), given.save)
+        print(f"{given.save or 'viewer'}: {said}")
+        return 0
+    with needing_viser():
+        from wam_live.playback import play
+    stop = Stop()
+    play(analysed_run(read(given.bag)), given.port, given.at, lambda: stop.is_set, lambda line: print(line, flush=True))
     return 0

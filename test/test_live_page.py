@@ -1,0 +1,497 @@
+"""The live page: drawn where the simulator has the arm, harmless to the run, usable in a real browser."""
+
+import argparse
+import base64
+import json
+import math
+import shutil
+import socket
+import subprocess
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from bag_comparison import compare
+from browser import browser
+from conftest import LONG, RosWorld
+from test_lockstep import STEPS, configuration, record_composed
+
+from wam_analysis.findings.analysed_run import analysed_run
+from wam_bag.bag import read
+from wam_cli.commands.live import page_beside, take_page
+from wam_description.configuration import Configuration, packaged
+from wam_description.effects import no_effects
+from wam_description.mjcf import mjcf
+from wam_description.parameters import build_part
+from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, Wrench
+from wam_description.world import NO_SPRINGS, Obstacles, World
+from wam_live.page import HOST, NoPageError, port_is_free, serve
+
+viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
+from geometry_msgs.msg import WrenchStamped  # noqa: E402
+
+from wam_live.hold import HeldTopic  # noqa: E402
+from wam_live.live_page import LivePage  # noqa: E402
+from wam_live.panel import POINTS, Controls, sample, status_page  # noqa: E402
+from wam_live.playback import BagSource  # noqa: E402
+from wam_live.scene import RELEASE, STRONGEST, LinkPush, Scene, band_push  # noqa: E402
+from wam_live.snapshot import Snapshot  # noqa: E402
+
+CONFIGURATION = Configuration.load(packaged("wam"))
+ARM = CONFIGURATION.shared.arm
+OBSTACLES = build_part(Obstacles, CONFIGURATION.sections["driver"], "world.obstacles.")
+MOVED = 3e-4  # rad, by which an arm that holds its posture gives way to a push
+POSE = (0.3, -0.9, 0.2, 0.8)
+
+
+def free_port() -> int:
+    """A port of this machine that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def server() -> Iterator[Any]:
+    made = serve(free_port())
+    yield made
+    made.stop()
+
+
+def turned(wxyz: Any, vector: Any) -> np.ndarray[Any, Any]:
+    """A vector turned by a quaternion, written out."""
+    w, x, y, z = map(float, wxyz)
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    return np.asarray(rotation @ np.asarray(vector, float))
+
+
+def test_links_are_drawn_where_the_simulator_has_them(server: Any) -> None:
+    scene = Scene(server, ARM, OBSTACLES, None)
+    scene.show(Snapshot(stamp=1, q=POSE))
+    model = mujoco.MjModel.from_xml_string(mjcf(ARM, 0.001, World(OBSTACLES, NO_SPRINGS), no_effects(ARM)))
+    data = mujoco.MjData(model)
+    for name, angle in zip(ARM.joints.names, POSE, strict=True):
+        data.joint(name).qpos[0] = angle
+    mujoco.mj_kinematics(model, data)
+    for name in ARM.covers.names:
+        geom = data.geom(name)
+        tube = server.scene.get_handle_by_name(f"/arm/{name}/tube")
+        frame = scene.links[name]
+        middle = np.array(frame.position) + turned(frame.wxyz, tube.position)
+        assert middle == pytest.approx(geom.xpos, abs=1e-6)
+        axis = turned(frame.wxyz, turned(tube.wxyz, (0.0, 0.0, 1.0)))
+        assert abs(axis @ geom.xmat.reshape(3, 3)[:, 2]) == pytest.approx(1.0, abs=1e-6)
+        length = 2.0 * (model.geom(name).size[0] + model.geom(name).size[1])
+        assert np.ptp(tube.vertices[:, 2]) == pytest.approx(length, rel=1e-3)
+
+
+def test_contacts_are_drawn_as_arrows_along_the_force_and_vanish(server: Any) -> None:
+    scene = Scene(server, ARM, OBSTACLES, None)
+    contact = Contact("outer_link", 0.2, (0.0, 0.0, 10.0), 0.01)
+    scene.show(Snapshot(1, POSE, true=contact, likely=(LikelyRange("outer_link", 0.1, 0.3),)))
+    arrow, band = (server.scene.get_handle_by_name(f"/contact/{name}") for name in ("true", "likely0"))
+    assert arrow.visible
+    assert band.visible
+    assert band.height == pytest.approx(0.2)
+    start, end = arrow.points[0]
+    assert start == pytest.approx(scene.point("outer_link", 0.2), abs=1e-6)
+    frame = scene.links["outer_link"]
+    assert end - start == pytest.approx(turned(frame.wxyz, (0.0, 0.0, 0.15)), abs=1e-6)
+    scene.show(Snapshot(2, POSE))
+    assert not arrow.visible
+    assert not band.visible
+
+
+def test_a_drag_pushes_like_a_rubber_band_of_limited_strength() -> None:
+    push = band_push("outer_link", np.array([0.2, 0.0, 0.0]), np.array([0.2, 0.1, 0.0]))
+    assert push.force == pytest.approx((0.0, 6.0, 0.0))
+    assert push.torque == pytest.approx((0.0, 0.0, 1.2))
+    far = band_push("outer_link", np.zeros(3), np.array([0.0, 0.0, 9.0]))
+    assert far.force == pytest.approx((0.0, 0.0, STRONGEST))
+
+
+def test_the_status_escapes_what_comes_from_topics() -> None:
+    status = NodeStatus(Level.ERROR, "<b>", node="driver", mode="fault", fault="<script>alert(1)</script>")
+    page = status_page(Snapshot(statuses={"driver": status}), 0.0)
+    assert "<script>" not in page
+    assert "&lt;script&gt;" in page
+    assert len(sample(Snapshot())) == 7
+
+
+def test_a_slider_that_the_page_moves_asks_for_nothing(server: Any) -> None:
+    panel = Controls(server, ARM, {("force_loop", "posture_gain"): 4.0})
+    panel.set_slider("force_loop", "posture_gain", 3.0)
+    time.sleep(0.2)
+    assert panel.requests.empty()
+
+
+def test_a_taken_port_is_refused_by_name() -> None:
+    port = free_port()
+    first = serve(port)
+    try:
+        with pytest.raises(NoPageError, match=f"port {port} .* is taken"):
+            serve(port)
+    finally:
+        first.stop()
+    assert port_is_free(free_port())
+
+
+def test_pages_of_other_sites_are_refused(server: Any) -> None:
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    address = f"ws://{HOST}:{server.get_port()}"
+    with pytest.raises(InvalidStatus) as refused:
+        connect(address, origin="http://evil.example")  # type: ignore[arg-type]
+    assert refused.value.response.status_code == 403
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(f"http://{_other_address()}:{server.get_port()}", timeout=2.0)
+
+
+def _other_address() -> str:
+    """An address of this machine that is not the one of the page."""
+    return "127.0.0.2"
+
+
+# a running stack
+
+
+class Shown:
+    """A page of a running stack, in a thread of this process."""
+
+    def __init__(self, domain_id: int) -> None:
+        self.port = free_port()
+        self._end = threading.Event()
+        self.page = LivePage("wam", self.port, lambda line: None, domain_id)
+        self._thread = threading.Thread(target=self.page.run, args=(self._end.is_set,))
+        self._thread.start()
+
+    def wait(self, holds: Callable[[], Any], spin: Callable[[], None]) -> None:
+        """Let the stack run until something holds on the page."""
+        end = time.monotonic() + LONG
+        while not holds():
+            assert time.monotonic() < end, "the page never showed it"
+            spin()
+
+    def close(self) -> None:
+        """End the page."""
+        self._end.set()
+        self._thread.join()
+
+
+@contextmanager
+def running(domain_id: int, factor: float = 0.0) -> Iterator[tuple[Any, Shown]]:
+    """A stack in lockstep and its page; a browser beside them wants a slow one."""
+    from wam_ros.bring_up import Composition
+
+    configuration = CONFIGURATION.with_values({"timing.real_time_factor": factor, "timing.timeout": LONG})
+    with Composition(configuration, domain_id=domain_id) as composition:
+        shown = Shown(domain_id)
+        try:
+            yield composition, shown
+        finally:
+            shown.close()
+
+
+def mode_of(shown: Shown) -> str:
+    """State of the driver as the page shows it."""
+    panel = shown.page.panel
+    driver = panel.snapshot.statuses.get("driver") if panel else None
+    return driver.mode if driver else ""
+
+
+def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> None:
+    from wam_description.wiring import Call, SetParameters
+
+    with running(domain_id) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel, scene = shown.page.panel, shown.page.scene
+        assert panel is not None
+        assert scene is not None
+        panel.requests.put(Call("driver", "enable", True))
+        shown.wait(lambda: mode_of(shown) == "enabled", spin)
+        start = panel.snapshot.q
+        scene._push(LinkPush("outer_link", (0.0, 30.0, 0.0), (0.0, 0.0, 9.0)))
+        shown.wait(lambda: math.dist(panel.snapshot.q, start) > MOVED, spin)
+        assert panel.snapshot.true.cover == "outer_link"
+        scene._push(RELEASE)
+        shown.wait(lambda: panel.snapshot.true.cover == "", spin)
+        panel.requests.put(SetParameters("force_loop", {"posture_gain": -1.0}))
+        shown.wait(lambda: "posture_gain" in panel._said.content and "refused" in panel._said.content, spin)
+        panel.requests.put(Call("driver", "estop"))
+        shown.wait(lambda: mode_of(shown) == "fault", spin)
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> Path:
+    """A run that nobody watched."""
+    return recorded(tmp_path_factory.mktemp("alone"), domain_of_module)
+
+
+def recorded(folder: Path, domain_id: int) -> Path:
+    """A short run in lockstep, as a bag."""
+    script = folder / "script.yaml"
+    script.write_text(json.dumps({"steps": STEPS}))
+    record_composed(configuration(script, folder, "bag"), domain_id)
+    return folder / "bag"
+
+
+@pytest.mark.slow
+def test_a_page_changes_no_bit_of_a_run(alone: Path, domain_id: int, tmp_path: Path) -> None:
+    shown = Shown(domain_id)
+    try:
+        watched = recorded(tmp_path, domain_id)
+        assert shown.page.panel is not None
+        assert shown.page.panel.snapshot.q
+    finally:
+        shown.close()
+    assert compare(alone, watched) == []
+
+
+def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
+    bag = read(alone)
+    source = BagSource(analysed_run(bag))
+    truth = bag.topics["/wam/sim/joint_states"]
+    for at in (0, 40, 100):
+        shown = source.snapshot(int(truth.stamp_ns[at]))  # type: ignore[union-attr]
+        assert shown.q == pytest.approx(truth.position[at], abs=0.02)  # type: ignore[union-attr]
+    pushed = source.snapshot(400_000_000)
+    assert pushed.true.cover == "outer_link"
+    assert pushed.true.place == pytest.approx(0.3, abs=1e-6)
+    assert pushed.estimated.position_sd > 0.0
+    assert source.snapshot(300_000_000).statuses["driver"].mode == "enabled"
+    assert len(list(source.past(400_000_000))) == POINTS
+
+
+def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: RosWorld) -> None:
+    listener, page = ros.node("listener"), ros.node("page")
+    heard: list[str] = []
+    listener.create_subscription(
+        WrenchStamped, "sim/disturbance", lambda message: heard.append(message.header.frame_id), 10
+    )
+    hold = HeldTopic(page, "sim/disturbance", CONFIGURATION.shared)
+    count = lambda: listener.count_publishers("sim/disturbance")  # noqa: E731
+    push = Wrench("outer_link", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    assert hold.send(1, push) == ""
+    ros.wait(lambda: count() == 1 and (hold.send(1, push), heard)[1])
+    hold.send(1, Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    hold.end()
+    ros.wait(lambda: count() == 0 and BASE in heard)
+    hold.send(1, push)
+    other = ros.node("other").create_publisher(WrenchStamped, "sim/disturbance", 10)
+    ros.wait(lambda: hold.send(1, push), what="the page leaves the topic")
+    assert not hold.is_on
+    assert "another program publishes sim/disturbance" in hold.send(1, push)
+    del other
+
+
+def test_an_arm_goes_on_where_the_page_presses_and_lets_go(domain_id: int) -> None:
+    from wam_description.wiring import Call
+    from wam_live.panel import NO_PRESS, Press
+
+    with running(domain_id) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel, node = shown.page.panel, composition.nodes["driver"]
+        assert panel is not None
+        press = Press("outer_link", (0.0, -2.0, 0.0))
+        panel.requests.put(press)
+        shown.wait(lambda: "enable the arm first" in panel._said.content, spin)
+        panel.requests.put(Call("driver", "enable", True))
+        shown.wait(lambda: mode_of(shown) == "enabled", spin)
+        panel.requests.put(press)
+        shown.wait(lambda: panel.snapshot.commanded == pytest.approx(2.0), spin)
+        panel.requests.put(NO_PRESS)
+        shown.wait(lambda: node.count_publishers("force_command") == 0, spin)
+        shown.wait(lambda: math.isnan(panel.snapshot.commanded), spin)
+        assert mode_of(shown) == "enabled"
+
+
+# beside a stack
+
+
+def options(*given: str) -> Any:
+    parser = argparse.ArgumentParser()
+    take_page(parser, default=None)
+    return parser.parse_args(given)
+
+
+def test_a_page_that_was_asked_for_is_refused_where_there_can_be_none(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as taken:
+        taken.bind((HOST, 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        with (
+            pytest.raises(NoPageError, match=f"port {port} .* --port"),
+            page_beside(options("--live", "--port", port), "wam"),
+        ):
+            pass
+        with page_beside(options("--port", port), "wam"):
+            assert f"no live page: port {port}" in capsys.readouterr().out
+        with page_beside(options("--no-live", "--port", port), "wam"):
+            assert capsys.readouterr().out == ""
+
+
+def test_the_page_runs_beside_the_stack_and_ends_with_it(domain_id: int) -> None:
+    port = free_port()
+    with page_beside(options("--port", str(port)), "wam"):
+        until(lambda: not port_is_free(port))
+    assert port_is_free(port)
+
+
+# a real browser
+
+FLAGS = (
+    "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
+    "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync", "--disable-dev-shm-usage", "--remote-allow-origins=*", "--window-size=1280,800",
+)  # fmt: skip
+
+
+class Tab:
+    """A page in Chromium, through its debugging protocol."""
+
+    def __init__(self, tab: Any) -> None:
+        self._socket, self._number = tab, 0
+
+    def ask(self, method: str, **values: Any) -> dict[str, Any]:
+        """One request and its answer."""
+        self._number += 1
+        self._socket.send(json.dumps({"id": self._number, "method": method, "params": values}))
+        while True:
+            answer: dict[str, Any] = json.loads(self._socket.recv(timeout=LONG))
+            if answer.get("id") == self._number:
+                return answer["result"]
+
+    def text(self) -> str:
+        """Everything that can be read on the page."""
+        found = self.ask("Runtime.evaluate", expression="document.body.innerText", returnByValue=True)
+        return str(found["result"].get("value", ""))
+
+    def mouse(self, kind: str, x: float, y: float, pressed: bool) -> None:
+        """Move, press or release the left button."""
+        button = {"button": "left" if pressed or kind == "mouseReleased" else "none", "buttons": int(pressed)}
+        self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, clickCount=1, **button)
+
+    def click(self, label: str) -> None:
+        """Press a button by its label."""
+        find = f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() === {label!r}).click()"
+        self.ask("Runtime.evaluate", expression=find)
+
+    def picture(self) -> bytes:
+        """PNG of the window."""
+        return base64.b64decode(self.ask("Page.captureScreenshot")["data"])
+
+
+@contextmanager
+def opened(address: str, folder: Path) -> Iterator[Tab]:
+    """A page in a browser without a screen."""
+    from websockets.sync.client import connect
+
+    profile = folder / "profile"
+    command = [browser(), *FLAGS, "--remote-debugging-port=0", f"--user-data-dir={profile}", address]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        end = time.monotonic() + LONG
+        while not (profile / "DevToolsActivePort").exists():
+            assert time.monotonic() < end, "the browser did not start"
+            assert process.poll() is None, "the browser ended"
+            time.sleep(0.1)
+        port = (profile / "DevToolsActivePort").read_text().split()[0]
+        with urllib.request.urlopen(f"http://{HOST}:{port}/json") as answer:
+            page = next(tab for tab in json.load(answer) if tab["type"] == "page")
+        with connect(page["webSocketDebuggerUrl"], max_size=2**27) as tab:
+            yield Tab(tab)
+    finally:
+        process.terminate()
+        process.wait()
+        shutil.rmtree(profile, ignore_errors=True)
+
+
+def pixel(camera: Any, size: tuple[float, float], point: Any) -> tuple[float, float]:
+    """Where a camera of the page sees a point of the base frame, px."""
+    w, x, y, z = camera.wxyz
+    right, down, ahead = turned((w, -x, -y, -z), np.asarray(point) - np.asarray(camera.position))
+    focal = 0.5 * size[1] / math.tan(0.5 * camera.fov)
+    return 0.5 * size[0] + focal * right / ahead, 0.5 * size[1] + focal * down / ahead
+
+
+@pytest.mark.slow
+def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_path: Path) -> None:
+    browser()
+    with running(domain_id, 0.3) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel, scene = shown.page.panel, shown.page.scene
+        assert panel is not None
+        assert scene is not None
+        server = shown.page._server
+
+        def drive() -> None:
+            with opened(f"http://{HOST}:{shown.port}/", tmp_path) as tab:
+                until(lambda: "Emergency stop" in tab.text() and server.get_clients())
+                tab.click("Enable")
+                until(lambda: mode_of(shown) == "enabled" and "enabled" in tab.text())
+                clients = list(server.get_clients().values())
+                until(lambda: clients[0].camera.image_width > 0)
+                camera = clients[0].camera
+                window = (camera.image_width, camera.image_height)
+                start = panel.snapshot.q
+                x, y = pixel(camera, window, scene.point("outer_link", 0.25))
+                tab.mouse("mouseMoved", x, y, False)
+                tab.mouse("mousePressed", x, y, True)
+                for i in range(1, 25):
+                    tab.mouse("mouseMoved", x + 6.0 * i, y, True)
+                    time.sleep(0.03)
+                until(lambda: panel.snapshot.true.cover == "outer_link")
+                until(lambda: math.dist(panel.snapshot.q, start) > MOVED)
+                until(lambda: "you push with" in tab.text())
+                tab.mouse("mouseReleased", x + 144.0, y, False)
+                until(lambda: panel.snapshot.true.cover == "")
+                before = panel.snapshot.stamp
+                until(lambda: panel._force_plot.data[0][-1] > before / 1e9)
+                tab.click("Brake")
+                until(lambda: mode_of(shown) == "braked")
+                assert len(tab.picture()) > 10_000
+
+        failed: list[BaseException] = []
+
+        def guarded() -> None:
+            try:
+                drive()
+            except BaseException as error:
+                failed.append(error)
+
+        user = threading.Thread(target=guarded, daemon=True)
+        user.start()
+        while user.is_alive():
+            spin()
+        if failed:
+            raise failed[0]
+
+
+def until(holds: Callable[[], Any]) -> None:
+    """Wait until something holds in the browser."""
+    end = time.monotonic() + LONG
+    while not holds():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.05)
+
+
+def test_frames_of_a_push_are_covers() -> None:
+    assert RELEASE.cover == BASE

@@ -1,0 +1,95 @@
+"""`wam live`: the live page of a stack that runs, in a browser; and the page of `wam up` and `wam demo`."""
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from wam_live.page import PORT, NoPageError, needing_viser, obstacle
+from wam_ros.run import NAMESPACE, PARENT, Stop, die_with_parent
+
+PATIENCE: Final = 1.0  # s, in which a page ends by itself
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("--namespace", default=NAMESPACE, help="of the stack; default: %(default)s")
+    take_port(parser)
+    parser.epilog = "Needs viser: pip install 'wam_stack[live]'.  The page is reachable from this machine alone."
+
+
+def take_port(parser: argparse.ArgumentParser) -> None:
+    """Give a command the option --port."""
+    parser.add_argument("--port", type=int, default=PORT, help="of the page on this machine; default: %(default)s")
+
+
+def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
+    """Give a command the options --live and --no-live; None: a page where that is possible."""
+    parser.add_argument(
+        "--live",
+        action=argparse.BooleanOptionalAction,
+        default=default,
+        help="show the arm in the browser; default: " + ("no" if default is False else "where that is possible"),
+    )
+    take_port(parser)
+
+
+@contextmanager
+def page_beside(given: argparse.Namespace, namespace: str) -> Iterator[Callable[[], None]]:
+    """The page of a stack that is about to start, as its options say; yields what ends it.
+
+    It is to be ended before the stack, which at its end waits for its listeners.
+
+    Raises
+    ------
+    NoPageError
+        if a page is required and there can be none.
+    """
+    reason = obstacle(given.port) if given.live is not False else ""
+    if reason and given.live:
+        raise NoPageError(reason)
+    if reason:
+        print(f"no live page: {reason}", flush=True)
+    if reason or given.live is False:
+        yield lambda: None
+        return
+    page = PageProcess(given.port, namespace)
+    try:
+        yield page.close
+    finally:
+        page.close()
+
+
+class PageProcess:
+    """The page as a process of its own, which can neither delay nor fail the stack."""
+
+    def __init__(self, port: int, namespace: str) -> None:
+        command = [sys.executable, "-m", "wam_cli.main", "live", "--port", str(port), "--namespace", namespace]
+        # a session of its own: Ctrl-C reaches the parent alone
+        self._process = subprocess.Popen(
+            command, start_new_session=True, stdin=subprocess.DEVNULL, env={**os.environ, PARENT: str(os.getpid())}
+        )
+
+    def close(self) -> None:
+        """End the page."""
+        if self._process.poll() is None:
+            self._process.terminate()
+            try:
+                self._process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+
+def run(given: argparse.Namespace) -> int:
+    """Serve the page until Ctrl-C."""
+    die_with_parent()
+    with needing_viser():
+        from wam_live.live_page import LivePage
+    stop = Stop()
+    page = LivePage(given.namespace.strip("/"), given.port, lambda line: print(line, flush=True))
+    page.run(lambda: stop.is_set)
+    return 0

@@ -1,0 +1,224 @@
+"""The page of a running stack, and what the page asks of it.
+
+It publishes nothing before somebody drags or presses, and no longer than that.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from rcl_interfaces.srv import SetParameters as SetParametersService
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool, Trigger
+
+from wam_description.arm import Shared
+from wam_description.parameters import build, build_part, fields
+from wam_description.signals import Wrench
+from wam_description.topics import BY_NAME
+from wam_description.wiring import Call, SetParameters
+from wam_description.world import Obstacles
+from wam_live.hold import HeldTopic
+from wam_live.page import quiet, serve
+from wam_live.panel import NO_PRESS, SLIDERS, Controls, Press, Request, mode_of
+from wam_live.scene import RELEASE, LinkPush, Scene
+from wam_live.snapshot import size
+from wam_live.stack_source import RunningStack
+from wam_ros.messages import message_type
+from wam_ros.qos import qos
+from wam_ros.remote_parameters import RemoteParameters
+from wam_ros.run import Connection
+from wam_ros.wire import stamp_of
+
+RATE: Final = 30.0  # Hz, of the picture
+PANEL_EVERY: Final = 6  # pictures, between changes of plots and texts
+
+
+class LivePage:
+    """The page of a running stack.
+
+    Parameters
+    ----------
+    namespace : of the stack.
+    port : to listen on.
+    say : called with lines for people.
+    domain_id : ROS domain, the one of the environment where None.
+
+    Attributes
+    ----------
+    scene, panel : what the page shows, None before the stack has answered.
+    """
+
+    scene: Scene | None = None
+    panel: Controls | None = None
+
+    def __init__(self, namespace: str, port: int, say: Callable[[str], None], domain_id: int | None = None) -> None:
+        self._namespace, self._port, self._say = namespace, port, say
+        self._connection = Connection(domain_id=domain_id)
+        self._asking = Node("live", context=self._connection.context, namespace=namespace)
+        self._connection.add(self._asking)
+        self._clients: dict[tuple[str, str], Any] = {}
+        self._server: Any = None
+        self._press: Press | None = None
+        self._push: LinkPush | None = None
+        self._holds: dict[str, HeldTopic] = {}
+        self._states: Any = None  # subscription while somebody presses
+        self._live: dict[tuple[str, str], Any] = {}
+
+    def run(self, until: Callable[[], bool]) -> None:
+        """Serve the page until a condition holds; a stack that is not there yet is waited for."""
+        self._server = serve(self._port)
+        try:
+            flat = self._parameters(until)
+            if flat is None:
+                return
+            names = {field.name.partition(".")[0] for field in fields(Shared)}
+            driver = flat["driver"]
+            shared = build(Shared, {k: v for k, v in driver.items() if k.partition(".")[0] in names})
+            obstacles = build_part(Obstacles, driver, "world.obstacles.")
+            source = RunningStack(self._connection.context, self._namespace, shared)
+            self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
+            self.scene = scene = Scene(self._server, shared.arm, obstacles, self._take_push)
+            self._live = {key: flat[key[0]][key[1]] for key in SLIDERS if key[1] in flat.get(key[0], {})}
+            self.panel = panel = Controls(self._server, shared.arm, self._live)
+            self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
+            self._say(f"live page: http://{self._server.get_host()}:{self._port}")
+            self._draw(source, scene, panel, until)
+            self._release(source.stamp)
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """End the server and leave ROS."""
+        if self._server is not None:
+            with quiet():
+                self._server.stop()
+            self._server = None
+        self._connection.close()
+
+    def _parameters(self, until: Callable[[], bool]) -> Mapping[str, Mapping[str, Any]] | None:
+        asked = RemoteParameters(self._asking, ["driver", *dict.fromkeys(node for node, _ in SLIDERS)])
+        begin = time.monotonic()
+        while not until():
+            asked.ask()
+            self._connection.executor.spin_once(timeout_sec=0.05)
+            late = time.monotonic() - begin > 2.0
+            if "driver" in asked.found and (late or not asked.missing):
+                return asked.found
+        return None
+
+    def _draw(self, source: RunningStack, scene: Scene, panel: Controls, until: Callable[[], bool]) -> None:
+        count, next_time = 0, time.monotonic()
+        while not until():
+            next_time = max(next_time + 1.0 / RATE, time.monotonic())
+            while (left := next_time - time.monotonic()) > 0.0:
+                self._connection.executor.spin_once(timeout_sec=left)
+            snapshot = source.snapshot()
+            with self._server.atomic():
+                scene.show(snapshot)
+                pushing = scene.drag()
+                if count % PANEL_EVERY == 0:
+                    panel.show(snapshot, pushing)
+            count += 1
+            self._send(source, panel)
+            while not panel.requests.empty():
+                self._ask(panel.requests.get(), source, panel)
+
+    # requests of the page
+
+    def _take_push(self, push: LinkPush) -> None:
+        self._push = push
+
+    def _let_go(self, scene: Scene, panel: Controls) -> None:
+        """A browser is gone: nobody holds the link, and nobody sees the force."""
+        scene.let_go()
+        panel.requests.put(NO_PRESS)
+
+    def _send(self, source: RunningStack, panel: Controls) -> None:
+        """Stream the push until it is released; end a force whose arm has stopped."""
+        if self._press is not None and mode_of(source.statuses) != "enabled":
+            self._end_press()
+            panel.say("letting go: the brakes are on")
+        push = self._push
+        if push is None:
+            return
+        hold = self._holds["sim/disturbance"]
+        refusal = hold.send(source.stamp, Wrench(*push)) if push is not RELEASE or hold.is_on else ""
+        if refusal:
+            panel.say(f"not pushed: {refusal}", refused=True)
+        if (push is RELEASE or refusal) and self._push is push:  # a newer one may have come from the browser meanwhile
+            self._push = None
+            hold.end()
+
+    def _start_press(self, press: Press, source: RunningStack, panel: Controls) -> None:
+        """Answer each state with the force from now on."""
+        if mode_of(source.statuses) != "enabled":
+            panel.say("not pressed: enable the arm first", refused=True)
+            return
+        self._press = press
+        if self._states is None:
+            row = BY_NAME["joint_states"]
+            self._states = self._asking.create_subscription(
+                message_type(row), row.name, lambda data: self._answer(data, panel), qos(row), raw=True
+            )
+        panel.say(f"pressing with {size(press.force):.1f} N")
+
+    def _answer(self, state: bytes, panel: Controls) -> None:
+        if self._press is None:
+            return
+        refusal = self._holds["force_command"].send(stamp_of(state), Wrench(*self._press, (0.0, 0.0, 0.0)))
+        if refusal:
+            self._press = None
+            panel.say(f"not pressed: {refusal}", refused=True)
+
+    def _end_press(self) -> None:
+        self._press = None
+        if self._states is not None:
+            self._asking.destroy_subscription(self._states)
+            self._states = None
+            self._holds["force_command"].end()
+
+    def _release(self, stamp: int) -> None:
+        """End what is held, before the page does."""
+        self._end_press()
+        if (hold := self._holds["sim/disturbance"]).is_on:
+            hold.send(stamp, Wrench(*RELEASE))
+            hold.end()
+
+    def _ask(self, request: Request, source: RunningStack, panel: Controls) -> None:
+        if isinstance(request, Press):
+            if any(request.force):
+                self._start_press(request, source, panel)
+            elif self._press is not None:
+                self._end_press()
+                panel.say("letting go")
+            return
+        if isinstance(request, SetParameters):
+            kind: Any = SetParametersService
+            service = f"{request.node}/set_parameters"
+            sent = [Parameter(name, value=value).to_parameter_msg() for name, value in request.values.items()]
+            message: Any = SetParametersService.Request(parameters=sent)
+        else:
+            kind = Trigger if request.data is None else SetBool
+            service = f"{request.node}/{request.service}"
+            message = Trigger.Request() if request.data is None else SetBool.Request(data=request.data)
+        if (service, kind) not in self._clients:
+            self._clients[service, kind] = self._asking.create_client(kind, service)
+            self._clients[service, kind].wait_for_service(0.5)
+        client = self._clients[service, kind]
+        if not client.service_is_ready():
+            panel.say(f"{request.node} does not answer", refused=True)
+            return
+        client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result(), panel))
+
+    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls) -> None:
+        if isinstance(request, Call):
+            panel.say(answer.message, refused=not answer.success)
+            return
+        reasons = "; ".join(result.reason for result in answer.results if not result.successful)
+        for name, value in request.values.items():
+            if reasons:
+                panel.set_slider(request.node, name, self._live[request.node, name])
+            else:
+                self._live[request.node, name] = value
+            panel.say(reasons or f"{name} = {value}", refused=bool(reasons))

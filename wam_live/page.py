@@ -1,0 +1,109 @@
+"""The web server of the page, reachable from this machine alone."""
+
+import contextlib
+import functools
+import io
+import logging
+import socket
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from importlib.util import find_spec
+from typing import Any, Final
+
+HOST: Final = "127.0.0.1"
+PORT: Final = 8080
+TITLE: Final = "WAM"
+NARROW: Final = 576  # px, of a window; below it viser puts the panel under the picture
+CAMERA: Final = (1.1, -1.7, 0.5), (0.35, 0.0, -0.15)  # m, where it is and what it looks at
+NARROW_CAMERA: Final = (1.6, -2.5, 0.3), (0.35, 0.0, -0.55)
+INSTALL: Final = "pip install 'wam_stack[live]'"
+
+
+class NoPageError(OSError):
+    """The page cannot be shown: viser is missing, or the port is taken."""
+
+
+def port_is_free(port: int) -> bool:
+    """Whether a server can listen on a port of this machine."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except OSError:
+            return False
+    return True
+
+
+def obstacle(port: int) -> str:
+    """Why there can be no page at a port of this machine, and what to do; '' where there can be one."""
+    if find_spec("viser") is None:
+        return f"the live page needs viser; {INSTALL}"
+    if not port_is_free(port):
+        return f"port {port} of {HOST} is taken; close the other page, or choose a port with --port"
+    return ""
+
+
+@contextlib.contextmanager
+def needing_viser() -> Iterator[None]:
+    """Say what to install where an import of the page's own modules fails.
+
+    Raises
+    ------
+    NoPageError
+        if viser is not installed, or is not the version that is needed.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise NoPageError(f"the live page needs viser ({error}); {INSTALL}") from error
+
+
+def quiet() -> AbstractContextManager[Any]:
+    """Keep what viser prints when it starts and ends off the terminal."""
+    return contextlib.redirect_stdout(io.StringIO())
+
+
+def serve(port: int) -> Any:
+    """Start the server of a page.
+
+    Parameters
+    ----------
+    port : to listen on.
+
+    Raises
+    ------
+    NoPageError
+        if viser is not installed or the port is taken; the message says what to do.
+    """
+    if reason := obstacle(port):  # viser would silently take the next port
+        raise NoPageError(reason)
+    with needing_viser():
+        import viser
+        from websockets.asyncio import server
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a browser that goes away is no news
+    with _only_this_page(server, port), quiet():
+        made = viser.ViserServer(host=HOST, port=port, label=TITLE, verbose=False)
+    made.initial_camera.position, made.initial_camera.look_at = CAMERA
+    made.on_client_connect(_look_from_a_telephone)
+    return made
+
+
+def _look_from_a_telephone(client: Any) -> None:
+    """Where the panel covers the lower half of a narrow window, look from farther away, at a point below the arm."""
+    if client.camera.image_width < NARROW:
+        client.camera.position, client.camera.look_at = NARROW_CAMERA
+
+
+@contextlib.contextmanager
+def _only_this_page(server: Any, port: int) -> Iterator[None]:
+    """Let the server refuse connections that other web pages open.
+
+    viser does not check where a WebSocket comes from: any page open in the same browser could press the buttons.
+    """
+    origins = [None, *(f"http://{name}:{port}" for name in (HOST, "localhost"))]
+    original = server.serve
+    server.serve = functools.partial(original, origins=origins)
+    try:
+        yield
+    finally:
+        server.serve = original

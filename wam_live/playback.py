@@ -1,0 +1,147 @@
+"""A bag as the source of the page: the same picture and plots, with a slider over the time."""
+
+import math
+import time
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from typing import Final
+
+import numpy as np
+
+from wam_analysis.demo_traces import ForceSignal
+from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.recorded import recorded_arm
+from wam_analysis.rerun_view import joint_motion
+from wam_bag.bag import TableColumns
+from wam_control.contact_table import contact_of, likely_of
+from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, NodeStatus
+from wam_live.page import quiet, serve
+from wam_live.panel import POINTS, WINDOW, Controls
+from wam_live.scene import Scene
+from wam_live.snapshot import NAN, Snapshot
+from wam_sim.replay import tables
+
+RATE: Final = 30.0  # Hz, of the picture
+SPEEDS: Final = ("0.1", "0.25", "0.5", "1", "2", "5")
+HELD: Final = 100_000_000  # ns for which a recorded estimate is shown
+
+
+class BagSource:
+    """What a recorded run showed at any time of it.
+
+    Parameters
+    ----------
+    recording : of a bag.
+
+    Raises
+    ------
+    ValueError
+        if the bag has no joint states.
+    """
+
+    def __init__(self, recording: AnalysedRun) -> None:
+        self.recorded = recorded_arm(recording.run.parameters)
+        joints = joint_motion(recording, self.recorded.arm)
+        if joints is None or not len(joints[0]):
+            raise ValueError(f"{recording.bag.path} has no joint states of this arm; nothing can be shown")
+        self._stamps, self._angles = joints
+        self._traces = recording.summary.traces
+        self._covers = self.recorded.arm.covers.names
+        statuses = sorted((status for status in recording.run.statuses), key=lambda status: status.stamp)
+        self._statuses: list[NodeStatus] = statuses
+        self._status_stamps = [status.stamp for status in statuses]
+        columns = recording.bag.topics.get(f"{recording.namespace}/contact/hypotheses")
+        self._likely: list[tuple[LikelyRange, ...]] = []
+        self._estimated: list[Contact] = []
+        self._likely_stamps: list[int] = []
+        if isinstance(columns, TableColumns):
+            read = list(tables(columns))
+            self._likely = [likely_of(table, self._covers) for table in read]
+            self._estimated = [contact_of(table, self._covers) for table in read]
+            self._likely_stamps = columns.stamp_ns.tolist()
+        self.begin, self.end = int(self._stamps[0]), int(self._stamps[-1])
+
+    def snapshot(self, stamp: int) -> Snapshot:
+        """What there was at a time of the arm, ns."""
+        at = max(int(np.searchsorted(self._stamps, stamp, side="right")) - 1, 0)
+        traces, row = self._traces, int(np.searchsorted(self._traces.stamp, stamp, side="right")) - 1
+        known = row >= 0
+        estimate = bisect_right(self._likely_stamps, stamp) - 1
+        is_fresh = estimate >= 0 and stamp - self._likely_stamps[estimate] < HELD
+        until = bisect_right(self._status_stamps, stamp)
+        return Snapshot(
+            stamp=stamp,
+            q=tuple(self._angles[at].tolist()),
+            true=self._contact(traces.true, row) if known else NO_CONTACT,
+            estimated=self._estimated[estimate] if is_fresh else NO_CONTACT,
+            likely=self._likely[estimate] if is_fresh else (),
+            commanded=float(traces.commanded.size[row]) if known else NAN,
+            measured=float(traces.measured.size[row]) if known else NAN,
+            statuses={status.node: status for status in self._statuses[:until]},
+        )
+
+    def past(self, stamp: int) -> Iterator[Snapshot]:
+        """What the plots show before a time of the arm, ns, oldest first."""
+        first = max(self.begin, stamp - round(WINDOW * 1e9))
+        return (self.snapshot(int(at)) for at in np.linspace(first, stamp, POINTS, endpoint=False))
+
+    @staticmethod
+    def _contact(signal: ForceSignal, row: int) -> Contact:
+        force = signal.force[row]
+        if not np.all(np.isfinite(force)) or not np.any(force) or signal.frame[row] in ("", BASE):
+            return NO_CONTACT
+        x, y, z = force.tolist()
+        return Contact(str(signal.frame[row]), float(signal.position[row]), (x, y, z))
+
+
+def play(
+    recording: AnalysedRun, port: int, at: float | None, until: Callable[[], bool], say: Callable[[str], None]
+) -> None:
+    """Serve the page of a bag until a condition holds; the errors are those of `BagSource` and `serve`.
+
+    Parameters
+    ----------
+    recording : of the bag.
+    port : to listen on.
+    at : time that is shown, s since the first state; None: it plays from there.
+    until : whether it is over.
+    say : called with lines for people.
+    """
+    source = BagSource(recording)
+    server = serve(port)
+    try:
+        scene = Scene(server, source.recorded.arm, source.recorded.obstacles, None)
+        length = (source.end - source.begin) / 1e9
+        place, then = min(max(at or 0.0, 0.0), length), time.monotonic()
+        slider = server.gui.add_slider("time [s]", 0.0, max(length, 0.01), 0.01, place)
+        speed = server.gui.add_dropdown("speed", SPEEDS, initial_value="1")
+        running = server.gui.add_checkbox("play", at is None)
+        panel = Controls(server, source.recorded.arm)
+        say(f"{recording.bag.path}: http://{server.get_host()}:{port}")
+
+        def moved(event: object) -> None:
+            nonlocal place
+            if getattr(event, "client", None) is not None:  # not by the page itself
+                place = float(slider.value)
+
+        slider.on_update(moved)
+        shown = math.nan
+        while not until():
+            time.sleep(1.0 / RATE)
+            now = time.monotonic()
+            if running.value:
+                place += (now - then) * float(speed.value)
+                place = place if place <= length else 0.0
+                slider.value = round(place, 2)
+            then = now
+            if place != shown:
+                if not 0.0 <= place - shown < 1.0:  # moved by hand, or begun again
+                    panel.fill(source.past(source.begin + round(place * 1e9)))
+                shown = place
+                snapshot = source.snapshot(source.begin + round(place * 1e9))
+                with server.atomic():
+                    scene.show(snapshot)
+                    panel.show(snapshot)
+    finally:
+        with quiet():
+            server.stop()

@@ -1,0 +1,239 @@
+"""The three-dimensional picture of the page: links, surroundings, contacts, and links that can be dragged.
+
+It is drawn from the parameters of the driver alone, so that every configuration draws itself.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+import trimesh
+import viser
+from numpy.typing import NDArray
+
+from wam_analysis.colours import BLOCK_COLOUR, COLOURS, PEDESTAL_COLOUR, TUBE_COLOURS, channels
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import BASE, Contact, LikelyRange, Triple
+from wam_description.world import Obstacles
+from wam_live.snapshot import Snapshot, size
+
+METRES_PER_NEWTON = 0.015
+LONGEST_ARROW = 0.6  # m
+PEDESTAL = 0.07  # m, radius of the drawn base, which is not in the parameters
+STIFFNESS = 60.0  # N/m, of the rubber band between the pointer and the link
+STRONGEST = 40.0  # N, that a drag pushes with
+BANDS = 4  # parts of the 90 % set that are drawn
+
+Array = NDArray[np.float64]
+
+
+class LinkPush(NamedTuple):
+    """A push on a cover: force at and torque about the origin of its frame, in that frame; zero force releases."""
+
+    cover: str
+    force: Triple  # N
+    torque: Triple  # N m
+
+
+RELEASE = LinkPush(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+class Scene:
+    """The arm in its surroundings.
+
+    Parameters
+    ----------
+    server : that shows it.
+    arm, obstacles : as the driver's parameters have them.
+    push : called with each `LinkPush` of a dragged link, with `RELEASE` at the end; None where nothing can be pushed.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, arm: Arm, obstacles: Obstacles, push: Callable[[LinkPush], None] | None
+    ) -> None:
+        self._scene, self._arm, self._push = server.scene, arm, push
+        self._body = RigidBody(arm)
+        self._q = list(arm.joints.start)
+        self._grabbed: tuple[str, Array] | None = None
+        self._pointer = np.zeros(3)
+        self._scene.set_up_direction("+z")
+        # shadows and the environment map take most of the time of a browser that draws by software
+        self._scene.configure_default_lights(cast_shadow=False)
+        self._scene.configure_environment_map(hdri=None)
+        self._scene.add_light_ambient("/light", intensity=1.2)
+        self.links = {name: self._add_link(i, name) for i, name in enumerate(arm.covers.names)}
+        self._add_surroundings(obstacles)
+        self._arrows = {name: self._add_arrow(name) for name in ("true", "estimated")}
+        self._place = self._scene.add_icosphere(
+            "/contact/place", 0.02, channels(COLOURS["estimated"]), visible=False, cast_shadow=False
+        )
+        self._bands = [
+            self._scene.add_cylinder(
+                f"/contact/likely{i}", 0.055, 1.0, channels("#f2a11a"), opacity=0.35, visible=False, cast_shadow=False
+            )
+            for i in range(BANDS)
+        ]
+        self._band = self._scene.add_arrows(
+            "/hand", np.zeros((1, 2, 3)), channels("#7a3db8"), shaft_radius=0.006, head_radius=0.016, head_length=0.04,
+            visible=False,
+        )  # fmt: skip
+        self.show(Snapshot(q=tuple(self._q)))
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Draw an instant; a change of the drawing, none of the run."""
+        if len(snapshot.q) == len(self._arm.joints.names):
+            self._q = list(snapshot.q)
+            for name, frame in self.links.items():
+                pose = self._body.cover_pose(self._q, name)
+                frame.position, frame.wxyz = pose.position, quaternion(pose.rotation)
+        self._show_arrow("true", snapshot.true)
+        self._show_arrow("estimated", snapshot.estimated)
+        self._show_likely(snapshot.likely)
+        self._show_hand()
+
+    def point(self, cover: str, place: float) -> Array:
+        """Base coordinates, (3,), m, of a position along a cover."""
+        return self._body.point(self._q, cover, (place, 0.0, 0.0))
+
+    # drawn once
+
+    def _add_link(self, i: int, name: str) -> Any:
+        covers = self._arm.covers
+        start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (covers.start, covers.end))
+        frame = self._scene.add_frame(f"/arm/{name}", show_axes=False)
+        length = float(np.linalg.norm(end - start))
+        capsule = trimesh.creation.capsule(length, covers.radius[i], count=(24, 24))
+        capsule.apply_translation((0.0, 0.0, -capsule.bounds.mean(axis=0)[2]))  # about its middle in every version
+        tube = self._scene.add_mesh_simple(
+            f"/arm/{name}/tube",
+            np.asarray(capsule.vertices),
+            np.asarray(capsule.faces),
+            color=channels(TUBE_COLOURS[i % len(TUBE_COLOURS)]),
+            position=tuple(0.5 * (start + end)),
+            wxyz=quaternion(turn_from_z(end - start)),
+            cast_shadow=False,
+        )
+        if self._push is not None:
+            tube.on_drag("left")(self._dragged(name))
+        return frame
+
+    def _add_surroundings(self, obstacles: Obstacles) -> None:
+        floor = -1.0
+        for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
+            three = slice(3 * i, 3 * i + 3)
+            sizes = obstacles.sizes[three]
+            place = {
+                "position": obstacles.positions[three],
+                "wxyz": quaternion(pin.rpy.rpyToMatrix(*obstacles.rotations[three])),
+                "cast_shadow": False,
+            }
+            path, colour = f"/world/{name}", channels(BLOCK_COLOUR)
+            if shape == "cylinder":
+                self._scene.add_cylinder(path, sizes[0], 2.0 * sizes[1], colour, **place)
+            else:
+                thick = sizes[2] if shape == "box" else 0.002
+                self._scene.add_box(path, colour, (2.0 * sizes[0], 2.0 * sizes[1], 2.0 * thick), **place)
+        self._scene.add_cylinder(
+            "/world/pedestal", PEDESTAL, -floor, channels(PEDESTAL_COLOUR), position=(0, 0, 0.5 * floor),
+            cast_shadow=False,
+        )  # fmt: skip
+        self._scene.add_grid("/world/floor", 4.0, 4.0, position=(0.0, 0.0, floor), cell_size=0.2)
+
+    def _add_arrow(self, name: str) -> Any:
+        return self._scene.add_arrows(
+            f"/contact/{name}", np.zeros((1, 2, 3)), channels(COLOURS[name]), shaft_radius=0.008, head_radius=0.02,
+            head_length=0.05, visible=False,
+        )  # fmt: skip
+
+    # drawn at each instant
+
+    def _show_arrow(self, name: str, contact: Contact) -> None:
+        """An arrow from where the world pushes, in the direction in which it pushes the arm."""
+        arrow = self._arrows[name]
+        length = METRES_PER_NEWTON * size(contact.force)
+        known = contact.cover in self.links and math.isfinite(contact.place) and length > 1e-3
+        if known:
+            pose = self._body.cover_pose(self._q, contact.cover)
+            start = self.point(contact.cover, contact.place)
+            scale = min(length, LONGEST_ARROW) / length * METRES_PER_NEWTON
+            end = start + scale * pose.rotation @ np.array(contact.force)
+            arrow.points = np.array([[start, end]], dtype=np.float32)
+            if name == "estimated":
+                self._place.position = start
+        arrow.visible = known
+        if name == "estimated":
+            self._place.visible = known
+
+    def _show_likely(self, likely: Sequence[LikelyRange]) -> None:
+        parts = [part for part in likely if part.cover in self.links and part.high > part.low]
+        for band, part in zip(self._bands, [*parts[:BANDS], *[None] * (BANDS - len(parts[:BANDS]))], strict=True):
+            band.visible = part is not None
+            if part is None:
+                continue
+            ends = self.point(part.cover, part.low), self.point(part.cover, part.high)
+            band.position, band.height = 0.5 * (ends[0] + ends[1]), part.high - part.low
+            band.wxyz = quaternion(turn_from_z(ends[1] - ends[0]))
+
+    # dragging
+
+    def _dragged(self, cover: str) -> Callable[[Any], Any]:
+        async def take(event: Any) -> None:  # an async callback: others run in a pool, out of order
+            if event.phase == "end":
+                self._let_go()
+                return
+            if self._grabbed is None:
+                pose = self._body.cover_pose(self._q, cover)
+                self._grabbed = (cover, pose.rotation.T @ (np.array(event.start_position) - pose.position))
+            self._pointer = np.array(event.end_position)
+
+        return take
+
+    def _let_go(self) -> None:
+        if self._grabbed is not None and self._push is not None:
+            self._grabbed = None
+            self._push(RELEASE)
+
+    def let_go(self) -> None:
+        """End a drag whose browser is gone."""
+        self._let_go()
+
+    def drag(self) -> float:
+        """Send the push of the present drag; returns its force, N.  Call it at every drawing."""
+        if self._grabbed is None or self._push is None:
+            return 0.0
+        cover, point = self._grabbed
+        pose = self._body.cover_pose(self._q, cover)
+        push = band_push(cover, point, pose.rotation.T @ (self._pointer - pose.position))
+        self._push(push)
+        return size(push.force)
+
+    def _show_hand(self) -> None:
+        self._band.visible = self._grabbed is not None
+        if self._grabbed is not None:
+            cover, point = self._grabbed
+            self._band.points = np.array([[self._body.point(self._q, cover, point), self._pointer]], dtype=np.float32)
+
+
+def band_push(cover: str, point: Array, pointer: Array) -> LinkPush:
+    """LinkPush of a rubber band between a point of a cover and the pointer, both (3,), m, in the cover's frame."""
+    force = STIFFNESS * (pointer - point)
+    force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), 1e-9))
+    fx, fy, fz = force.tolist()
+    tx, ty, tz = np.cross(point, force).tolist()
+    return LinkPush(cover, (fx, fy, fz), (tx, ty, tz))
+
+
+def quaternion(rotation: Array) -> tuple[float, float, float, float]:
+    """Quaternion w x y z of a rotation matrix."""
+    x, y, z, w = pin.Quaternion(rotation).coeffs().tolist()
+    return w, x, y, z
+
+
+def turn_from_z(direction: Array) -> Array:
+    """A rotation matrix that turns z into a direction."""
+    unit = np.asarray(direction, dtype=float) / float(np.linalg.norm(direction))
+    turned: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), unit).toRotationMatrix()
+    return turned

@@ -1,0 +1,124 @@
+"""A running stack as the source of the page.
+
+It must not disturb the run: it listens with the least demanding quality of service, and takes what has come only when
+a picture is drawn.
+"""
+
+import time
+from typing import Any, Final
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from wam_control.contact_table import contact_of, likely_of
+from wam_description.arm import Shared
+from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, State, Table
+from wam_description.topics import BY_NAME, STATUS
+from wam_live.snapshot import NAN, Snapshot, size
+from wam_ros.messages import Refused, message_type, read_status
+from wam_ros.wire import decoder, stamp_of
+
+TOPICS: Final = (
+    "joint_states",
+    "sim/joint_states",
+    "sim/contact/wrench",
+    "sim/contact/point",
+    "contact/hypotheses",
+    "force_command",
+    "force_measured",
+)
+NEWEST: Final = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, history=HistoryPolicy.KEEP_LAST, depth=1)
+LATCHED: Final = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    history=HistoryPolicy.KEEP_LAST,
+    depth=50,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+
+class RunningStack:
+    """The newest of each topic of a running stack.
+
+    Parameters
+    ----------
+    context : of ROS.
+    namespace : of the stack.
+    shared : shared parameters of the driver.
+
+    Attributes
+    ----------
+    statuses : newest of each node, by name.
+    """
+
+    def __init__(self, context: Any, namespace: str, shared: Shared) -> None:
+        # its node is in no executor: what has come is taken when a picture is drawn
+        self.node = Node("live_view", context=context, namespace=namespace)
+        self._covers = shared.arm.covers.names
+        self._topics = {
+            name: (
+                self.node.create_subscription(message_type(BY_NAME[name]), name, print, NEWEST, raw=True),
+                decoder(BY_NAME[name], shared, "position?" if "joint" in name else ""),
+            )
+            for name in TOPICS
+        }
+        self._status = self.node.create_subscription(message_type(BY_NAME[STATUS]), STATUS, print, LATCHED)
+        self._newest: dict[str, Any] = {}
+        self._stamps: dict[str, int] = {}
+        self.statuses: dict[str, NodeStatus] = {}
+        self._pace: tuple[float, int] = (time.monotonic(), 0)
+        self._factor = NAN
+
+    def snapshot(self) -> Snapshot:
+        """What the stack shows now."""
+        for name, (subscription, decode) in self._topics.items():
+            if (data := _taken(subscription, raw=True)) is not None:
+                try:
+                    self._newest[name], self._stamps[name] = decode(data), stamp_of(data)
+                except Refused:
+                    continue
+        while (message := _taken(self._status, raw=False)) is not None:
+            status = read_status(message)
+            self.statuses[status.node] = status
+        truth = self._newest.get("sim/joint_states")
+        joints: State | None = truth or self._newest.get("joint_states")
+        table: Table | None = self._newest.get("contact/hypotheses")
+        return Snapshot(
+            stamp=self.stamp,
+            q=tuple(joints.position) if joints else (),
+            true=self._true(),
+            estimated=contact_of(table, self._covers),
+            likely=likely_of(table, self._covers),
+            commanded=self._force("force_command"),
+            measured=self._force("force_measured"),
+            statuses=self.statuses,
+            real_time_factor=self._real_time_factor(),
+        )
+
+    @property
+    def stamp(self) -> int:
+        """Time of the newest state of the arm, ns."""
+        return max(self._stamps.get("joint_states", 0), self._stamps.get("sim/joint_states", 0))
+
+    def _true(self) -> Contact:
+        wrench, point = self._newest.get("sim/contact/wrench"), self._newest.get("sim/contact/point")
+        if wrench is None or point is None or wrench.frame == BASE or wrench.frame != point.frame:
+            return NO_CONTACT
+        return Contact(wrench.frame, point.position[0], wrench.force)
+
+    def _force(self, topic: str) -> float:
+        wrench = self._newest.get(topic)
+        return size(wrench.force) if wrench is not None and self.stamp - self._stamps[topic] < 500_000_000 else NAN
+
+    def _real_time_factor(self) -> float:
+        now, (then, stamp) = time.monotonic(), self._pace
+        if now - then > 1.0:
+            if 0 < stamp <= self.stamp:
+                self._factor = (self.stamp - stamp) / 1e9 / (now - then)
+            self._pace = now, self.stamp
+        return self._factor
+
+
+def _taken(subscription: Any, raw: bool) -> Any:
+    with subscription.handle:
+        taken = subscription.handle.take_message(subscription.msg_type, raw)
+    return None if taken is None else taken[0]
