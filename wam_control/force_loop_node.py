@@ -4,7 +4,7 @@ from wam_control.contact_table import contact_of
 from wam_control.force_loop import ForceLoop, ForceLoopParameters
 from wam_control.guard_report import Report
 from wam_description.arm import Shared
-from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Wrench
+from wam_description.signals import ZERO, Answer, ForceCommand, Level, NodeStatus, State, Wrench
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Followed, Input, Outputs, reaction
 
@@ -50,19 +50,18 @@ class ForceLoopNode:
             inputs["joint_sensors"],
             contact_of(inputs["contact/hypotheses"], self._covers),
             external.effort if external else None,
-            ForceCommand(command.frame, command.force) if command else None,
+            ForceCommand(command.frame, command.force, command.torque) if command else None,
             inputs.age("force_command"),
             posture.position if posture else None,
             torque.effort if torque else None,
             inputs.dt,
         )
-        frame = command.frame if command else BASE
         return {
             "joint_velocity_command": State([], out.velocity, []),
             "joint_effort_command": State([], [], out.effort),
-            "force_measured": Wrench(frame, out.measured, ZERO),
-            "force_error": Wrench(frame, out.error, ZERO),
-            "force_error_limited": Wrench(frame, out.limited, ZERO),
+            "force_measured": Wrench(out.frame, out.measured, ZERO),
+            "force_error": Wrench(out.frame, out.error, ZERO),
+            "force_error_limited": Wrench(out.frame, out.limited, ZERO),
             **self._status(),
         }
 
@@ -79,6 +78,11 @@ class ForceLoopNode:
     def refusals(self) -> dict[str, str]:
         """Why a present command or contact is not used, by topic."""
         return self._loop.refusals
+
+    @property
+    def reason(self) -> str:
+        """Why the loop does not do what is commanded, '' where it does."""
+        return self._loop.reason
 
     def diagnostics(self) -> dict[str, str]:
         """Why the estimated contact position is not used."""

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
+from wam_control.force_axis import SensingParameters
 from wam_control.force_law import ForceLaw
+from wam_control.motion_limits import LimitParameters
 from wam_control.sampled_loop import Feedback
 from wam_control.stability_guard import GuardedTask, GuardParameters
 from wam_description.arm import Arm
@@ -16,6 +18,8 @@ class ForceLoopParameters:
     """Gains and limits of the force loop."""
 
     guard: GuardParameters
+    sensing: SensingParameters
+    limits: LimitParameters
     mode: str = parameter(
         "hybrid: force along its direction, posture elsewhere; joint_torque: torque of each joint; "
         "open_loop: J^T F fed forward, no feedback",
@@ -77,6 +81,13 @@ class ForceLoopParameters:
         low=0.001,
         live=True,
     )
+    contact_source: str = parameter(
+        "where the force acts: estimated: at the estimated contact if it is certain enough, else as pinned; pinned: at "
+        "contact_position.  The torque of a force command in the frame of a cover pins the position in either case",
+        choices=("estimated", "pinned"),
+        live=True,
+        before="estimated",
+    )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
     contact_position: float = parameter("contact position assumed along it", "m", live=True)
     schedule: str = parameter(
@@ -105,6 +116,12 @@ def require_fit(parameters: ForceLoopParameters, arm: Arm) -> None:
     require(
         parameters.contact_cover in covers,
         f"contact_cover is '{parameters.contact_cover}'; allowed: {', '.join(covers)}",
+    )
+    length = arm.covers.length[covers.index(parameters.contact_cover)]
+    require(
+        0.0 <= parameters.contact_position <= length,
+        f"contact_position is {parameters.contact_position:g} m; {parameters.contact_cover} reaches from 0 to "
+        f"{length:g} m",
     )
     require(
         parameters.feedback == "contact_estimate" or arm.joint_sensors,

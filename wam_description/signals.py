@@ -44,10 +44,15 @@ class Table(NamedTuple):
 
 
 class ForceCommand(NamedTuple):
-    """Commanded force of the arm on the world; `frame` is 'base' or a cover."""
+    """Commanded force of the arm on the world; `frame` is 'base' or a cover.
+
+    In the frame of a cover a torque that is not zero pins where the force acts: it is that of the force about
+    the origin of the cover.
+    """
 
     frame: str
     force: Triple  # N
+    torque: Triple = ZERO  # N m
 
 
 class Contact(NamedTuple):
