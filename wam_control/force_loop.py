@@ -50,6 +50,8 @@ class ForceOutput(NamedTuple):
     limited: Triple = (0.0, 0.0, 0.0)  # N
     frame: str = BASE
     axis: ForceAxis | None = None  # of the commanded force; None where none is commanded
+    point: ForcePoint | None = None  # where it acts
+    sd_limit: float = math.inf  # N, of its standard deviation
 
 
 class ForceLoop:
@@ -240,6 +242,8 @@ class ForceLoop:
             _triple([part * scalar.limited(0, error) for part in axis]),
             command.frame,
             force_axis,
+            point,
+            own.sensing.sd_limit(desired),
         )
         reaction, reason = self._hold.step(force_axis, point, self._felt[0], measured, desired, own, dt)
         self._react(reaction, reason)
