@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from wam_theory import linear_loop
-from wam_theory.zero_order_hold import zero_order_hold
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
+from wam_theory.zero_order_hold import zero_order_hold
 
 
 def state_matrices(

@@ -44,7 +44,9 @@ def axis_of(q: Sequence[float], direction: np.ndarray, force: float = 10.0, posi
     return ForceAxes(ARM, BODY, GIVEN.sensing).axis(q, "outer_link", TIP, position_sd, direction, force)
 
 
-def press(loop: ForceLoop, q: Sequence[float], direction: np.ndarray, force: float, periods: int = 1, **more: Any) -> Any:
+def press(
+    loop: ForceLoop, q: Sequence[float], direction: np.ndarray, force: float, periods: int = 1, **more: Any
+) -> Any:
     """Output after some periods at rest, with nothing touched."""
     state = State(list(q), STILL, DRIVEN)
     sensed = State(list(q), STILL, BODY.gravity_torque(q).tolist())
@@ -144,7 +146,9 @@ def tilted(bend: float, angle: float, force: float) -> Task:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("bend", "force"), [(0.15, 5.0), (0.2, 15.0), (0.4, 5.0), (0.4, 15.0)])
-def test_a_wall_ahead_of_a_nearly_straight_arm_is_never_pressed_harder_than_commanded(bend: float, force: float) -> None:
+def test_a_wall_ahead_of_a_nearly_straight_arm_is_never_pressed_harder_than_commanded(
+    bend: float, force: float
+) -> None:
     """Before: 0 to 222 N, unnoticed, and chatter of 4 rad/s before the wall."""
     q = bent(bend)
     x, y, z = radial(q).tolist()
@@ -278,7 +282,9 @@ def test_no_joint_is_driven_into_its_end() -> None:
         world = World(1e-9, n=(1.0, 0.0, 0.0), q=[0.0, 1.2, 0.0, 0.3])
         for _ in range(1500):
             world.move(ask(loop, world, (0.0, 0.0, -20.0)).velocity)
-        inside = all(a + 0.045 < b < c - 0.045 for a, b, c in zip(ARM.joints.lower, world.q, ARM.joints.upper, strict=True))
+        inside = all(
+            a + 0.045 < b < c - 0.045 for a, b, c in zip(ARM.joints.lower, world.q, ARM.joints.upper, strict=True)
+        )
         assert inside is is_safe
         if is_safe:
             assert loop.reaction is Reaction.JOINT_END

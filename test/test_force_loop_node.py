@@ -74,7 +74,7 @@ def test_status_says_domain_margin_stiffness_and_cycle_and_changes_with_the_set(
     refused = feeder.set(force_gain=[0.5])
     assert not refused.successful
     assert "times the largest linearly stable one" in refused.reason
-    assert feeder.loop.node._loop.parameters.force_gain == (0.015,)
+    assert feeder.loop.node._loop.parameters.force_gain == (0.0145,)
     assert feeder.set(force_gain=[0.5], guard__mode="warn").successful
     feeder.feed_until(lambda: feeder.facts()[0].message != reported.message)
     assert feeder.facts()[0].level == DiagnosticStatus.WARN

@@ -141,7 +141,9 @@ def test_a_recording_with_a_gap_has_no_cycle_to_be_confident_of():
     assert limit_cycle(late, value).confidence == 0.0
 
 
-@pytest.mark.parametrize(("growth", "expected"), [(1.003, StabilityVerdict.DIVERGES), (0.992, StabilityVerdict.SETTLES)])
+@pytest.mark.parametrize(
+    ("growth", "expected"), [(1.003, StabilityVerdict.DIVERGES), (0.992, StabilityVerdict.SETTLES)]
+)
 def test_a_slow_trend_is_no_limit_cycle(growth, expected):
     turns = np.arange(0.0, 100.0, 0.01)
     assert stability(growth**turns * np.cos(math.pi * turns), 1e-3).verdict is expected

@@ -145,6 +145,13 @@ def test_the_gain_that_a_refusal_allows_is_accepted(gain: float) -> None:
         assert make(replace(own, **{name: (float(reported.split(",")[0]),)})).assessment is not None
 
 
+@pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
+def test_the_packaged_parameters_are_accepted_with_either_feedback(feedback: str) -> None:
+    found = Loop(replace(OWN, feedback=feedback)).assessment
+    assert found is not None
+    assert found.domain is Domain.I
+
+
 def test_a_bad_set_stops_the_loop_at_its_start() -> None:
     with pytest.raises(ParameterError, match=r"torque_gain .* times the largest linearly stable one"):
         Loop(replace(OWN, mode="joint_torque", torque_gain=(0.1,)))

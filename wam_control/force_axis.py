@@ -27,7 +27,9 @@ SMALLEST_FORCE = 1.0  # N, for the size of tangential forces
 class SensingParameters:
     """What disturbs the measured force, and how well it has to be known."""
 
-    torque_sd: float = parameter("sd of the error of each measured joint torque", "N m", low=1e-6, live=True, before=0.1)
+    torque_sd: float = parameter(
+        "sd of the error of each measured joint torque", "N m", low=1e-6, live=True, before=0.1
+    )
     friction: float = parameter(
         "sd of the tangential force on the link, per commanded force", low=0.0, high=2.0, live=True, before=0.0
     )
@@ -54,7 +56,6 @@ class SensingParameters:
         live=True,
         before=0.0,
     )
-
 
     def sd_limit(self, force: float) -> float:
         """Largest standard deviation, N, with which a commanded force, N, is controlled."""

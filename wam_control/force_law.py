@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 from wam_description.parameters import require
 
-
 NEGLIGIBLE = 1e-12  # square of a component of a direction that counts as zero
 
 
@@ -83,7 +82,6 @@ class ForceLaw:
     def velocities(self, errors: Sequence[float], before: Sequence[float], dt: float) -> list[float]:
         """Velocity of every axis; arguments as those of `velocity`, one of each per axis."""
         return [self.velocity(i, *pair, dt) for i, pair in enumerate(zip(errors, before, strict=True))]
-
 
     def along(self, axis: Sequence[float]) -> "ForceLaw":
         """The law of the error along one unit vector of the frame: its saturation and deadband are ellipsoids.

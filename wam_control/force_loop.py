@@ -17,13 +17,13 @@ from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_command import CommandAdmission
+from wam_control.force_hold import ForceHold, Reaction
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, require_fit
 from wam_control.force_measurement import ForceMeasurement, LowPass
 from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
-from wam_control.force_hold import ForceHold, Reaction
 from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits
 from wam_control.stability_guard import GuardAssessment

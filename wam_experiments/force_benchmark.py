@@ -8,6 +8,7 @@ design, singular poses included; the same seed draws the same tasks.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -213,6 +214,48 @@ def judged(task: Task, forces: Array, reason: str) -> Result:
     is_right = abs(mean - task.force) <= max(TOLERANCE * task.force, LEAST)
     outcome = Outcome.REFUSED if reason else Outcome.DONE if is_right else Outcome.SILENT
     return Result(outcome, mean, sd, peak, reason)
+
+
+class ElbowRow(NamedTuple):
+    """A force on a surface in front of or beside a nearly straight arm."""
+
+    bend: float  # rad
+    is_radial: bool
+    force: float  # N, commanded
+    result: Result
+
+
+def elbow(base: Configuration, seconds: float = 3.0) -> list[ElbowRow]:
+    """Forces of 5 and 15 N with the elbow bent by 0 to 0.5 rad, against a wall ahead and against a rod beside the arm."""
+    arm = base.shared.arm
+    body, cover, length = RigidBody(arm), arm.covers.names[-1], arm.covers.length[-1]
+    rows = []
+    for is_radial in (True, False):
+        for bend in [round(0.05 * k, 2) for k in range(11)]:
+            q = (0.0, -1.0, 0.0, math.pi / 2.0 - bend)
+            tip, rotation = body.point(q, cover, (length, 0.0, 0.0)), body.cover_pose(q, cover).rotation
+            direction = _triple(tip / np.linalg.norm(tip) if is_radial else rotation[:, 2])
+            for force in (5.0, 15.0):
+                task = Task(q, cover, length if is_radial else 0.28, direction, force, 4000.0, 0.3, is_radial)
+                result = perform(base, task, seconds, {"force_loop:contact_source": "pinned"})
+                rows.append(ElbowRow(bend, is_radial, force, result))
+    return rows
+
+
+def elbow_table(rows: Sequence[ElbowRow]) -> str:
+    """Mean and peak of the true force, N, in Markdown; with a star where the loop reports that it cannot do it."""
+    lines = [
+        "| bend [rad] | radial 5 N | radial 15 N | lateral 5 N | lateral 15 N |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for bend in sorted({row.bend for row in rows}):
+        cells = []
+        for is_radial, force in product((True, False), (5.0, 15.0)):
+            (found,) = (r.result for r in rows if (r.bend, r.is_radial, r.force) == (bend, is_radial, force))
+            star = " *" if found.outcome is Outcome.REFUSED else ""
+            cells.append(f"{found.mean:.2f} ({found.peak:.2f}){star}")
+        lines.append(f"| {bend:g} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
 
 
 def summary(tasks: Sequence[Task], results: Sequence[Result]) -> str:
