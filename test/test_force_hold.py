@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,7 @@ def test_the_published_standard_deviation_is_that_of_the_sensed_force() -> None:
 
 def test_near_straight_a_radial_force_is_known_worse_and_worse_and_not_suddenly() -> None:
     found = [axis_of(bent(bend), radial(bent(bend))).force_sd for bend in np.linspace(0.6, 0.02, 30)]
-    assert all(1.0 < later / before < 2.0 for before, later in zip(found, found[1:], strict=False))
+    assert all(1.0 < later / before < 2.0 for before, later in pairwise(found))
     assert found[0] < 1.0
     assert found[-1] > 10.0
     assert axis_of(bent(0.0), radial(bent(0.0))).force_sd == math.inf

@@ -20,6 +20,7 @@ from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
 REACH = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
+ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
 SMALLEST_FORCE = 1.0  # N, for the size of tangential forces
 
 
@@ -137,7 +138,7 @@ class ForceAxes:
             return ForceAxis(lever, zero, zero, math.inf, math.inf, math.inf, 0.0, np.zeros((n, n)))
         size = max(force, SMALLEST_FORCE)
         tangential = parameters.friction * size * (jacobian - np.outer(direction, lever))
-        shifted = direction @ (self._body.point_jacobian(q, cover, point + [1.0, 0.0, 0.0]) - jacobian)
+        shifted = direction @ (self._body.point_jacobian(q, cover, point + ALONG) - jacobian)
         shifted *= position_sd * size
         spread = parameters.torque_sd**2 * np.eye(n) + tangential.T @ tangential + np.outer(shifted, shifted)
         inverse = np.linalg.inv(spread)

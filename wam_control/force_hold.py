@@ -91,15 +91,15 @@ class ForceHold:
             return Reaction.OTHER_LINK, f"{point.conflict}; the arm holds its position"
         if not self._is_sensed:
             return Reaction.NOT_SENSED, (
-                f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m of "
-                f"{point.cover}; allowed: {limit:g} N (sensing.force_sd_limit, force_sd_fraction); the arm holds its position: bend the arm, "
-                "or command another direction or place"
+                f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
+                f"of {point.cover}; allowed: {limit:g} N (sensing.force_sd_limit, force_sd_fraction); the arm holds "
+                "its position: bend the arm, or command another direction or place"
             )
         if self._travel > parameters.limits.free_travel:
             return Reaction.NOTHING_TOUCHED, (
                 f"the arm has moved {self._travel:.3g} m along the force and nothing is touched; allowed: "
-                f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no force, "
-                "then again"
+                f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
+                "force, then again"
             )
         error = desired - measured
         # an error of either sign all the time; one that changes its sign follows a command or a surface that moves
@@ -108,8 +108,8 @@ class ForceHold:
         self._missed += math.copysign(dt, error)
         if abs(self._missed) > parameters.limits.settling_time:
             return Reaction.NOT_REACHED, (
-                f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s; the arm moves "
-                f"with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, another "
-                "direction, or bend the arm"
+                f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s; the arm "
+                f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
+                "another direction, or bend the arm"
             )
         return Reaction.NONE, ""

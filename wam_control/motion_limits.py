@@ -39,8 +39,8 @@ class LimitParameters:
         before=1e9,
     )
     impact: float = parameter(
-        "predicted peak of the impact (3.1) on a surface of guard.contact_stiffness, per commanded force: it limits the "
-        "speed along the force until something is touched; 0: no limit",
+        "predicted peak of the impact (3.1) on a surface of guard.contact_stiffness, per commanded force: it limits "
+        "the speed along the force until something is touched; 0: no limit",
         low=0.0,
         live=True,
         before=0.0,

@@ -226,7 +226,7 @@ class ElbowRow(NamedTuple):
 
 
 def elbow(base: Configuration, seconds: float = 3.0) -> list[ElbowRow]:
-    """Forces of 5 and 15 N with the elbow bent by 0 to 0.5 rad, against a wall ahead and against a rod beside the arm."""
+    """Forces of 5 and 15 N, the elbow bent by 0 to 0.5 rad, against a wall ahead and a rod beside the arm."""
     arm = base.shared.arm
     body, cover, length = RigidBody(arm), arm.covers.names[-1], arm.covers.length[-1]
     rows = []
