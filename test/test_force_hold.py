@@ -12,14 +12,14 @@ from test_force_loop import ARM, BODY, DRIVEN, DT, GIVEN, OWN, POSE, STILL, Worl
 
 from wam_control.contact_position import pinned_position, torque_of_position
 from wam_control.force_axis import ForceAxes, ForceAxis
-from wam_control.force_hold import Reaction
+from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceCommand, ForceLoop
 from wam_control.motion_limits import least_force
 from wam_control.stability_guard import GuardedContact, StabilityGuard
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import NO_CONTACT, Contact, State
-from wam_experiments.force_benchmark import Outcome, Task, perform
+from wam_experiments.force_benchmark import Task, TaskEnd, perform
 
 WAM = Configuration.load(packaged("wam"))
 QUIET = replace(GIVEN, guard=replace(GIVEN.guard, mode="off"), blend_time=0.0)
@@ -102,7 +102,7 @@ def test_a_force_that_cannot_be_sensed_is_refused_with_its_number_and_nothing_mo
     loop = force_loop(ARM, PINNED)
     out = press(loop, bent(0.2), radial(bent(0.2)), 5.0, 3)
     assert (out.velocity, out.effort) == (STILL, STILL)
-    assert loop.reaction is Reaction.NOT_SENSED
+    assert loop.reaction is ForceReaction.NOT_SENSED
     assert "standard deviation of 2." in loop.refusals["force_command"]
     assert "bend the arm" in loop.reason
     assert out.axis.force_sd > out.sd_limit == 1.5
@@ -117,14 +117,14 @@ def test_while_it_holds_the_posture_does_not_move_it_and_without_the_command_it_
     posture = [angle + 0.1 for angle in q]
     assert press(loop, q, radial(q), 5.0, 3, posture=posture).velocity == STILL
     assert max(map(abs, press(loop, q, radial(q), 0.0, 1, posture=posture).velocity)) > 0.5
-    assert loop.reaction is Reaction.NONE
+    assert loop.reaction is ForceReaction.NONE
 
 
 def test_the_hold_ends_only_well_below_the_limit() -> None:
     loop = force_loop(ARM, replace(PINNED, contact_position=TIP))
     for bend, reaction in ((0.4, "NONE"), (0.25, "NOT_SENSED"), (0.35, "NOT_SENSED"), (0.45, "NONE"), (0.35, "NONE")):
         press(loop, bent(bend), radial(bent(bend)), 5.0)
-        assert loop.reaction is Reaction[reaction], bend
+        assert loop.reaction is ForceReaction[reaction], bend
 
 
 def test_the_guard_leaves_out_what_the_loop_does_not_control() -> None:
@@ -156,7 +156,7 @@ def test_a_wall_ahead_of_a_nearly_straight_arm_is_never_pressed_harder_than_comm
     result = perform(WAM, Task(q, "outer_link", TIP, (x, y, z), force, 4000.0, 0.3, True), 3.0, PIN)
     assert result.peak < 1.2 * force + IMPACT * force
     assert result.mean < 1.1 * force
-    assert result.outcome is not Outcome.SILENT
+    assert result.outcome is not TaskEnd.SILENT
 
 
 PIN = {"force_loop:contact_source": "pinned"}
@@ -207,7 +207,7 @@ def test_under_a_strong_lean_no_estimated_place_is_sure(angle: float, is_used: b
     command = ForceCommand("outer_link", (math.sin(lean), math.cos(lean), 0.0))
     out = ask(loop, World(400.0), None, command=command, contact=sure)
     assert out.point.position == (0.1 if is_used else OWN.contact_position)
-    assert ("leans" in loop.fallback) is not is_used
+    assert ("off the normal" in loop.fallback) is not is_used
 
 
 def test_a_place_that_is_not_certain_makes_the_force_less_certain() -> None:
@@ -230,15 +230,15 @@ def test_a_contact_on_another_link_is_not_controlled_through_the_jacobian_of_thi
     for _ in range(30):
         step(touch)
     held = step(touch)
-    assert loop.reaction is Reaction.OTHER_LINK
+    assert loop.reaction is ForceReaction.OTHER_LINK
     assert "inner_link is touched" in loop.refusals["force_command"]
     assert held.velocity == STILL
     step(NO_CONTACT)
-    assert loop.reaction is Reaction.NONE
+    assert loop.reaction is ForceReaction.NONE
     where_it_is = ForceCommand("inner_link", (0.0, 0.0, 5.0), torque_of_position((0.0, 0.0, 5.0), 0.4))
     for _ in range(30):
         loop.step(state, sensed, touch, None, where_it_is, 0.0, None, None, DT)
-    assert loop.reaction is not Reaction.OTHER_LINK
+    assert loop.reaction is not ForceReaction.OTHER_LINK
 
 
 DOWNWARDS = (0.0, 0.0, -1.0)
@@ -253,7 +253,7 @@ def test_a_way_through_free_space_ends_with_a_reason() -> None:
         world.move(out.velocity)
     moved = -(BODY.point(world.q, "outer_link", (0.28, 0, 0)) - BODY.point(POSE, "outer_link", (0.28, 0, 0)))[2]
     assert moved == pytest.approx(0.05, abs=0.005)
-    assert loop.reaction is Reaction.NOTHING_TOUCHED
+    assert loop.reaction is ForceReaction.NOTHING_TOUCHED
     assert "nothing is touched; allowed: limits.free_travel, 0.05 m" in loop.reason
     ask(loop, world, None)
     assert max(map(abs, ask(loop, world, down(5.0)).velocity)) > 0.0, "commanded again, it goes on"
@@ -264,7 +264,7 @@ def test_pressing_is_no_free_travel() -> None:
     loop, world = force_loop(ARM, own), World(400.0, force=2.0)
     for _ in range(600):
         world.move(ask(loop, world, down(9.0)).velocity)
-    assert loop.reaction is Reaction.NONE
+    assert loop.reaction is ForceReaction.NONE
     assert world.force == pytest.approx(9.0, abs=0.1)
 
 
@@ -288,7 +288,7 @@ def test_no_joint_is_driven_into_its_end() -> None:
         )
         assert inside is is_safe
         if is_safe:
-            assert loop.reaction is Reaction.JOINT_END
+            assert loop.reaction is ForceReaction.JOINT_END
             assert "its end is" in loop.reason
 
 
@@ -321,7 +321,7 @@ def test_above_the_largest_contact_force_the_arm_moves_only_away_from_it() -> No
             out = loop.step(State(POSE, STILL, DRIVEN), sensed, NO_CONTACT, None, None, 0.0, posture, None, DT)
             signs.append(float(np.sign(round(float(external @ out.velocity), 9))))
             if most == 60.0 and signs[-1] == 0.0:
-                assert loop.reaction is Reaction.CONTACT_FORCE
+                assert loop.reaction is ForceReaction.CONTACT_FORCE
                 assert "the world pushes with at least" in loop.reason
     assert 0.0 in signs[:2]
     assert set(signs[2:]) == {-1.0, 1.0}, "without the limit one of them presses on"
@@ -341,14 +341,14 @@ def test_a_force_that_is_not_reached_is_reported() -> None:
     loop = force_loop(ARM, own)
     for _ in range(99):
         ask(loop, World(400.0, force=3.0), down(5.0))
-    assert loop.reaction is Reaction.NONE
+    assert loop.reaction is ForceReaction.NONE
     for _ in range(3):
         out = ask(loop, World(400.0, force=3.0), down(5.0))
-    assert loop.reaction is Reaction.NOT_REACHED
+    assert loop.reaction is ForceReaction.NOT_REACHED
     assert "3 N are measured and 5 N commanded" in loop.reason
     assert any(out.velocity), "and it goes on"
     ask(loop, World(400.0, force=4.9), down(5.0))
-    assert loop.reaction is Reaction.NONE
+    assert loop.reaction is ForceReaction.NONE
 
 
 # ------------------------------------------------------------------------------------- commands

@@ -91,7 +91,7 @@ def _problem(contact: Contact, lean: float, parameters: ForceLoopParameters) -> 
     """Why an estimated position is not certain, '' if it is; an uncertainty that is not published counts as none."""
     if lean > STEEPEST:
         return (
-            f"the commanded force leans {math.degrees(lean):.0f} deg from the normal of {contact.cover}; a contact "
+            f"the commanded force is {math.degrees(lean):.0f} deg off the normal of {contact.cover}; a contact "
             f"position is estimated well up to {math.degrees(STEEPEST):.0f} deg, and not on the end of a link; "
             "pin the position (contact_source, or the torque of the command)"
         )

@@ -141,7 +141,7 @@ class ForceAxes:
         shifted = direction @ (self._body.point_jacobian(q, cover, point + ALONG) - jacobian)
         shifted *= position_sd * size
         spread = parameters.torque_sd**2 * np.eye(n) + tangential.T @ tangential + np.outer(shifted, shifted)
-        inverse = np.linalg.inv(spread)
+        inverse = np.asarray(np.linalg.inv(spread), np.float64)
         weighted = inverse @ lever
         precision = float(lever @ weighted)
         sense: Array = weighted / precision

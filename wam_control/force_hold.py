@@ -19,7 +19,7 @@ CONFLICT = 0.1  # s, after which another contact counts
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
 
-class Reaction(IntEnum):
+class ForceReaction(IntEnum):
     """What the force loop does instead of what is commanded, as a number for a topic."""
 
     NONE = 0  # the command is obeyed
@@ -33,7 +33,7 @@ class Reaction(IntEnum):
     @property
     def holds(self) -> bool:
         """Whether the arm holds its position instead of controlling the force."""
-        return self in (Reaction.NOT_SENSED, Reaction.OTHER_LINK, Reaction.NOTHING_TOUCHED)
+        return self in (ForceReaction.NOT_SENSED, ForceReaction.OTHER_LINK, ForceReaction.NOTHING_TOUCHED)
 
 
 class ForceHold:
@@ -67,7 +67,7 @@ class ForceHold:
         desired: float,
         parameters: ForceLoopParameters,
         dt: float,
-    ) -> tuple[Reaction, str]:
+    ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
         Parameters
@@ -88,15 +88,15 @@ class ForceHold:
         unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2 if point.conflict else 0.0
         self._conflict = self._conflict + dt if unexplained > UNEXPLAINED else 0.0
         if self._conflict > CONFLICT:
-            return Reaction.OTHER_LINK, f"{point.conflict}; the arm holds its position"
+            return ForceReaction.OTHER_LINK, f"{point.conflict}; the arm holds its position"
         if not self._is_sensed:
-            return Reaction.NOT_SENSED, (
+            return ForceReaction.NOT_SENSED, (
                 f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
                 f"of {point.cover}; allowed: {limit:g} N (sensing.force_sd_limit, force_sd_fraction); the arm holds "
                 "its position: bend the arm, or command another direction or place"
             )
         if self._travel > parameters.limits.free_travel:
-            return Reaction.NOTHING_TOUCHED, (
+            return ForceReaction.NOTHING_TOUCHED, (
                 f"the arm has moved {self._travel:.3g} m along the force and nothing is touched; allowed: "
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
@@ -107,9 +107,9 @@ class ForceHold:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
         if abs(self._missed) > parameters.limits.settling_time:
-            return Reaction.NOT_REACHED, (
+            return ForceReaction.NOT_REACHED, (
                 f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s; the arm "
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
                 "another direction, or bend the arm"
             )
-        return Reaction.NONE, ""
+        return ForceReaction.NONE, ""

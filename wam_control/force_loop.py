@@ -17,7 +17,7 @@ from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_command import CommandAdmission
-from wam_control.force_hold import ForceHold, Reaction
+from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, require_fit
 from wam_control.force_measurement import ForceMeasurement, LowPass
@@ -91,7 +91,7 @@ class ForceLoop:
         self.refused = 0
         self.refusals: dict[str, str] = {}
         self.fallback = ""
-        self.reaction, self.reason = Reaction.NONE, ""
+        self.reaction, self.reason = ForceReaction.NONE, ""
         self._take(servo, parameters)
 
     @property
@@ -176,7 +176,7 @@ class ForceLoop:
         commands = self._admission.step(own, joints.position, command, command_age, posture, torque, dt)
         self.refused += len(commands.refusals)
         self.refusals, self.fallback = commands.refusals, ""
-        self.reaction, self.reason = Reaction.NONE, ""
+        self.reaction, self.reason = ForceReaction.NONE, ""
         self._measurement.step(own, sensors, external)
         is_felt = own.feedback != "contact_estimate" or bool(contact.cover)
         felt = self._measurement.external if is_felt else np.zeros(self._n)
@@ -188,12 +188,12 @@ class ForceLoop:
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
         limited = self._limits.step(velocity, joints.position, self._felt[0])
         if not self.reaction.holds and limited.contact_force:
-            self._react(Reaction.CONTACT_FORCE, limited.contact_force)
+            self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
         elif not self.reaction.holds and limited.joint_end:
-            self._react(Reaction.JOINT_END, limited.joint_end)
+            self._react(ForceReaction.JOINT_END, limited.joint_end)
         return out._replace(velocity=limited.velocity)
 
-    def _react(self, reaction: Reaction, reason: str) -> None:
+    def _react(self, reaction: ForceReaction, reason: str) -> None:
         self.reaction, self.reason = reaction, reason
 
     def _reset(self, q: Sequence[float]) -> None:

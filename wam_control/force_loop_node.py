@@ -3,7 +3,7 @@
 import math
 
 from wam_control.contact_table import contact_of
-from wam_control.force_hold import Reaction
+from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.guard_report import Report
 from wam_description.arm import Shared
@@ -25,8 +25,8 @@ class ForceLoopNode:
         self.retune = self._loop.retune_servo
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
-        self._reported: tuple[Report, Reaction] | None = None
-        self._reaction = Reaction.NONE
+        self._reported: tuple[Report, ForceReaction] | None = None
+        self._reaction = ForceReaction.NONE
 
     @reaction(
         Input("joint_states"),

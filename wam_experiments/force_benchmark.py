@@ -59,7 +59,7 @@ class Task(NamedTuple):
     is_plane: bool
 
 
-class Outcome(StrEnum):
+class TaskEnd(StrEnum):
     """How a task has ended."""
 
     DONE = "within the tolerance"
@@ -67,10 +67,10 @@ class Outcome(StrEnum):
     SILENT = "silent: wrong force without a reason"
 
 
-class Result(NamedTuple):
+class TaskResult(NamedTuple):
     """What the simulator saw of a task: forces along the commanded direction, N."""
 
-    outcome: Outcome
+    outcome: TaskEnd
     mean: float
     sd: float
     peak: float
@@ -171,8 +171,8 @@ def configured(base: Configuration, task: Task, changes: Mapping[str, Any]) -> C
     return base.with_values({**values, **changes})
 
 
-def perform(base: Configuration, task: Task, seconds: float, changes: Mapping[str, Any] | None = None) -> Result:
-    """Do a task in simulation and judge it by the simulator's force."""
+def perform(base: Configuration, task: Task, seconds: float, changes: Mapping[str, Any] | None = None) -> TaskResult:
+    """Do a task in simulation and evaluate it by the simulator's force."""
     try:
         configuration = configured(base, task, changes or {})
         command = ForceCommand("base", _triple(task.force * np.array(task.direction)))
@@ -182,7 +182,7 @@ def perform(base: Configuration, task: Task, seconds: float, changes: Mapping[st
         ]
         run = Simulation(configuration, steps)
     except ValueError as error:
-        return Result(Outcome.REFUSED, 0.0, 0.0, 0.0, str(error))
+        return TaskResult(TaskEnd.REFUSED, 0.0, 0.0, 0.0, str(error))
     reason = ""
     while not run.step():
         node = run.nodes["force_loop"]
@@ -207,26 +207,26 @@ def true_forces(arm: Arm, run: Simulation, task: Task) -> Array:
     return np.array(forces)
 
 
-def judged(task: Task, forces: Array, reason: str) -> Result:
+def judged(task: Task, forces: Array, reason: str) -> TaskResult:
     """The outcome of a task from its true forces, one per outer period of 5 ms, and why it was refused or held."""
     last = forces[-round(CONTINUOUS / 0.005) :]
     mean, sd, peak = float(last.mean()), float(last.std()), float(forces.max())
     is_right = abs(mean - task.force) <= max(TOLERANCE * task.force, LEAST)
-    outcome = Outcome.REFUSED if reason else Outcome.DONE if is_right else Outcome.SILENT
-    return Result(outcome, mean, sd, peak, reason)
+    outcome = TaskEnd.REFUSED if reason else TaskEnd.DONE if is_right else TaskEnd.SILENT
+    return TaskResult(outcome, mean, sd, peak, reason)
 
 
 class ElbowRow(NamedTuple):
-    """A force on a surface in front of or beside a nearly straight arm."""
+    """A force on a surface in front of or at the side of a nearly straight arm."""
 
     bend: float  # rad
     is_radial: bool
     force: float  # N, commanded
-    result: Result
+    result: TaskResult
 
 
 def elbow(base: Configuration, seconds: float = 3.0) -> list[ElbowRow]:
-    """Forces of 5 and 15 N, the elbow bent by 0 to 0.5 rad, against a wall ahead and a rod beside the arm."""
+    """Forces of 5 and 15 N, the elbow bent by 0 to 0.5 rad, against a wall ahead and a rod at its side."""
     arm = base.shared.arm
     body, cover, length = RigidBody(arm), arm.covers.names[-1], arm.covers.length[-1]
     rows = []
@@ -252,15 +252,15 @@ def elbow_table(rows: Sequence[ElbowRow]) -> str:
         cells = []
         for is_radial, force in product((True, False), (5.0, 15.0)):
             (found,) = (r.result for r in rows if (r.bend, r.is_radial, r.force) == (bend, is_radial, force))
-            star = " *" if found.outcome is Outcome.REFUSED else ""
+            star = " *" if found.outcome is TaskEnd.REFUSED else ""
             cells.append(f"{found.mean:.2f} ({found.peak:.2f}){star}")
         lines.append(f"| {bend:g} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
-def summary(tasks: Sequence[Task], results: Sequence[Result]) -> str:
+def summary(tasks: Sequence[Task], results: Sequence[TaskResult]) -> str:
     """Counts of the outcomes, and the shares above the allowed peak."""
-    counts = {outcome: sum(result.outcome is outcome for result in results) for outcome in Outcome}
+    counts = {outcome: sum(result.outcome is outcome for result in results) for outcome in TaskEnd}
     high = sum(result.peak > OVERSHOOT * task.force for task, result in zip(tasks, results, strict=True))
     lines = [f"{len(results)} tasks: " + ", ".join(f"{count} {outcome}" for outcome, count in counts.items())]
     return "\n".join([*lines, f"peak above {OVERSHOOT:g} times the commanded force: {high}"])
