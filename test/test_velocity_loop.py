@@ -199,3 +199,16 @@ def test_gains_of_a_wrong_number_are_refused(
     assert loop.step([0.0], [0.0], [1.0], 0.0, [0.0], DT) == VelocityLoop(ONE, SERVO, OWN).step(
         [0.0], [0.0], [1.0], 0.0, [0.0], DT
     ), "the gains in use stay"
+
+
+def test_the_integral_grows_through_the_deadband_of_an_amplifier_and_not_against_brakes() -> None:
+    """A torque of exactly zero is what both give: the integral must not be wiped where it is too small to act."""
+    for dead, is_moved in ((0.05, True), (10.0, False)):
+        loop, torque, largest = VelocityLoop(ONE, SERVO, OWN), 0.0, 0.0
+        for _ in range(400):
+            (current,) = loop.step([0.0], [torque], [1.0], 0.0, [0.0], DT)
+            torque = current * CONSTANT if abs(current * CONSTANT) > dead else 0.0
+            largest = max(largest, abs(current * CONSTANT))
+        assert (torque > 0.05) is is_moved
+        if not is_moved:
+            assert largest < 0.05 * PEAK, "against brakes nothing winds up"

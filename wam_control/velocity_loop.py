@@ -7,6 +7,8 @@ from wam_control.dither import DitherParameters
 from wam_description.arm import Motors, Servo
 from wam_description.parameters import lengths, parameter
 
+DEAD = 0.02  # of the peak torque: a smaller one may be lost in the deadband of an amplifier, not in brakes
+
 
 @dataclass(frozen=True)
 class VelocityLoopParameters:
@@ -26,7 +28,7 @@ class VelocityLoop:
     tau = K_p e + K_i integral(e) + tau_ff, e = commanded minus measured velocity, clipped to the
     peak torque; i = tau/k_t.  The integral is frozen where it would only push further into a limit
     (anti-windup), and reset where the commanded torque does not act at all (brakes, fault), so that
-    an enabled arm starts without a jolt.
+    an enabled arm starts without a jolt.  It grows through the deadband of an amplifier.
     """
 
     def __init__(self, motors: Motors, servo: Servo, parameters: VelocityLoopParameters) -> None:
@@ -83,7 +85,7 @@ class VelocityLoop:
                 self._integral[i] = 0.0
                 torque = feedforward[i]
             else:
-                if tau_motor[i] == 0.0 and self._commanded[i] != 0.0:
+                if tau_motor[i] == 0.0 and abs(self._commanded[i]) > DEAD * peak:
                     self._integral[i] = 0.0
                 error = command[i] - thetad[i]
                 torque = self._kp[i] * error + self._integral[i] + feedforward[i]
