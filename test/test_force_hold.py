@@ -378,8 +378,8 @@ def test_refused_commands_do_not_keep_an_old_one_alive_nor_name_its_frame() -> N
 def test_a_command_does_not_survive_a_fault() -> None:
     loop = force_loop(ARM, replace(OWN, force_limit=30.0))
     ask(loop, World(400.0), down(10.0))
-    loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, None, 0.0, None, None, DT)
     refused = ForceCommand("base", down(99.0))
+    loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, refused, 0.0, None, None, DT)
     out = loop.step(State(POSE, STILL, DRIVEN), None, NO_CONTACT, None, refused, 0.0, None, None, DT)
     assert out.effort == STILL
 
