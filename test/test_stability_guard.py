@@ -311,8 +311,13 @@ def normal(guard: StabilityGuard, q: Sequence[float]) -> tuple[float, float, flo
     return -x, -y, -z
 
 
+FREE = replace(OWN.limits, joint_gain=0.0, contact_force=1e9, impact=0.0)
+
+
 def test_the_velocity_obeys_the_factor() -> None:
-    loop = Loop(replace(OWN, force_gain=(0.09,), blend_time=0.0, force_error_limit=(1e9,), joint_speed_limit=1e9))
+    loop = Loop(
+        replace(OWN, force_gain=(0.09,), blend_time=0.0, force_error_limit=(1e9,), joint_speed_limit=1e9, limits=FREE)
+    )
     follow(loop, OWN.guard.posture)
     state, command = State(list(STIFF_POSE), [0.0] * 4, [1.0] * 4), ForceCommand("outer_link", (0.0, 0.0, -1.0))
     speeds = []
