@@ -121,8 +121,8 @@ class CommandAdmission:
         if pinned is None or command.frame not in covers.names:
             return (
                 f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque pins the place of a "
-                f"force across a cover, in the frame of that cover ({', '.join(covers.names)}); send zero torque, or such "
-                f"a force{last}"
+                f"force across a cover, in the frame of that cover ({', '.join(covers.names)}); send zero torque, "
+                f"or such a force{last}"
             )
         cover, place = pinned
         length = covers.length[covers.names.index(cover)]
