@@ -5,8 +5,8 @@
 - driver_node: the driver as a ROS node
 - lockstep, realtime: the two ways in which its time passes
 - pacer: simulated time no faster than the wall clock
+- session: which life of the driver the nodes follow
 - safety: braked, enabled, fault
-- session: which run of the driver the nodes follow, and since when commands count
 - limit_watch: speeds, travel, currents and tensions against their limits
 - amplifier: clipping, I2t, deadband, ripple and noise of the motor currents
 - sensors: resolution and noise of encoders and strain gauges

@@ -120,12 +120,15 @@ class Lockstep:
             self._one_period()
 
     def _overdue(self, missing: list[str]) -> str:
-        silent, senders = " and ".join(self._session.silent), " and ".join(self._senders[topic] for topic in missing)
-        advice = f"{silent} has stopped, start it again, then reset_fault" if silent else f"check that {senders} runs"
-        return (
-            f"lockstep: no {' and '.join(missing)} for the state of {self._driver.stamp} ns within "
-            f"{self._timing.timeout:.1f} s; {advice}"
-        )
+        topics, silent = " and ".join(missing), " and ".join(self._session.silent)
+        senders = " and ".join(self._senders[topic] for topic in missing)
+        stamp, limit = self._driver.stamp, self._timing.timeout
+        if silent:
+            return (
+                f"lockstep: no {topics} for the state of {stamp} ns within {limit:.1f} s; "
+                f"{silent} has stopped, start it again, then reset_fault"
+            )
+        return f"lockstep: no {topics} for the state of {stamp} ns within {limit:.1f} s; check that {senders} runs"
 
     @property
     def start_overdue(self) -> bool:

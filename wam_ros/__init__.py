@@ -2,10 +2,10 @@
 
 - node: the ROS node of a declared node (`wam_description.wiring`); the program that starts one
 - ports: publishers, subscriptions, status and diagnostics of a node; qos: quality of service
+- claims: one publisher for each topic that a node works on
 - messages: ROS messages to values and back; header: stamps and frames; markers: what viewers draw
 - wire: the same from and to bytes, faster, for the types that carry numbers
 - tolerance: a node that goes on when a callback raises, and reports it as a fault
-- claims: one publisher for each topic that a node works on
 - parameters: declared, described, live; remote_parameters: those of other nodes
 - recorder, recorder_node, recorder_interface: every topic into a bag
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals

@@ -40,7 +40,13 @@ def start(
     apart : a process for each node; otherwise all in this one.
     is_stopped : whether the start is to be broken off.
     namespace : namespace of the nodes.
+
+    Raises
+    ------
+    ParameterError
+        where there is no such node, or one of this name runs already in this namespace.
     """
+    require_places(node_names(configuration).values(), namespace)
     return Processes(configuration, namespace) if apart else Composition(configuration, namespace, None, is_stopped)
 
 
@@ -79,7 +85,6 @@ class Processes:
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
         names = node_names(configuration)
-        require_places(names.values(), namespace)
         prepare_logging_directory()
         self.killed: list[str] = []
         self._stack = ExitStack()
