@@ -16,6 +16,7 @@ LEAST = 0.3  # N
 TOUCH = 0.2  # of the commanded force, from which something is touched
 UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the commanded force
 CONFLICT = 0.1  # s, after which another contact counts
+FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
 
@@ -29,6 +30,7 @@ class ForceReaction(IntEnum):
     CONTACT_FORCE = 4  # does not move against the world
     JOINT_END = 5  # a joint is at its end
     NOT_REACHED = 6  # goes on: the force is not reached within the time for it
+    PLACE_ASSUMED = 7  # goes on: where the force acts is not known well, and not pinned
 
     @property
     def holds(self) -> bool:
@@ -45,7 +47,7 @@ class ForceHold:
     def reset(self) -> None:
         """Another force is commanded."""
         self._is_sensed, self._is_touching = True, False
-        self._travel = self._conflict = self._missed = 0.0
+        self._travel = self._conflict = self._missed = self._assumed = 0.0
 
     def approach_speed(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1)."""
@@ -86,9 +88,11 @@ class ForceHold:
             self._travel = 0.0
         # tangential forces grow with the force
         unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2 if point.conflict else 0.0
-        self._conflict = self._conflict + dt if unexplained > UNEXPLAINED else 0.0
+        lasting = self._conflict + (dt if unexplained > UNEXPLAINED else -FADING * dt)
+        self._conflict = min(max(lasting, 0.0), 2.0 * CONFLICT)
         if self._conflict > CONFLICT:
-            return ForceReaction.OTHER_LINK, f"{point.conflict}; the arm holds its position"
+            other = point.conflict or "another link was touched"
+            return ForceReaction.OTHER_LINK, f"{other}; the arm holds its position"
         if not self._is_sensed:
             return ForceReaction.NOT_SENSED, (
                 f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
@@ -111,5 +115,12 @@ class ForceHold:
                 f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s; the arm "
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
                 "another direction, or bend the arm"
+            )
+        self._assumed = self._assumed + dt if self._is_touching and point.is_assumed else 0.0
+        if self._assumed > parameters.limits.settling_time:
+            return ForceReaction.PLACE_ASSUMED, (
+                f"something is touched and it is not known where; {point.position:.3g} m of {point.cover} is assumed "
+                "(contact_cover, contact_position), and the force is as wrong as that; pin the position by the torque of "
+                "the command, or set contact_source to pinned"
             )
         return ForceReaction.NONE, ""
