@@ -249,7 +249,11 @@ def test_a_contact_on_another_link_is_not_controlled_through_the_jacobian_of_thi
     assert loop.reaction is ForceReaction.OTHER_LINK
     assert "inner_link is touched" in loop.refusals["force_command"]
     assert held.velocity == STILL
-    step(NO_CONTACT)
+    for _ in range(20):  # a link that bounces off is still the one that is touched
+        step(NO_CONTACT)
+    assert loop.reaction is ForceReaction.OTHER_LINK
+    for _ in range(60):
+        step(NO_CONTACT)
     assert loop.reaction is ForceReaction.NONE
     where_it_is = ForceCommand("inner_link", (0.0, 0.0, 5.0), torque_of_position((0.0, 0.0, 5.0), 0.4))
     for _ in range(30):
@@ -383,7 +387,7 @@ def test_the_least_force_is_a_lower_bound() -> None:
 
 
 def test_a_force_that_is_not_reached_is_reported() -> None:
-    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), force_gain=(1e-6,))
+    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), force_gain=(1e-6,), contact_source="pinned")
     loop = force_loop(ARM, own)
     for _ in range(99):
         ask(loop, World(400.0, force=3.0), down(5.0))
@@ -395,6 +399,27 @@ def test_a_force_that_is_not_reached_is_reported() -> None:
     assert any(out.velocity), "and it goes on"
     ask(loop, World(400.0, force=4.9), down(5.0))
     assert loop.reaction is ForceReaction.NONE
+
+
+@pytest.mark.parametrize(
+    ("source", "probability", "expected"),
+    [
+        ("estimated", 0.4, ForceReaction.PLACE_ASSUMED),
+        ("estimated", 1.0, ForceReaction.NONE),
+        ("pinned", 0.4, ForceReaction.NONE),
+    ],
+)
+def test_a_place_that_is_assumed_is_reported(source: str, probability: float, expected: ForceReaction) -> None:
+    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), contact_source=source)
+    loop = force_loop(ARM, own)
+    contact = Contact("outer_link", OWN.contact_position, (0.0, 1.0, 0.0), 0.001, probability)
+    for _ in range(99):
+        ask(loop, World(400.0, force=5.0), down(5.0), contact=contact)
+    assert loop.reaction is ForceReaction.NONE
+    for _ in range(3):
+        ask(loop, World(400.0, force=5.0), down(5.0), contact=contact)
+    assert loop.reaction is expected
+    assert (f"{OWN.contact_position:g} m of outer_link is assumed" in loop.reason) is bool(expected)
 
 
 # ------------------------------------------------------------------------------------- commands

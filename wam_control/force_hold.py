@@ -120,7 +120,7 @@ class ForceHold:
         if self._assumed > parameters.limits.settling_time:
             return ForceReaction.PLACE_ASSUMED, (
                 f"something is touched and it is not known where; {point.position:.3g} m of {point.cover} is assumed "
-                "(contact_cover, contact_position), and the force is as wrong as that; pin the position by the torque of "
-                "the command, or set contact_source to pinned"
+                "(contact_cover, contact_position), and the force is as wrong as that; pin it by the torque of the "
+                "command, or set contact_source to pinned"
             )
         return ForceReaction.NONE, ""
