@@ -10,11 +10,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from conftest import LONG, ROOT
 
+from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
+from wam_driver.lockstep import ROLL_CALL
 from wam_ros.network import (
     FIRST_PORT,
     OPEN,
@@ -54,6 +57,13 @@ if estop.service_is_ready():
 print("saw", [name for name in node.get_node_names() if name != "stranger"])
 rclpy.shutdown()
 """
+
+
+def test_what_was_lost_is_repeated_before_lockstep_calls_it_missing() -> None:
+    dds = "{http://www.eprosima.com}"
+    (period,) = ElementTree.parse(PROFILE).iter(f"{dds}heartbeatPeriod")
+    repeated = int(period.findtext(f"{dds}sec") or 0) + int(period.findtext(f"{dds}nanosec") or 0) * 1e-9
+    assert 0.0 < 3.0 * repeated < Configuration.load(packaged("wam")).shared.timing.timeout - ROLL_CALL
 
 
 @pytest.fixture

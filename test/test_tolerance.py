@@ -173,6 +173,14 @@ def test_a_callback_that_raises_is_a_bounded_fault_until_all_goes_well_again(ros
     assert "unexpected KeyError" in answer.message
 
 
+def test_a_message_that_is_handed_over_after_the_end_of_a_node_is_left_alone(ros: Any) -> None:
+    node = ros.add(Clumsy(context=ros.context, namespace="/wam"))
+    (callback,) = (found.callback for found in node.subscriptions if found.topic_name == "/wam/status")
+    ros.remove(node)
+    callback(DiagnosticStatus())
+    assert node.calls == 0
+
+
 @pytest.mark.parametrize("name", ["velocity_loop", "recorder"])
 def test_the_driver_brakes_by_name_where_a_node_reports_a_fault(name: str, ros: Any, tmp_path: Path) -> None:
     driver = make(ros, tmp_path, "driver", ["driver", "velocity_loop", "recorder"])

@@ -6,6 +6,7 @@ from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Servo, Shared
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
+from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input, Outputs, reaction
 
 
@@ -24,6 +25,9 @@ class VelocityLoopNode:
         self._dither = Dither(shared.arm, shared.timing, own.dither)
         self._cost = self._dither.cost(shared.arm.joints.start)
         zero = [0.0] * len(shared.arm.motors.names)
+        self._motors = shared.arm.motors.names
+        self._fastest = TransmissionMap.of(shared.arm).largest_motor_velocities(shared.arm.joints.speed_limit)
+        self.refusals: dict[str, str] = {}
         self._at_rest, self._no_effort = State([], zero, []), State([], [], zero)
 
     @reaction(
@@ -40,11 +44,24 @@ class VelocityLoopNode:
         currents = self._loop.step(
             motors.velocity,
             motors.effort,
-            velocity.velocity,
+            self._limited(velocity.velocity),
             self._dither.added(inputs.stamp, effort.effort),
             inputs.dt,
         )
         return {"motor_current_command": State([], [], currents)}
+
+    def _limited(self, velocity: list[float]) -> list[float]:
+        """A commanded velocity within what the speed limits of the joints allow each motor, rad/s."""
+        for name, speed, most in zip(self._motors, velocity, self._fastest, strict=False):
+            if abs(speed) > most:
+                self.refusals["motor_velocity_command"] = (
+                    f"{name} is to turn at {speed:.4g} rad/s; allowed: up to {most:.4g} rad/s, "
+                    "from arm.joints.speed_limit; it turns no faster than that"
+                )
+                return [min(max(v, -m), m) for v, m in zip(velocity, self._fastest, strict=True)]
+        if self.refusals:
+            self.refusals.clear()
+        return velocity
 
     def retune(self, servo: Servo) -> None:
         """Take new gains while the arm moves, or refuse them."""

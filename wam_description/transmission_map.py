@@ -76,6 +76,10 @@ class TransmissionMap:
         absolute = [[(j, abs(factor)) for j, factor in row] for row in self._inverse_transposed]
         return _product(absolute, peak_torque)
 
+    def largest_motor_velocities(self, speed_limit: Sequence[float]) -> list[float]:
+        """Largest speed of each motor, n, rad/s, with joints up to speed_limit, n, rad/s."""
+        return _product([[(j, abs(factor)) for j, factor in row] for row in self._inverse], speed_limit)
+
 
 def _check(matrix: NDArray[np.float64]) -> None:
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:

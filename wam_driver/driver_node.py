@@ -25,7 +25,7 @@ from wam_ros.ports import Ports
 from wam_ros.run import raise_priority
 from wam_ros.tolerance import TolerantNode
 
-ROLL_CALL = 0.4  # s before the time-out in which the nodes say that they run
+STATUS_PERIOD = 0.05  # s, between repetitions of the status in realtime, so that every node knows the brakes
 
 
 class DriverNode(TolerantNode):
@@ -90,6 +90,7 @@ class DriverNode(TolerantNode):
             self._started = True
             self._announce()  # in lockstep the first status goes to all peers
             self.create_timer(shared.timing.period, self.time.tick, clock=steady)
+            self.create_timer(STATUS_PERIOD, ports.repeat_status, clock=steady)
             self.time.start()
 
     def destroy_node(self) -> None:

@@ -29,6 +29,7 @@ from wam_ros.ports import SECOND, Ports
 from wam_ros.run import raise_priority, run
 from wam_ros.tolerance import TolerantNode
 
+REPEATED = 10  # steps, after which a loss is reported again while the arm is enabled
 PATIENCE = 2.0  # s, after which a request reports that it still waits for its service
 
 
@@ -146,6 +147,8 @@ class AdaptedNode(TolerantNode):
                 "inputs",
                 f"{silent} has stopped: {' and '.join(lost)} is too old; start {silent} again, then reset_fault",
             )
+        elif self._ports.counts["steps"] % REPEATED == 0:
+            self._ports.repeat_status()
 
     def _take_status(self, status: NodeStatus) -> None:
         """Follow the driver: forget what came before its session, and commands from before the brakes were switched."""

@@ -181,6 +181,10 @@ class Ports:
             self._logged[topic] = now, self.refusals[topic]
             self.node.get_logger().warning(f"{topic}: refused: {printable(reason, LONGEST_REASON)}{more}")
 
+    def repeat_status(self) -> None:
+        """Publish the present status once more, as a message may be lost on a loaded machine."""
+        self._send(STATUS, diagnostic_status(self._status, self.shared.arm.name))
+
     def set_problem(self, concerned: str, reason: str) -> None:
         """Say in the status, with level ERROR, why the driver has to brake; '' where there is no reason any more."""
         if self.problems.get(concerned, "") == reason:

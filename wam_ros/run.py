@@ -28,7 +28,7 @@ from wam_ros.network import limit_to_this_machine
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
 LONGEST_END = 0.5  # s, for what has arrived before the end
-# s, for the last messages of all nodes of this process together; the middleware repeats what was lost every 3 s
+# s, for the last messages of all nodes of this process together; only a listener that is frozen needs it
 LONGEST_DELIVERY = 4.0
 PR_SET_PDEATHSIG = 1
 MakeNode = Callable[..., Node]

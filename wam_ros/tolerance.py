@@ -27,10 +27,16 @@ class TolerantNode(Node):
     ERROR with a `fault`: the driver brakes and names it.
     """
 
+    _has_ended = False
     _exceptions = 0  # so far
     _exception_time = 0.0  # of the newest one, s
     _exception_fault = ""
     _exception_timer: Any = None
+
+    def destroy_node(self) -> None:
+        """As that of rclpy; what the executor still has for this node is of no use any more."""
+        self._has_ended = True
+        super().destroy_node()
 
     def take_fault(self, reason: str) -> None:
         """Report a fault of this node; '' where it is over."""
@@ -56,10 +62,13 @@ class TolerantNode(Node):
     def _bearing(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
         @functools.wraps(callback)  # rclpy looks at its signature
         def bear(*arguments: Any) -> Any:
+            if self._has_ended:
+                return None
             try:
                 return callback(*arguments)
             except Exception as error:
                 self._take_exception(what, error)
+                return None
 
         return bear
 

@@ -19,7 +19,9 @@ FROZEN: Final = (0.2, 1.5)  # s of wall time that a driver is frozen
 def play(mode: str, configuration: Configuration, seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count` of a seed, one loss each."""
     chain: NodeProcesses | None = None
-    configured = configuration.with_values({"timing.mode": mode, "timing.timeout": 2.0})
+    # with the estimate fed back, the estimator belongs to the chain, too
+    feedback = {"force_loop:feedback": "contact_estimate", "force_loop:guard.mode": "off"}
+    configured = configuration.with_values({"timing.mode": mode, "timing.timeout": 2.0, **feedback})
     try:
         for index in range(first, first + count):
             chance = Random(f"losses {seed} {index}")

@@ -10,7 +10,7 @@ from rclpy.publisher import Publisher
 from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
-from wam_experiments.faults.trials import FaultTrial
+from wam_experiments.faults.trials import HELD_MOTION, MOTION, FaultTrial
 
 MESSAGES: Final = 20  # of one trial
 BETWEEN: Final = 0.001  # s of the arm's time between two of them
@@ -52,6 +52,7 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     publisher: Publisher | None
     publisher = stack.foreign_publisher(todo.topic) if todo.is_foreign else stack.own_publisher(todo.topic, chance)
     sent = 0
+    stack.allowed_motion = MOTION if todo.is_foreign else HELD_MOTION
     if publisher is None:
         return 1
     for _ in range(MESSAGES):

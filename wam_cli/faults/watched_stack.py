@@ -73,7 +73,7 @@ class WatchedStack:
         self.statuses: dict[str, Any] = {}
         self.escapes: list[str] = []
         self.motion = self.force = 0.0
-        self.allowed_force = FORCE
+        self.allowed_force, self.allowed_motion = FORCE, MOTION
         self._peak = [
             t / k for t, k in zip(shared.arm.motors.peak_torque, shared.arm.motors.torque_constant, strict=True)
         ]
@@ -175,7 +175,7 @@ class WatchedStack:
         self.motion = max(self.motion, motion)
         force = max((math.hypot(*load.force) for load in plant.loads()), default=0.0)
         self.force = max(self.force, force)
-        if motion > MOTION:
+        if motion > self.allowed_motion:
             self._escape("the arm moved without a command")
             self._held = list(plant.q)  # do not pull it back
         if force > self.allowed_force:
@@ -233,6 +233,7 @@ class WatchedStack:
     def begin(self) -> str:
         """Start a trial with an enabled arm at rest; returns why that is not possible, '' where it is."""
         self._injected.clear()
+        self.allowed_motion = MOTION
         self.driver.plant.release()
         if reason := self.recover():
             return reason

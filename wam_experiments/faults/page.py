@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from wam_analysis.table import markdown, plain
-from wam_experiments.faults.trials import FORCE, MOTION, ZERO_CURRENT, KindResult
+from wam_experiments.faults.trials import FORCE, HELD_MOTION, MOTION, ZERO_CURRENT, KindResult
 
 HEAD = (
     "kind",
@@ -85,7 +85,8 @@ A trial escapes if one of these is measured. The measures do not come from the n
 those of the simulated plant, currents and texts those that arrive over topics.
 
 * A joint moves by more than {MOTION:g} rad, or the arm presses with more than {FORCE:g} N, without a legitimate
-  command.
+  command. A wrong number from the node whose command it is, with a stamp of the present, is a command until it is too
+  old: {HELD_MOTION:g} rad are allowed for it.
 * A node ends, or raises an exception.
 * A number in any output is not finite, or a current is above the peak of its motor.
 * The loss of a node is not reported by its name, or a current is not zero {ZERO_CURRENT * 1e3:g} ms of the arm's time

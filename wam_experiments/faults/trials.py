@@ -8,6 +8,7 @@ from wam_description.configuration import Configuration
 
 ZERO_CURRENT = 0.05  # s of the arm's time, from the loss of a node to zero current
 MOTION = 0.01  # rad, of a joint without a legitimate command
+HELD_MOTION = 0.2  # rad, of a joint that obeys one wrong message of its own commander until it is too old
 FORCE = 15.0  # N, of the arm on the world without a legitimate command
 MOST_ESCAPES = 20  # of one kind; then the kind is stopped
 
