@@ -31,6 +31,7 @@ from wam_description.topics import TOPICS
 from wam_experiments.contact_benchmark import resting_push
 from wam_experiments.figures.catalogue import FIGURES, file_of, numbers
 from wam_experiments.figures.catalogue import table as figures_table
+from wam_experiments.force_benchmark import elbow, elbow_table
 from wam_experiments.plant.figure import figure
 from wam_experiments.scorecard import report as scorecard
 from wam_sim.batch import processes
@@ -245,6 +246,7 @@ def blocks() -> dict[str, Callable[[], str]]:
         "resting pushes": resting_pushes,
         "dither": lambda: dither(configuration),
         "refusals": refusals,
+        "elbow": lambda: f"\n{(ROOT / 'docs' / 'elbow.txt').read_text(encoding='utf-8')}",
         "guard": lambda: f"```\n{(ROOT / 'docs' / 'guard.txt').read_text(encoding='utf-8')}```\n",
         "figures": figures,
         "equations": equations,
@@ -329,6 +331,12 @@ def measure_guard() -> None:
     (ROOT / "docs" / "guard.txt").write_text(done.stdout.rstrip() + "\n", encoding="utf-8")
 
 
+def measure_elbow() -> None:
+    """Press with a nearly straight elbow and keep the table."""
+    table = elbow_table(elbow(Configuration.load(CONFIGURATION)))
+    (ROOT / "docs" / "elbow.txt").write_text(table + "\n", encoding="utf-8")
+
+
 def filled(text: str) -> str:
     """A page with its generated blocks up to date."""
     known = blocks()
@@ -375,6 +383,7 @@ def main() -> None:
     given = parser.parse_args()
     if not given.pages:
         measure_guard()
+        measure_elbow()
     for path, text in pages().items():
         path.write_text(text, encoding="utf-8")
         print(path.relative_to(ROOT))

@@ -207,7 +207,7 @@ def admitted(
 
 
 def test_a_posture_beyond_the_joint_limits_is_refused_by_name_and_the_last_one_held() -> None:
-    admission = CommandAdmission(ARM.joints, math.inf)
+    admission = CommandAdmission(ARM.joints, ARM.covers, math.inf)
     good = [0.1, -0.5, 0.0, 0.6]
     assert admitted(admission, posture=good).posture == good
     found = admitted(admission, posture=[0.1, -2.5, 0.0, 0.6])
@@ -221,7 +221,7 @@ def test_a_posture_beyond_the_joint_limits_is_refused_by_name_and_the_last_one_h
 
 def test_force_and_torque_rise_no_faster_than_their_limits() -> None:
     own = replace(OWN, force_rate_limit=400.0, torque_rate_limit=200.0)  # 2 N and 1 N m in a period
-    admission = CommandAdmission(ARM.joints, math.inf)
+    admission = CommandAdmission(ARM.joints, ARM.covers, math.inf)
     wanted = ForceCommand("base", (3.0, 0.0, -4.0))
     sizes = [math.hypot(*admitted(admission, own, wanted).force.force) for _ in range(4)]
     assert sizes == pytest.approx([2.0, 4.0, 5.0, 5.0])
@@ -233,7 +233,7 @@ def test_force_and_torque_rise_no_faster_than_their_limits() -> None:
     assert np.array(torques) == pytest.approx(np.array([[1.0, 0, -0.5, 0], [2.0, 0, -0.5, 0], [2.5, 0, -0.5, 0]]))
     admission.restart(ARM.joints.start)
     assert admitted(admission, own, wanted, torque=[2.5, 0.0, 0.0, 0.0]).torque == [1.0, 0.0, 0.0, 0.0]
-    unlimited = admitted(CommandAdmission(ARM.joints, math.inf), OWN, wanted)
+    unlimited = admitted(CommandAdmission(ARM.joints, ARM.covers, math.inf), OWN, wanted)
     assert unlimited.force is wanted, "the configured limit is above any step"
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from wam_theory import linear_loop
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess, simulate
+from wam_theory.zero_order_hold import zero_order_hold
 
 
 def state_matrices(
@@ -99,6 +100,27 @@ def test_sampled_margin_has_a_pole_on_the_circle_at_its_frequency() -> None:
     nearest = poles[np.argmin(np.abs(np.abs(np.angle(poles)) - margin.frequency * 0.2))]
     assert abs(nearest) == pytest.approx(1.0, abs=1e-5)
     assert np.abs(poles).max() == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("delay", [0, 5, 24, 40, 80])
+def test_sampled_margin_is_where_an_eigenvalue_leaves_the_circle_also_after_a_long_delay(delay: int) -> None:
+    period = 0.002
+    margin = linear_loop.sampled_margin(*TESTBED, period, delay)
+    inertia, damping, ktr, kc = TESTBED
+    rate = np.array([[0.0, 1.0, 0.0], [-(ktr + kc) / inertia, -damping / inertia, ktr / inertia], [0.0, 0.0, 0.0]])
+    held, inlet = zero_order_hold(rate, np.array([[0.0], [0.0], [1.0]]), period)
+    largest = []
+    for factor in (0.99, 1.01):
+        feedback = np.array([[-factor * margin.gain * kc, 0.0, 0.0]])
+        if delay:  # x, v, x_m, then the commands under way
+            system = np.zeros((3 + delay, 3 + delay))
+            system[:3, :3], system[:3, 3:4] = held, inlet
+            system[3:-1, 4:] = np.eye(delay - 1)
+            system[-1:, :3] = feedback
+        else:
+            system = held + inlet @ feedback
+        largest.append(np.abs(np.linalg.eigvals(system)).max())
+    assert largest[0] < 1.0 < largest[1]
 
 
 TESTBED = (4.0, 33.10755, 14443.0, 12960.0)  # J, b, k_tr, k_c in pounds and inches; zeta 0.05

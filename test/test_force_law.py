@@ -148,25 +148,43 @@ def test_the_jump_that_is_bridged_decays_with_the_time_constant() -> None:
     assert transfer.step([-1.0, 0.0], [1.0, 1.0], time_constant, DT) == [0.0, 0.0], "from rest"
 
 
-def test_the_limited_error_has_the_limit_of_each_axis() -> None:
-    own = replace(OWN, force_error_limit=(1.0, 2.0, 3.0))
-    out = ask(force_loop(ARM, own), World(400.0), (30.0, -30.0, 2.5))
-    assert out.limited == pytest.approx((1.0, -2.0, 2.5))
+def test_the_saturation_holds_along_every_direction() -> None:
+    """Axis by axis, an error along the diagonal would be sqrt(3) times as large."""
+    for direction in ((0.0, 0.0, -1.0), (1.0, 1.0, 0.0), (1.0, -1.0, 1.0)):
+        unit = np.array(direction) / np.linalg.norm(direction)
+        out = ask(force_loop(ARM, OWN), World(400.0), (90.0 * unit).tolist())
+        assert out.limited == pytest.approx(20.0 * unit)
+        assert lever(POSE, unit) @ out.velocity == pytest.approx(GAIN * 20.0, rel=1e-6)
 
 
-def test_another_frame_begins_without_the_memory_of_the_one_before() -> None:
-    """A low pass and a delay line that remembered would mix forces along different axes."""
-    outs = {}
+def test_different_limits_of_the_axes_are_those_of_an_ellipsoid() -> None:
+    along = law(error_limit=(1.0, 2.0, 3.0), deadband=(0.5, 0.5, 0.0), gain=(1.0, 2.0, 3.0))
+    half = math.sqrt(0.5)
+    assert along.along((half, half, 0.0)).error_limit[0] == pytest.approx(1.0 / math.sqrt(0.5 + 0.5 / 4.0))
+    assert along.along((half, half, 0.0)).deadband[0] == pytest.approx(0.5)
+    assert along.along((half, half, 0.0)).gain[0] == pytest.approx(1.5)
+    assert along.along((0.0, -1.0, 0.0)) == replace(along.along((0.0, 1.0, 0.0)), error_limit=(2.0,), gain=(2.0,))
+
+
+def test_a_force_that_turns_or_flips_is_measured_with_the_right_sign_at_once() -> None:
+    """The filter remembers torques, not a force along a direction that is commanded no more."""
+    loop = force_loop(ARM, replace(OWN, force_filter=1.0))
+    for _ in range(400):
+        ask(loop, World(400.0, force=5.0), down(5.0))
+    assert ask(loop, World(400.0, force=5.0), down(-5.0)).measured == pytest.approx(down(5.0), abs=1e-6)
+
+
+def test_another_frame_begins_without_the_answers_still_delayed() -> None:
+    speeds = {}
     for frame in ("base", "inner_link"):
-        loop = force_loop(ARM, replace(OWN, force_filter=1.0, delay_samples=5))
+        loop = force_loop(ARM, replace(OWN, delay_samples=5))
         for _ in range(400):
             ask(loop, World(400.0, force=9.0), down(9.5))
         rotation = np.eye(3) if frame == "base" else BODY.cover_pose(POSE, frame).rotation
         command = ForceCommand(frame, tuple((rotation.T @ down(9.5)).tolist()))
         out = ask(loop, World(400.0, force=3.0), None, command=command)
-        outs[frame] = (rotation @ out.measured)[2], lever(POSE) @ out.velocity
-    assert outs["base"] == (pytest.approx(-9.0, abs=0.1), pytest.approx(GAIN * 0.5, rel=0.1))
-    assert outs["inner_link"] == (pytest.approx(-3.0, abs=1e-6), pytest.approx(0.0, abs=1e-9))
+        speeds[frame] = lever(POSE) @ out.velocity
+    assert speeds == {"base": pytest.approx(GAIN * 0.5, rel=0.1), "inner_link": pytest.approx(0.0, abs=1e-9)}
 
 
 def test_joint_torques_begin_without_the_rate_of_an_earlier_measurement() -> None:

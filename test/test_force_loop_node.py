@@ -80,7 +80,7 @@ def test_status_says_domain_margin_stiffness_and_cycle_and_changes_with_the_set(
     refused = feeder.set(force_gain=[0.5])
     assert not refused.successful
     assert "times the largest linearly stable one" in refused.reason
-    assert feeder.loop.node._loop.parameters.force_gain == (0.015,)
+    assert feeder.loop.node._loop.parameters.force_gain == (0.0145,)
     assert feeder.set(force_gain=[0.5], guard__mode="warn").successful
     feeder.feed_until(lambda: feeder.facts()[0].message != reported.message)
     assert feeder.facts()[0].level == DiagnosticStatus.WARN
@@ -108,7 +108,7 @@ def test_a_torque_in_a_force_command_is_refused_by_name_once_for_each_message(
         feeder.feed(None)
     assert feeder.loop._ports.refusals["force_command"] == 1
     said = capfd.readouterr().err
-    assert said.count("force_command: refused: torque (0.0, 0.0, 0.5) N m is commanded; send zero torque") == 1
+    assert said.count("force_command: refused: torque (0.0, 0.0, 0.5) N m is commanded in frame 'base'") == 1
 
 
 def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: Any, tmp_path: Path) -> None:

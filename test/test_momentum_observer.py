@@ -270,3 +270,10 @@ def test_mass_scale_of_another_arm_is_refused() -> None:
     wrong: ObserverParameters = dataclasses.replace(NOMINAL, mass_scale=(1.0,))
     with pytest.raises(ParameterError, match=r"mass_scale.*1 values; 4 links need 4"):
         MomentumObserver(ARM, wrong, use_joint_sensors=False)
+
+
+@pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid value")
+def test_finite_values_whose_sum_overflows_are_refused_and_do_not_end_the_node() -> None:
+    observer = MomentumObserver(ARM, FREE, use_joint_sensors=True)
+    huge = [1e308] * 4
+    assert not observer.observe(State(huge, huge, huge), DT)

@@ -308,7 +308,7 @@ def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     [
         ("velocity_loop", "integral_gain:", "integral_gian:", "missing parameter 'servo.integral_gain'"),
         ("driver", "watchdog: 0.045", "watchdog: 0.5", "parameter 'watchdog' is 0.5 s; allowed: 0.002 to 0.05"),
-        ("force_loop", "force_gain: [1.5e-2]", "force_gain: [0.5]", "times the largest linearly stable one"),
+        ("force_loop", "force_gain: [1.45e-2]", "force_gain: [0.5]", "times the largest linearly stable one"),
         ("transform", "mode: lockstep", "mode: fast", "parameter 'timing.mode' is 'fast'; allowed: one of lockstep"),
     ],
 )

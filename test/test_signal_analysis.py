@@ -88,6 +88,13 @@ def test_a_step_that_keeps_swinging_does_not_settle():
     assert found.ripple == near(0.1)
 
 
+@pytest.mark.parametrize("phase", [k * math.pi / 4.0 for k in range(8)])
+def test_a_cycle_wider_than_the_band_does_not_settle_wherever_the_recording_stops(phase):
+    time = np.arange(4000) / 1000.0
+    cycle = 1.0 + 0.05 * np.sin(2.0 * math.pi * 4.0 * time + phase)
+    assert step_response(time, cycle - np.exp(-30.0 * time), 0.0, 1.0, 0.02).settling == math.inf
+
+
 def test_a_signal_without_a_step_is_refused():
     with pytest.raises(ValueError, match="no step"):
         step_response(np.arange(10.0), np.ones(10), 1.0, 3.0, 0.02)
@@ -124,6 +131,22 @@ def test_noise_does_not_add_to_the_height_of_a_plateau() -> None:
     time = np.arange(6000) / 1000.0
     value = 0.8 * np.sign(np.sin(2.0 * math.pi * time / 0.7 + 0.1)) + draws(31, len(time), 0.1)
     assert limit_cycle(time, value).peak_to_peak == near(1.6)
+
+
+def test_a_recording_with_a_gap_has_no_cycle_to_be_confident_of():
+    time = np.arange(6000) / 1000.0
+    value = np.sin(2.0 * math.pi * time / 0.9)
+    assert limit_cycle(time, value).confidence > 0.99
+    late = np.where(time < 3.0, time, time + 1.3)
+    assert limit_cycle(late, value).confidence == 0.0
+
+
+@pytest.mark.parametrize(
+    ("growth", "expected"), [(1.003, StabilityVerdict.DIVERGES), (0.992, StabilityVerdict.SETTLES)]
+)
+def test_a_slow_trend_is_no_limit_cycle(growth, expected):
+    turns = np.arange(0.0, 100.0, 0.01)
+    assert stability(growth**turns * np.cos(math.pi * turns), 1e-3).verdict is expected
 
 
 def random_walk(n: int) -> np.ndarray:

@@ -214,3 +214,16 @@ def test_commanded_velocity_begins_at_the_measured_one_when_the_brakes_are_relea
     for _ in range(10):  # braked: the commanded torque does not act
         (current,) = loop.step([0.0], [0.0], [2.0], [0.0], DT)
     assert current * CONSTANT == pytest.approx(KP * 0.5)
+
+
+def test_the_integral_grows_through_the_deadband_of_an_amplifier_and_not_against_brakes() -> None:
+    """A torque of exactly zero is what both give: the integral must not be wiped where it is too small to act."""
+    for dead, is_moved in ((0.05, True), (10.0, False)):
+        loop, torque, largest = VelocityLoop(ONE, SERVO, OWN), 0.0, 0.0
+        for _ in range(400):
+            (current,) = loop.step([0.0], [torque], [1.0], [0.0], DT)
+            torque = current * CONSTANT if abs(current * CONSTANT) > dead else 0.0
+            largest = max(largest, abs(current * CONSTANT))
+        assert (torque > 0.05) is is_moved
+        if not is_moved:
+            assert largest < 0.05 * PEAK, "against brakes nothing winds up"

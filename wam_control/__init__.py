@@ -11,7 +11,10 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``force_loop``                    outer loop: force along a direction, posture elsewhere, or joint torques
 ``force_command``                 - which commands are admitted: limits and age
 ``contact_position``              - where the force acts: estimated or configured contact position
-``force_measurement``             - the measured force, by the feedback that is chosen; low pass
+``force_measurement``             - the external torques, by the feedback that is chosen; low pass
+``force_axis``                    - how a force along a direction is sensed, how the arm moves along it, how well
+``force_hold``                    - when the arm holds its position instead, and why
+``motion_limits``                 - limits of the velocities: ends of the joints, contact force
 ``force_law``                     - error to velocity of one axis: saturation, deadband, G_I, G_P; delay line
 ``hybrid_velocity``               - joint velocities of force and posture together
 ``bumpless_transfer``             - no jump of velocity where the law changes

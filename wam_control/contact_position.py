@@ -1,10 +1,12 @@
-"""Where the controlled force acts: at the estimated contact if it is certain enough, else where the parameters say."""
+"""Where the controlled force acts: where the command or the parameters pin it, or at the estimated contact."""
 
 import math
 from typing import NamedTuple
 
 from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_description.signals import Contact
+from wam_description.signals import BASE, Contact, ForceCommand, Triple
+
+STEEPEST = math.radians(30.0)  # lean of a force from the normal of a link, up to which its position is estimated well
 
 
 class ForcePoint(NamedTuple):
@@ -12,15 +14,20 @@ class ForcePoint(NamedTuple):
 
     Attributes
     ----------
-    cover, position : cover, and position along it, m.
-    is_certain : whether the present estimate alone is certain enough to be used.
-    rejection : why the present estimate is not used, '' if it is, or if no contact is detected.
+    cover, position, position_sd : cover, position along it and its standard deviation, m.
+    is_certain : whether the position is pinned, or the present estimate alone is certain enough to be used.
+    is_assumed : whether the position is the configured one although it was to be estimated.
+    rejection : why the present estimate is not used, '' if it is or is not needed.
+    conflict : why no force can be controlled there: something else is touched; '' if nothing is known of that.
     """
 
     cover: str
     position: float
+    position_sd: float
     is_certain: bool
+    is_assumed: bool
     rejection: str
+    conflict: str
 
 
 class ContactPosition:
@@ -30,33 +37,85 @@ class ContactPosition:
     """
 
     def __init__(self) -> None:
-        self._last: tuple[str, float] | None = None
+        self._last: tuple[str, float, float] | None = None
 
-    def step(self, contact: Contact, parameters: ForceLoopParameters) -> ForcePoint:
-        """Point of action for the present estimate; a second call in the same period gives the same."""
-        is_certain = contact_is_certain(contact, parameters)
+    def step(
+        self, contact: Contact, command: ForceCommand | None, lean: float, parameters: ForceLoopParameters
+    ) -> ForcePoint:
+        """Point of action for the present estimate; a second call in the same period gives the same.
+
+        Parameters
+        ----------
+        contact : estimated contact.
+        command : commanded force; a torque in it pins the position, see `pinned_position`.
+        lean : angle of the commanded force from the normal of the touched cover, rad.
+        parameters : of the force loop.
+        """
+        pinned = pinned_position(command)
+        if pinned is not None or parameters.contact_source == "pinned":
+            self._last = None
+            cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
+            return ForcePoint(cover, position, 0.0, True, False, "", _conflict(contact, cover, parameters))
+        problem = _problem(contact, lean, parameters) if contact.cover else ""
         if not contact.cover:
             self._last = None
-        elif is_certain:
-            self._last = contact.cover, contact.place
-        rejection = self._rejection(contact, parameters) if contact.cover and not is_certain else ""
-        cover, position = self._last or (parameters.contact_cover, parameters.contact_position)
-        return ForcePoint(cover, position, is_certain, rejection)
+        elif not problem:
+            sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
+            self._last = contact.cover, contact.place, sd
+        assumed = parameters.contact_cover, parameters.contact_position, parameters.position_uncertainty_limit
+        cover, position, sd = self._last or assumed
+        if problem:
+            used = "the last certain position is used" if self._last else "contact_cover and contact_position are used"
+            problem = f"{problem}; {used}"
+        is_certain = bool(contact.cover) and not problem
+        conflict = _conflict(contact, cover, parameters)
+        return ForcePoint(cover, position, sd, is_certain, self._last is None, problem, conflict)
 
-    def _rejection(self, contact: Contact, parameters: ForceLoopParameters) -> str:
-        used = "the last certain position is used" if self._last else "contact_cover and contact_position are used"
+
+def pinned_position(command: ForceCommand | None) -> tuple[str, float] | None:
+    """Cover and position, m, that a command pins: its torque is that of the force about the origin of the cover.
+
+    A force (fx, fy, fz) at the position x has the torque (0, -x fz, x fy).  None for a command without a torque
+    or in the base frame, whose torque says nothing of a cover.
+    """
+    if command is None or command.frame == BASE or not any(command.torque):
+        return None
+    (_, fy, fz), (_, my, mz) = command.force, command.torque
+    across = fy * fy + fz * fz
+    return (command.frame, (fy * mz - fz * my) / across) if across else None
+
+
+def torque_of_position(force: Triple, position: float) -> Triple:
+    """Torque about the origin of a cover, N m, of a force at a position along it; the inverse of `pinned_position`."""
+    return 0.0, -position * force[2], position * force[1]
+
+
+def _problem(contact: Contact, lean: float, parameters: ForceLoopParameters) -> str:
+    """Why an estimated position is not certain, '' if it is; an uncertainty that is not published counts as none."""
+    if lean > STEEPEST:
         return (
-            f"the contact position estimated on {contact.cover} has a standard deviation of "
-            f"{contact.position_sd:.3g} m and a probability of {contact.probability:.2f}; "
-            f"allowed: at most position_uncertainty_limit, {parameters.position_uncertainty_limit:g} m, "
-            f"and at least link_probability_limit, {parameters.link_probability_limit:g}; {used}"
+            f"the commanded force is {math.degrees(lean):.0f} deg off the normal of {contact.cover}; a contact "
+            f"position is estimated well up to {math.degrees(STEEPEST):.0f} deg, and not on the end of a link; "
+            "pin the position (contact_source, or the torque of the command)"
         )
+    known = position_is_certain(contact.place, contact.position_sd, parameters.position_uncertainty_limit)
+    if known and not contact.probability < parameters.link_probability_limit:
+        return ""
+    return (
+        f"the contact position estimated on {contact.cover} has a standard deviation of "
+        f"{contact.position_sd:.3g} m and a probability of {contact.probability:.2f}; "
+        f"allowed: at most position_uncertainty_limit, {parameters.position_uncertainty_limit:g} m, "
+        f"and at least link_probability_limit, {parameters.link_probability_limit:g}"
+    )
 
 
-def contact_is_certain(contact: Contact, parameters: ForceLoopParameters) -> bool:
-    """Whether position and link are known well enough; an uncertainty that is not published (NaN) counts as none."""
-    return position_is_certain(contact.place, contact.position_sd, parameters.position_uncertainty_limit) and not (
-        contact.probability < parameters.link_probability_limit
+def _conflict(contact: Contact, cover: str, parameters: ForceLoopParameters) -> str:
+    """Why a contact on another cover than that of the force forbids to control it, '' where there is none."""
+    if contact.cover in ("", cover) or not contact.probability >= parameters.link_probability_limit:
+        return ""
+    return (
+        f"{contact.cover} is touched, with a probability of {contact.probability:.2f}, and the force is commanded on "
+        f"{cover}; command it on {contact.cover}, with its position, or free the arm"
     )
 
 

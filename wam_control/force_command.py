@@ -4,10 +4,12 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from wam_control.contact_position import pinned_position, torque_of_position
 from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_description.arm import Joints
-from wam_description.signals import ForceCommand
+from wam_description.arm import Covers, Joints
+from wam_description.signals import ZERO, ForceCommand
 
+ASIDE = 1e-3  # m, lever of the part of a torque that is not that of the force at a place of the cover
 NO_FORCE = ForceCommand("", (0.0, 0.0, 0.0))
 
 
@@ -36,6 +38,7 @@ class CommandAdmission:
     Parameters
     ----------
     joints : of the arm, with their limits.
+    covers : of the arm, with their lengths.
     command_age : time for which the last good command counts while others are refused, s.
 
     Attributes
@@ -43,8 +46,8 @@ class CommandAdmission:
     posture : joint angles to hold (n,), rad; empty before the first state.
     """
 
-    def __init__(self, joints: Joints, command_age: float) -> None:
-        self._joints, self._command_age = joints, command_age
+    def __init__(self, joints: Joints, covers: Covers, command_age: float) -> None:
+        self._joints, self._covers, self._command_age = joints, covers, command_age
         self._force_age = self._torque_age = 0.0
         self.posture: list[float] = []
         self._present = NO_FORCE
@@ -73,25 +76,22 @@ class CommandAdmission:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
         refusals = {}
         pressed = self._force is not None and any(self._force.force)
-        commanded = math.hypot(*force.force) if force is not None else 0.0
+        commanded = _size(force)
         if commanded > parameters.force_limit:
             refusals["force_command"] = _refusal(commanded, "force_limit", parameters.force_limit, "N")
-        elif force is not None and any(force.torque):
-            refusals["force_command"] = (
-                f"torque {force.torque} N m is commanded; send zero torque: the contact takes a force alone, joint "
-                "torques are commanded on joint_torque_command; the last good command remains in force"
-            )
+        elif force is not None and (unpinned := self._unpinned(force)):
+            refusals["force_command"] = unpinned
         if "force_command" in refusals:
             self._force_age += dt
-            if self._force_age > self._command_age:
+            if self._force_age > self._command_age or _size(self._force) > parameters.force_limit:
                 self._force = force = None
         else:
             self._force, self._force_age = force, 0.0
-        commanded = max(map(abs, torque)) if torque is not None else 0.0
+        commanded = _largest(torque)
         if commanded > parameters.torque_limit:
             refusals["joint_torque_command"] = _refusal(commanded, "torque_limit", parameters.torque_limit, "N m")
             self._torque_age += dt
-            if self._torque_age > self._command_age:
+            if self._torque_age > self._command_age or _largest(self._torque) > parameters.torque_limit:
                 self._torque = None
         else:
             self._torque, self._torque_age = torque, 0.0
@@ -111,6 +111,34 @@ class CommandAdmission:
             self.posture,
             refusals,
         )
+
+    def _unpinned(self, command: ForceCommand) -> str:
+        """Why the torque of a command is refused: it is not that of its force at a place of a cover; '' if it is."""
+        if not any(command.torque):
+            return ""
+        covers, pinned = self._covers, pinned_position(command)
+        last = "; the last good command remains in force"
+        if pinned is None or command.frame not in covers.names:
+            return (
+                f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque pins the place of a "
+                f"force across a cover, in the frame of that cover ({', '.join(covers.names)}); send zero torque, "
+                f"or such a force{last}"
+            )
+        cover, place = pinned
+        length = covers.length[covers.names.index(cover)]
+        own = torque_of_position(command.force, place)
+        if math.dist(own, command.torque) > ASIDE * _size(command):
+            return (
+                f"torque {command.torque} N m is commanded; that of the force {command.force} N about the origin of "
+                f"{cover} is (0, -x fz, x fy), at the place x: send zero torque, or such a one; joint torques are "
+                f"commanded on joint_torque_command{last}"
+            )
+        if not 0.0 <= place <= length:
+            return (
+                f"torque {command.torque} N m pins the force at {place:.3g} m of {cover}; allowed: 0 to {length:g} m"
+                f"{last}"
+            )
+        return ""
 
     def _beyond(self, posture: Sequence[float]) -> str:
         """Why a posture is refused: the first joint beyond its limits; '' if there is none."""
@@ -132,7 +160,9 @@ class CommandAdmission:
         size = math.hypot(*change)
         if size > most:
             x, y, z = (b + most / size * step for b, step in zip(present, change, strict=True))
-            wanted = ForceCommand(wanted.frame, (x, y, z))
+            pinned = pinned_position(wanted)
+            torque = torque_of_position((x, y, z), pinned[1]) if pinned else ZERO
+            wanted = ForceCommand(wanted.frame, (x, y, z), torque)
         self._present = wanted
         return wanted
 
@@ -145,6 +175,14 @@ class CommandAdmission:
             wanted = [b + min(max(a - b, -most), most) for a, b in zip(wanted, present, strict=True)]
         self._present_torque = wanted
         return wanted
+
+
+def _size(command: ForceCommand | None) -> float:
+    return math.hypot(*command.force) if command is not None else 0.0
+
+
+def _largest(torque: Sequence[float] | None) -> float:
+    return max(map(abs, torque)) if torque is not None else 0.0
 
 
 def _refusal(commanded: float, name: str, limit: float, unit: str) -> str:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 from wam_description.parameters import require
 
+NEGLIGIBLE = 1e-12  # square of a component of a direction that counts as zero
+
 
 @dataclass(frozen=True)
 class ForceLaw:
@@ -80,6 +82,34 @@ class ForceLaw:
     def velocities(self, errors: Sequence[float], before: Sequence[float], dt: float) -> list[float]:
         """Velocity of every axis; arguments as those of `velocity`, one of each per axis."""
         return [self.velocity(i, *pair, dt) for i, pair in enumerate(zip(errors, before, strict=True))]
+
+    def along(self, axis: Sequence[float]) -> "ForceLaw":
+        """The law of the error along one unit vector of the frame: its saturation and deadband are ellipsoids.
+
+        Saturated axis by axis, an error along a diagonal could be sqrt(3) times as large.
+        """
+        squares = [part * part for part in axis]
+
+        def mean(values: Sequence[float]) -> float:
+            return sum(a * b for a, b in zip(squares, values, strict=True))
+
+        def radius(values: Sequence[float]) -> float:
+            used = [(square, value) for square, value in zip(squares, values, strict=True) if square > NEGLIGIBLE]
+            if not all(value for _, value in used):
+                return 0.0
+            first = used[0][1]
+            if all(value == first for _, value in used):
+                return first
+            return math.sqrt(sum(square for square, _ in used) / sum(a / (b * b) for a, b in used))
+
+        return ForceLaw(
+            self.group,
+            ("along",),
+            (mean(self.gain),),
+            (mean(self.proportional_gain),),
+            (radius(self.error_limit),),
+            (radius(self.deadband),),
+        )
 
 
 class DelayLine:

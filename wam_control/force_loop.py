@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
+from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_command import CommandAdmission
+from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, require_fit
 from wam_control.force_measurement import ForceMeasurement, LowPass
@@ -23,10 +25,11 @@ from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
 from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
+from wam_control.motion_limits import MotionLimits
 from wam_control.stability_guard import GuardAssessment
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import NO_CONTACT, Contact, ForceCommand, State, Triple
+from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
 
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
@@ -36,8 +39,8 @@ Array = NDArray[np.float64]
 class ForceOutput(NamedTuple):
     """Commands of one period of the force loop, and the forces behind them.
 
-    Measured force and error are components along the commanded direction, as vectors in the command's
-    frame; limited is the error of each axis of that frame after its own saturation.
+    Measured force and error are components along the commanded direction, as vectors in the frame of the
+    command in force; limited is the error after saturation.
     """
 
     velocity: list[float]  # (n,) rad/s, empty for torque only
@@ -45,6 +48,10 @@ class ForceOutput(NamedTuple):
     measured: Triple = (0.0, 0.0, 0.0)  # N
     error: Triple = (0.0, 0.0, 0.0)  # N
     limited: Triple = (0.0, 0.0, 0.0)  # N
+    frame: str = BASE
+    axis: ForceAxis | None = None  # of the commanded force; None where none is commanded
+    point: ForcePoint | None = None  # where it acts
+    sd_limit: float = math.inf  # N, of its standard deviation
 
 
 class ForceLoop:
@@ -64,6 +71,7 @@ class ForceLoop:
     refused : number of refused commands.
     refusals : why a present command is refused, by topic; the last good one remains in force.
     fallback : why the estimated contact position is not used, '' if it is or if no contact is detected.
+    reaction, reason : what the loop does instead of what is commanded, and why; NONE and '' where it obeys.
     """
 
     def __init__(
@@ -78,17 +86,20 @@ class ForceLoop:
         self._body = RigidBody(arm)
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
-        self._admission = CommandAdmission(arm.joints, command_age)
+        self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._position = ContactPosition()
         self._contact_rejected = False
+        self._held_at: list[float] | None = None
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._delay = LowPass(), DelayLine()
         self._transfer = BumplessTransfer(self._n)
+        self._hold = ForceHold()
         self._axes = ""
         self._torque_before: list[float] = []
         self.refused = 0
         self.refusals: dict[str, str] = {}
         self.fallback = ""
+        self.reaction, self.reason = ForceReaction.NONE, ""
         self._take(servo, parameters)
 
     @property
@@ -131,6 +142,8 @@ class ForceLoop:
         require_fit(parameters, self._arm)
         self._supervision = Supervision(self._arm, servo, self._timing, parameters, self._joints)
         self._servo, self.parameters = servo, parameters
+        self._force_axes = ForceAxes(self._arm, self._body, parameters.sensing)
+        self._limits = MotionLimits(self._arm, self._body, parameters.limits)
         self._transfer.restart()
 
     def tare(self) -> None:
@@ -174,26 +187,40 @@ class ForceLoop:
         commands = self._admission.step(own, joints.position, command, posture, torque, dt)
         self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
         self.refusals, self.fallback = commands.refusals, ""
+        self.reaction, self.reason = ForceReaction.NONE, ""
         self._measurement.step(own, sensors, external)
+        is_felt = own.feedback != "contact_estimate" or bool(contact.cover)
+        felt = self._measurement.external if is_felt else np.zeros(self._n)
+        self._felt = self._filter.step(felt, own.force_filter, dt)
         if own.mode == "joint_torque":
             out = self._joint_torque(contact, commands.torque, dt)
         else:
             out = self._force(joints.position, contact, commands.force, commands.posture, dt)
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        return out._replace(velocity=velocity)
+        limited = self._limits.step(velocity, joints.position, self._felt[0])
+        if not self.reaction.holds and limited.contact_force:
+            self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
+        elif not self.reaction.holds and limited.joint_end:
+            self._react(ForceReaction.JOINT_END, limited.joint_end)
+        return out._replace(velocity=limited.velocity)
+
+    def _react(self, reaction: ForceReaction, reason: str) -> None:
+        self.reaction, self.reason = reaction, reason
 
     def _reset(self, q: Sequence[float]) -> None:
         """Hold this posture and forget what was before."""
         self._admission.restart(q)
         self._transfer.reset()
+        self._filter.reset()
         self._begin("")
 
     def _begin(self, axes: str) -> None:
         """Control other axes, without a memory of the force on those before; '' for none."""
-        self._filter.reset()
+        self._hold.reset()
         self._delay.reset()
         self._torque_before = []
         self._axes = axes
+        self._held_at = None
         self._transfer.restart()
 
     def _force(
@@ -208,30 +235,48 @@ class ForceLoop:
             self._begin(axes)
         held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit)
         if command is None or not desired:
-            return ForceOutput([] if is_open else held, [0.0] * self._n)
+            return ForceOutput([] if is_open else held, [0.0] * self._n, frame=command.frame if command else BASE)
         rotation = np.eye(3) if command.frame == "base" else self._body.cover_pose(q, command.frame).rotation
         direction = rotation @ (np.array(command.force) / desired)
         axis = (rotation.T @ direction).tolist()
-        point = self._point(contact)
-        jacobian = self._body.point_jacobian(q, point.cover, (point.position, 0.0, 0.0))
-        along = direction @ jacobian
-        force = self._measurement.along(direction, q, jacobian, own.feedback, contact, point)
-        measured, before = self._filter.step(force, own.force_filter, dt)
-        errors = [(desired - measured) * part for part in axis]
-        velocity: list[float] = []
-        if not is_open:
-            speeds = law.velocities(errors, [(desired - before) * part for part in axis], dt)
-            speeds = self._delay.step(speeds, own.delay_samples)
-            speed = sum(part * of_axis for part, of_axis in zip(axis, speeds, strict=True))
-            speed *= self._gain_factor(contact, _triple(direction.tolist()), dt)
-            velocity = hybrid_velocity(held, along, speed, own.joint_speed_limit)
-        return ForceOutput(
-            velocity,
-            (along * desired).tolist(),
+        point = self._point(contact, command, direction)
+        force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
+        measured, before = (-float(force_axis.sense @ torques) for torques in self._felt)
+        scalar = law.along(axis)
+        error = desired - measured
+        out = ForceOutput(
+            [],
+            [0.0] * self._n,
             _triple([part * measured for part in axis]),
-            _triple(errors),
-            _triple([law.limited(i, error) for i, error in enumerate(errors)]),
+            _triple([part * error for part in axis]),
+            _triple([part * scalar.limited(0, error) for part in axis]),
+            command.frame,
+            force_axis,
+            point,
+            own.sensing.sd_limit(desired),
         )
+        reaction, reason = self._hold.step(force_axis, point, self._felt[0], measured, desired, own, dt)
+        self._react(reaction, reason)
+        if reaction.holds:
+            self.refusals["force_command"] = reason
+            if self._held_at is None:
+                self._held_at = list(q)
+                self._transfer.restart()
+            return out._replace(
+                velocity=[] if is_open else posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
+            )
+        if self._held_at is not None:
+            self._held_at = None
+            self._transfer.restart()
+        effort = (force_axis.lever * desired).tolist()
+        if is_open:
+            return out._replace(effort=effort)
+        speeds = self._delay.step(scalar.velocities([error], [desired - before], dt), own.delay_samples)
+        speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
+        speed = min(speed, self._hold.approach_speed(force_axis, desired, own))
+        velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
+        self._hold.travel(float(force_axis.lever @ velocity) * dt)
+        return out._replace(velocity=velocity, effort=effort)
 
     def _joint_torque(self, contact: Contact, torque: Sequence[float] | None, dt: float) -> ForceOutput:
         """Torque of each joint; without a command the arm holds still."""
@@ -245,12 +290,17 @@ class ForceLoop:
         errors, errors_before = ([a - b for a, b in zip(torque, values, strict=True)] for values in (measured, before))
         velocity = self._supervision.torque_law.velocities(errors, errors_before, dt)
         velocity = self._delay.step(velocity, self.parameters.delay_samples)
-        factor = self._gain_factor(contact, None, dt)
+        point = self._position.step(contact, None, 0.0, self.parameters)
+        factor = self._gain_factor(point, None, 0.0, dt)
         return ForceOutput([factor * v for v in velocity], list(torque))
 
-    def _point(self, contact: Contact) -> ForcePoint:
+    def _point(self, contact: Contact, command: ForceCommand, direction: Array) -> ForcePoint:
         """Point of action of the force; where the loop relies on the estimate, a rejected one counts as refused."""
-        point = self._position.step(contact, self.parameters)
+        lean = 0.0
+        if contact.cover:
+            along = self._body.cover_pose(self._joints, contact.cover).rotation[:, 0]
+            lean = math.asin(min(abs(float(direction @ along)), 1.0))
+        point = self._position.step(contact, command, lean, self.parameters)
         self.fallback = point.rejection
         if point.rejection and self.parameters.feedback == "contact_estimate":
             self.refused += not self._contact_rejected
@@ -258,9 +308,9 @@ class ForceLoop:
         self._contact_rejected = bool(point.rejection)
         return point
 
-    def _gain_factor(self, contact: Contact, direction: Triple | None, dt: float) -> float:
-        """The guard's factor of the gains; `direction` as in `Supervision.step`."""
-        factor, has_changed = self._supervision.step(self._joints, lambda: self._point(contact), direction, dt)
+    def _gain_factor(self, point: ForcePoint, direction: Triple | None, force: float, dt: float) -> float:
+        """The guard's factor of the gains; `direction` and `force` as in `Supervision.step`."""
+        factor, has_changed = self._supervision.step(self._joints, point, direction, force, dt)
         if has_changed:
             self._transfer.restart()
         return factor

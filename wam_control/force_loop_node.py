@@ -1,10 +1,13 @@
 """Node `force_loop`: the outer loop, forces and postures in, joint velocities and torques out."""
 
+import math
+
 from wam_control.contact_table import contact_of
-from wam_control.force_loop import ForceLoop, ForceLoopParameters
+from wam_control.force_hold import ForceReaction
+from wam_control.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.guard_report import Report
 from wam_description.arm import Shared
-from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Wrench
+from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Table, Wrench
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Followed, Input, Outputs, reaction
 
@@ -21,7 +24,9 @@ class ForceLoopNode:
         self.tune = self._loop.tune
         self.retune = self._loop.retune_servo
         self._covers = shared.arm.covers.names
-        self._reported: Report | None = None
+        self._timing = shared.timing
+        self._reported: tuple[Report, ForceReaction] | None = None
+        self._reaction = ForceReaction.NONE
 
     @reaction(
         Input("joint_states"),
@@ -37,6 +42,7 @@ class ForceLoopNode:
             "force_measured",
             "force_error",
             "force_error_limited",
+            "force_axis",
         ),
     )
     def step(self, inputs: Inputs) -> Outputs:
@@ -55,13 +61,13 @@ class ForceLoopNode:
             torque.effort if torque else None,
             inputs.dt,
         )
-        frame = command.frame if command else BASE
         return {
             "joint_velocity_command": State([], out.velocity, []),
             "joint_effort_command": State([], [], out.effort),
-            "force_measured": Wrench(frame, out.measured, ZERO),
-            "force_error": Wrench(frame, out.error, ZERO),
-            "force_error_limited": Wrench(frame, out.limited, ZERO),
+            "force_measured": Wrench(out.frame, out.measured, ZERO),
+            "force_error": Wrench(out.frame, out.error, ZERO),
+            "force_error_limited": Wrench(out.frame, out.limited, ZERO),
+            **self._force_axis(out, inputs.stamp),
             **self._status(),
         }
 
@@ -71,19 +77,38 @@ class ForceLoopNode:
         is_fed_back = self._loop.parameters.feedback == "contact_estimate"
         return frozenset({"external_joint_torques", "contact/hypotheses"} if is_fed_back else ())
 
-    def _status(self) -> Outputs:
-        """What the guard reports, where it has changed."""
-        report = self._loop.report
-        if report is self._reported:
+    def _force_axis(self, out: ForceOutput, stamp: int) -> Outputs:
+        """How well the force is known, at the display rate and where the reaction has changed."""
+        reaction, before = self._loop.reaction, self._reaction
+        self._reaction = reaction
+        if reaction is before and not self._timing.is_display(stamp):
             return {}
-        self._reported = report
-        level = Level.WARN if report.is_warning else Level.OK
-        return {"status": NodeStatus(level, report.message, facts=report.facts)}
+        axis, point = out.axis, out.point
+        if axis is None or point is None:
+            return {"force_axis": Table(BASE, ())}
+        lever = math.hypot(*axis.lever)
+        row = (float(reaction), axis.force_sd, out.sd_limit, lever, axis.apparent_mass, axis.speed_fraction)
+        return {"force_axis": Table(point.cover, ((*row, point.position, point.position_sd),))}
+
+    def _status(self) -> Outputs:
+        """What the guard reports and how the loop reacts, where it has changed."""
+        report, reaction = self._loop.report, self._loop.reaction
+        if self._reported is not None and report is self._reported[0] and reaction is self._reported[1]:
+            return {}
+        self._reported = report, reaction
+        message = self._loop.reason or report.message
+        level = Level.WARN if report.is_warning or self._loop.reason else Level.OK
+        return {"status": NodeStatus(level, message, facts={**report.facts, "reaction": reaction.name.lower()})}
 
     @property
     def refusals(self) -> dict[str, str]:
         """Why a present command or contact is not used, by topic."""
         return self._loop.refusals
+
+    @property
+    def reason(self) -> str:
+        """Why the loop does not do what is commanded, '' where it does."""
+        return self._loop.reason
 
     def diagnostics(self) -> dict[str, str]:
         """Why the estimated contact position is not used."""

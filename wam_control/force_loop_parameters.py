@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
+from wam_control.force_axis import SensingParameters
 from wam_control.force_law import ForceLaw
+from wam_control.motion_limits import LimitParameters
 from wam_control.sampled_loop import Feedback
 from wam_control.stability_guard import GuardedTask, GuardParameters
 from wam_description.arm import Arm
@@ -16,6 +18,8 @@ class ForceLoopParameters:
     """Gains and limits of the force loop."""
 
     guard: GuardParameters
+    sensing: SensingParameters
+    limits: LimitParameters
     mode: str = parameter(
         "hybrid: force along its direction, posture elsewhere; joint_torque: torque of each joint; "
         "open_loop: J^T F fed forward, no feedback",
@@ -95,6 +99,13 @@ class ForceLoopParameters:
     )
     spring_rest: tuple[float, ...] = parameter(
         "joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0, live=True
+    )
+    contact_source: str = parameter(
+        "where the force acts: estimated: at the estimated contact if it is certain enough, else as pinned; pinned: at "
+        "contact_position.  The torque of a force command in the frame of a cover pins the position in either case",
+        choices=("estimated", "pinned"),
+        live=True,
+        before="estimated",
     )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
     contact_position: float = parameter("contact position assumed along it", "m", low=0.0, high=3.0, live=True)

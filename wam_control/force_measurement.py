@@ -1,22 +1,19 @@
-"""The measured force F_c: of the arm on the world, from the feedback that the parameters choose."""
+"""The torques behind the measured force F_c, from the feedback that the parameters choose."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.contact_position import ForcePoint
 from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_control.stability_guard import SMALLEST_LEVER
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import Contact, State
+from wam_description.signals import State
 
 Array = NDArray[np.float64]
 
 
 class ForceMeasurement:
-    """External torques of the joints, their tare, and the force along a direction.
+    """External torques of the joints, and their tare.
 
     Attributes
     ----------
@@ -56,45 +53,19 @@ class ForceMeasurement:
             return np.array(parameters.spring_stiffness) * (np.array(parameters.spring_rest) - sensors.position)
         return self._body.gravity_torque(sensors.position) - np.array(sensors.effort)
 
-    def along(
-        self,
-        direction: Array,
-        q: Sequence[float],
-        jacobian: Array,
-        feedback: str,
-        contact: Contact,
-        point: ForcePoint,
-    ) -> float:
-        """Force of the arm on the world along a direction, N.
-
-        Parameters
-        ----------
-        direction : unit vector in the base frame (3,).
-        q : joint angles (n,), rad.
-        jacobian : of the point of action (3, n), m.
-        feedback : parameter of this name.
-        contact, point : estimated contact, and the point of action selected for it.
-        """
-        if feedback == "contact_estimate" and not contact.cover:
-            return 0.0
-        if feedback == "contact_estimate" and (math.isnan(contact.place) or not point.rejection):
-            return -float(direction @ (self._body.cover_pose(q, contact.cover).rotation @ np.array(contact.force)))
-        force = np.linalg.pinv(jacobian.T, rcond=SMALLEST_LEVER) @ self.external
-        return -float(direction @ force)
-
 
 class LowPass:
-    """First-order low pass that starts at its first input."""
+    """First-order low pass of several values that starts at its first input."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
         """Forget all inputs."""
-        self._value: float | None = None
+        self._value: Array | None = None
 
-    def step(self, value: float, time_constant: float, dt: float) -> tuple[float, float]:
-        """Filtered value now and one period before; `time_constant` and `dt` in s."""
+    def step(self, value: Array, time_constant: float, dt: float) -> tuple[Array, Array]:
+        """Filtered values now and one period before; `time_constant` and `dt` in s."""
         before = value if self._value is None else self._value
         self._value = value if self._value is None else before + (value - before) * dt / (dt + time_constant)
         return self._value, before

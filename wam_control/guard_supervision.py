@@ -1,6 +1,6 @@
 """The guard's part of the force loop: it admits a parameter set, and scales its gains while the arm moves."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from wam_control.contact_position import ForcePoint
@@ -45,7 +45,7 @@ class Supervision:
         self.force_law, self.torque_law = force_law(parameters), torque_law(parameters, arm.joints.names)
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None
-        self._guard = StabilityGuard(arm, servo, timing, parameters.guard)
+        self._guard = StabilityGuard(arm, servo, timing, parameters.guard, parameters.sensing)
         if parameters.guard.mode != "off" and parameters.mode != "open_loop":
             self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
         self._report()
@@ -54,12 +54,13 @@ class Supervision:
         guard, parameters = self._guard, self._parameters
         is_joints, mode = parameters.mode == "joint_torque", parameters.guard.mode
         task = task_of(parameters, self.torque_law if is_joints else self.force_law)
+        position_sd = 0.0 if parameters.contact_source == "pinned" else parameters.position_uncertainty_limit
         contacts = [
             contact
             for q in postures
-            for contact in guard.contacts(q, parameters.contact_cover, parameters.contact_position)
+            for contact in guard.contacts(q, parameters.contact_cover, parameters.contact_position, position_sd)
         ]
-        found = guard.assess(task, contacts)
+        found = guard.assess(task, contacts if is_joints else guard.sensed(contacts))
         if found.reason and found.stable_error and mode == "limit":
             limits = tuple(min(limit, found.stable_error) for limit in task.law.error_limit)
             task = task._replace(law=replace(task.law, error_limit=limits))
@@ -76,29 +77,33 @@ class Supervision:
         self.report = report(self.assessment, self.watch, parameters.guard.mode, parameters.mode == "joint_torque")
 
     def step(
-        self, q: tuple[float, ...], point: Callable[[], ForcePoint], direction: Triple | None, dt: float
+        self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float, dt: float
     ) -> tuple[float, bool]:
         """Factor of the gains in this period, and whether it has changed.
 
         Parameters
         ----------
         q : joint angles (n,), rad.
-        point : gives the point of action; called when a assessment is due.
+        point : of action.
         direction : of the force in the base frame (3,); None for both directions across the cover.
+        force : commanded, N.
         dt : outer period, s.
         """
         watch = self.watch
         if watch is None:
             return 1.0, False
-        has_changed = watch.step(lambda: self._contacts(q, point(), direction), dt)
+        has_changed = watch.step(lambda: self._contacts(q, point, direction, force), dt)
         if has_changed:
             self._report()
         return 1.0 if self._parameters.guard.mode == "warn" else watch.factor, has_changed
 
-    def _contacts(self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None) -> list[GuardedContact]:
+    def _contacts(
+        self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float
+    ) -> list[GuardedContact]:
         guard, covers = self._guard, self._covers
         if self._parameters.schedule == "position" and not point.is_certain:
             return possible_contacts(guard, q, point.cover, covers.length[covers.names.index(point.cover)])
         if direction is None:
-            return guard.contacts(q, point.cover, point.position)
-        return guard.with_lever(GuardedContact(q, point.cover, point.position, direction))
+            return guard.contacts(q, point.cover, point.position, point.position_sd)
+        contact = GuardedContact(q, point.cover, point.position, point.position_sd, direction, force)
+        return guard.sensed(guard.with_lever(contact))

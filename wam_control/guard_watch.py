@@ -12,8 +12,9 @@ import numpy as np
 from wam_control.stability_guard import LARGEST, GuardAssessment, GuardedContact, GuardedTask, StabilityGuard
 
 TURN = 0.1  # rad, of a joint or of the force direction, after which the loop is assessed again
-SHIFT = 0.02  # m, of the contact position, after which it is assessed again
-PARTS = (0.25, 0.5, 0.75, 1.0)  # of the required scale, all of which have to be stable
+SHIFT = 0.02  # m, of the contact position or its uncertainty, after which it is assessed again
+GROWTH = 1.5  # of the commanded force, after which it is assessed again
+PARTS = (0.02, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0)  # of the required scale, all of which have to be stable
 POSITIONS = (0.25, 0.5, 0.75, 1.0)  # of a cover's length, at which an uncertain contact may be
 
 
@@ -85,10 +86,12 @@ class Watch:
 
 def possible_contacts(guard: StabilityGuard, q: Sequence[float], cover: str, length: float) -> list[GuardedContact]:
     """Contacts at an unknown position: along the whole cover, `length` m, along both axes across it."""
-    return [contact for part in POSITIONS for contact in guard.contacts(q, cover, part * length)]
+    return [contact for part in POSITIONS for contact in guard.contacts(q, cover, part * length, 0.0)]
 
 
 def _is_apart(one: GuardedContact, other: GuardedContact) -> bool:
     turned = any(abs(a - b) > TURN for a, b in zip(one.q, other.q, strict=True))
     bent = any(abs(a - b) > TURN for a, b in zip(one.direction, other.direction, strict=True))
-    return turned or bent or one.cover != other.cover or abs(one.position - other.position) > SHIFT
+    shifted = max(abs(one.position - other.position), abs(one.position_sd - other.position_sd)) > SHIFT
+    grown = not one.force / GROWTH <= other.force <= one.force * GROWTH
+    return turned or bent or shifted or grown or one.cover != other.cover

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.stability_guard import REACH
+from wam_control.force_axis import ForceAxis
 
 Array = NDArray[np.float64]
 
@@ -15,27 +15,20 @@ def posture_velocity(posture: Sequence[float], q: Sequence[float], gain: float, 
     return [min(max(gain * (a - b), -limit), limit) for a, b in zip(posture, q, strict=True)]
 
 
-def hybrid_velocity(posture: Sequence[float], along: Array, speed: float, limit: float) -> list[float]:
-    """Joint velocities (n,), rad/s, that move the point of action at `speed` along the force.
+def hybrid_velocity(posture: Sequence[float], axis: ForceAxis, speed: float, limit: float) -> list[float]:
+    """Joint velocities (n,), rad/s, that move the point of action along the force.
 
     Parameters
     ----------
     posture : velocities towards the posture (n,), rad/s; only their part without motion along the force is used.
-    along : velocity along the force per joint velocity (n,), m.
-    speed : along the force, m/s.
+    axis : of the force; it has a lever.
+    speed : commanded along the force, m/s.
     limit : largest joint speed due to the force, rad/s.
     """
-    held = np.array(posture)
-    square = float(along @ along)
-    if square <= REACH * REACH:
-        return _list(held)
-    force = along * (speed / square)
+    held, lever = np.array(posture), axis.lever
+    force = axis.move * speed
     fastest = float(np.abs(force).max())
-    if fastest > limit:  # with a short lever a small speed needs a very fast joint
+    if fastest > limit:
         force *= limit / fastest
-    return _list(force + held - along * (float(along @ held) / square))
-
-
-def _list(values: Array) -> list[float]:
-    result: list[float] = values.tolist()
+    result: list[float] = (force + held - lever * (float(lever @ held) / float(lever @ lever))).tolist()
     return result

@@ -155,9 +155,8 @@ class MomentumObserver:
         if not (0.0 < dt < math.inf):
             return False
         position, velocity, effort = state
-        if not len(position) == len(velocity) == len(effort) == n or not math.isfinite(
-            math.fsum(map(abs, position)) + math.fsum(map(abs, velocity)) + math.fsum(map(abs, effort))
-        ):
+        finite = all(map(math.isfinite, (*position, *velocity, *effort)))
+        if not len(position) == len(velocity) == len(effort) == n or not finite:
             self._gap += dt
             return False
         if self._link_side:

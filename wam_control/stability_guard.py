@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.force_axis import REACH, ForceAxes, ForceAxis, SensingParameters
 from wam_control.force_law import ForceLaw
 from wam_control.friction_trial import stable_error
 from wam_control.friction_verdict import SOFTER, Domain, PredictedCycle, stiction_cycle
@@ -26,12 +27,11 @@ from wam_theory.linear_loop import series_stiffness
 from wam_theory.stick_slip import FrictionNode
 
 Array = NDArray[np.float64]
-SMALLEST_LEVER = 0.05  # relative singular value below which a direction of the force is neglected
 ESTIMATE = "contact_estimate"
 LARGEST = 10.0  # scale of the gains up to which a margin is searched
 SCALES: tuple[float, ...] = tuple(np.geomspace(0.01, LARGEST, 19).tolist())
 SLACK = 0.003  # the search for a margin ends within 0.2 %
-REACH = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
+FORCES = (1.0, 40.0)  # N, of commands at which parameters are assessed: the sensed force depends on them
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,22 @@ class GuardedTask(NamedTuple):
 
 
 class GuardedContact(NamedTuple):
-    """A contact: joint angles (n,), rad, cover, position along it, m, direction of the force (3,), base frame."""
+    """A contact, and the force commanded there.
+
+    Attributes
+    ----------
+    q : joint angles (n,), rad.
+    cover, position, position_sd : position along the cover and its standard deviation, m.
+    direction : of the force (3,), base frame.
+    force : commanded, N.
+    """
 
     q: tuple[float, ...]
     cover: str
     position: float
+    position_sd: float
     direction: tuple[float, float, float]
+    force: float
 
 
 class GuardAssessment(NamedTuple):
@@ -133,6 +143,7 @@ class StabilityGuard:
     servo : gains of the velocity loop.
     timing : periods of the loops, and the delay of the outer one.
     parameters : of the guard.
+    sensing : how the force is sensed.
 
     Raises
     ------
@@ -140,23 +151,40 @@ class StabilityGuard:
         where lists do not fit the arm.
     """
 
-    def __init__(self, arm: Arm, servo: Servo, timing: Timing, parameters: GuardParameters) -> None:
+    def __init__(
+        self, arm: Arm, servo: Servo, timing: Timing, parameters: GuardParameters, sensing: SensingParameters
+    ) -> None:
         lengths("guard", arm.joints.names, {"posture": parameters.posture})
         lengths("servo", arm.motors.names, vars(servo))
         self.parameters = parameters
         self._arm, self._timing = arm, timing
         self._loop = SampledLoop(arm, timing, servo)
+        self._sensing = sensing
+        self._force_axes = ForceAxes(arm, self._loop.body, sensing)
 
-    def contacts(self, q: Sequence[float], cover: str, position: float) -> list[GuardedContact]:
-        """Contacts at a position of a cover: along both axes across it, as far as they have a lever."""
+    def contacts(self, q: Sequence[float], cover: str, position: float, position_sd: float) -> list[GuardedContact]:
+        """Contacts at a position of a cover, m: along both axes across it, with a small and with a large force."""
         rotation = self._loop.body.cover_pose(q, cover).rotation
-        candidates = [GuardedContact(tuple(q), cover, position, _triple(rotation[:, axis])) for axis in (1, 2)]
+        candidates = [
+            GuardedContact(tuple(q), cover, position, position_sd, _triple(rotation[:, axis]), force)
+            for axis in (1, 2)
+            for force in FORCES
+        ]
         return [contact for each in candidates for contact in self.with_lever(each)]
 
     def with_lever(self, contact: GuardedContact) -> list[GuardedContact]:
         """The contact itself; nothing where its force has no lever on any joint."""
-        lever = self._levers(contact)
+        lever = self.axis(contact).lever
         return [contact] if float(lever @ lever) > REACH * REACH else []
+
+    def sensed(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
+        """Those contacts whose force is known well enough to be controlled."""
+        return [contact for contact in contacts if self.axis(contact).force_sd <= self._sensing.sd_limit(contact.force)]
+
+    def axis(self, contact: GuardedContact) -> ForceAxis:
+        """How the force loop senses the force of a contact, and moves along it."""
+        q, cover, position, position_sd, direction, force = contact
+        return self._force_axes.axis(q, cover, position, position_sd, np.array(direction), force)
 
     def scales(
         self, task: GuardedTask, contacts: Sequence[GuardedContact], tried: Sequence[float] = SCALES
@@ -208,7 +236,6 @@ class StabilityGuard:
         With the friction of the joints alone: the velocity loop encloses that of the rotors.
         """
         joints, loop = self._arm.joints, self._loop
-        lever = self._levers(contact)
         stiffness = self.parameters.contact_stiffness
         if task.is_joints:
             reach = np.zeros(len(joints.names))
@@ -216,7 +243,7 @@ class StabilityGuard:
             jacobian = loop.body.point_jacobian(contact.q, contact.cover, (contact.position, 0.0, 0.0))
             stiffness *= float(np.sum(jacobian[:, axis] ** 2))
         else:
-            reach = lever
+            reach = self.axis(contact).lever
         square = float(reach @ reach)
         inertia = loop.body.mass_matrix(contact.q) + loop.armature
 
@@ -296,23 +323,15 @@ class StabilityGuard:
         if task.is_joints:
             gains = np.array(law.gain), np.array(law.proportional_gain)
             return Axes(np.eye(n), np.eye(n), *gains, np.zeros((n, n)), 0.0, delay)
-        lever = self._levers(contact)
-        square = float(lever @ lever)
-        jacobian = self._loop.body.point_jacobian(contact.q, contact.cover, (contact.position, 0.0, 0.0))
-        sense = np.array(contact.direction) @ np.linalg.pinv(jacobian.T, rcond=SMALLEST_LEVER)
-        hold = task.hold_gain * (np.eye(n) - np.outer(lever, lever) / square)
+        axis = self.axis(contact)
+        lever = axis.lever
+        hold = task.hold_gain * (np.eye(n) - np.outer(lever, lever) / float(lever @ lever))
         gains = np.array([max(law.gain)]), np.array([max(law.proportional_gain)])
-        return Axes(sense[None], lever[:, None] / square, *gains, hold, task.filter_time, delay)
+        return Axes(axis.sense[None], axis.move[:, None], *gains, hold, task.filter_time, delay)
 
     def _stiffness(self, contact: GuardedContact) -> Array:
-        lever = self._levers(contact)
+        lever = self.axis(contact).lever
         return self.parameters.contact_stiffness * np.outer(lever, lever)
-
-    def _levers(self, contact: GuardedContact) -> Array:
-        """Torque on each joint per force along the direction, (n,), m."""
-        jacobian = self._loop.body.point_jacobian(contact.q, contact.cover, (contact.position, 0.0, 0.0))
-        result: Array = np.array(contact.direction) @ jacobian
-        return result
 
 
 def _lags(feedback: Feedback) -> list[Feedback]:

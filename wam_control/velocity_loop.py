@@ -9,6 +9,8 @@ from wam_control.servo_guard import ServoGuardParameters
 from wam_description.arm import Motors, Servo
 from wam_description.parameters import lengths, parameter
 
+DEAD = 0.02  # of the peak torque: a smaller one may be lost in the deadband of an amplifier, not in brakes
+
 
 @dataclass(frozen=True)
 class VelocityLoopParameters:
@@ -30,8 +32,8 @@ class VelocityLoop:
     tau = K_p e + K_i integral(e) + tau_ff, e = commanded minus measured velocity, clipped to the
     peak torque; i = tau/k_t.  The integral is frozen where it would only push further into a limit
     (anti-windup), and reset where the commanded torque does not act at all (brakes, fault), so that
-    an enabled arm starts without a jolt.  Commanded velocity and feed-forward follow their commands no faster than
-    their rate limits, from the measured velocity and from zero.
+    an enabled arm starts without a jolt.  It grows through the deadband of an amplifier.  Commanded velocity and
+    feed-forward follow their commands no faster than their rate limits, from the measured velocity and from zero.
     """
 
     def __init__(self, motors: Motors, servo: Servo, parameters: VelocityLoopParameters) -> None:
@@ -89,8 +91,8 @@ class VelocityLoop:
                 torque = carried
             else:
                 if tau_motor[i] == 0.0 and commanded[i] != 0.0:
-                    integral[i] = 0.0
                     self._velocity[i] = thetad[i]
+                    integral[i] *= abs(commanded[i]) <= DEAD * peak
                 velocity = self._velocity[i] = _toward(command[i], self._velocity[i], faster)
                 error = velocity - thetad[i]
                 torque = self._kp[i] * error + integral[i] + carried

@@ -44,11 +44,15 @@ class Table(NamedTuple):
 
 
 class ForceCommand(NamedTuple):
-    """Commanded force of the arm on the world; `frame` is 'base' or a cover."""
+    """Commanded force of the arm on the world; `frame` is 'base' or a cover.
+
+    In the frame of a cover a torque that is not zero pins where the force acts: it is that of the force about
+    the origin of the cover.
+    """
 
     frame: str
     force: Triple  # N
-    torque: Triple = ZERO  # N m; refused unless it is zero
+    torque: Triple = ZERO  # N m; pins the place, refused where it does not
 
 
 class Contact(NamedTuple):

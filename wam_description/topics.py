@@ -39,6 +39,17 @@ HYPOTHESIS_COLUMNS: Final = (
     "reasons",  # why the place is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact_inference.REASONS`
 )
 
+FORCE_AXIS_COLUMNS: Final = (
+    "reaction",  # number of `wam_control.force_hold.ForceReaction`: 0 where the command is obeyed
+    "force_sd",  # N, standard deviation of the measured force; infinite where the force has no lever
+    "force_sd_limit",  # N, above which the arm holds its position
+    "lever",  # m, size of the joint torques per force
+    "apparent_mass",  # kg, measured force per acceleration along the force
+    "speed_fraction",  # velocity along the force per commanded one, 0 to 1
+    "place",  # m along the cover where the force acts
+    "position_sd",  # m
+)
+
 
 # Magnitudes that no arm reaches, by quantity, also in an experiment without limits: a message with more is refused
 # whole.  What is computed from less stays finite.
@@ -137,6 +148,14 @@ TOPICS: Final = (
     ),
     Topic("force_error", WRENCH, "outer", "F_error = F_des - F_c before saturation, N"),
     Topic("force_error_limited", WRENCH, "outer", "F_error after saturation, N"),
+    Topic(
+        "force_axis",
+        TABLE,
+        "display",
+        "how well the commanded force can be measured and applied here, and what the force loop does; frame = the cover, "
+        "no row without a command; at once where the reaction changes; float64 columns: see docs/force.md",
+        columns=FORCE_AXIS_COLUMNS,
+    ),
     _joints("external_joint_torques", "outer", "effort = estimated torque of the world on the joints, N m"),
     _joints("external_joint_torques_sd", "outer", "effort = standard deviation of `external_joint_torques`, N m"),
     Topic(

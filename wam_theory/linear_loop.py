@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import polynomial
+from numpy.polynomial import chebyshev, polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from wam_theory.arguments import Array, above_zero, zero_or_more
@@ -201,6 +201,7 @@ def sampled_margin(
     earlier.  With P(z) z^d + g Q(z) the characteristic polynomial of the exactly discretised loop,
     the loop oscillates where Q/(P z^d) is real and negative on the unit circle; its imaginary part is
     sin(theta) times a polynomial in cos(theta), whose roots are all candidates apart from theta = pi.
+    It is kept as a Chebyshev series: in powers of the cosine the roots of a long delay are lost.
 
     Parameters
     ----------
@@ -228,8 +229,8 @@ def sampled_margin(
     for i, qi in enumerate(q):
         for k, pk in enumerate(p):
             if i != k:
-                condition = polynomial.polyadd(condition, math.copysign(1.0, i - k) * qi * pk * _sine_ratio(abs(i - k)))
-    roots = polynomial.polyroots(np.trim_zeros(condition, "b"))
+                condition = chebyshev.chebadd(condition, math.copysign(1.0, i - k) * qi * pk * _sine_ratio(abs(i - k)))
+    roots = chebyshev.chebroots(np.trim_zeros(condition, "b"))
     cosines = [r.real for r in roots if abs(r.imag) < 1e-7 and abs(r.real) < 1.0 - 1e-9]
     best = SampledMargin(math.inf, math.nan)
     for theta in [*map(math.acos, cosines), math.pi]:
@@ -252,8 +253,9 @@ def _held_loop(j: float, b: float, ktr: float, kc: float, period: float) -> tupl
 
 
 def _sine_ratio(n: int) -> Array:
-    """sin(n theta)/sin(theta) as a polynomial in cos(theta), ascending."""
-    before, now = np.zeros(1), np.ones(1)
-    for _ in range(n - 1):
-        before, now = now, np.asarray(polynomial.polysub(polynomial.polymulx(2.0 * now), before), dtype=float)
-    return now
+    """sin(n theta)/sin(theta) as a Chebyshev series in cos(theta), ascending."""
+    series = np.zeros(n)
+    series[n - 1 :: -2] = 2.0
+    if n % 2:
+        series[0] = 1.0
+    return series

@@ -17,6 +17,7 @@ from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 
 Numbers = NDArray[np.float64]
+TYPICAL = 10.0  # N, of a press
 
 
 class Guarded(NamedTuple):
@@ -59,10 +60,10 @@ def guarded(
     x, y, z = axis.tolist()
     law = force_law(loop)
     try:
-        guard = StabilityGuard(arm, servo, timing, parameters)
+        guard = StabilityGuard(arm, servo, timing, parameters, loop.sensing)
     except ParameterError:
         return None
-    touches = guard.with_lever(GuardedContact(tuple(q), cover, position, (x, y, z)))
+    touches = guard.with_lever(GuardedContact(tuple(q), cover, position, 0.0, (x, y, z), TYPICAL))
     if not touches or not any((*law.gain, *law.proportional_gain)):
         return None
     found = guard.assess(task_of(loop, law), touches)

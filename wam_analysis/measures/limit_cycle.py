@@ -14,6 +14,7 @@ Numbers = NDArray[np.float64]
 PHASES = 192  # of a cycle that are resolved, if there are enough samples
 LEAST = 8  # samples for each of them
 FEWEST = 3  # cycles that are needed
+GAP = 2.5  # periods between two samples from which some are missing
 ALIKE = 0.9  # of the highest correlation; the shortest lag that reaches it is the period, not a multiple
 
 
@@ -56,10 +57,10 @@ def limit_cycle(time: Numbers, value: Numbers) -> LimitCycle:
     Returns
     -------
     LimitCycle
-        with confidence 0 if nothing repeats at least three times.
+        with confidence 0 if nothing repeats at least three times, or the times have gaps.
     """
     n = len(value)
-    if n < 4 * FEWEST or float(np.ptp(value)) == 0.0:
+    if n < 4 * FEWEST or float(np.ptp(value)) == 0.0 or _has_gaps(time):
         return NO_CYCLE
     seconds = float(time[-1] - time[0]) / (n - 1)
     centre = np.linspace(-1.0, 1.0, n)
@@ -83,6 +84,12 @@ def limit_cycle(time: Numbers, value: Numbers) -> LimitCycle:
         growth=growth,
         shape=np.roll(folded.shape, -int(np.argmin(folded.shape))) + float(np.mean(value)),
     )
+
+
+def _has_gaps(time: Numbers) -> bool:
+    """Whether samples are missing, so that a number of samples is no time."""
+    steps = np.diff(time)
+    return bool(steps.max() > GAP * float(np.median(steps)))
 
 
 class CycleExtent(NamedTuple):

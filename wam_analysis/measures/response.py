@@ -21,7 +21,8 @@ class StepResponse(NamedTuple):
     ----------
     final : mean of the steady end.
     rise : from 10 % to 90 % of the way to `final`, s; NaN if it does not get there.
-    settling : until the signal stays within the band about `final`, s; infinite if it never does.
+    settling : until the signal stays within the band about `final`, s; infinite if it leaves the band in the
+        steady end.
     overshoot : largest excess over `final` as a fraction of the step, 0 if there is none.
     peak_time : of the largest excess, s; NaN if there is none.
     ripple : half of the range in the steady end.
@@ -69,8 +70,8 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
     outside = np.flatnonzero(np.abs(part - 1.0) > band)
     if not len(outside):
         settling = 0.0
-    elif outside[-1] == len(part) - 1:
-        settling = math.inf
+    elif time[outside[-1]] >= time[-1] - steady:
+        settling = math.inf  # what leaves the band in the steady end has not settled, wherever the recording stops
     else:
         settling = _between(time, np.abs(part - 1.0), int(outside[-1]), band)
     return StepResponse(

@@ -11,7 +11,7 @@ Numbers = NDArray[np.float64]
 
 TRANSIENT = 2  # first peaks, which are not conclusive: gamma 1.5 gives 4.00, 2.70, 2.94, 3.06, 3.24 ... and diverges
 FEWEST = 3  # further peaks that a trend needs
-STEADY = 0.01  # growth per half cycle below which the amplitude is constant
+STEADY = 0.002  # growth per half cycle below which the amplitude is constant
 FLATTENED = 0.3  # of the earlier decay; a response whose decay is slower goes to a cycle, not to rest
 
 

@@ -109,8 +109,8 @@ def margin_with_servo(run: Recording) -> float:
     parameters = run.node("force_loop", ForceLoopParameters)
     servo = run.part("velocity_loop", "servo", Servo)
     guard = replace(parameters.guard, extra_delay=0)
-    found = StabilityGuard(run.shared.arm, servo, run.shared.timing, guard)
-    touches = found.contacts(guard.posture, parameters.contact_cover, parameters.contact_position)
+    found = StabilityGuard(run.shared.arm, servo, run.shared.timing, guard, parameters.sensing)
+    touches = found.contacts(guard.posture, parameters.contact_cover, parameters.contact_position, 0.0)
     law = force_law(parameters)
     return law.gain[ACROSS] * found.assess(task_of(parameters, law), touches).scale
 

@@ -33,8 +33,6 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
     run = runs["chirp"]
     found, low, high = transfer(run), *swept(run)
     gain = 1.0 / np.abs(found.inverse)
-    arm = run.shared.arm
-    static = 1.0 / (arm.joint_from_motor[0] * joint_stiffness(run))
     inside = (found.frequency > low) & (found.frequency < high)
     lowest = inside & (found.frequency < 2.0 * low)
     predicted = np.abs(response_of(run, found.frequency))
@@ -42,8 +40,8 @@ def frequency_response(runs: Mapping[str, Recording]) -> Result:
         *_resonance_rows(run, found),
         Comparison(
             f"joint angle per motor torque, {low:g} to {2.0 * low:g} Hz",
-            static,
-            float(np.median(gain[lowest] * (static / predicted[lowest]))),
+            float(np.median(predicted[lowest])),
+            float(np.median(gain[lowest])),
             "rad/(N m)",
             WITHIN,
             "(4.3)",

@@ -1,0 +1,157 @@
+"""One direction of force at one place of the arm: how it is sensed, how the arm moves along it, how well.
+
+Shared by the force loop and its guard.  Torques of the world on the joints are tau = -(l f + J' P t + l' f dx) + e:
+the force f along the direction u with its lever l = J'u, tangential forces t (P = I - u u'), an error dx of the place,
+whose lever changes by l' per metre, and an error e of the torques.  With e, t and dx as random numbers of
+known size, f is sensed by generalised least squares, without shrinkage (s.l = 1).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.arm import Arm
+from wam_description.parameters import parameter
+from wam_description.rigid_body import RigidBody
+
+Array = NDArray[np.float64]
+REACH = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
+ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
+SMALLEST_FORCE = 1.0  # N, for the size of tangential forces
+
+
+@dataclass(frozen=True)
+class SensingParameters:
+    """What disturbs the measured force, and how well it has to be known."""
+
+    torque_sd: float = parameter(
+        "sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, live=True, before=0.1
+    )
+    friction: float = parameter(
+        "sd of the tangential force on the link, per commanded force", low=0.0, high=2.0, live=True, before=0.0
+    )
+    force_sd_limit: float = parameter(
+        "standard deviation of the measured force up to which any force is controlled; where it is larger, and larger "
+        "than force_sd_fraction, the arm holds its position",
+        "N",
+        low=0.0,
+        high=1e9,
+        live=True,
+        before=1e9,
+    )
+    force_sd_fraction: float = parameter(
+        "standard deviation of the measured force, per commanded force, up to which it is controlled",
+        low=0.0,
+        high=1.0,
+        live=True,
+        before=0.0,
+    )
+    apparent_mass_limit: float = parameter(
+        "largest mass of the arm that the loop may see in the measured force; the motion along directions in which it "
+        "is larger is slowed down; 0: no limit",
+        "kg",
+        low=0.0,
+        high=1e6,
+        live=True,
+        before=0.0,
+    )
+
+    def sd_limit(self, force: float) -> float:
+        """Largest standard deviation, N, with which a commanded force, N, is controlled."""
+        return max(self.force_sd_limit, self.force_sd_fraction * force)
+
+
+class ForceAxis(NamedTuple):
+    """A direction of force at a place of the arm.
+
+    Attributes
+    ----------
+    lever : torque on each joint per force (n,), m.
+    sense : force per torque on each joint (n,), 1/m; sense @ lever is 1.
+    move : joint velocity per commanded velocity along the direction (n,), 1/m.
+    force_sd : standard deviation of the sensed force, N; infinite where the force has no lever.
+    apparent_mass : sensed force per acceleration along the direction, kg.
+    impact_mass : mass that hits a surface, with rotors, as the arm moves along the direction, kg.
+    speed_fraction : velocity along the direction per commanded one, 0 to 1.
+    precision : (n, n), inverse covariance of the torques apart from the force, 1/(N m)^2.
+    """
+
+    lever: Array
+    sense: Array
+    move: Array
+    force_sd: float
+    apparent_mass: float
+    impact_mass: float
+    speed_fraction: float
+    precision: Array
+
+    def unexplained(self, torques: Array) -> float:
+        """chi^2 of torques of the world on the joints (n,), N m, that no force along the direction explains."""
+        weighted = self.precision @ torques
+        force = float(self.sense @ torques)
+        return float(torques @ weighted) - force * force / (self.force_sd * self.force_sd)
+
+
+class ForceAxes:
+    """Makes the axes of one arm.
+
+    Parameters
+    ----------
+    arm : the arm as the controller knows it.
+    body : its kinematics and dynamics.
+    parameters : of sensing.
+    """
+
+    def __init__(self, arm: Arm, body: RigidBody, parameters: SensingParameters) -> None:
+        self._body, self._covers, self._parameters = body, arm.covers, parameters
+        n = len(arm.joints.names)
+        motor_from_joint = np.linalg.inv(np.reshape(arm.joint_from_motor, (n, n)))
+        self._armature = np.diag(arm.joints.armature)
+        self._rotors = motor_from_joint.T @ (np.array(arm.motors.inertia)[:, None] * motor_from_joint)
+
+    def axis(
+        self, q: Sequence[float], cover: str, position: float, position_sd: float, direction: Array, force: float
+    ) -> ForceAxis:
+        """The axis of a force at a contact.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        cover, position, position_sd : where the force acts, m along the cover, and how uncertain that is, m.
+        direction : unit vector of the force of the arm on the world (3,), base frame.
+        force : commanded force, N, to which tangential forces are proportional.
+        """
+        parameters, covers = self._parameters, self._covers
+        n = len(q)
+        rotation = self._body.cover_pose(q, cover).rotation
+        normal = rotation.T @ direction
+        # friction acts at the surface, one radius off the axis of the tube
+        point = np.array([position, *covers.aside(cover, position)])
+        point += covers.radius[covers.names.index(cover)] * normal
+        jacobian = self._body.point_jacobian(q, cover, point)
+        lever: Array = direction @ jacobian
+        square = float(lever @ lever)
+        if square <= REACH * REACH:
+            zero = np.zeros(n)
+            return ForceAxis(lever, zero, zero, math.inf, math.inf, math.inf, 0.0, np.zeros((n, n)))
+        size = max(force, SMALLEST_FORCE)
+        tangential = parameters.friction * size * (jacobian - np.outer(direction, lever))
+        shifted = direction @ (self._body.point_jacobian(q, cover, point + ALONG) - jacobian)
+        shifted *= position_sd * size
+        spread = parameters.torque_sd**2 * np.eye(n) + tangential.T @ tangential + np.outer(shifted, shifted)
+        inverse = np.asarray(np.linalg.inv(spread), np.float64)
+        weighted = inverse @ lever
+        precision = float(lever @ weighted)
+        sense: Array = weighted / precision
+        inertia = self._body.mass_matrix(q) + self._armature
+        mass = float(sense @ inertia @ lever) / square
+        impact = float(lever @ (inertia + self._rotors) @ lever) / (square * square)
+        damped = square
+        if parameters.apparent_mass_limit:
+            damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
+        sd = 1.0 / math.sqrt(precision)
+        return ForceAxis(lever, sense, lever / damped, sd, mass, impact, square / damped, inverse)

@@ -1,0 +1,141 @@
+"""Limits of the commanded joint velocities: near the ends of the joints, and where the world pushes back too hard."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.arm import Arm
+from wam_description.parameters import parameter
+from wam_description.rigid_body import RigidBody
+
+Array = NDArray[np.float64]
+PUSH_BACK = 0.3  # rad/s, at which a joint beyond its end is brought back, at most
+BEGIN = 0.9  # of the largest contact force, from which motion against it is slowed down
+
+
+@dataclass(frozen=True)
+class LimitParameters:
+    """Where the force loop stops the arm."""
+
+    joint_gain: float = parameter(
+        "largest speed of a joint per distance from where it has to stop; 0: the ends of the joints are not watched",
+        "1/s",
+        low=0.0,
+        high=100.0,
+        live=True,
+        before=0.0,
+    )
+    joint_margin: float = parameter(
+        "distance from the end of a joint at which it has to stop", "rad", low=0.0, high=1.0, live=True, before=0.0
+    )
+    contact_force: float = parameter(
+        "largest force on the arm, as far as the joints measure it; above it the arm does not move against it",
+        "N",
+        low=0.0,
+        high=1e9,
+        live=True,
+        before=1e9,
+    )
+    impact: float = parameter(
+        "predicted peak of the impact (3.1) on a surface of guard.contact_stiffness, per commanded force: it limits "
+        "the speed along the force until something is touched; 0: no limit",
+        low=0.0,
+        high=1e3,
+        live=True,
+        before=0.0,
+    )
+    settling_time: float = parameter(
+        "time after which a force that is still not reached is reported", "s", low=0.0, high=1e9, live=True, before=1e9
+    )
+    free_travel: float = parameter(
+        "largest way along a commanded force without touching anything; then the arm holds its position",
+        "m",
+        low=0.0,
+        high=1e9,
+        live=True,
+        before=1e9,
+    )
+
+
+class Limited(NamedTuple):
+    """Joint velocities (n,), rad/s, and why they are less than commanded, '' where they are not."""
+
+    velocity: list[float]
+    joint_end: str
+    contact_force: str
+
+
+class MotionLimits:
+    """Limits the velocities of one arm.
+
+    Parameters
+    ----------
+    arm : the arm as the controller knows it.
+    body : its kinematics.
+    parameters : the limits.
+    """
+
+    def __init__(self, arm: Arm, body: RigidBody, parameters: LimitParameters) -> None:
+        self._joints, self._body, self._parameters = arm.joints, body, parameters
+
+    def step(self, velocity: Sequence[float], q: Sequence[float], external: Array) -> Limited:
+        """Limit commanded velocities.
+
+        Parameters
+        ----------
+        velocity : commanded (n,), rad/s; empty for torque only, which is not limited.
+        q : joint angles (n,), rad.
+        external : torques of the world on the joints (n,), N m.
+        """
+        if not velocity:
+            return Limited([], "", "")
+        slowed, force = self._against_the_world(list(velocity), q, external)
+        stopped, end = self._before_the_ends(slowed, q)
+        return Limited(stopped, end, force)
+
+    def _against_the_world(self, velocity: list[float], q: Sequence[float], external: Array) -> tuple[list[float], str]:
+        """Without the part that does work on the world, where its force is above the limit."""
+        most = self._parameters.contact_force
+        force = least_force(self._body, q, external)
+        power = float(external @ velocity)
+        if force <= BEGIN * most or power >= 0.0:
+            return velocity, ""
+        part = min((force - BEGIN * most) / max((1.0 - BEGIN) * most, 1e-9), 1.0)
+        slowed: list[float] = (np.array(velocity) - part * power / float(external @ external) * external).tolist()
+        reason = (
+            f"the world pushes with at least {force:.3g} N; allowed: limits.contact_force, {most:g} N; "
+            "the arm does not move against it: command a posture away from it, or less force"
+        )
+        return slowed, reason if part >= 1.0 else ""
+
+    def _before_the_ends(self, velocity: list[float], q: Sequence[float]) -> tuple[list[float], str]:
+        gain, margin = self._parameters.joint_gain, self._parameters.joint_margin
+        if not gain:
+            return velocity, ""
+        joints, reason, limited = self._joints, "", []
+        for name, low, angle, high, speed in zip(joints.names, joints.lower, q, joints.upper, velocity, strict=True):
+            slowest, fastest = -_approach(angle - low, gain, margin), _approach(high - angle, gain, margin)
+            limited.append(min(max(speed, slowest), fastest))
+            end = low if speed < slowest else high
+            if limited[-1] != speed and abs(angle - end) <= margin + PUSH_BACK / gain:
+                reason = (
+                    f"{name} is at {angle:.4g} rad, its end is {end:.4g} rad and limits.joint_margin {margin:g} rad: "
+                    "it does not move on; command another posture or direction"
+                )
+        return limited, reason
+
+
+def _approach(distance: float, gain: float, margin: float) -> float:
+    """Largest speed towards an end at this distance, rad/s; beyond the end negative, back from it."""
+    if distance < 0.0:
+        return max(gain * distance, -PUSH_BACK)
+    return gain * max(distance - margin, 0.0)
+
+
+def least_force(body: RigidBody, q: Sequence[float], external: Array) -> float:
+    """Smallest force at the tool that gives external torques of this size, N; a force nearer to the base is larger."""
+    largest = float(np.linalg.norm(body.tool_jacobian(q), 2))
+    return float(np.linalg.norm(external)) / largest if largest > 0.0 else 0.0
