@@ -181,10 +181,10 @@ def test_a_node_that_ends_is_an_escape_and_the_next_trial_has_all_nodes(domain_i
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="the stack is not yet safe from all of these faults", strict=False)
-def test_nothing_escapes_in_the_short_form(domain_id: int, capsys: Any) -> None:
+def test_nothing_escapes_in_the_short_form(domain_id: int, capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from wam_cli.main import main
 
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
     with pytest.raises(SystemExit) as end:
         main(["evaluate", "faults", "--short", "--seed", "1"])
     assert end.value.code == 0, capsys.readouterr().out

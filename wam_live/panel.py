@@ -74,9 +74,7 @@ class Controls:
         if live is not None:
             self._add_buttons()
             self._add_press(arm)
-        self._force_plot = self._add_plot(
-            "force [N]", ("commanded", "measured", "estimated", "true"), {"auto": True}
-        )
+        self._force_plot = self._add_plot("force [N]", ("commanded", "measured", "estimated", "true"), {"auto": True})
         self._place_plot = self._add_plot(
             "position along the link [m]", ("estimated", "true"), {"auto": False, "range": (0.0, max(arm.covers.end))}
         )

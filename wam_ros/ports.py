@@ -102,7 +102,8 @@ class Ports:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._readiness = node.create_timer(0.02, self._look_for_peers, clock=steady)
         node.create_timer(CLAIM_PERIOD, self._look_for_rivals, clock=steady)
-        node.create_timer(1.0, self._report_standstill, clock=steady)
+        if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
+            node.create_timer(1.0, self._report_standstill, clock=steady)
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
@@ -318,14 +319,11 @@ class Ports:
         self._publish_report(level, self._status.message, more)
 
     def _report_standstill(self) -> None:
-        """Once in a second of the wall clock: report where the node has had nothing to do for long.
-
-        In lockstep a node that waits for its start is silent: how long that takes is not the arm's time.
-        """
+        """Once in a second of the wall clock: report where the node has had nothing to do for long."""
         steps = self.counts["steps"]
         self._seconds_without_step = 0 if steps != self._last_steps else self._seconds_without_step + 1
         self._last_steps = steps
-        if self._seconds_without_step >= STALE_AFTER and (steps or self.shared.timing.mode == "realtime"):
+        if self._seconds_without_step >= STALE_AFTER:
             reason = f"no step for {self._seconds_without_step} s" if self.ready else self._status.message
             self._publish_report(Level.STALE, reason, {})
 
