@@ -18,6 +18,7 @@ import pytest
 import yaml
 from conftest import LONG, soon
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
@@ -569,3 +570,14 @@ def test_every_message_that_the_stack_publishes_is_in_the_bag(
     recorded = {name: topic.messages for name, topic in contents(tmp_path / "bag").topics.items()}
     assert published["/wam/motor_states"] == 301
     assert {name: published[name] for name in recorded} == recorded
+
+
+def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(tmp_path: Path) -> None:
+    states, push = BY_NAME["motor_states"], BY_NAME["sim/disturbance"]
+    names = {"/wam/motor_states": states, "/wam/sim/disturbance": push}
+    offered = {name: qos(row) for name, row in names.items()}
+    machine = Recorder(BagWriter(tmp_path / "bag"), names, "lockstep", offered, lambda name: "", "/wam")
+    machine.receive("/wam/motor_states", serialize_message(JointState(header=header(5_000_000))), 1, 1, 1)
+    machine.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
+    machine.finish()
+    assert read(tmp_path / "bag").topics["/wam/sim/disturbance"].log_time_ns.tolist() == [5_000_000]

@@ -81,7 +81,10 @@ class Processes:
     Attributes
     ----------
     killed : nodes that did not end by themselves.
+    bag_failure : after the end, why the bag is not whole; '' where it is, or where nothing was recorded.
     """
+
+    bag_failure = ""
 
     def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
         names = node_names(configuration)
@@ -130,6 +133,8 @@ class Processes:
                 self._wait_until(name, deadline)
         self._terminate(LAST)
         self._wait_for_recorder()
+        if code := self.ended().get(LAST):
+            self.bag_failure = f"the recorder ended with code {code}; what it wrote may lack messages"
         self._stack.close()
 
     def _terminate(self, name: str) -> None:
@@ -208,6 +213,7 @@ class Composition:
     """
 
     killed: tuple[str, ...] = ()
+    bag_failure = ""
 
     def __init__(
         self,
@@ -270,5 +276,7 @@ class Composition:
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last."""
         names = {node: name for name, node in self.nodes.items()}
+        recorder = self.nodes.get(LAST)
         self._connection.close(lambda node: (names[node] == LAST) - (names[node] == FIRST))
+        self.bag_failure = str(getattr(recorder, "failure", ""))
         self.nodes.clear()

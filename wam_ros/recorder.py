@@ -140,6 +140,7 @@ class Recorder:
         self._bag = bag
         self._lockstep = mode == "lockstep"
         self._stamps: dict[str, int] = {}
+        self._newest = 0  # stamp of all, ns
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, qos[name])
@@ -167,6 +168,9 @@ class Recorder:
         channel.numbering(publisher).add(number)
         if self._lockstep:
             stamp = channel.stamp_of(data)
+            if stamp == 0 and channel.topic.is_numbers:  # sent by hand without a stamp: it came with the newest state
+                stamp = self._newest
+            self._newest = max(self._newest, stamp or 0)
             if stamp is None:
                 stamp = self._stamps.get(publisher, 0)
             else:

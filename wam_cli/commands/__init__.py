@@ -6,6 +6,7 @@ Here is what several of them take.
 import argparse
 import math
 import os
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
@@ -19,6 +20,22 @@ from wam_sim.pieces import default_folder
 from wam_sim.progress import Progress
 
 BASE_CONFIGURATION = "wam"
+
+
+def namespace(text: str) -> str:
+    """The namespace of an arm, as an option takes it.
+
+    Raises
+    ------
+    ArgumentTypeError
+        where ROS would not take it.
+    """
+    inner = text.strip("/")
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", inner):
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is no namespace; give words of letters, digits and '_' that begin with no digit, joined by '/'"
+        )
+    return inner
 
 
 def take_configuration(parser: argparse.ArgumentParser) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 
+from wam_cli.commands import namespace
 from wam_ros.call import call
 
 REQUESTS = {  # node, service, and the value where it is a switch
@@ -17,7 +18,7 @@ REQUESTS = {  # node, service, and the value where it is a switch
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("request", choices=tuple(REQUESTS))
-    parser.add_argument("--namespace", default="wam", help="namespace of the stack; default: wam")
+    parser.add_argument("--namespace", type=namespace, default="wam", help="namespace of the stack; default: wam")
 
 
 def run(given: argparse.Namespace) -> int:

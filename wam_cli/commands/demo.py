@@ -54,6 +54,8 @@ def run(given: argparse.Namespace) -> int:
         if not ended and not stop.is_set:
             failures = [f"not ready within {LONGEST_START:g} s: {driver.awaited}"]
         close_page()
+    if stack.bag_failure:
+        failures = [*failures, stack.bag_failure]
     if stop.is_set:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from wam_cli.commands import namespace
 from wam_live.page import PORT, NoPageError, needing_viser, obstacle
 from wam_ros.run import NAMESPACE, PARENT, Stop, die_with_parent
 
@@ -16,7 +17,7 @@ PATIENCE: Final = 1.0  # s, in which a page ends by itself
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("--namespace", default=NAMESPACE, help="of the stack; default: %(default)s")
+    parser.add_argument("--namespace", type=namespace, default=NAMESPACE, help="of the stack; default: %(default)s")
     take_port(parser)
     parser.epilog = "Needs viser: pip install 'wam_stack[live]'.  The page is reachable from this machine alone."
 

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from wam_cli.commands import configuration_of, take_configuration
+from wam_cli.commands import configuration_of, namespace, take_configuration
 from wam_cli.commands.live import page_beside, take_page
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import start
@@ -18,7 +18,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mode", choices=("realtime", "lockstep"), help=argparse.SUPPRESS)  # what it was called before
     parser.add_argument("--scenario", default="", help="play this scenario: a YAML file, or demo_scenario")
     parser.add_argument("--record", action="store_true", help="record every topic")
-    parser.add_argument("--namespace", default=NAMESPACE, help="namespace of the nodes; default: %(default)s")
+    parser.add_argument(
+        "--namespace", type=namespace, default=NAMESPACE, help="namespace of the nodes; default: %(default)s"
+    )
     take_page(parser, default=False)
     take_configuration(parser)
 
@@ -96,4 +98,6 @@ def run(given: argparse.Namespace) -> int:
             print(f"node {node} has ended; all were stopped")
     for failure in failures:
         print(f"error: {failure}; all were stopped", file=sys.stderr)
-    return max([abs(code) for code in ended.values()], default=0) or int(bool(stack.killed))
+    if stack.bag_failure:
+        print(f"error: {stack.bag_failure}", file=sys.stderr)
+    return max([abs(code) for code in ended.values()], default=0) or int(bool(stack.killed or stack.bag_failure))
