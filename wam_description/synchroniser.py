@@ -225,7 +225,7 @@ class Synchroniser:
         if 0 < self._last < stamp - limit_ns:
             raise OutOfTime(
                 f"stamp {stamp} ns is {seconds(stamp - self._last):.3g} s ahead of the newest state, {self._last} ns; "
-                "give a command the stamp of the state that it answers"
+                "give a command the stamp of the state that it answers; between nodes of the stack, this one is late"
             )
 
     def _has_jumped(self, stamp: int) -> bool:
