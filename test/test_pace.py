@@ -151,7 +151,7 @@ def test_a_period_passes_when_the_state_is_answered_and_the_next_is_due() -> Non
 STOPPED = [
     (["gravity", "velocity_loop"], "check that velocity_loop runs"),
     (["velocity_loop"], "gravity has stopped, start it again, then reset_fault"),
-    ([], "gravity and velocity_loop have stopped, start it again, then reset_fault"),
+    ([], "gravity, velocity_loop has stopped, start it again, then reset_fault"),
 ]
 
 

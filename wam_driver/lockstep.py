@@ -120,13 +120,13 @@ class Lockstep:
             self._one_period()
 
     def _overdue(self, missing: list[str]) -> str:
-        topics, silent = " and ".join(missing), " and ".join(self._session.silent)
+        topics, silent = " and ".join(missing), ", ".join(self._session.silent)
         senders = " and ".join(self._senders[topic] for topic in missing)
         stamp, limit = self._driver.stamp, self._timing.timeout
         if silent:
             return (
                 f"lockstep: no {topics} for the state of {stamp} ns within {limit:.1f} s; "
-                f"{silent} {'have' if ' and ' in silent else 'has'} stopped, start it again, then reset_fault"
+                f"{silent} has stopped, start it again, then reset_fault"
             )
         return f"lockstep: no {topics} for the state of {stamp} ns within {limit:.1f} s; check that {senders} runs"
 

@@ -142,11 +142,10 @@ class AdaptedNode(TolerantNode):
             self._ports.set_problem("inputs", "")
         elif not self._ports.problems.get("inputs"):
             lost = [topic for topic, age in ages.items() if age > 0.5]  # what stopped together is not lost together
-            silent = " and ".join(self._interface.silent(lost, [topic for topic in ages if topic not in lost]))
+            silent = ", ".join(self._interface.silent(lost, [topic for topic in ages if topic not in lost]))
             self._ports.set_problem(
                 "inputs",
-                f"{silent} {'have' if ' and ' in silent else 'has'} stopped: {' and '.join(lost)} too old; "
-                f"start {silent} again, then reset_fault",
+                f"{silent} has stopped: {' and '.join(lost)} too old; start {silent} again, then reset_fault",
             )
         elif self._ports.counts["steps"] % REPEATED == 0:
             self._ports.repeat_status()
