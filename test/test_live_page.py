@@ -362,7 +362,7 @@ FLAGS = (
     "--disable-sync", "--disable-dev-shm-usage", "--remote-allow-origins=*", "--window-size=1280,800",
 )  # fmt: skip
 
-SLOWEST = 4.0  # frames a second, with which a drag by the mouse still works
+SLOWEST = 2.5  # frames a second, with which a drag by the mouse still works
 PATIENCE = 100.0  # s
 
 

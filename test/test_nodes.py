@@ -466,7 +466,7 @@ def test_every_command_carries_the_stamp_of_the_state_that_caused_it(mode: str, 
 
 
 def test_lockstep_goes_on_after_a_node_was_restarted(ros: Any, tmp_path: Path) -> None:
-    configured = changed(SIX, timing__mode="lockstep", timing__real_time_factor=0.0, timing__timeout=0.3)
+    configured = changed(SIX, timing__mode="lockstep", timing__real_time_factor=0.0, timing__timeout=3.0)
     nodes = {name: make(ros, tmp_path, name, "/wam", configured) for name in SIX if name != "velocity_loop"}
     driver, time = nodes["driver"].driver, nodes["driver"].time
 
