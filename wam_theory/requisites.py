@@ -81,6 +81,7 @@ class Measures:
     steady_force : continuous force at any point of the links in any pose, N.
     steady_force_required : by the thesis, N.
     least_force : force at the tip masked by dry friction, N.
+    cycle_force : greatest stiction cycle of a force loop, (5.8) at the tip, peak to peak, N; zero without stiction.
     friction_share : dry friction of each joint over its peak torque.
     friction_required : by the thesis, of each joint.
     impact_speed : speed limit of the tip, m/s.
@@ -107,6 +108,7 @@ class Measures:
     steady_force: float
     steady_force_required: float
     least_force: float
+    cycle_force: float
     friction_share: tuple[float, ...]
     friction_required: tuple[float, ...]
     impact_speed: float
@@ -127,8 +129,10 @@ class Measures:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = np.asarray(getattr(self, field.name))
-            if not np.all(np.isfinite(value) & (value > 0.0)):
-                raise ValueError(f"{field.name} is {getattr(self, field.name)!r}; it must be finite and above zero")
+            least = "zero or more" if field.name == "cycle_force" else "above zero"
+            allowed = value >= 0.0 if field.name == "cycle_force" else value > 0.0
+            if not np.all(np.isfinite(value) & allowed):
+                raise ValueError(f"{field.name} is {getattr(self, field.name)!r}; it must be finite and {least}")
 
 
 class Requisite(NamedTuple):
@@ -229,6 +233,13 @@ def _dynamic_range(m: Measures) -> list[Requisite]:
             name,
             "steady force over force masked by friction, open loop",
             m.steady_force / m.least_force,
+            "",
+            source="3.2.1",
+        ),
+        _row(
+            name,
+            "steady force over the largest stiction cycle (5.8), force feedback",
+            m.steady_force / m.cycle_force if m.cycle_force else math.inf,
             "",
             source="3.2.1",
         ),

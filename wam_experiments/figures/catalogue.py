@@ -6,8 +6,18 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wam_analysis.table import markdown
-from wam_experiments.figures import bandwidth, cables, links, responses, stability
+from wam_experiments.figures import (
+    backdrivability,
+    backdrivability_drawing,
+    bandwidth,
+    cables,
+    friction_claims,
+    links,
+    responses,
+    stability,
+)
 from wam_experiments.figures import force_control_drawings as force_control
+from wam_experiments.figures import friction_claim_drawings as in_words
 from wam_experiments.figures import transmission_drawings as transmission
 from wam_experiments.figures.series import Series
 from wam_sim import batch
@@ -49,9 +59,30 @@ def _bound_distance(numbers: stability.StabilityBound) -> dict[str, float]:
     return {"bound": numbers.bound.relative_distance}
 
 
+def _start_distance(numbers: friction_claims.AsymmetricStart) -> dict[str, float]:
+    return {
+        "asymmetry": max(series.distance for series in numbers.asymmetry),
+        "period": max(series.distance for series in numbers.period),
+    }
+
+
+def _harmonics_distance(numbers: friction_claims.HarmonicsOfFriction) -> dict[str, float]:
+    return {"shares": max(series.relative_distance for series in numbers.shares)}
+
+
+def _kept_contact_distance(numbers: friction_claims.KeptContact) -> dict[str, float]:
+    return {"step down": max(series.relative_distance for series in numbers.series)}
+
+
 FIGURES: dict[str, ThesisFigure] = {
     "3.1": ThesisFigure(
         "Effect of aspect ratio on available contact length.", links.grasp, transmission.draw_grasp, _no_plant
+    ),
+    "3.2.6": ThesisFigure(
+        "Backdriven inertia and friction with 2 kg over the workspace.",
+        backdrivability.backdrivability,
+        backdrivability_drawing.draw,
+        _no_plant,
     ),
     "4.9": ThesisFigure(
         "Open-loop force bandwidth versus contact stiffness.",
@@ -64,6 +95,24 @@ FIGURES: dict[str, ThesisFigure] = {
         responses.simple_responses,
         force_control.draw_simple,
         _across("proportional", "integral"),
+    ),
+    "5.4-start": ThesisFigure(
+        "Asymmetric start of the stiction cycle.",
+        friction_claims.asymmetric_start,
+        in_words.draw_start,
+        _start_distance,
+    ),
+    "5.5.1-harmonics": ThesisFigure(
+        "Harmonics that the describing function neglects, and the cycles it has and has not.",
+        friction_claims.harmonics_of_friction,
+        in_words.draw_harmonics,
+        _harmonics_distance,
+    ),
+    "5.5.2-contact": ThesisFigure(
+        "Step down that loses contact.",
+        friction_claims.kept_contact,
+        in_words.draw_kept_contact,
+        _kept_contact_distance,
     ),
     "5.5": ThesisFigure(
         "Step response in a nearly-inertialess transmission with stiction.",

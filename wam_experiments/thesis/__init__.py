@@ -8,6 +8,7 @@ evaluation      from the bags of an experiment to its result
 recording       a bag as an experiment reads it: signals, parameters, steps
 rows            a result: predicted and measured quantities, curves, tables
 figure, page    the result as a figure, and on a page of the documentation
+claims          what the thesis claims and where it is shown: rows of docs/thesis.yaml
 samples         the sample bags and their index
 
 step_response   (5.2), (5.3), half cycles of (5.17) and (5.18)

@@ -1,8 +1,8 @@
 """An experiment as data: its runs, and the function that evaluates them.
 
-`config/experiments/NAME.yaml` holds title, section, configuration, evaluation, `include` (sets of
-values in `config/experiments/sets/`), values, runs with a name, values and the steps of a scenario, and a
-sample: the part of a run that is kept in `bags/sample/NAME`, and its evaluation.
+`config/experiments/NAME.yaml`, of a whole-arm task `config/tasks/NAME.yaml`, holds title, section, configuration,
+evaluation, `include` (sets of values in `config/experiments/sets/`), values, runs with a name, values and the steps of
+a scenario, and a sample: the part of a run that is kept in `bags/sample/NAME`, and its evaluation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +16,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, require
 
 FOLDER = "experiments"
+TASKS = "tasks"
 SETS = "experiments/sets"
 KEYS = ("title", "section", "configuration", "evaluation", "include", "values", "runs", "sample")
 RUN_KEYS = ("name", "values", "steps", "stops")
@@ -74,8 +75,16 @@ class Experiment(NamedTuple):
 
 def names() -> list[str]:
     """The experiments that come with the package."""
-    folder = packaged("wam").parent / FOLDER
-    return sorted(path.stem for path in folder.glob("*.yaml"))
+    return _names(FOLDER)
+
+
+def tasks() -> list[str]:
+    """The whole-arm tasks that come with the package."""
+    return _names(TASKS)
+
+
+def _names(folder: str) -> list[str]:
+    return sorted(path.stem for path in (packaged("wam").parent / folder).glob("*.yaml"))
 
 
 def load(name: str) -> Experiment:
@@ -83,7 +92,7 @@ def load(name: str) -> Experiment:
 
     Parameters
     ----------
-    name : of an experiment of the package, or the path of a YAML file.
+    name : of an experiment or task of the package, or the path of a YAML file.
 
     Raises
     ------
@@ -94,8 +103,9 @@ def load(name: str) -> Experiment:
         path = Path(name)
         require(path.is_file(), f"experiment {path} is not a file")
     else:
-        require(name in names(), f"no experiment is named '{name}'; choose from {', '.join(names())}")
-        path = packaged(f"{FOLDER}/{name}")
+        known = [*names(), *tasks()]
+        require(name in known, f"no experiment is named '{name}'; choose from {', '.join(known)}")
+        path = packaged(f"{TASKS if name in tasks() else FOLDER}/{name}")
     tree = _mapping(path)
     _keys(str(path), tree, KEYS, ("title", "section", "configuration", "evaluation", "runs"))
     shared: dict[str, Any] = {}
@@ -119,22 +129,30 @@ def configured(experiment: Experiment, run: Run, directory: Path) -> Configurati
     ParameterError
         if a value has no parameter or is not allowed.
     """
-    base = Configuration.load(packaged(experiment.configuration))
-    script = directory / f"{run.name}.yaml"
-    script.parent.mkdir(parents=True, exist_ok=True)
-    script.write_text(yaml.safe_dump({"steps": list(run.steps)}, sort_keys=False), encoding="utf-8")
-    nodes = run.values.get("nodes", base.shared.nodes)
+    base = with_run(Configuration.load(packaged(experiment.configuration)), run, directory)
     return base.with_values(
         {
-            **run.values,
-            "nodes": [*nodes, "scenario", "recorder"],
+            "nodes": [*base.shared.nodes, "scenario", "recorder"],
             "timing.mode": "lockstep",
             "timing.real_time_factor": 0.0,
-            "scenario:script": str(script),
             "recorder:directory": str(directory),
             "recorder:name": run.name,
         }
     )
+
+
+def with_run(base: Configuration, run: Run, directory: Path) -> Configuration:
+    """A configuration with the values of a run, and its steps as the scenario, written to `directory/NAME.yaml`.
+
+    Raises
+    ------
+    ParameterError
+        if a value has no parameter or is not allowed.
+    """
+    script = directory / f"{run.name}.yaml"
+    script.parent.mkdir(parents=True, exist_ok=True)
+    script.write_text(yaml.safe_dump({"steps": list(run.steps)}, sort_keys=False), encoding="utf-8")
+    return base.with_values({**run.values, "scenario:script": str(script)})
 
 
 def _run(where: str, body: Any, shared: Mapping[str, Any]) -> Run:

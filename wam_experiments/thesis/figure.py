@@ -26,14 +26,15 @@ def draw(experiment: Experiment, result: Result, file: Path) -> None:
     rows = -(-count // columns)
     with panels(file, rows, columns, 4.6 * columns, 2.6 * rows + 0.3) as (picture, axes):
         for panel, panel_axes in zip(result.panels, axes, strict=False):
-            _panel(panel_axes, panel)
+            draw_panel(panel_axes, panel)
         for unused in axes[count:]:
             unused.set_axis_off()
         title = f"{experiment.title} (section {experiment.section})"
         picture.suptitle("\n".join(textwrap.wrap(title, 60 * columns)), fontsize=9)
 
 
-def _panel(axes: Axes, panel: Panel) -> None:
+def draw_panel(axes: Axes, panel: Panel) -> None:
+    """Draw the curves of a panel: predictions dashed, measurements in colour."""
     colour = -1
     for curve in panel.curves:
         step = max(1, len(curve.x) // MOST_POINTS)

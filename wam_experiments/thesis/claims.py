@@ -1,0 +1,107 @@
+"""What the thesis claims and where it is shown: rows of docs/thesis.yaml, checked, and as tables."""
+
+import importlib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+from wam_analysis.table import markdown
+from wam_experiments.figures.catalogue import FIGURES
+from wam_experiments.plant.effects import STUDIES
+
+
+class Claim(NamedTuple):
+    """One claim of the thesis.
+
+    Attributes
+    ----------
+    section : of the thesis.
+    text : what is claimed.
+    shown : references, see `unresolved`; none if nothing shows it.
+    near : how near, in words or a number.
+    missing : what is not shown, and why; empty if nothing is missing.
+    """
+
+    section: str
+    text: str
+    shown: tuple[str, ...]
+    near: str
+    missing: str
+
+
+def load(file: Path) -> dict[str, tuple[Claim, ...]]:
+    """Claims of each chapter.
+
+    Raises
+    ------
+    ValueError
+        if a row has not five cells, or neither shows anything nor says why not.
+    """
+    chapters: Mapping[str, list[list[object]]] = yaml.safe_load(file.read_text(encoding="utf-8"))
+    return {title: tuple(_claim(row) for row in rows) for title, rows in chapters.items()}
+
+
+def _claim(row: list[object]) -> Claim:
+    if len(row) != 5:
+        raise ValueError(f"{row} has {len(row)} cells; a claim has section, text, shown, near and missing")
+    section, text, shown, near, missing = map(str, row)
+    claim = Claim(section, text, tuple(filter(None, (name.strip() for name in shown.split(";")))), near, missing)
+    if not claim.shown and not missing:
+        raise ValueError(f"{section}, '{text}': it names nothing that shows it and no reason")
+    return claim
+
+
+def unresolved(reference: str, root: Path) -> str:
+    """Why a reference leads nowhere; empty if it does not.
+
+    Parameters
+    ----------
+    reference : dotted name of Python, `experiment NAME`, `task NAME`, `figure NAME`, `effect NAME`,
+        `test FILE.NAME`, or a file.
+    root : of the repository.
+    """
+    kind, _, name = reference.partition(" ")
+    known: dict[str, bool] = {
+        "experiment": (root / "config" / "experiments" / f"{name}.yaml").is_file(),
+        "task": (root / "config" / "tasks" / f"{name}.yaml").is_file(),
+        "figure": name in FIGURES,
+        "effect": name in STUDIES,
+    }
+    if kind in known:
+        return "" if known[kind] else f"there is no {kind} '{name}'"
+    if kind == "test":
+        file, _, test = name.partition(".")
+        path = root / "test" / f"{file}.py"
+        there = path.is_file() and re.search(
+            rf"^def {re.escape(test)}\(", path.read_text(encoding="utf-8"), re.MULTILINE
+        )
+        return "" if there else f"there is no test '{name}'"
+    if "/" in reference:
+        return "" if (root / reference).is_file() else f"there is no file '{reference}'"
+    return "" if _importable(reference) else f"'{reference}' cannot be imported"
+
+
+def _importable(name: str) -> bool:
+    """Whether a dotted name is a module, or a name of one."""
+    module, _, attribute = name.rpartition(".")
+    try:
+        return hasattr(importlib.import_module(module), attribute) or bool(importlib.import_module(name))
+    except (ImportError, ValueError):
+        return False
+
+
+def table(claims: tuple[Claim, ...]) -> str:
+    """Claims as Markdown."""
+    head = ("section", "claimed", "shown by", "how near", "not shown, because")
+    return markdown(head, [(c.section, c.text, "; ".join(map(_cell, c.shown)), c.near, c.missing) for c in claims])
+
+
+def _cell(reference: str) -> str:
+    kind, _, name = reference.partition(" ")
+    where = {"experiment": f"experiments.md#{name}", "task": "tasks.md", "figure": "figures.md", "effect": "plant.md"}
+    if kind in where:
+        return f"{kind} [{name}]({where[kind].split('#')[0]})"
+    return f"`{name if kind == 'test' else reference}`"
