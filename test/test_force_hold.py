@@ -35,7 +35,10 @@ from wam_control.stability_guard import GuardedContact, StabilityGuard
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import NO_CONTACT, Contact, State
-from wam_experiments.force_benchmark import Task, TaskEnd, perform
+from wam_experiments.force_benchmark.outcome import TaskEnd
+from wam_experiments.force_benchmark.surfaces import Surface
+from wam_experiments.force_benchmark.tasks import Task
+from wam_experiments.force_benchmark.trial import perform
 
 WAM = Configuration.load(packaged("wam"))
 QUIET = replace(GIVEN, guard=replace(GIVEN.guard, mode="off"), blend_time=0.0)
@@ -136,6 +139,15 @@ def test_while_it_holds_the_posture_does_not_move_it_and_without_the_command_it_
     assert loop.reaction is ForceReaction.NONE
 
 
+def test_an_arm_that_holds_is_pulled_back_to_where_the_hold_began() -> None:
+    loop, q = force_loop(ARM, PINNED), bent(0.2)
+    press(loop, q, radial(q), 5.0)
+    for shift in (0.004, 0.007, 0.01):
+        out = press(loop, [angle + shift for angle in q], radial(q), 5.0)
+    assert loop.reaction is ForceReaction.NOT_SENSED
+    assert out.velocity == pytest.approx([-0.01 * PINNED.posture_gain] * 4)
+
+
 def test_the_hold_ends_only_well_below_the_limit() -> None:
     loop = force_loop(ARM, replace(PINNED, contact_position=TIP))
     for bend, reaction in ((0.4, "NONE"), (0.25, "NOT_SENSED"), (0.35, "NOT_SENSED"), (0.45, "NONE"), (0.35, "NONE")):
@@ -158,7 +170,7 @@ def tilted(bend: float, angle: float, force: float) -> Task:
     q = bent(bend)
     rotation = BODY.cover_pose(q, "outer_link").rotation
     x, y, z = (math.sin(angle) * rotation[:, 0] + math.cos(angle) * rotation[:, 1]).tolist()
-    return Task(q, "outer_link", TIP, (x, y, z), force, 4000.0, 0.3, True)
+    return Task(q, Surface("outer_link", TIP, (x, y, z), 4000.0, 0.3, is_plane=True), force)
 
 
 @pytest.mark.slow
@@ -169,13 +181,12 @@ def test_a_wall_ahead_of_a_nearly_straight_arm_is_never_pressed_harder_than_comm
     """Before: 0 to 222 N, unnoticed, and chatter of 4 rad/s before the wall."""
     q = bent(bend)
     x, y, z = radial(q).tolist()
-    result = perform(WAM, Task(q, "outer_link", TIP, (x, y, z), force, 4000.0, 0.3, True), 3.0, PIN)
+    result = perform(WAM, Task(q, Surface("outer_link", TIP, (x, y, z), 4000.0, 0.3, is_plane=True), force), 3.0)
     assert result.peak < 1.2 * force + IMPACT * force
     assert result.mean < 1.1 * force
     assert result.outcome is not TaskEnd.SILENT
 
 
-PIN = {"force_loop:contact_source": "pinned"}
 IMPACT = 0.3  # of the commanded force
 
 
@@ -183,9 +194,9 @@ IMPACT = 0.3  # of the commanded force
 @pytest.mark.parametrize("force", [5.0, 15.0])
 def test_on_a_tilted_plane_near_straight_the_force_is_not_above_the_commanded(force: float) -> None:
     """Before: 12.6 and 37.3 N."""
-    result = perform(WAM, tilted(math.radians(7.0), math.radians(40.0), force), 3.0, PIN)
+    result = perform(WAM, tilted(math.radians(7.0), math.radians(40.0), force), 3.0)
     assert result.peak < 1.2 * force
-    loose = {**PIN, "force_loop:sensing.force_sd_fraction": 1.0}
+    loose = {"force_loop:sensing.force_sd_fraction": 1.0}
     assert perform(WAM, tilted(math.radians(7.0), math.radians(40.0), force), 3.0, loose).mean == pytest.approx(
         force, rel=0.25
     )
@@ -402,15 +413,19 @@ def test_a_force_that_is_not_reached_is_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "probability", "expected"),
+    ("source", "probability", "friction", "expected", "text"),
     [
-        ("estimated", 0.4, ForceReaction.PLACE_ASSUMED),
-        ("estimated", 1.0, ForceReaction.NONE),
-        ("pinned", 0.4, ForceReaction.NONE),
+        ("estimated", 0.4, 0.1, ForceReaction.PLACE_ASSUMED, "it is not known where; 0.28 m of outer_link is assumed"),
+        ("estimated", 1.0, 0.1, ForceReaction.NONE, ""),
+        ("estimated", 1.0, 0.3, ForceReaction.PLACE_ASSUMED, "the torques alone, so that the force is known to 0.56 N"),
+        ("pinned", 0.4, 0.3, ForceReaction.NONE, ""),
     ],
 )
-def test_a_place_that_is_assumed_is_reported(source: str, probability: float, expected: ForceReaction) -> None:
-    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), contact_source=source)
+def test_a_place_that_is_not_known_well_is_reported(
+    source: str, probability: float, friction: float, expected: ForceReaction, text: str
+) -> None:
+    sensing = replace(OWN.sensing, friction=friction)
+    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), contact_source=source, sensing=sensing)
     loop = force_loop(ARM, own)
     contact = Contact("outer_link", OWN.contact_position, (0.0, 1.0, 0.0), 0.001, probability)
     for _ in range(99):
@@ -419,7 +434,53 @@ def test_a_place_that_is_assumed_is_reported(source: str, probability: float, ex
     for _ in range(3):
         ask(loop, World(400.0, force=5.0), down(5.0), contact=contact)
     assert loop.reaction is expected
-    assert (f"{OWN.contact_position:g} m of outer_link is assumed" in loop.reason) is bool(expected)
+    assert text in loop.reason
+    assert bool(loop.reason) is bool(expected)
+
+
+def test_a_position_known_from_the_same_torques_makes_the_force_as_uncertain_as_any_on_the_cover() -> None:
+    for q in (POSE, bent(0.4), (0.5, 0.2, -0.4, 0.3)):
+        anywhere = axis_of(q, lateral(q), 10.0, TIP / math.sqrt(12.0))
+        for position_sd in (0.0, 0.03):
+            assert axis_of(q, lateral(q), 10.0, position_sd).free_sd == pytest.approx(anywhere.force_sd)
+        assert anywhere.free_sd == pytest.approx(anywhere.force_sd)
+
+
+@pytest.mark.parametrize(("place", "expected"), [(0.28, ForceReaction.NONE), (0.05, ForceReaction.NOT_EXPLAINED)])
+def test_torques_of_a_force_elsewhere_than_at_the_pinned_position_are_reported(
+    place: float, expected: ForceReaction
+) -> None:
+    limits = replace(OWN.limits, settling_time=0.5)
+    loop = force_loop(ARM, replace(OWN, limits=limits, contact_source="pinned", contact_position=place))
+    q = [0.4, -1.2, 0.7, 0.6]
+    direction = lateral(q)
+    levers = lever(q, direction, "outer_link", 0.28)
+    command = ForceCommand("base", tuple((20.0 * direction).tolist()))
+    sense = ForceAxes(ARM, BODY, OWN.sensing).axis(q, "outer_link", place, 0.0, direction, 20.0).sense
+    size = 20.0 / float(sense @ levers)  # N, which is measured as the commanded force
+    sensed = State(q, STILL, (BODY.gravity_torque(q) + size * levers).tolist())
+    for _ in range(103):
+        loop.step(State(q, STILL, DRIVEN), sensed, NO_CONTACT, None, command, None, None, DT)
+    assert loop.reaction is expected
+    if expected:
+        assert f"at {place:g} m of outer_link (chi^2 " in loop.reason
+        assert abs(size - 20.0) > 2.0, "the force is wrong by as much"
+
+
+def test_a_force_that_swings_about_the_commanded_one_is_reported_until_it_rests() -> None:
+    loop = force_loop(
+        ARM, replace(OWN, limits=replace(OWN.limits, settling_time=0.5, cycle_force=1e9), contact_source="pinned")
+    )
+    reactions = []
+    for k in range(220):
+        ask(loop, World(400.0, force=5.0 + 1.5 * math.sin(2.0 * math.pi * k * DT / 0.2)), down(5.0))
+        reactions.append(loop.reaction)
+    assert ForceReaction.NOT_REACHED not in reactions[:100]
+    assert reactions[-1] is ForceReaction.NOT_REACHED
+    assert "the force swings about 5 N by more than 0.5 N to either side" in loop.reason
+    for _ in range(60):
+        ask(loop, World(400.0, force=5.2), down(5.0))
+    assert loop.reaction is ForceReaction.NONE
 
 
 # ------------------------------------------------------------------------------------- commands

@@ -290,21 +290,21 @@ def rotation(cover: str, q: list[float] = POSE) -> np.ndarray:
 
 def test_the_estimate_is_fed_back_if_it_is_chosen() -> None:
     loop, world = force_loop(ARM, replace(OWN, feedback="contact_estimate")), World(400.0, force=9.0)
-    felt = (-4.0 * lever(POSE)).tolist()
+    torques = (-4.0 * lever(POSE)).tolist()
     touch = Contact(COVER, PLACE, (0.0, 1.0, 0.0))
-    out = ask(loop, world, down(6.0), contact=touch, external=felt)
+    out = ask(loop, world, down(6.0), contact=touch, external=torques)
     assert out.measured == pytest.approx(down(4.0), abs=1e-6)
     assert out.error == pytest.approx(down(2.0), abs=1e-6)
-    assert ask(loop, world, down(6.0), external=felt).error == pytest.approx(down(6.0)), "no contact is no force"
+    assert ask(loop, world, down(6.0), external=torques).error == pytest.approx(down(6.0)), "no contact is no force"
 
 
 def test_tare_acts_on_the_estimate_too() -> None:
     loop, world = force_loop(ARM, replace(OWN, feedback="contact_estimate")), World(400.0)
     touch = Contact(COVER, PLACE, (0.0, 1.0, 0.0))
-    felt = (-4.0 * lever(POSE)).tolist()
-    ask(loop, world, down(6.0), contact=touch, external=felt)
+    torques = (-4.0 * lever(POSE)).tolist()
+    ask(loop, world, down(6.0), contact=touch, external=torques)
     loop.tare()
-    assert ask(loop, world, down(6.0), contact=touch, external=felt).measured == pytest.approx(down(0.0), abs=1e-9)
+    assert ask(loop, world, down(6.0), contact=touch, external=torques).measured == pytest.approx(down(0.0), abs=1e-9)
 
 
 def test_the_force_acts_where_contact_is_detected() -> None:

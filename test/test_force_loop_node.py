@@ -13,6 +13,7 @@ from test_nodes import ARM, WAM, Listener, start
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State, Wrench
 from wam_description.topics import BY_NAME
+from wam_ros.header import stamp_of
 from wam_ros.messages import joint_state, message_type, wrench_stamped
 from wam_ros.qos import qos
 
@@ -125,9 +126,28 @@ def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: An
         ros.wait(future.done, what="an answer to the set")
         assert future.result().result.successful
 
-    set_gain(0.05)
+    set_gain(0.1)
     ros.wait(lambda: "velocity_loop uses servo.* that are not accepted here" in feeder.facts()[0].message)
     assert feeder.facts()[0].level == DiagnosticStatus.WARN
     set_gain(1.05)
     feeder.feed_until(lambda: "domain I" in feeder.facts()[0].message)
     assert feeder.loop.node._loop._servo.proportional_gain[0] == 1.05 * WAM.shared.servo.proportional_gain[0]
+
+
+def test_a_joint_torque_command_that_is_too_old_counts_as_none(ros: Any, tmp_path: Path) -> None:
+    feeder = Feeder(ros, tmp_path)
+    assert feeder.set(mode="joint_torque").successful
+    heard = Listener(ros, "joint_effort_command").seen["joint_effort_command"]
+    row = BY_NAME["joint_torque_command"]
+    publisher = feeder.node.create_publisher(message_type(row), row.name, qos(row))
+    ros.wait(publisher.get_subscription_count)
+    ros.wait(lambda: feeder.feed(None) or heard)
+    for _ in range(10):
+        sent = feeder.stamp + 5 * MS
+        publisher.publish(joint_state(sent, ARM.joints.names, State([], [], [2.0, 0.0, 0.0, 0.0])))
+        feeder.feed(None)
+    for _ in range(60):
+        feeder.feed(None)
+    ros.wait(lambda: stamp_of(heard[-1]) == feeder.stamp)
+    obeyed = [stamp_of(message) for message in heard if any(message.effort)]
+    assert sent + 150 * MS < max(obeyed) <= sent + 200 * MS

@@ -14,9 +14,14 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``force_measurement``             - the external torques, by the feedback that is chosen; low pass
 ``force_axis``                    - how a force along a direction is sensed, how the arm moves along it, how well
 ``force_hold``                    - when the arm holds its position instead, and why
+``force_swing``                   - limit cycles of the measured force, and the shaking of the arm by a dither
 ``motion_limits``                 - limits of the velocities: ends of the joints, contact force
 ``force_law``                     - error to velocity of one axis: saturation, deadband, G_I, G_P; delay line
 ``hybrid_velocity``               - joint velocities of force and posture together
+``task``                          - a task as data: axes of force, velocity, position, impedance
+``task_frame``                    - its law: strict priority, posture in what the axes leave; what 4 joints cannot do
+``task_parameters``               - its limits
+``task_control``                  - one task after the other: refuses, holds, watches
 ``bumpless_transfer``             - no jump of velocity where the law changes
 ``guard_supervision``             - the guard's part: admits a parameter set, scales its gains
 ``force_loop_parameters``         - its parameters
@@ -25,11 +30,16 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``sampled_loop``                  arm, velocity loop and force loop as one linear map from sample to sample
 ``friction_trial``                the same map with saturation and friction, for an arm of one joint
 ``friction_verdict``              domain, stable error and limit cycle of one friction node, chapter 5
+``loop_design``                   the same for a force loop of your own
 ``contact_estimator``             what touches the arm: observer, detection and inference together
 ``momentum_observer``             - external joint torques and their covariance
 ``contact_inference``             - which link is touched, where and how hard
 ``contact_fit``                   - the probability of contact positions along straight links
 ``contact_table``                 hypotheses as rows of numbers, as the topic carries them, and back
+``motion``                        trajectories of the joints and straight lines, limited in speed, acceleration and jerk
+``trajectory_player``             - a trajectory that a program streams
 ``scenario``                      steps of a task, as data
+``task_text``                     - the axes of a task in its file
+``scenario_values``               - values of its file, refused with a reason
 ================================  ==============================================================================
 """

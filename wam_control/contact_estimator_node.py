@@ -30,7 +30,7 @@ class ContactEstimatorNode:
     services = ("tare",)
 
     def __init__(self, shared: Shared, own: ContactEstimatorParameters) -> None:
-        self._estimator = ContactEstimator(shared.arm, shared.timing, own)
+        self._estimator = ContactEstimator(shared.model_arm, shared.timing, own)
         self._covers, self._timing = shared.arm.covers.names, shared.timing
         self._in_contact: bool | None = None
         self.unused = frozenset() if own.use_joint_sensors else frozenset({"joint_sensors"})

@@ -16,6 +16,7 @@ class ForcePoint(NamedTuple):
     ----------
     cover, position, position_sd : cover, position along it and its standard deviation, m.
     is_certain : whether the position is pinned, or the present estimate alone is certain enough to be used.
+    is_pinned : whether the position is pinned.
     is_assumed : whether the position is the configured one although it was to be estimated.
     rejection : why the present estimate is not used, '' if it is or is not needed.
     conflict : why no force can be controlled there: something else is touched; '' if nothing is known of that.
@@ -25,6 +26,7 @@ class ForcePoint(NamedTuple):
     position: float
     position_sd: float
     is_certain: bool
+    is_pinned: bool
     is_assumed: bool
     rejection: str
     conflict: str
@@ -55,7 +57,7 @@ class ContactPosition:
         if pinned is not None or parameters.contact_source == "pinned":
             self._last = None
             cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
-            return ForcePoint(cover, position, 0.0, True, False, "", _conflict(contact, cover, parameters))
+            return ForcePoint(cover, position, 0.0, True, True, False, "", _conflict(contact, cover, parameters))
         problem = _problem(contact, lean, parameters) if contact.cover else ""
         if not contact.cover:
             self._last = None
@@ -69,7 +71,7 @@ class ContactPosition:
             problem = f"{problem}; {used}"
         is_certain = bool(contact.cover) and not problem
         conflict = _conflict(contact, cover, parameters)
-        return ForcePoint(cover, position, sd, is_certain, self._last is None, problem, conflict)
+        return ForcePoint(cover, position, sd, is_certain, False, self._last is None, problem, conflict)
 
 
 def pinned_position(command: ForceCommand | None) -> tuple[str, float] | None:

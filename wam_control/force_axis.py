@@ -50,6 +50,13 @@ class SensingParameters:
         live=True,
         before=0.0,
     )
+    reported_fraction: float = parameter(
+        "standard deviation of the measured force, per commanded force, above which it is reported",
+        low=0.0,
+        high=1e9,
+        live=True,
+        before=1e9,
+    )
     apparent_mass_limit: float = parameter(
         "largest mass of the arm that the loop may see in the measured force; the motion along directions in which it "
         "is larger is slowed down; 0: no limit",
@@ -74,6 +81,7 @@ class ForceAxis(NamedTuple):
     sense : force per torque on each joint (n,), 1/m; sense @ lever is 1.
     move : joint velocity per commanded velocity along the direction (n,), 1/m.
     force_sd : standard deviation of the sensed force, N; infinite where the force has no lever.
+    free_sd : the same if its position along the cover has to be known from the same torques, N.
     apparent_mass : sensed force per acceleration along the direction, kg.
     impact_mass : mass that hits a surface, with rotors, as the arm moves along the direction, kg.
     speed_fraction : velocity along the direction per commanded one, 0 to 1.
@@ -84,6 +92,7 @@ class ForceAxis(NamedTuple):
     sense: Array
     move: Array
     force_sd: float
+    free_sd: float
     apparent_mass: float
     impact_mass: float
     speed_fraction: float
@@ -113,8 +122,32 @@ class ForceAxes:
         self._armature = np.diag(arm.joints.armature)
         self._rotors = motor_from_joint.T @ (np.array(arm.motors.inertia)[:, None] * motor_from_joint)
 
+    def inertia(self, q: Sequence[float]) -> Array:
+        """Inertia at the joints with their armature (n, n), kg m^2, without rotors."""
+        return self._body.mass_matrix(q) + self._armature
+
+    def lever(self, q: Sequence[float], cover: str, position: float, direction: Array) -> Array:
+        """Torque on each joint per force (n,), m; arguments as those of `axis`."""
+        result: Array = direction @ self._jacobian(q, cover, position, direction)[0]
+        return result
+
+    def _jacobian(self, q: Sequence[float], cover: str, position: float, direction: Array) -> tuple[Array, Array]:
+        """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""
+        covers = self._covers
+        normal = self._body.cover_pose(q, cover).rotation.T @ direction
+        point = np.array([position, *covers.aside(cover, position)])
+        point += covers.radius[covers.names.index(cover)] * normal
+        return self._body.point_jacobian(q, cover, point), point
+
     def axis(
-        self, q: Sequence[float], cover: str, position: float, position_sd: float, direction: Array, force: float
+        self,
+        q: Sequence[float],
+        cover: str,
+        position: float,
+        position_sd: float,
+        direction: Array,
+        force: float,
+        others: Sequence[Array] = (),
     ) -> ForceAxis:
         """The axis of a force at a contact.
 
@@ -124,34 +157,35 @@ class ForceAxes:
         cover, position, position_sd : where the force acts, m along the cover, and how uncertain that is, m.
         direction : unit vector of the force of the arm on the world (3,), base frame.
         force : commanded force, N, to which tangential forces are proportional.
+        others : torques (n,), N m, of other forces, each as large as its standard deviation.
         """
-        parameters, covers = self._parameters, self._covers
-        n = len(q)
-        rotation = self._body.cover_pose(q, cover).rotation
-        normal = rotation.T @ direction
-        # friction acts at the surface, one radius off the axis of the tube
-        point = np.array([position, *covers.aside(cover, position)])
-        point += covers.radius[covers.names.index(cover)] * normal
-        jacobian = self._body.point_jacobian(q, cover, point)
+        parameters, n = self._parameters, len(q)
+        jacobian, point = self._jacobian(q, cover, position, direction)  # friction acts at the surface
         lever: Array = direction @ jacobian
         square = float(lever @ lever)
         if square <= REACH * REACH:
             zero = np.zeros(n)
-            return ForceAxis(lever, zero, zero, math.inf, math.inf, math.inf, 0.0, np.zeros((n, n)))
+            return ForceAxis(lever, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, np.zeros((n, n)))
         size = max(force, SMALLEST_FORCE)
         tangential = parameters.friction * size * (jacobian - np.outer(direction, lever))
-        shifted = direction @ (self._body.point_jacobian(q, cover, point + ALONG) - jacobian)
-        shifted *= position_sd * size
-        spread = parameters.torque_sd**2 * np.eye(n) + tangential.T @ tangential + np.outer(shifted, shifted)
+        shift = direction @ (self._body.point_jacobian(q, cover, point + ALONG) - jacobian) * size
+        spread = parameters.torque_sd**2 * np.eye(n) + tangential.T @ tangential
+        spread += position_sd**2 * np.outer(shift, shift)
+        for torque in others:
+            spread += np.outer(torque, torque)
         inverse = np.asarray(np.linalg.inv(spread), np.float64)
         weighted = inverse @ lever
         precision = float(lever @ weighted)
         sense: Array = weighted / precision
-        inertia = self._body.mass_matrix(q) + self._armature
+        inertia = self.inertia(q)
         mass = float(sense @ inertia @ lever) / square
         impact = float(lever @ (inertia + self._rotors) @ lever) / (square * square)
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        sd = 1.0 / math.sqrt(precision)
-        return ForceAxis(lever, sense, lever / damped, sd, mass, impact, square / damped, inverse)
+        # anywhere along the cover: the covariance grows by a multiple of shift shift' [Sherman and Morrison]
+        length = self._covers.length[self._covers.names.index(cover)]
+        unknown = max(length * length / 12.0 - position_sd**2, 0.0)
+        lost = float(shift @ weighted) ** 2 * unknown / (1.0 + unknown * float(shift @ inverse @ shift))
+        sd, free_sd = 1.0 / math.sqrt(precision), 1.0 / math.sqrt(max(precision - lost, 1e-12 * precision))
+        return ForceAxis(lever, sense, lever / damped, sd, free_sd, mass, impact, square / damped, inverse)

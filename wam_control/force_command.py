@@ -95,7 +95,7 @@ class CommandAdmission:
                 self._torque = None
         else:
             self._torque, self._torque_age = torque, 0.0
-        if posture is not None and (beyond := self._beyond(posture)):
+        if posture is not None and (beyond := self._joints.beyond(posture)):
             refusals["joint_posture_command"] = beyond
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
         has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
@@ -138,17 +138,6 @@ class CommandAdmission:
                 f"torque {command.torque} N m pins the force at {place:.3g} m of {cover}; allowed: 0 to {length:g} m"
                 f"{last}"
             )
-        return ""
-
-    def _beyond(self, posture: Sequence[float]) -> str:
-        """Why a posture is refused: the first joint beyond its limits; '' if there is none."""
-        joints = self._joints
-        for name, angle, low, high in zip(joints.names, posture, joints.lower, joints.upper, strict=True):
-            if not low <= angle <= high:
-                return (
-                    f"{name} is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad; "
-                    "the last good posture remains in force"
-                )
         return ""
 
     def _rising_force(self, wanted: ForceCommand | None, most: float) -> ForceCommand | None:

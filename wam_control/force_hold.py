@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 from wam_control.contact_position import ForcePoint
 from wam_control.force_axis import ForceAxis
 from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.force_swing import Reversals, Shake
 
 Array = NDArray[np.float64]
-TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least LEAST
-LEAST = 0.3  # N
+TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
 TOUCH = 0.2  # of the commanded force, from which something is touched
 UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the commanded force
 CONFLICT = 0.1  # s, after which another contact counts
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
+SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
+SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
 
@@ -31,23 +33,40 @@ class ForceReaction(IntEnum):
     JOINT_END = 5  # a joint is at its end
     NOT_REACHED = 6  # goes on: the force is not reached within the time for it
     PLACE_ASSUMED = 7  # goes on: where the force acts is not known well, and not pinned
+    NOT_EXPLAINED = 8  # goes on: the torques are not those of the commanded force where it is thought to act
+    TASK_REFUSED = 9  # holds: the axes of the task cannot be done here
+    UNCERTAIN = 10  # goes on: the force is not known as well as it has to be reached
+    CYCLE = 11  # goes on: the measured force is in a limit cycle
+    SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
 
     @property
     def holds(self) -> bool:
         """Whether the arm holds its position instead of controlling the force."""
-        return self in (ForceReaction.NOT_SENSED, ForceReaction.OTHER_LINK, ForceReaction.NOTHING_TOUCHED)
+        return self in (
+            ForceReaction.NOT_SENSED,
+            ForceReaction.OTHER_LINK,
+            ForceReaction.NOTHING_TOUCHED,
+            ForceReaction.TASK_REFUSED,
+            ForceReaction.SHAKEN,
+        )
 
 
 class ForceHold:
     """Watches one commanded force."""
 
     def __init__(self) -> None:
+        self._turns, self._shake = Reversals(), Shake(SHAKE_SAMPLES)
         self.reset()
 
     def reset(self) -> None:
         """Another force is commanded."""
+        self._turns.reset()
+        self._shake.reset()
+        self._way = self._shaken = 0.0
         self._is_sensed, self._is_touching = True, False
-        self._travel = self._conflict = self._missed = self._assumed = 0.0
+        self._travel = self._conflict = self._missed = self._swings = self._assumed = self._strange = 0.0
+        self._above = self._below = math.inf
+        self._uncertain = 0.0
 
     def approach_speed(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1)."""
@@ -59,6 +78,27 @@ class ForceHold:
     def travel(self, distance: float) -> None:
         """Count a way along the force, m."""
         self._travel += distance
+
+    def shaken(self, moved: float, desired: float, parameters: ForceLoopParameters, dt: float) -> str:
+        """Why the arm shakes too much for the surface, '' where it does not; `moved` along the force in a period, m.
+
+        On the stiffest surface the swing of the position makes a swing of the force of k_c times its size: above
+        twice the commanded force the contact is lost and hit again in every cycle of the dither.
+        """
+        self._way += moved
+        swing = self._shake.step(self._way)
+        force = parameters.guard.contact_stiffness * swing
+        is_strong = force > parameters.limits.shake_force * desired
+        lasting = self._shaken + (dt if is_strong else -dt)
+        self._shaken = min(max(lasting, 0.0), 2.0 * CONFLICT)
+        if self._shaken <= CONFLICT:
+            return ""
+        return (
+            f"the arm shakes by {swing:.2g} m along the force (dither): on {parameters.guard.contact_stiffness:g} N/m "
+            f"the force would swing by {force:.3g} N; allowed: limits.shake_force, {parameters.limits.shake_force:g} "
+            f"times the commanded {desired:.3g} N; the arm holds its position: use joint sensors, command more force, "
+            "or declare a softer surface (guard.contact_stiffness)"
+        )
 
     def step(
         self,
@@ -87,8 +127,9 @@ class ForceHold:
         if self._is_touching:
             self._travel = 0.0
         # tangential forces grow with the force
-        unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2 if point.conflict else 0.0
-        lasting = self._conflict + (dt if unexplained > UNEXPLAINED else -FADING * dt)
+        unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2
+        is_strange = self._is_sensed and unexplained > UNEXPLAINED
+        lasting = self._conflict + (dt if is_strange and point.conflict else -FADING * dt)
         self._conflict = min(max(lasting, 0.0), 2.0 * CONFLICT)
         if self._conflict > CONFLICT:
             other = point.conflict or "another link was touched"
@@ -105,22 +146,85 @@ class ForceHold:
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
-        error = desired - measured
-        # an error of either sign all the time; one that changes its sign follows a command or a surface that moves
-        if abs(error) <= max(TOLERANCE * desired, LEAST) or error * self._missed < 0.0:
+        lasting = parameters.limits.settling_time
+        is_touching = self._is_touching
+        self._strange = self._strange + dt if is_touching and is_strange else 0.0
+        least = tolerance(desired, parameters)
+        is_vague = not point.is_pinned and axis.free_sd > least
+        self._assumed = self._assumed + dt if is_touching and (point.is_assumed or is_vague) else 0.0
+        is_uncertain = axis.force_sd > parameters.sensing.reported_fraction * desired
+        self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
+        swing = parameters.limits.cycle_force * desired
+        is_cycling = self._turns.step(measured, swing, lasting, dt) and is_touching
+        missed = self._not_reached(axis, measured, desired, parameters, dt)
+        if is_cycling:
+            return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
+        if missed:
+            return ForceReaction.NOT_REACHED, missed
+        if self._strange > lasting:
+            return ForceReaction.NOT_EXPLAINED, (
+                f"the torques are not those of a force along the commanded direction at {point.position:.3g} m of "
+                f"{point.cover} (chi^2 {unexplained:.3g}; allowed: {UNEXPLAINED:g}): it acts elsewhere or on another "
+                "link, or is not the only one; pin it where it acts, or free the arm"
+            )
+        if self._assumed > lasting:
+            return ForceReaction.PLACE_ASSUMED, _place_assumed(axis, point)
+        if self._uncertain > lasting:
+            return ForceReaction.UNCERTAIN, (
+                f"the force is known to +-{axis.force_sd:.2g} N, {axis.force_sd / desired:.0%} of the commanded "
+                f"{desired:.3g} N; sensing.reported_fraction, {parameters.sensing.reported_fraction:.0%}, is to be "
+                "known: tare in free space, command more force, or another direction or pose"
+            )
+        return ForceReaction.NONE, ""
+
+    def _not_reached(
+        self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters, dt: float
+    ) -> str:
+        """Why the force counts as not reached, '' where it does not: it is off on one side, or swings."""
+        error, lasting = desired - measured, parameters.limits.settling_time
+        is_off = abs(error) > tolerance(desired, parameters)
+        if not is_off or error * self._missed < 0.0:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
-        if abs(self._missed) > parameters.limits.settling_time:
-            return ForceReaction.NOT_REACHED, (
+        self._above = 0.0 if is_off and error < 0.0 else self._above + dt
+        self._below = 0.0 if is_off and error > 0.0 else self._below + dt
+        self._swings = self._swings + dt if max(self._above, self._below) < SWING * lasting else 0.0
+        if abs(self._missed) > lasting:
+            return (
                 f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s; the arm "
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
                 "another direction, or bend the arm"
             )
-        self._assumed = self._assumed + dt if self._is_touching and point.is_assumed else 0.0
-        if self._assumed > parameters.limits.settling_time:
-            return ForceReaction.PLACE_ASSUMED, (
-                f"something is touched and it is not known where; {point.position:.3g} m of {point.cover} is assumed "
-                "(contact_cover, contact_position), and the force is as wrong as that; pin it by the torque of the "
-                "command, or set contact_source to pinned"
+        if self._swings > lasting:
+            return (
+                f"the force swings about {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N to either "
+                f"side, for {self._swings:.2g} s: the surface moves, the position is not known, or it is a limit "
+                "cycle; pin the position, or lower force_gain"
             )
-        return ForceReaction.NONE, ""
+        return ""
+
+
+def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
+    """Error, N, up to which a force counts as reached."""
+    return max(TOLERANCE * desired, parameters.limits.least_tolerance)
+
+
+def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) -> str:
+    swing, period = turns.cycle
+    return (
+        f"the measured force is in a limit cycle of {swing:.2g} N peak to peak and {period:.2g} s about {desired:.3g} "
+        f"N; allowed: limits.cycle_force, {parameters.limits.cycle_force:g} of the commanded; friction or the surface "
+        "keeps it up: lower force_gain, or use joint sensors"
+    )
+
+
+def _place_assumed(axis: ForceAxis, point: ForcePoint) -> str:
+    known = (
+        "it is not known where"
+        if point.is_assumed
+        else f"where it is known from the torques alone, so that the force is known to {axis.free_sd:.2g} N"
+    )
+    return (
+        f"something is touched and {known}; {point.position:.3g} m of {point.cover} is assumed, and the force is as "
+        "wrong as that; pin it by the torque of the command, or set contact_source to pinned (contact_position)"
+    )

@@ -27,6 +27,8 @@ from wam_control.guard_watch import Watch
 from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits
 from wam_control.stability_guard import GuardAssessment
+from wam_control.task import TaskCommand
+from wam_control.task_control import AxisRow, TaskControl
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
@@ -34,6 +36,7 @@ from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, Sta
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
 Array = NDArray[np.float64]
+TASK = "task"  # in place of a frame of the force
 
 
 class ForceOutput(NamedTuple):
@@ -52,6 +55,7 @@ class ForceOutput(NamedTuple):
     axis: ForceAxis | None = None  # of the commanded force; None where none is commanded
     point: ForcePoint | None = None  # where it acts
     sd_limit: float = math.inf  # N, of its standard deviation
+    rows: tuple[AxisRow, ...] = ()  # of the axes of a task
 
 
 class ForceLoop:
@@ -90,12 +94,14 @@ class ForceLoop:
         self._position = ContactPosition()
         self._contact_rejected = False
         self._held_at: list[float] | None = None
+        self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._delay = LowPass(), DelayLine()
         self._transfer = BumplessTransfer(self._n)
         self._hold = ForceHold()
         self._axes = ""
         self._torque_before: list[float] = []
+        self._rate: Sequence[float] | None = None
         self.refused = 0
         self.refusals: dict[str, str] = {}
         self.fallback = ""
@@ -144,6 +150,7 @@ class ForceLoop:
         self._servo, self.parameters = servo, parameters
         self._force_axes = ForceAxes(self._arm, self._body, parameters.sensing)
         self._limits = MotionLimits(self._arm, self._body, parameters.limits)
+        self._tasks = TaskControl(self._arm, self._body, self._force_axes, parameters, self._supervision)
         self._transfer.restart()
 
     def tare(self) -> None:
@@ -160,6 +167,8 @@ class ForceLoop:
         posture: Sequence[float] | None,
         torque: Sequence[float] | None,
         dt: float,
+        task: TaskCommand | None = None,
+        posture_rate: Sequence[float] | None = None,
     ) -> ForceOutput:
         """One outer period.
 
@@ -176,28 +185,37 @@ class ForceLoop:
         posture : commanded joint angles (n,), rad; None holds those of the start, or those where a posture ended.
         torque : commanded joint torques on the world in the joint_torque mode (n,), N m.
         dt : outer period, s.
+        task : takes the place of force and torque; where it ends, the arm stays where it is.
+        posture_rate : velocity at which the commanded posture moves (n,), rad/s.
         """
         own = self.parameters
         if not self._joints or not any(joints.effort):
             self._reset(joints.position)
         self._joints = tuple(joints.position)
-        if (contact if own.feedback == "contact_estimate" else sensors) is None and own.mode != "open_loop":
-            command = torque = None  # a force that is not measured would grow without bounds
+        if (contact if own.feedback == "contact_estimate" else sensors) is None:
+            task = None
+            if own.mode != "open_loop":
+                command = torque = None  # a force that is not measured would grow without bounds
         contact = contact or NO_CONTACT
+        if task is None and self._axes == TASK:
+            self._reset(joints.position)
         commands = self._admission.step(own, joints.position, command, posture, torque, dt)
+        self._rate = posture_rate if posture_rate and commands.posture == posture else None
         self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
         self.refusals, self.fallback = commands.refusals, ""
         self.reaction, self.reason = ForceReaction.NONE, ""
         self._measurement.step(own, sensors, external)
-        is_felt = own.feedback != "contact_estimate" or bool(contact.cover)
-        felt = self._measurement.external if is_felt else np.zeros(self._n)
-        self._felt = self._filter.step(felt, own.force_filter, dt)
-        if own.mode == "joint_torque":
+        is_touched = own.feedback != "contact_estimate" or bool(contact.cover)
+        present = self._measurement.external if is_touched else np.zeros(self._n)
+        self._external = self._filter.step(present, own.force_filter, dt)
+        if task is not None:
+            out = self._task(joints.position, contact, task, commands.posture, dt)
+        elif own.mode == "joint_torque":
             out = self._joint_torque(contact, commands.torque, dt)
         else:
             out = self._force(joints.position, contact, commands.force, commands.posture, dt)
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        limited = self._limits.step(velocity, joints.position, self._felt[0])
+        limited = self._limits.step(velocity, joints.position, self._external[0])
         if not self.reaction.holds and limited.contact_force:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
         elif not self.reaction.holds and limited.joint_end:
@@ -218,7 +236,7 @@ class ForceLoop:
         """Control other axes, without a memory of the force on those before; '' for none."""
         self._hold.reset()
         self._delay.reset()
-        self._torque_before = []
+        self._torque_before, self._q_before = [], []
         self._axes = axes
         self._held_at = None
         self._transfer.restart()
@@ -233,7 +251,7 @@ class ForceLoop:
         axes = command.frame if command is not None and desired else ""
         if axes != self._axes:
             self._begin(axes)
-        held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit)
+        held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, self._rate)
         if command is None or not desired:
             return ForceOutput([] if is_open else held, [0.0] * self._n, frame=command.frame if command else BASE)
         rotation = np.eye(3) if command.frame == "base" else self._body.cover_pose(q, command.frame).rotation
@@ -241,7 +259,7 @@ class ForceLoop:
         axis = (rotation.T @ direction).tolist()
         point = self._point(contact, command, direction)
         force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
-        measured, before = (-float(force_axis.sense @ torques) for torques in self._felt)
+        measured, before = (-float(force_axis.sense @ torques) for torques in self._external)
         scalar = law.along(axis)
         error = desired - measured
         out = ForceOutput(
@@ -255,7 +273,12 @@ class ForceLoop:
             point,
             own.sensing.sd_limit(desired),
         )
-        reaction, reason = self._hold.step(force_axis, point, self._felt[0], measured, desired, own, dt)
+        reaction, reason = self._hold.step(force_axis, point, self._external[0], measured, desired, own, dt)
+        if own.feedback == "contact_estimate":
+            moved = [a - b for a, b in zip(q, self._q_before or q, strict=True)]
+            if not reaction.holds and (shaken := self._hold.shaken(float(force_axis.lever @ moved), desired, own, dt)):
+                reaction, reason = ForceReaction.SHAKEN, shaken
+            self._q_before = list(q)
         self._react(reaction, reason)
         if reaction.holds:
             self.refusals["force_command"] = reason
@@ -277,6 +300,22 @@ class ForceLoop:
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
         return out._replace(velocity=velocity, effort=effort)
+
+    def _task(
+        self, q: Sequence[float], contact: Contact, task: TaskCommand, posture: list[float], dt: float
+    ) -> ForceOutput:
+        """Force, motion or impedance along each axis of a task, posture in what they leave."""
+        if self._axes != TASK:
+            self._begin(TASK)
+            self._tasks.restart()
+        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt)
+        self._react(found.reaction, found.reason)
+        if found.reaction.holds:
+            self.refusals["task_command"] = found.reason
+        if found.has_changed:
+            self._transfer.restart()
+        measured, error = _triple(found.measured.tolist()), _triple(found.error.tolist())
+        return ForceOutput(found.velocity, found.effort, measured, error, error, task.frame, rows=found.rows)
 
     def _joint_torque(self, contact: Contact, torque: Sequence[float] | None, dt: float) -> ForceOutput:
         """Torque of each joint; without a command the arm holds still."""

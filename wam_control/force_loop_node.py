@@ -6,7 +6,10 @@ from wam_control.contact_table import contact_of
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.guard_report import Report
+from wam_control.task import TaskCommand, task_of
+from wam_control.trajectory_player import TrajectoryPlayer
 from wam_description.arm import Shared
+from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Table, Wrench
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Followed, Input, Outputs, reaction
@@ -20,9 +23,15 @@ class ForceLoopNode:
     follows = Followed("velocity_loop", "servo")
 
     def __init__(self, shared: Shared, own: ForceLoopParameters) -> None:
-        self._loop = ForceLoop(shared.arm, shared.servo, own, shared.timing, shared.ages.command)
+        self._loop = ForceLoop(shared.model_arm, shared.servo, own, shared.timing, shared.ages.command)
         self.tune = self._loop.tune
         self.retune = self._loop.retune_servo
+        self._arm = shared.arm
+        self._player = TrajectoryPlayer(shared.arm, shared.motion)
+        self._is_on_trajectory = False
+        self._command: Table | None = None
+        self._known: TaskCommand | None = None
+        self._refusal = ""
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
         self._reported: tuple[Report, ForceReaction] | None = None
@@ -34,8 +43,10 @@ class ForceLoopNode:
         Input("external_joint_torques", "effort", absent="brake"),
         Input("contact/hypotheses", absent="brake"),
         Input("force_command", age="command", absent="hold"),
-        Input("joint_posture_command", "position", age="command", absent="hold"),
+        Input("joint_posture_command", "position velocity?", age="command", absent="hold"),
+        Input("joint_trajectory", age="command", absent="hold"),
         Input("joint_torque_command", "effort", age="command", absent="hold"),
+        Input("task_command", age="command", absent="hold"),
         outputs=(
             "joint_velocity_command",
             "joint_effort_command",
@@ -43,6 +54,7 @@ class ForceLoopNode:
             "force_error",
             "force_error_limited",
             "force_axis",
+            "task_axes",
         ),
     )
     def step(self, inputs: Inputs) -> Outputs:
@@ -50,9 +62,14 @@ class ForceLoopNode:
         command, posture, torque = (
             inputs[topic] for topic in ("force_command", "joint_posture_command", "joint_torque_command")
         )
+        task, joints = self._task(inputs["task_command"]), inputs["joint_states"]
+        if inputs["joint_trajectory"] is not None or self._is_on_trajectory:
+            posture = self._on_trajectory(inputs)
+        if self._refusal:
+            command = posture = torque = None  # the arm holds its position
         external, hypotheses = inputs["external_joint_torques"], inputs["contact/hypotheses"]
         out = self._loop.step(
-            inputs["joint_states"],
+            joints,
             inputs["joint_sensors"],
             contact_of(hypotheses, self._covers) if external and hypotheses else None,
             external.effort if external else None,
@@ -60,6 +77,8 @@ class ForceLoopNode:
             posture.position if posture else None,
             torque.effort if torque else None,
             inputs.dt,
+            task,
+            posture.velocity if posture else None,
         )
         return {
             "joint_velocity_command": State([], out.velocity, []),
@@ -70,6 +89,23 @@ class ForceLoopNode:
             **self._force_axis(out, inputs.stamp),
             **self._status(),
         }
+
+    def _on_trajectory(self, inputs: Inputs) -> State | None:
+        """The posture on a trajectory, None where the arm is to stay where it is."""
+        trajectory, joints = inputs["joint_trajectory"], inputs["joint_states"]
+        self._is_on_trajectory = trajectory is not None
+        moving = self._player.step(trajectory, joints.position, joints.velocity, inputs.dt)
+        return State(moving.position, moving.velocity, []) if moving else None
+
+    def _task(self, command: Table | None) -> TaskCommand | None:
+        """The commanded task; one that is not understood is refused, and the arm holds its position."""
+        if command != self._command:
+            self._command, self._refusal = command, ""
+            try:
+                self._known = task_of(command, self._arm)
+            except ParameterError as error:
+                self._known, self._refusal = None, f"{error}; the arm holds its position"
+        return self._known
 
     @property
     def needs(self) -> frozenset[str]:
@@ -84,6 +120,8 @@ class ForceLoopNode:
         if reaction is before and not self._timing.is_display(stamp):
             return {}
         axis, point = out.axis, out.point
+        if out.rows:
+            return {"force_axis": Table(BASE, ()), "task_axes": Table(out.frame, out.rows)}
         if axis is None or point is None:
             return {"force_axis": Table(BASE, ())}
         lever = math.hypot(*axis.lever)
@@ -103,12 +141,23 @@ class ForceLoopNode:
     @property
     def refusals(self) -> dict[str, str]:
         """Why a present command or contact is not used, by topic."""
-        return self._loop.refusals
+        own = {"task_command": self._refusal, "joint_trajectory": self._player.refusal}
+        return {**self._loop.refusals, **{topic: reason for topic, reason in own.items() if reason}}
 
     @property
     def reason(self) -> str:
         """Why the loop does not do what is commanded, '' where it does."""
         return self._loop.reason
+
+    @property
+    def force_reaction(self) -> ForceReaction:
+        """What the loop does instead of what is commanded."""
+        return self._loop.reaction
+
+    @property
+    def guard_report(self) -> Report:
+        """What the guard reports of the parameters in force."""
+        return self._loop.report
 
     def diagnostics(self) -> dict[str, str]:
         """Why the estimated contact position is not used."""

@@ -7,6 +7,7 @@ from wam_control.force_law import ForceLaw
 from wam_control.motion_limits import LimitParameters
 from wam_control.sampled_loop import Feedback
 from wam_control.stability_guard import GuardedTask, GuardParameters
+from wam_control.task_parameters import TaskParameters
 from wam_description.arm import Arm
 from wam_description.parameters import lengths, parameter, require
 
@@ -20,6 +21,7 @@ class ForceLoopParameters:
     guard: GuardParameters
     sensing: SensingParameters
     limits: LimitParameters
+    task: TaskParameters
     mode: str = parameter(
         "hybrid: force along its direction, posture elsewhere; joint_torque: torque of each joint; "
         "open_loop: J^T F fed forward, no feedback",

@@ -50,24 +50,30 @@ class FrictionVerdict(NamedTuple):
     margin : largest gain that is linearly stable with every contact stiffness.
     stable_error : largest saturation that is accepted; infinite in domain I, 0 in domain III.
     cycle : stiction limit cycle of small errors.
+    saturated_cycle : peak to peak of the largest limit cycle of F_c found in domain I with the saturation of the loop,
+        N or N m: near the margin of a delayed loop friction keeps up one above the saturation.
     """
 
     domain: Domain
     margin: float
     stable_error: float
     cycle: PredictedCycle
+    saturated_cycle: float
 
 
 def friction_verdict(node: FrictionNode, loop: IntegralLoop) -> FrictionVerdict:
-    """Verdict on a node under a loop, with its contact and every softer one; the saturation of the loop is ignored."""
+    """Verdict on a node under a loop, with its contact and every softer one.
+
+    The saturation of the loop counts for `saturated_cycle` only.
+    """
     nodes = [replace(node, contact_stiffness=part * node.contact_stiffness) for part in SOFTER]
     margins = [linear_margin(each, loop) for each in nodes]
     cycle = stiction_cycle(node, loop.gain)
     if loop.gain <= min(margins):
-        return FrictionVerdict(Domain.I, min(margins), math.inf, cycle)
+        return FrictionVerdict(Domain.I, min(margins), math.inf, cycle, _saturated_cycle(node, loop))
     beyond = [each for each, margin in zip(nodes, margins, strict=True) if loop.gain > margin]
     error = min(stable_error(each, loop) for each in beyond)
-    return FrictionVerdict(Domain.II if error else Domain.III, min(margins), error, cycle)
+    return FrictionVerdict(Domain.II if error else Domain.III, min(margins), error, cycle, 0.0)
 
 
 def linear_margin(node: FrictionNode, loop: IntegralLoop) -> float:
@@ -109,13 +115,24 @@ def stable_error(node: FrictionNode, loop: IntegralLoop) -> float:
     return 0.0
 
 
-def _comes_to_rest(node: FrictionNode, loop: IntegralLoop, cycle: float) -> bool:
+def _saturated_cycle(node: FrictionNode, loop: IntegralLoop) -> float:
+    if math.isinf(loop.error_limit) or not loop.sample_period:
+        return 0.0
+    ends = [assess(node, loop, force, start, max_events=EVENTS) for force, start in _responses(node, loop)]
+    return max([0.0, *(end.peak_to_peak for end in ends if end.verdict is Verdict.LIMIT_CYCLE)])
+
+
+def _responses(node: FrictionNode, loop: IntegralLoop) -> list[tuple[float, tuple[float, float, float]]]:
+    """Steps of F_des, and the state in which they begin: at rest, or thrown at the contact or away from it."""
     limit = loop.error_limit
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     thrown = 3.0 * limit / node.contact_stiffness * frequency
     tries = [(part * limit, (0.0, 0.0, 0.0)) for part in STEPS]
-    tries += [(0.0, (0.0, thrown, 0.0)), (limit, (0.0, -thrown, 0.0))]
-    for force, start in tries:
+    return [*tries, (0.0, (0.0, thrown, 0.0)), (limit, (0.0, -thrown, 0.0))]
+
+
+def _comes_to_rest(node: FrictionNode, loop: IntegralLoop, cycle: float) -> bool:
+    for force, start in _responses(node, loop):
         found = assess(node, loop, force, start, max_events=EVENTS)
         is_stiction = found.verdict is Verdict.LIMIT_CYCLE and found.peak_to_peak <= cycle
         if found.verdict is not Verdict.SETTLED and not is_stiction:

@@ -14,7 +14,7 @@ class GravityNode:
     name, parameters = "gravity", Nothing
 
     def __init__(self, shared: Shared, own: Nothing) -> None:
-        self._body = RigidBody(shared.arm)
+        self._body = RigidBody(shared.model_arm)
 
     @reaction(Input("joint_states", "position"), outputs=("gravity_effort",))
     def step(self, inputs: Inputs) -> Outputs:

@@ -1,6 +1,6 @@
 """The guard's part of the force loop: it admits a parameter set, and scales its gains while the arm moves."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from wam_control.contact_position import ForcePoint
@@ -89,13 +89,27 @@ class Supervision:
         force : commanded, N.
         dt : outer period, s.
         """
+        return self.factor(lambda: self._contacts(q, point, direction, force), dt)
+
+    def factor(self, where: Callable[[], list[GuardedContact]], dt: float) -> tuple[float, bool]:
+        """Factor of the gains in this period, and whether it has changed.
+
+        Parameters
+        ----------
+        where : gives the contacts that are controlled now, each of which the guard considers alone.
+        dt : outer period, s.
+        """
         watch = self.watch
         if watch is None:
             return 1.0, False
-        has_changed = watch.step(lambda: self._contacts(q, point, direction, force), dt)
+        has_changed = watch.step(where, dt)
         if has_changed:
             self._report()
         return 1.0 if self._parameters.guard.mode == "warn" else watch.factor, has_changed
+
+    def known(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
+        """Those contacts whose force has a lever, and is known well enough to be controlled."""
+        return self._guard.sensed([found for contact in contacts for found in self._guard.with_lever(contact)])
 
     def _contacts(
         self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float

@@ -10,8 +10,15 @@ from wam_control.force_axis import ForceAxis
 Array = NDArray[np.float64]
 
 
-def posture_velocity(posture: Sequence[float], q: Sequence[float], gain: float, limit: float) -> list[float]:
-    """Joint velocities (n,), rad/s, towards a posture (n,), rad, at `gain` 1/s and at most `limit` rad/s."""
+def posture_velocity(
+    posture: Sequence[float], q: Sequence[float], gain: float, limit: float, rate: Sequence[float] | None = None
+) -> list[float]:
+    """Joint velocities (n,), rad/s, towards a posture (n,), rad, at `gain` 1/s and at most `limit` rad/s.
+
+    `rate` (n,), rad/s, is the velocity of a posture that moves.
+    """
+    if rate is not None:
+        return [min(max(r + gain * (a - b), -limit), limit) for a, b, r in zip(posture, q, rate, strict=True)]
     return [min(max(gain * (a - b), -limit), limit) for a, b in zip(posture, q, strict=True)]
 
 

@@ -337,7 +337,7 @@ class _Load:
         links = dataclasses.replace(
             arm.links, mass=(NO_MASS,) * (n - 1) + (1.0,), centre=centre, inertia=(0.0,) * (3 * n)
         )
-        self._body = RigidBody(dataclasses.replace(arm, links=links))
+        self._body = RigidBody(dataclasses.replace(arm, links=links, payload=0.0))
         low, high = payload
         # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
         self.mass, self.sd = low, (high - low) / math.sqrt(3.0)

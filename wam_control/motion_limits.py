@@ -1,5 +1,6 @@
 """Limits of the commanded joint velocities: near the ends of the joints, and where the world pushes back too hard."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -58,6 +59,29 @@ class LimitParameters:
         live=True,
         before=1e9,
     )
+    least_tolerance: float = parameter(
+        "least error up to which a force counts as reached, however small it is",
+        "N",
+        low=0.0,
+        high=1e3,
+        live=True,
+        before=0.3,
+    )
+    cycle_force: float = parameter(
+        "swing of the measured force, per commanded force, from which it is reported as a limit cycle",
+        low=0.0,
+        high=1e9,
+        live=True,
+        before=1e9,
+    )
+    shake_force: float = parameter(
+        "swing of the force, per commanded force, that a shaking arm (dither) may make on a surface of "
+        "guard.contact_stiffness; above it the arm holds its position; with feedback contact_estimate",
+        low=0.0,
+        high=1e9,
+        live=True,
+        before=1e9,
+    )
 
 
 class Limited(NamedTuple):
@@ -99,9 +123,8 @@ class MotionLimits:
     def _against_the_world(self, velocity: list[float], q: Sequence[float], external: Array) -> tuple[list[float], str]:
         """Without the part that does work on the world, where its force is above the limit."""
         most = self._parameters.contact_force
-        force = least_force(self._body, q, external)
         power = float(external @ velocity)
-        if force <= BEGIN * most or power >= 0.0:
+        if power >= 0.0 or (force := least_force(self._body, q, external)) <= BEGIN * most:
             return velocity, ""
         part = min((force - BEGIN * most) / max((1.0 - BEGIN) * most, 1e-9), 1.0)
         slowed: list[float] = (np.array(velocity) - part * power / float(external @ external) * external).tolist()
@@ -137,5 +160,6 @@ def _approach(distance: float, gain: float, margin: float) -> float:
 
 def least_force(body: RigidBody, q: Sequence[float], external: Array) -> float:
     """Smallest force at the tool that gives external torques of this size, N; a force nearer to the base is larger."""
-    largest = float(np.linalg.norm(body.tool_jacobian(q), 2))
-    return float(np.linalg.norm(external)) / largest if largest > 0.0 else 0.0
+    jacobian = body.tool_jacobian(q)
+    largest = math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1]))
+    return math.sqrt(float(external @ external)) / largest if largest > 0.0 else 0.0

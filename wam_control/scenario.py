@@ -8,11 +8,19 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from wam_control.motion import LineMotion, PostureMotion
+from wam_control.scenario_values import known, number, numbers
+from wam_control.task import TaskCommand
+from wam_control.task_text import task_of_text, torque_task
 from wam_description import yaml_text
-from wam_description.arm import Arm
+from wam_description.arm import Arm, Shared
+from wam_description.configuration import packaged
 from wam_description.parameters import ParameterError, flatten, parameter, require
-from wam_description.signals import Contact, ForceCommand
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import Contact, ForceCommand, PathPoint, PosturePath, Triple
 
+MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
+FORCES = ("force", "task", "torque")
 REQUESTS = ("", "enable", "disable")
 TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
 NO_FORCE = ForceCommand("base", (0.0, 0.0, 0.0))
@@ -70,6 +78,14 @@ class ScenarioStep(NamedTuple):
     request: str = ""  # to the driver, when the step begins
     chirp: Chirp | None = None  # along the force
     settings: tuple[Setting, ...] = ()  # applied when the step begins
+    task: TaskCommand | None = None  # in place of a force
+    trajectory: PosturePath | None = None  # in place of a posture
+    tip: Triple | None = None  # m, base frame, to which the tool goes along a straight line, in place of a posture
+
+    @property
+    def moves(self) -> bool:
+        """Whether the posture of the arm is commanded."""
+        return bool(self.posture) or self.trajectory is not None or self.tip is not None
 
 
 class ScenarioOutput(NamedTuple):
@@ -85,6 +101,8 @@ class ScenarioOutput(NamedTuple):
     step: str
     done: bool
     failure: str
+    task: TaskCommand | None = None
+    rate: tuple[float, ...] = ()  # rad/s, of a posture that moves; empty where it is not known
 
 
 class Scenario:
@@ -94,9 +112,11 @@ class Scenario:
     detected, the scenario fails: it requests the brakes and ends.
     """
 
-    def __init__(self, steps: Sequence[ScenarioStep]) -> None:
+    def __init__(self, steps: Sequence[ScenarioStep], shared: Shared | None = None) -> None:
         require(len(steps) > 0, "the scenario has no steps")
-        self._steps = list(steps)
+        self._steps, self._shared = list(steps), shared
+        self._motion: PostureMotion | LineMotion | None = None
+        self._rate: tuple[float, ...] = ()
         self._index = -1
         self._elapsed = 0.0
         self._from: list[float] = []
@@ -121,7 +141,11 @@ class Scenario:
             self._elapsed += dt
             begins = self._advance(q, contact)
         step = self._steps[self._index]
-        if step.posture and not self.done:
+        self._rate = ()
+        if self._motion is not None and not self.done:
+            self._posture, rate = self._motion.at(self._elapsed)
+            self._rate = tuple(rate)
+        elif step.posture and not self.done:
             self._posture = self._on_path(step)
         push = step.push
         pushing = push is not None and push.begin <= self._elapsed + ROUNDING < push.end and not self.done
@@ -139,15 +163,35 @@ class Scenario:
             step=step.name,
             done=self.done,
             failure=self.failure,
+            task=None if self.done else step.task,
+            rate=self._rate,
         )
 
     def _begin(self, index: int, q: Sequence[float]) -> None:
-        pressed = self._index >= 0 and self._steps[self._index].force != NO_FORCE
+        before = self._steps[self._index] if self._index >= 0 else None
+        pressed = before is not None and (before.force != NO_FORCE or before.task is not None)
         self._index, self._elapsed = index, 0.0
         step = self._steps[index]
-        if pressed and (step.posture or step.force == NO_FORCE):
-            self._posture = list(q)  # the arm has moved along the force, away from the posture
+        if pressed and (step.moves or (step.force == NO_FORCE and step.task is None)):
+            self._posture = list(q)  # the arm has moved along the force or the task, away from the posture
         self._from = list(self._posture)
+        self._motion = None
+        if step.trajectory is not None or step.tip is not None:
+            self._plan(step)
+
+    def _plan(self, step: ScenarioStep) -> None:
+        """Plan the motion of a step as a whole; where that is not possible, the scenario fails before it moves."""
+        try:
+            if self._shared is None:
+                raise ParameterError("a motion has limits; give them to the scenario: Scenario(steps, shared)")
+            self._motion = motion = planned(step, self._from, self._shared)
+            require(
+                motion.duration <= step.seconds + ROUNDING,
+                f"the motion takes {motion.duration:.3g} s within its limits (motion); seconds is {step.seconds:g}",
+            )
+        except ParameterError as error:
+            self._motion, self.done = None, True
+            self.failure = f"step '{step.name}': {error}"
 
     def _advance(self, q: Sequence[float], contact: Contact) -> bool:
         """Go on to the next step if this one is over; whether a request may be due."""
@@ -184,11 +228,30 @@ class Scenario:
         return [a + (b - a) * blend for a, b in zip(self._from, step.posture, strict=True)]
 
 
+def planned(step: ScenarioStep, start: Sequence[float], shared: Shared) -> PostureMotion | LineMotion:
+    """The motion of a step from joint angles (n,), rad.
+
+    Raises
+    ------
+    ParameterError
+        where it leaves the limits.
+    """
+    if step.trajectory is not None:
+        return PostureMotion(start, step.trajectory, shared.arm, shared.motion)
+    assert step.tip is not None
+    return LineMotion(start, step.tip, shared.arm, RigidBody(shared.arm), shared.motion)
+
+
 def swept_sine(chirp: Chirp, elapsed: float, seconds: float) -> float:
     """Force of a chirp of `seconds`, N, at the time `elapsed`, s."""
     growth = math.log(chirp.end / chirp.start)
     turns = chirp.start * seconds / growth * math.expm1(growth * elapsed / seconds)
     return chirp.newtons * math.sin(2.0 * math.pi * turns)
+
+
+def script_file(script: str) -> Path:
+    """The file of a scenario: a path that ends in '.yaml', or the name of one that comes with the package."""
+    return Path(script) if script.endswith(".yaml") else packaged(script, "scenario")
 
 
 def load(path: Path, arm: Arm) -> list[ScenarioStep]:
@@ -207,7 +270,7 @@ def load(path: Path, arm: Arm) -> list[ScenarioStep]:
         raise ParameterError(f"scenario {path} is not YAML: {error}") from error
     if not isinstance(tree, dict) or not isinstance(tree.get("steps"), list):
         raise ParameterError(f"scenario {path} has no list 'steps'")
-    _known(f"scenario {path}", tree, ("steps",), ("steps",))
+    known(f"scenario {path}", tree, ("steps",), ("steps",))
     require(len(tree["steps"]) > 0, f"scenario {path} has no steps; give at least one")
     return [_step(f"{path}, step {i + 1}", body, arm) for i, body in enumerate(tree["steps"])]
 
@@ -215,18 +278,22 @@ def load(path: Path, arm: Arm) -> list[ScenarioStep]:
 def _step(where: str, body: Any, arm: Arm) -> ScenarioStep:
     if not isinstance(body, dict):
         raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
-    keys = ("name", "seconds", "posture", "until_force", "force", "chirp", "push", "request", "set")
-    _known(where, body, keys, ("name", "seconds"))
+    keys = ("name", "seconds", *MOTIONS, *FORCES, "until_force", "chirp", "push", "request", "set")
+    known(where, body, keys, ("name", "seconds"))
     name = body["name"]
     require(isinstance(name, str) and name != "", f"{where}: name is {name!r}; it must be a text (quote it)")
     request = body.get("request", "")
     require(request in REQUESTS, f"{where}: request is {request!r}; allowed: enable, disable")
-    seconds = _float(where, "seconds", body["seconds"])
+    seconds = number(where, "seconds", body["seconds"])
     require(seconds > 0.0, f"{where}: seconds is {seconds:g}; it must be above 0")
-    until_force = _float(where, "until_force", body.get("until_force", 0.0))
+    until_force = number(where, "until_force", body.get("until_force", 0.0))
     require(until_force >= 0.0, f"{where}: until_force is {until_force:g}; it must be 0 (no contact expected) or above")
     force = _force(where, body["force"], arm) if "force" in body else NO_FORCE
     require("chirp" not in body or any(force.force), f"{where}: chirp needs a force above 0 N, along which it acts")
+    chosen = [key for key in FORCES if key in body]
+    require(len(chosen) <= 1, f"{where}: {' and '.join(chosen)} are given; give one of them")
+    moves = [key for key in MOTIONS if key in body]
+    require(len(moves) <= 1, f"{where}: {' and '.join(moves)} are given; give one of them")
     return ScenarioStep(
         name=name,
         seconds=seconds,
@@ -237,35 +304,58 @@ def _step(where: str, body: Any, arm: Arm) -> ScenarioStep:
         request=request,
         chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
         settings=tuple(_settings(where, body["set"])) if "set" in body else (),
+        task=_task(where, body, arm),
+        trajectory=_trajectory(where, body["trajectory"], arm) if "trajectory" in body else None,
+        tip=_tip(where, body["tip"]) if "tip" in body else None,
     )
+
+
+def _trajectory(where: str, body: Any, arm: Arm) -> PosturePath:
+    known(f"{where}, trajectory", body, ("postures", "times"), ("postures",))
+    postures = body["postures"]
+    require(isinstance(postures, list) and len(postures) > 0, f"{where}: postures is {postures!r}; give a list of them")
+    times = numbers(where, "times", body["times"], len(postures)) if "times" in body else (0.0,) * len(postures)
+    points = zip(postures, times, strict=True)
+    return PosturePath(tuple(PathPoint(_posture(where, one, arm), (), time) for one, time in points))
+
+
+def _tip(where: str, body: Any) -> Triple:
+    x, y, z = numbers(where, "tip", body, 3)
+    return x, y, z
+
+
+def _task(where: str, body: Any, arm: Arm) -> TaskCommand | None:
+    if "torque" in body:
+        return torque_task(where, body["torque"], arm)
+    return task_of_text(where, body["task"], arm) if "task" in body else None
 
 
 def _posture(where: str, body: Any, arm: Arm) -> tuple[float, ...]:
     joints = arm.joints
-    posture = _floats(where, "posture", body, len(joints.names))
+    posture = numbers(where, "posture", body, len(joints.names))
     for name, low, angle, high in zip(joints.names, joints.lower, posture, joints.upper, strict=True):
         require(low <= angle <= high, f"{where}: posture of {name} is {angle:g} rad; allowed: {low:g} to {high:g} rad")
     return posture
 
 
 def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
-    _known(where + ", force", body, ("frame", "newtons"), ("frame", "newtons"))
+    known(where + ", force", body, ("frame", "newtons"), ("frame", "newtons"))
     frames = ("base", *arm.covers.names)
     require(body["frame"] in frames, f"{where}: frame is {body['frame']!r}; allowed: {', '.join(frames)}")
-    x, y, z = _floats(where, "newtons", body["newtons"], 3)
+    x, y, z = numbers(where, "newtons", body["newtons"], 3)
     return ForceCommand(body["frame"], (x, y, z))
 
 
 def _chirp(where: str, body: Any) -> Chirp:
     keys = ("newtons", "from", "to")
-    _known(where + ", chirp", body, keys, keys)
-    newtons, start, end = (_float(where + ", chirp", key, body[key]) for key in keys)
+    known(where + ", chirp", body, keys, keys)
+    newtons, start, end = (number(where + ", chirp", key, body[key]) for key in keys)
     require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
     return Chirp(newtons, start, end)
 
 
 def _settings(where: str, body: Any) -> Iterator[Setting]:
-    _known(where + ", set", body, TUNABLE, ())
+    known(where + ", set", body, TUNABLE, ())
     for node, values in body.items():
         require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
         for name, value in flatten(values).items():
@@ -274,35 +364,14 @@ def _settings(where: str, body: Any) -> Iterator[Setting]:
 
 def _push(where: str, body: Any, arm: Arm) -> Push:
     names = ("cover", "place", "newtons", "begin", "end")
-    _known(where + ", push", body, names, names)
+    known(where + ", push", body, names, names)
     require(
         body["cover"] in arm.covers.names,
         f"{where}: cover is {body['cover']!r}; allowed: {', '.join(arm.covers.names)}",
     )
-    x, y, z = _floats(where, "newtons", body["newtons"], 3)
-    place, begin, end = (_float(where, key, body[key]) for key in ("place", "begin", "end"))
+    x, y, z = numbers(where, "newtons", body["newtons"], 3)
+    place, begin, end = (number(where, key, body[key]) for key in ("place", "begin", "end"))
     length = arm.covers.length[arm.covers.names.index(body["cover"])]
     require(0.0 <= place <= length, f"{where}: place is {place:g} m; {body['cover']} reaches from 0 to {length:g} m")
     require(0.0 <= begin < end, f"{where}: begin is {begin:g} s, end {end:g} s; end must be later, begin 0 or later")
     return Push(body["cover"], place, (x, y, z), begin, end, arm.covers.aside(body["cover"], place))
-
-
-def _known(where: str, body: Any, allowed: Sequence[str], needed: Sequence[str]) -> None:
-    if not isinstance(body, Mapping):
-        raise ParameterError(f"{where} is {body!r}; it must be a mapping with {', '.join(needed)}")
-    for key in body:
-        require(key in allowed, f"{where}: unknown key '{key}'; allowed: {', '.join(allowed)}")
-    for key in needed:
-        require(key in body, f"{where}: '{key}' is missing")
-
-
-def _float(where: str, key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ParameterError(f"{where}: {key} is {value!r}; it must be a finite number")
-    return float(value)
-
-
-def _floats(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
-    if not isinstance(value, list) or len(value) != length:
-        raise ParameterError(f"{where}: {key} is {value!r}; it must be a list of {length} numbers")
-    return tuple(_float(where, key, element) for element in value)

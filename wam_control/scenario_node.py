@@ -1,12 +1,11 @@
 """Node `scenario`: plays a task into the stack, as a user's program would."""
 
-from pathlib import Path
 from typing import Any
 
 from wam_control.contact_table import contact_of
-from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, Setting, load
+from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, Setting, load, script_file
+from wam_control.task import table_of
 from wam_description.arm import Shared
-from wam_description.configuration import packaged
 from wam_description.signals import BASE, ZERO, Level, NodeStatus, State, Wrench
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Call, Input, Outputs, SetParameters, reaction
@@ -33,7 +32,7 @@ class ScenarioNode:
     starts_with_all = True
 
     def __init__(self, shared: Shared, own: ScenarioParameters, scenario: Scenario | None = None) -> None:
-        self._scenario = scenario or Scenario(load(script_file(own.script), shared.arm))
+        self._scenario = scenario or Scenario(load(script_file(own.script), shared.arm), shared)
         self._covers = shared.arm.covers.names
         self._step, self._stamp = "", 0
         self.requests: list[Call | SetParameters] = []
@@ -42,7 +41,7 @@ class ScenarioNode:
     @reaction(
         Input("joint_states", "position"),
         Input("contact/hypotheses", absent="zero"),
-        outputs=("joint_posture_command", "force_command", "sim/disturbance"),
+        outputs=("joint_posture_command", "force_command", "task_command", "sim/disturbance"),
     )
     def step(self, inputs: Inputs) -> Outputs:
         """One outer period of the task."""
@@ -55,8 +54,9 @@ class ScenarioNode:
             self._request(out)
         force = out.force
         outputs: dict[str, Any] = {
-            "joint_posture_command": State(out.posture, [], []),
+            "joint_posture_command": State(out.posture, list(out.rate), []),
             "force_command": Wrench(force.frame, force.force, ZERO),
+            "task_command": table_of(out.task, self._covers),
             "sim/disturbance": Wrench(out.push_cover or BASE, out.push_force, out.push_torque),
         }
         if out.done:
@@ -91,11 +91,6 @@ class ScenarioNode:
         self.done, self.failure = True, self.failure or failure
         level = Level.ERROR if self.failure else Level.OK
         return {"status": NodeStatus(level, self.failure or "done", stamp=self._stamp)}
-
-
-def script_file(script: str) -> Path:
-    """The file of a scenario: a path that ends in '.yaml', or the name of one that comes with the package."""
-    return Path(script) if script.endswith(".yaml") else packaged(script, "scenario")
 
 
 def _plain(setting: Setting) -> Any:

@@ -1,7 +1,8 @@
 """Which gains of the velocity loop are stable on the arm: the guard of the inner loop.
 
 The linear part is rotors, cables and links under the sampled servo (`wam_theory.velocity_servo`), with the links held
-and with the links free.  Friction only takes energy away; without it the bound holds for any friction.
+and with the links free.  Friction only takes energy away; without it the bound holds for any friction.  Gains that
+are too small are stable, but hold nothing: both are assessed here alone.
 """
 
 from collections.abc import Sequence
@@ -13,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.sampled_loop import Feedback, SampledLoop
-from wam_control.stability_guard import rounded_down
+from wam_control.stability_guard import rounded_down, rounded_up
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.parameters import ParameterError, lengths, parameter
+from wam_description.parameters import ParameterError, lengths, parameter, require
+from wam_description.transmission_map import TransmissionMap
 from wam_theory.velocity_servo import is_stable, largest_scale, locked_rotors, servo_period
 
 Array = NDArray[np.float64]
 LARGEST = 1e3  # factor on the gains up to which a margin is searched
+DEAD = 0.02  # of the peak torque: a smaller one may be lost in the deadband of an amplifier, not in brakes
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class ServoGuardParameters:
     """Assumptions about the velocity loop, and what is done about gains that are not stable."""
 
     mode: str = parameter(
-        "off: any gains are taken; refuse: gains that are not stable are refused",
+        "off: any gains are taken; refuse: gains that are not stable or do not hold the arm are refused",
         choices=("off", "refuse"),
         before="off",
     )
@@ -71,15 +74,18 @@ class ServoGuard:
         self._arm, self._timing, self._parameters = arm, timing, parameters
 
     def require_stable(self, servo: Servo) -> None:
-        """Refuse gains that are not stable.
+        """Refuse gains that are not stable, or that do not hold the arm.
 
         Raises
         ------
         ParameterError
-            names the gains, their limit and the largest that would be taken.
+            names the gains, their limit and the smallest or largest that would be taken.
         """
         lengths("servo", self._arm.motors.names, vars(servo))
-        if self._parameters.mode == "off" or self._accepts(servo, 1.0, 1.0):
+        if self._parameters.mode == "off":
+            return
+        self._require_holding(servo)
+        if self._accepts(servo, 1.0, 1.0):
             return
         kp, ki = servo.proportional_gain, servo.integral_gain
         proportional = largest_scale(lambda scale: self._accepts(servo, scale, 1.0), 1.0)
@@ -104,6 +110,23 @@ class ServoGuard:
             return all(self._is_stable(mechanism, servo, scale, scale, 0) for mechanism in self._mechanisms)
 
         return largest_scale(is_stable_at, LARGEST)
+
+    def _require_holding(self, servo: Servo) -> None:
+        """Refuse proportional gains with which a motor at its largest speed is hardly braked.
+
+        The integral gain alone does not brake: it is a spring to the motor.
+        """
+        motors = self._arm.motors
+        speeds = TransmissionMap.of(self._arm).largest_motor_velocities(self._arm.joints.speed_limit)
+        least = [DEAD * peak / speed if speed else 0.0 for peak, speed in zip(motors.peak_torque, speeds, strict=True)]
+        for name, gain, enough, speed in zip(motors.names, servo.proportional_gain, least, speeds, strict=True):
+            require(
+                gain >= enough,
+                f"servo.proportional_gain {_listed(servo.proportional_gain)} cannot hold the arm: {name} at "
+                f"{speed:.3g} rad/s, from arm.joints.speed_limit, is braked with {gain * speed:.3g} N m, less than "
+                f"{DEAD:.0%} of its peak torque, whatever servo.integral_gain is; "
+                f"allowed: at least {_listed([rounded_up(each) for each in least])}",
+            )
 
     def _accepts(self, servo: Servo, proportional: float, integral: float) -> bool:
         return not self._trouble(servo, proportional, integral)

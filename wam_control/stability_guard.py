@@ -347,6 +347,12 @@ def rounded_down(value: float) -> float:
     return math.floor(value / digit) * digit
 
 
+def rounded_up(value: float) -> float:
+    """To three digits, never down: as `rounded_down`, for what is named as the least allowed."""
+    digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value else 1.0
+    return math.ceil(value / digit) * digit
+
+
 def _list(values: Sequence[float]) -> str:
     return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"
 

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wam_control.dither import DitherParameters
-from wam_control.servo_guard import ServoGuardParameters
+from wam_control.servo_guard import DEAD, ServoGuardParameters
 from wam_description.arm import Motors, Servo
 from wam_description.parameters import lengths, parameter
-
-DEAD = 0.02  # of the peak torque: a smaller one may be lost in the deadband of an amplifier, not in brakes
 
 
 @dataclass(frozen=True)

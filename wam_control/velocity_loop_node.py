@@ -19,10 +19,10 @@ class VelocityLoopNode:
 
     def __init__(self, shared: Shared, own: VelocityLoopParameters) -> None:
         self._own = own
-        self._guard = ServoGuard(shared.arm, shared.timing, own.guard)
+        self._guard = ServoGuard(shared.model_arm, shared.timing, own.guard)
         self._guard.require_stable(shared.servo)
         self._loop = VelocityLoop(shared.arm.motors, shared.servo, own)
-        self._dither = Dither(shared.arm, shared.timing, own.dither)
+        self._dither = Dither(shared.model_arm, shared.timing, own.dither)
         self._cost = self._dither.cost(shared.arm.joints.start)
         zero = [0.0] * len(shared.arm.motors.names)
         self._motors = shared.arm.motors.names

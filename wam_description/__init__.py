@@ -6,12 +6,17 @@
 - parameter_history: what parameters were in earlier versions, for old recordings
 - configuration, yaml_text: parameter files, which may build on one another
 - arm: parameters that every node shares
+- model: what the controllers know of the arm, where it is not the arm's own parameters
 - cables, effects, mismatch: parameters of the cables, of further effects of the plant, of model mismatch
 - world: parameters of what the arm can touch
+- movable: parameters of what the arm can move, and of what moves by itself
 - transmission_map: motors to joints and back, (A.5)
 - rigid_body, jacobian: kinematics and dynamics of the links; the hand Jacobian (A.7) in closed form
 - mjcf, urdf: the arm as a model for MuJoCo and for ROS
+- mjcf_objects: free bodies and doors in the model for MuJoCo
+- contact_pairs: what may touch what, and the law of each contact force
 - wiring, synchroniser: declaration of a node; its inputs brought together by stamp
+- driver_contract: what a driver of the arm promises, row by row
 - nodes, topics, interface: table of nodes, table of topics, who publishes and takes each topic
 - signals, status: the values that nodes exchange; the status of a node
 """

@@ -5,13 +5,15 @@ arrays are flattened row by row because ROS parameters cannot be nested.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from wam_description.cables import Cables, Circuit, circuits
-from wam_description.parameters import lengths, parameter, require
+from wam_description.model import ArmModel
+from wam_description.parameters import lengths, one_each, parameter, require
 from wam_description.units import STANDARD_GRAVITY
 
 
@@ -76,6 +78,16 @@ class Joints:
         for name, low, start, high in zip(self.names, self.lower, self.start, self.upper, strict=True):
             require(low < high, f"{name}: arm.joints.lower {low:g} rad is not below upper {high:g} rad")
             require(low <= start <= high, f"{name}: arm.joints.start {start:g} rad is outside {low:g} to {high:g} rad")
+
+    def beyond(self, posture: Sequence[float]) -> str:
+        """Why a posture (n,), rad, is refused: the first joint beyond its stops; '' where none is."""
+        for name, angle, low, high in zip(self.names, posture, self.lower, self.upper, strict=True):
+            if not low <= angle <= high:
+                return (
+                    f"{name} is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad; "
+                    "the last good posture remains in force"
+                )
+        return ""
 
 
 def _friction(group: str, names: tuple[str, ...], static: tuple[float, ...], dynamic: tuple[float, ...]) -> None:
@@ -159,6 +171,10 @@ class Arm:
     tool: tuple[float, ...] = parameter(
         "origin of the tool frame in the last link's frame, x y z", "m", low=-3.0, high=3.0
     )
+    payload: float = parameter(
+        "mass carried at the tool, known to all nodes and part of the simulated arm", "kg", low=0.0, high=50.0,
+        before=0.0,
+    )  # fmt: skip
     gravity: tuple[float, ...] = parameter("gravity in the base frame, x y z", "m/s^2", low=-20.0, high=20.0)
     joint_sensors: bool = parameter("true if joint-side encoders and strain gauges are mounted")
 
@@ -185,7 +201,7 @@ class Arm:
 
     def _require_plausible(self) -> None:
         """Refuse links that this arm cannot have, such as values in other units."""
-        joints, links = self.joints, self.links
+        joints, links = self.joints, self.carried
         spans = [abs(a) + abs(d) for a, d in zip(joints.length, joints.offset, strict=True)]
         size = sum(spans) + math.hypot(*self.tool)
         for i, name in enumerate(links.names):
@@ -218,6 +234,30 @@ class Arm:
                 f"the peak torque is {strength[i]:.3g} N m; check arm.links.mass, arm.links.centre, "
                 "arm.joints.length and offset",
             )
+
+    @cached_property
+    def carried(self) -> Links:
+        """The links with the payload, a point mass at the tool: what the motors carry, in every model of the arm.
+
+        Raises
+        ------
+        ParameterError
+            if the payload would turn the principal axes of the last link.
+        """
+        links, payload = self.links, self.payload
+        if not payload:
+            return links
+        centre, inertia = np.reshape(links.centre, (-1, 3)).copy(), np.reshape(links.inertia, (-1, 3)).copy()
+        lever, mass = np.array(self.tool) - centre[-1], links.mass[-1]
+        require(
+            int(np.count_nonzero(lever)) <= 1,
+            f"the payload is {payload:g} kg, but the tool is not on an axis of the last link's inertia; set it to 0",
+        )
+        fraction = payload / (mass + payload)
+        inertia[-1] += mass * fraction * (lever @ lever - lever * lever)
+        centre[-1] += fraction * lever
+        moved = {"centre": tuple(centre.ravel().tolist()), "inertia": tuple(inertia.ravel().tolist())}
+        return replace(links, mass=(*links.mass[:-1], mass + payload), **moved)
 
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
@@ -321,6 +361,26 @@ class InputAges:
 
 
 @dataclass(frozen=True)
+class MotionParameters:
+    """Limits of motions that are planned: trajectories of the joints, and straight lines of the tool."""
+
+    joint_speed: tuple[float, ...] = parameter(
+        "largest speed of each joint", "rad/s", low=1e-3, high=100.0, before=one_each("arm.joints.names", 1.2)
+    )
+    joint_acceleration: tuple[float, ...] = parameter(
+        "largest acceleration of each joint", "rad/s^2", low=1e-3, high=1e4, before=one_each("arm.joints.names", 4.0)
+    )
+    joint_jerk: tuple[float, ...] = parameter(
+        "largest jerk of each joint", "rad/s^3", low=1e-3, high=1e6, before=one_each("arm.joints.names", 40.0)
+    )
+    speed: float = parameter("largest speed of the tool on a line", "m/s", low=1e-3, high=10.0, before=0.4)
+    acceleration: float = parameter(
+        "largest acceleration of the tool on a line", "m/s^2", low=1e-3, high=100.0, before=1.0
+    )
+    jerk: float = parameter("largest jerk of the tool on a line", "m/s^3", low=1e-3, high=1e4, before=10.0)
+
+
+@dataclass(frozen=True)
 class Shared:
     """The part of a configuration that every node reads."""
 
@@ -328,4 +388,40 @@ class Shared:
     ages: InputAges
     arm: Arm
     servo: Servo
+    motion: MotionParameters
+    model: ArmModel
     nodes: tuple[str, ...] = parameter("nodes of this bring-up; lockstep starts when all are present")
+
+    def __post_init__(self) -> None:
+        require(
+            bool(self.nodes),
+            "parameter 'nodes' is empty; list the nodes to start, for example "
+            "[driver, transform, velocity_loop, gravity, force_loop, contact_estimator]",
+        )
+        each = ("joint_speed", "joint_acceleration", "joint_jerk")
+        lengths("motion", self.arm.joints.names, {key: getattr(self.motion, key) for key in each})
+
+    @cached_property
+    def model_arm(self) -> Arm:
+        """The arm as the controllers model it: links, inertia, and friction as the mean of both directions."""
+        arm, model = self.arm, self.model
+        motors = replace(
+            arm.motors,
+            inertia=model.motors.inertia,
+            dynamic_friction=_means(model.motors.coulomb_positive, model.motors.coulomb_negative),
+            static_friction=_means(model.motors.static_positive, model.motors.static_negative),
+            viscous_friction=model.motors.viscous,
+        )
+        joints = replace(
+            arm.joints,
+            armature=model.joints.armature,
+            dynamic_friction=model.joints.coulomb,
+            static_friction=model.joints.static,
+            viscous_friction=model.joints.viscous,
+        )
+        links = replace(arm.links, **vars(model.links))
+        return replace(arm, motors=motors, joints=joints, links=links)
+
+
+def _means(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(0.5 * (a + b) for a, b in zip(first, second, strict=True))

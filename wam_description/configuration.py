@@ -12,13 +12,15 @@ import yaml
 
 from wam_description import yaml_text
 from wam_description.arm import Shared
-from wam_description.parameters import ParameterError, build, flatten
+from wam_description.parameters import ParameterError, build, fields, flatten
 
 T = TypeVar("T")
 SHARED = "/**"
 BASE = "base"  # key of an overlay that names the configuration it changes
 PARAMETERS = "ros__parameters"
+MOST_OVERLAYS = 20  # files that build on each other
 SCENARIO_KEY = "steps"  # a file with this at its top is a scenario
+_DERIVED = frozenset(field.name for field in fields(Shared) if field.derived)  # a file need not give them
 
 
 class Configuration(NamedTuple):
@@ -93,7 +95,7 @@ class Configuration(NamedTuple):
         for key, value in values.items():
             node, colon, parameter = key.rpartition(":")
             flat = sections[self._section(node) if colon else SHARED]
-            if parameter not in flat:
+            if parameter not in flat and (colon or parameter not in _DERIVED):
                 where = f"node '{node}'" if colon else "section '/**'"
                 raise ParameterError(
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
@@ -196,6 +198,10 @@ def _base(path: Path, name: Any, above: tuple[Path, ...]) -> Path:
             f"{path}: {BASE} is {name!r}; give the name of a configuration or a path relative to the file"
         )
     base = path.parent / name if name.endswith((".yaml", ".yml")) else packaged(name)
+    if len(above) >= MOST_OVERLAYS:
+        raise ParameterError(
+            f"{above[0]}: more than {MOST_OVERLAYS} files build on each other by '{BASE}'; put some of them together"
+        )
     if base.resolve() in (path.resolve(), *above):
         raise ParameterError(f"{path}: {BASE} is the file itself, or one that builds on it; name another configuration")
     return base

@@ -239,6 +239,7 @@ ARM_ASSUMED: tuple[Constant, ...] = (
     _assumed("", "radius of the inner tube", 1.5, "in",
         "not printed; 3 in of tube below the 4.4 in of the joint-4 mechanism", parameter="arm.covers.radius",
         index=(0,)),
+    _assumed("", "payload at the tool", 0.0, "kg", "nothing is carried", parameter="arm.payload"),
     _assumed("g", "gravity, base upright", (0.0, 0.0, -9.80665), "m/s^2",
         "standard gravity; 7.2.1 has axis 1 vertical", parameter="arm.gravity"),
 )
@@ -340,6 +341,7 @@ TESTBED: tuple[Constant, ...] = (
         parameter="arm.covers.rotation"),
     _assumed("", "near end of the link", (0.0, 0.0, 0.0), "in", "drawn from the axis", parameter="arm.covers.start"),
     _assumed("", "radius of the link", 1.0, "in", "6.4.5: the manipulator is 2 in wide", parameter="arm.covers.radius"),
+    _assumed("", "payload at the tool", 0.0, "kg", "nothing is carried", parameter="arm.payload"),
     _assumed("g", "gravity, base upright", (0.0, 0.0, -9.80665), "m/s^2", "standard gravity", parameter="arm.gravity"),
 )
 # fmt: on

@@ -1,7 +1,7 @@
 """The interface of a bring-up: who publishes and who takes each topic, from the declarations of its nodes."""
 
 import importlib
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError
 from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
-from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration
+from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, raised
 
 
 @cache
@@ -39,6 +39,8 @@ def declared(entry: str) -> Declaration:
         raise ParameterError(
             f"node '{entry}' cannot be imported: {error}; check that '{module}' is installed or on PYTHONPATH"
         ) from error
+    except Exception as error:
+        raise ParameterError(f"node '{entry}' cannot be imported: {raised(error)}; correct '{module}'") from error
 
 
 class Interface:
@@ -172,6 +174,30 @@ class Interface:
         every: frozenset[str] = frozenset().union(*suspects)
         alive: frozenset[str] = frozenset().union(*(self.upstream(topic) for topic in present))
         return sorted(every.intersection(*suspects) - alive or every - alive or every)
+
+    def unanswered(self, topics: Collection[str], awaited: Mapping[str, Collection[str]]) -> dict[str, list[str]]:
+        """The nodes that are the reason why topics do not come, each with what it should have published.
+
+        A node that lacks what its step takes is none; those that publish what it lacks are looked at in its place.
+
+        Parameters
+        ----------
+        topics : that have not come.
+        awaited : by node, the topics that it lacks; only a node that is listed is known to run.
+        """
+        found: dict[str, list[str]] = {}
+        passed, waiting = set(topics), list(topics)
+        while waiting:
+            topic = waiting.pop(0)
+            for name, one in self.declarations.items():
+                reactions = [reaction for reaction in one.reactions if topic in reaction.outputs]
+                taken = {item.topic for reaction in reactions for item in (reaction.trigger, *reaction.inputs)}
+                lacking = sorted(taken.intersection(awaited.get(name, ())))
+                if reactions and not lacking:
+                    found.setdefault(name, []).append(topic)
+                waiting += [one for one in lacking if one not in passed]
+                passed.update(lacking)
+        return found
 
     def _check(self) -> None:
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from wam_description.arm import Arm, Joints, Links, Motors
-from wam_description.parameters import lengths, parameter, require
+from wam_description.parameters import lengths, one_each, parameter
 
 Shafts = TypeVar("Shafts", Motors, Joints)
 
@@ -21,7 +21,10 @@ class ModelMismatch:
     motor_friction: tuple[float, ...] = parameter("factor on the friction of each motor", low=0.0, high=10.0)
     joint_friction: tuple[float, ...] = parameter("factor on the friction of each joint", low=0.0, high=10.0)
     stiffness: tuple[float, ...] = parameter("factor on the stiffness of each cable circuit", low=0.01, high=100.0)
-    payload: float = parameter("unmodelled payload at the tool", "kg", low=0.0, high=100.0)
+    payload: float = parameter("unmodelled payload at the tool, besides arm.payload", "kg", low=0.0, high=100.0)
+    torque_constant: tuple[float, ...] = parameter(
+        "factor on the torque of each motor per current", low=0.1, high=10.0, before=one_each("arm.motors.names", 1.0)
+    )
 
 
 def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
@@ -35,14 +38,17 @@ def true_arm(arm: Arm, mismatch: ModelMismatch) -> Arm:
     lengths("mismatch", arm.links.names, {"mass": mismatch.mass})
     lengths("mismatch", arm.motors.names, {"motor_friction": mismatch.motor_friction})
     lengths("mismatch", arm.motors.names, {"stiffness": mismatch.stiffness})
+    lengths("mismatch", arm.motors.names, {"torque_constant": mismatch.torque_constant})
     lengths("mismatch", arm.joints.names, {"joint_friction": mismatch.joint_friction})
     by_motor = dict(zip(arm.motors.names, mismatch.stiffness, strict=True))
     stages = [by_motor[motor] for motor in arm.cables.stage_motors]
+    constants = _scaled(arm.motors.torque_constant, mismatch.torque_constant)
     return dataclasses.replace(
         arm,
-        motors=_with_friction(arm.motors, mismatch.motor_friction),
+        motors=dataclasses.replace(_with_friction(arm.motors, mismatch.motor_friction), torque_constant=constants),
         joints=_with_friction(arm.joints, mismatch.joint_friction),
-        links=_loaded(arm, mismatch),
+        links=_scaled_links(arm, mismatch),
+        payload=arm.payload + mismatch.payload,
         cables=dataclasses.replace(arm.cables, stage_ea=_scaled(arm.cables.stage_ea, stages)),
     )
 
@@ -60,24 +66,11 @@ def _with_friction(shafts: Shafts, factors: Sequence[float]) -> Shafts:
     )
 
 
-def _loaded(arm: Arm, mismatch: ModelMismatch) -> Links:
+def _scaled_links(arm: Arm, mismatch: ModelMismatch) -> Links:
     links = arm.links
     mass = np.multiply(links.mass, mismatch.mass)
-    centre = np.reshape(links.centre, (-1, 3)).astype(float)
     inertia = np.reshape(links.inertia, (-1, 3)) * np.array(mismatch.mass)[:, None]
-    if mismatch.payload > 0.0:
-        lever = np.array(arm.tool) - centre[-1]
-        require(
-            int(np.count_nonzero(lever)) <= 1,
-            f"mismatch.payload is {mismatch.payload:g} kg, but the tool is not on an axis of the last link's "
-            "inertia; set it to 0",
-        )
-        fraction = mismatch.payload / (mass[-1] + mismatch.payload)
-        reduced = mass[-1] * fraction
-        inertia[-1] += reduced * (lever @ lever - lever * lever)
-        centre[-1] += fraction * lever
-        mass[-1] += mismatch.payload
-    return dataclasses.replace(links, mass=_row(mass), centre=_row(centre), inertia=_row(inertia))
+    return dataclasses.replace(links, mass=_row(mass), inertia=_row(inertia))
 
 
 def _row(values: np.ndarray) -> tuple[float, ...]:

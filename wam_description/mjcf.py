@@ -12,7 +12,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from wam_description.arm import Arm
+from wam_description.contact_pairs import ContactPair, contact_pairs
 from wam_description.effects import Effects, Ripples
+from wam_description.mjcf_objects import add_bodies, add_doors, require_names
 from wam_description.parameters import lengths, require
 from wam_description.world import SHAPES, Obstacles, Pushers, Springs, World
 
@@ -30,8 +32,8 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     ----------
     arm : the arm.
     step : simulation step, s.
-    world : obstacles, each paired with every cover and with nothing else, springs at joints, pushers, each
-        paired with its cover.
+    world : obstacles, free bodies and doors, each paired with every cover; free bodies also with each other, with
+        obstacles and doors; springs at joints; pushers, each paired with its cover.
     effects : slack, torque ripple of motors and pulleys.
 
     Returns
@@ -53,11 +55,13 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     _add_rotors(bodies, arm)
     _add_links(bodies, arm)
     for i, name in enumerate(world.obstacles.names):
-        _add_obstacle(bodies, world.obstacles, i, name)
+        _add_obstacle(bodies, world.obstacles, i, name, name in world.moving)
     _add_pushers(bodies, world.pushers)
+    add_doors(bodies, world.doors)
+    add_bodies(bodies, world.bodies)
     contact = _add(root, "contact")
-    _add_pairs(contact, arm, world.obstacles)
-    _add_pusher_pairs(contact, world.pushers)
+    for pair in contact_pairs(arm, world):
+        _add_pair(contact, pair)
     tendons = _add(root, "tendon")
     _add_cables(tendons, arm, effects.slack)
     _add_springs(tendons, world.springs)
@@ -75,6 +79,7 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
         require(name not in taken, f"pusher '{name}' has the name of a cover or an obstacle; rename it")
         known = ", ".join(arm.covers.names)
         require(cover in arm.covers.names, f"pusher '{name}' presses on '{cover}'; covers: {known}")
+    require_names(world, (*arm.covers.names, *arm.links.names, *motors, *joints))
     for name in world.springs.joints:
         require(name in joints, f"world.springs.joints names '{name}'; joints: {', '.join(joints)}")
     for name in effects.ripples.shafts:
@@ -143,7 +148,7 @@ def _add_rotors(world: ElementTree.Element, arm: Arm) -> None:
 
 
 def _add_links(world: ElementTree.Element, arm: Arm) -> None:
-    joints, links, covers = arm.joints, arm.links, arm.covers
+    joints, links, covers = arm.joints, arm.carried, arm.covers
     parent = world
     for i, name in enumerate(links.names):
         twist = joints.twist[i]
@@ -203,18 +208,19 @@ def rotation_xyz(roll: float, pitch: float, yaw: float) -> np.ndarray:
     )
 
 
-def _add_obstacle(world: ElementTree.Element, obstacles: Obstacles, i: int, name: str) -> None:
+def _add_obstacle(world: ElementTree.Element, obstacles: Obstacles, i: int, name: str, moves: bool) -> None:
     shape = obstacles.shapes[i]
     size = list(obstacles.sizes[3 * i : 3 * i + 3])
     if shape == "plane":
         size[2] = 0.1  # MuJoCo's spacing of the grid lines that it draws
+    pose = {"pos": _triple(obstacles.positions, i), "euler": _triple(obstacles.rotations, i)}
+    parent = _add(world, "body", name=name, mocap="true", **pose) if moves else world
     _add(
-        world,
+        parent,
         "geom",
         name=name,
         type=shape,
-        pos=_triple(obstacles.positions, i),
-        euler=_triple(obstacles.rotations, i),
+        **({} if moves else pose),
         size=_numbers(size[: SHAPES[shape]]),
         rgba="0.95 0.75 0.35 1",
     )
@@ -230,33 +236,19 @@ def _add_pushers(world: ElementTree.Element, pushers: Pushers) -> None:
         _add(body, "geom", name=name, type=pushers.shapes[i], size=_numbers(size), rgba="0.85 0.6 0.5 1")
 
 
-def _add_pairs(contact: ElementTree.Element, arm: Arm, obstacles: Obstacles) -> None:
-    for cover in arm.covers.names:
-        for i, name in enumerate(obstacles.names):
-            _add_pair(contact, cover, name, obstacles.friction[i], obstacles.stiffness[i], obstacles.damping[i])
-
-
-def _add_pusher_pairs(contact: ElementTree.Element, pushers: Pushers) -> None:
-    for i, name in enumerate(pushers.names):
-        if pushers.force[i] > 0.0:
-            cover = pushers.covers[i]
-            _add_pair(contact, cover, name, pushers.friction[i], pushers.stiffness[i], pushers.damping[i])
-
-
-def _add_pair(
-    contact: ElementTree.Element, cover: str, other: str, friction: float, stiffness: float, damping: float
-) -> None:
+def _add_pair(contact: ElementTree.Element, pair: ContactPair) -> None:
+    friction = pair.friction
     _add(
         contact,
         "pair",
-        name=f"{cover}/{other}",
-        geom1=cover,
-        geom2=other,
+        name=pair.name,
+        geom1=pair.first,
+        geom2=pair.second,
         condim="3" if friction > 0.0 else "1",
         friction=_numbers((friction, friction, 0.0, 0.0, 0.0)),
         # with so small an impedance the plant can set the force itself, see wam_driver/surfaces.py
         solimp="0.001 0.001 0.001 0.5 2",
-        solref=_numbers((-stiffness, -damping)),
+        solref=_numbers((-pair.stiffness, -pair.damping)),
     )
 
 

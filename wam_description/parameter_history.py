@@ -36,7 +36,7 @@ class Completed(NamedTuple):
     Attributes
     ----------
     values : flat, by present name.
-    added : names that the recording lacks and that have their value from before they existed.
+    added : names that the recording lacks and that have their value from before they existed, apart from derived ones.
     missing : names that the recording lacks and for which nothing is known.
     unknown : recorded names that this version does not know; their values are ignored.
     """
@@ -70,7 +70,9 @@ def complete(node: str, nodes: Mapping[str, Mapping[str, Any]], classes: tuple[t
     missing = tuple(name for name, value in added.items() if value is None)
     values |= {name: value for name, value in added.items() if value is not None}
     unknown = tuple(name for name in recorded if name not in used and not name.startswith(OF_ROS))
-    return Completed(values, tuple(name for name in added if name not in missing), missing, unknown)
+    derived = {field.name for field in present if field.derived}  # a recording need not have them either
+    noted = tuple(name for name in added if name not in missing and name not in derived)
+    return Completed(values, noted, missing, unknown)
 
 
 def _before(field: Field, values: Mapping[str, Any]) -> Any:

@@ -5,9 +5,10 @@ nowhere else.  The same classes check the values, describe the parameters to ROS
 ``docs/parameters.md``.
 """
 
+import contextlib
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 T = TypeVar("T")
@@ -32,6 +33,7 @@ class Field(NamedTuple):
     live: bool
     before: Value | Callable[[Mapping[str, Any]], Value] | None
     length: int
+    derived: Callable[[Mapping[str, Any]], Value] | None
 
     @property
     def allowed(self) -> str:
@@ -56,6 +58,7 @@ def parameter(
     live: bool = False,
     before: Value | Callable[[Mapping[str, Any]], Value] | None = None,
     length: int = 0,
+    derived: Callable[[Mapping[str, Any]], Value] | None = None,
 ) -> Any:
     """Declare a field of a parameter class.
 
@@ -69,13 +72,20 @@ def parameter(
     before : the value that a recording without this parameter had in effect, or a function of the node's
         other parameters, see `one_each`.  Only recordings may lack a parameter; a configuration has to give it.
     length : of a list, the number of values that it must have, 0 where that is checked elsewhere.
+    derived : the value where a configuration does not give one, a function of the other parameters of its section,
+        see `copy_of`; recordings without the parameter had the same value.
     """
     return dataclasses.field(
         metadata={
-            "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live, "before": before,
-            "length": length,
+            "doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "live": live,
+            "before": derived if before is None else before, "length": length, "derived": derived,
         }
     )  # fmt: skip
+
+
+def copy_of(name: str) -> Callable[[Mapping[str, Any]], Value]:
+    """The value of another parameter of the section, as ``derived=copy_of("arm.links.mass")``."""
+    return lambda others: others[name]
 
 
 def one_each(names: str, value: bool | int | float | str) -> Callable[[Mapping[str, Any]], Value]:
@@ -130,6 +140,7 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
         names every missing and unknown parameter, or the first value that is not allowed.
     """
     known = {field.name: field for field in fields(cls)}
+    flat = {**_derived(known.values(), flat), **flat}
     missing = [name for name in known if name not in flat]
     unknown = [name for name in flat if name not in known]
     if missing or unknown:
@@ -138,6 +149,16 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
         raise ParameterError("; ".join(parts) + " (compare with docs/parameters.md)")
     checked = {name: _checked(field, flat[name]) for name, field in known.items()}
     return _assemble(cls, checked, "")
+
+
+def _derived(known: Iterable[Field], flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Derived values; none of a parameter that follows from a missing one, which is then reported."""
+    found = {}
+    for field in known:
+        with contextlib.suppress(LookupError):
+            if field.derived is not None:
+                found[field.name] = field.derived(flat)
+    return found
 
 
 def build_part(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:

@@ -128,6 +128,15 @@ class RigidBody:
         """Joint torques, (n,), N m, that give the links the acceleration qdd, (n,), rad/s^2."""
         return pin.rnea(self._model, self._data, _vector(q), _vector(qd), _vector(qdd))
 
+    def inverse_dynamics_regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Torques of `inverse_dynamics` per inertial parameter, (n, 10 n).
+
+        Of each link: mass, kg; mass times centre x y z, kg m; inertia xx, xy, yy, xz, yz, zz about the frame's origin,
+        kg m^2.  The torques are linear in them (Atkeson, An & Hollerbach 1986).
+        """
+        args = (_vector(q), _vector(qd), _vector(qdd))
+        return np.array(pin.computeJointTorqueRegressor(self._model, self._data, *args))
+
     def _known(self, cover: str) -> int:
         if cover not in self._frame:
             raise ValueError(f"cover '{cover}' is not on arm '{self.arm.name}'; covers: {', '.join(self.covers)}")
@@ -175,12 +184,13 @@ def _model(arm: Arm, mass_scale: Sequence[float]) -> pin.Model:
     model = pin.Model()
     model.name = arm.name
     model.gravity.linear = np.array(arm.gravity)
-    centres = np.reshape(arm.links.centre, (-1, 3))
-    inertias = np.reshape(arm.links.inertia, (-1, 3))
+    links = arm.carried
+    centres = np.reshape(links.centre, (-1, 3))
+    inertias = np.reshape(links.inertia, (-1, 3))
     joint = 0
     for i, name in enumerate(arm.joints.names):
         joint = model.addJoint(joint, pin.JointModelRZ(), joint_placement(arm, i), name)
-        mass = arm.links.mass[i] * mass_scale[i]
+        mass = links.mass[i] * mass_scale[i]
         inertia = pin.Inertia(mass, centres[i], np.diag(inertias[i] * mass_scale[i]))
         model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
     _add_frame(model, "tool", joint, pin.SE3(np.eye(3), np.array(arm.tool)))

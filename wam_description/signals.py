@@ -43,6 +43,20 @@ class Table(NamedTuple):
     rows: tuple[tuple[float, ...], ...]
 
 
+class PathPoint(NamedTuple):
+    """A posture (n,), rad, its velocity (n,), rad/s, empty for a stop, and its time from the start, s."""
+
+    position: tuple[float, ...]
+    velocity: tuple[float, ...] = ()
+    time: float = 0.0
+
+
+class PosturePath(NamedTuple):
+    """Postures one after the other; without times, as fast as the arm may move."""
+
+    points: tuple[PathPoint, ...]
+
+
 class ForceCommand(NamedTuple):
     """Commanded force of the arm on the world; `frame` is 'base' or a cover.
 
@@ -79,6 +93,44 @@ class Load(NamedTuple):
 
 
 NO_LOAD = Load("", float("nan"), ZERO, ZERO)
+
+
+class ObjectState(NamedTuple):
+    """The true state of an object of the world, known to the simulator only, in the base frame.
+
+    Attributes
+    ----------
+    object : index in `World.objects`.
+    x, y, z : of a free body or moving obstacle its centre, of a door the middle of its hinge, m.
+    qx, qy, qz, qw : orientation.
+    vx, vy, vz : velocity of that point, m/s.
+    angle : of a door, rad; NaN for others.
+    arm_force_x, arm_force_y, arm_force_z : force of the arm on it, N.
+    arm_torque_x, arm_torque_y, arm_torque_z : torque of that force about that point, N m.
+    other_force_x, other_force_y, other_force_z : force on it of obstacles and other objects, N.
+    """
+
+    object: float
+    x: float
+    y: float
+    z: float
+    qx: float
+    qy: float
+    qz: float
+    qw: float
+    vx: float
+    vy: float
+    vz: float
+    angle: float
+    arm_force_x: float
+    arm_force_y: float
+    arm_force_z: float
+    arm_torque_x: float
+    arm_torque_y: float
+    arm_torque_z: float
+    other_force_x: float
+    other_force_y: float
+    other_force_z: float
 
 
 class LikelyRange(NamedTuple):

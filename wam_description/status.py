@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from wam_description.signals import Level, NodeStatus
 
 REAL_TIME_FACTOR, BEHIND, SLIPS = "real-time factor", "behind [ms]", "slips"
+AWAITED = "waits for"  # fact: topics that a node lacks for its next step, separated by blanks
 WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 
 _CONNECTED = ("waiting", "connected")
@@ -24,18 +25,23 @@ def diagnosed_name(namespace: str, node: str) -> str:
     return f"{namespace.strip('/')}: {node}"
 
 
-def guidance(mode: str, before: str, absent: Sequence[str], namespace: str, is_played: bool) -> str:
+def guidance(
+    mode: str, before: str, absent: Sequence[str], faulty: Sequence[str], namespace: str, is_played: bool
+) -> str:
     """What the console says of the driver's state, and what to call next.
 
     Parameters
     ----------
     mode, before : the driver's state, and that before it, '' at the start.
     absent : nodes that are not connected yet.
+    faulty : nodes that report a fault.
     namespace : of the arm.
     is_played : whether a scenario makes the calls.
     """
     if absent:
         return f"{mode}; not connected yet: {', '.join(absent)}"
+    if mode == "braked" and faulty:
+        return f"braked; enable is refused until the fault is over that is reported by {', '.join(faulty)}"
     if mode == "enabled":
         return "enabled: the brakes are released"
     if is_played or (mode == "braked" and before == "enabled"):

@@ -10,6 +10,7 @@ Nothing is used that is from the future, too old, or from before the driver's se
   one goes on from it: a single message never moves the clock, a driver that starts again does.
 - An input far ahead of the clock is refused; one a little ahead is kept until the clock is there.
 - An input older than its limit is given as absent, and an older one never replaces a newer one.
+- A session that a status announces forgets nothing by itself, as anybody can send a status; its first state does.
 - A command of a program counts while it is streamed: a message of its own, which no other has preceded within
   the limit, does nothing.  Without a stamp it has that of the newest state when it comes.
 """
@@ -25,6 +26,7 @@ LONGEST_JUMP = (
     200_000_000  # ns, by which a clock goes on at once where a node was late; a longer one needs two messages
 )
 MOST_AHEAD = 1000  # messages ahead of the clock that are kept
+MOST_EARLY = 64  # messages of a session that was announced, kept until its first state comes
 
 
 class OutOfTime(ValueError):
@@ -114,7 +116,7 @@ class Synchroniser:
         self._limits = {topic: spec.limit_ns for topic, spec in waited.items()}
         self._longest_jump = max(LONGEST_JUMP, 3 * self._period)
         self._kept: dict[str, dict[int, Any]] = {topic: {} for topic in waited}
-        self._newest = {topic: _Newest(topic, spec) for topic, spec in inputs.items() if topic not in waited}
+        self._newest = {topic: _Newest(spec) for topic, spec in inputs.items() if topic not in waited}
         self._groups = [
             _Group(
                 spec.outer,
@@ -126,6 +128,8 @@ class Synchroniser:
         ]
         self._is_alone = not inputs  # a trigger is all there is to a step
         self._triggers: deque[tuple[int, Any]] = deque()
+        self._announced: int | None = None  # first state of a session that none of its states has confirmed yet, ns
+        self._early: deque[tuple[str, int, Any]] = deque(maxlen=MOST_EARLY)
         self.strays = 0
         self.restart()
 
@@ -137,6 +141,7 @@ class Synchroniser:
         begin : first state of the session, ns; nothing can come in answer to one before it.
         """
         self._begin = begin
+        self._announced = None
         self._last = self._last_done = self._suspect = 0
         self._triggers.clear()
         for kept in self._kept.values():
@@ -145,12 +150,16 @@ class Synchroniser:
             newest.clear()
 
     def follow(self, begin: int) -> None:
-        """Another session of the driver begins with this state, ns; what came is forgotten unless its clock goes on.
+        """Another session of the driver begins with this state, ns, as a status announces.
 
-        It goes on where the driver only asks which nodes run.
+        Where the clock goes on, the driver only asks which nodes run.  Where it goes back, what came is forgotten
+        with the first trigger that goes back, too.
         """
-        if not 0 < self._last <= begin:
+        if not self._last:
             self.restart(begin)
+        elif begin < self._last:
+            self._announced = begin
+            self._early.clear()
 
     def discard_commands(self, before: int) -> None:
         """Forget the commands whose stamp is before this time, ns: the brakes have been switched."""
@@ -176,11 +185,17 @@ class Synchroniser:
         if topic == self._trigger:
             if self._thinned and not self._timing.is_outer(stamp):
                 return ()
-            if not last < stamp <= last + self._longest_jump and (last or stamp <= 0) and not self._has_jumped(stamp):
+            if (
+                not last < stamp <= last + self._longest_jump
+                and (last or stamp <= 0)
+                and not (self._is_announced(stamp) or self._has_jumped(stamp))
+            ):
                 return ()
             self._last, self._suspect = stamp, 0
             self._triggers.append((stamp, value))
         elif not self._outer or topic in self._newest or self._timing.is_outer(stamp):
+            if self._announced is not None:
+                self._early.append((topic, stamp, value))
             self._keep(topic, stamp, value)
         if not self._triggers:
             return ()
@@ -228,6 +243,18 @@ class Synchroniser:
                 "give a command the stamp of the state that it answers; between nodes of the stack, this one is late"
             )
 
+    def _is_announced(self, stamp: int) -> bool:
+        """Whether a trigger confirms the session that was announced; its inputs that came before it are kept."""
+        begin = self._announced
+        if begin is None or not begin <= stamp <= self._last:
+            return False
+        self.restart(begin)
+        for topic, early, value in self._early:
+            if begin <= early <= stamp:
+                self._keep(topic, early, value)
+        self._early.clear()
+        return True
+
     def _has_jumped(self, stamp: int) -> bool:
         """Whether a trigger that does not go on from the last one goes on from the one that was suspected before."""
         suspect, self._suspect = self._suspect, stamp
@@ -262,6 +289,13 @@ class Synchroniser:
             for topic, kept in group.members
             if cause not in kept
         ]
+
+    def awaited(self, now: int) -> list[str]:
+        """Topics without which no step has been made for the state of this time, ns; none where it has been made."""
+        if self._triggers:
+            return self.missing(self._triggers[0][0])
+        due = self._timing.outer_stamp(now) if self._outer else now
+        return [self._trigger] if self._last < due else []
 
     def ages(self) -> dict[str, float]:
         """How old the inputs are that no step waits for and that have come, as parts of their limits, by topic."""
@@ -305,10 +339,10 @@ class Synchroniser:
 class _Newest:
     """The newest value of an input that no step waits for, and those that are ahead of the clock."""
 
-    __slots__ = ("_ahead", "_before", "_value", "is_command", "limit_ns", "stamp", "topic")
+    __slots__ = ("_ahead", "_before", "_value", "is_command", "limit_ns", "stamp")
 
-    def __init__(self, topic: str, spec: InputSpec) -> None:
-        self.topic, self.limit_ns, self.is_command = topic, spec.limit_ns, spec.is_command
+    def __init__(self, spec: InputSpec) -> None:
+        self.limit_ns, self.is_command = spec.limit_ns, spec.is_command
         self._ahead: deque[tuple[int, Any]] = deque(maxlen=MOST_AHEAD)
         self.clear()
 

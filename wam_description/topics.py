@@ -8,12 +8,15 @@ written from both, nodes take their types and QoS from here, the recorder record
 from functools import cache
 from typing import Final, NamedTuple
 
+from wam_description.signals import ObjectState
+
 JOINT_STATE, WRENCH, POINT = (
     "sensor_msgs/msg/JointState",
     "geometry_msgs/msg/WrenchStamped",
     "geometry_msgs/msg/PointStamped",
 )
 TABLE = "sensor_msgs/msg/PointCloud2"
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 EVERY_NODE: Final = ("status", "/diagnostics")  # published by every node, declared by none
 STATUS: Final = "status"
 
@@ -50,6 +53,27 @@ FORCE_AXIS_COLUMNS: Final = (
     "position_sd",  # m
 )
 
+TASK_COLUMNS: Final = (
+    "kind",  # number of `wam_control.task.AxisKind`: 1 force, 2 velocity, 3 position, 4 impedance
+    "joint",  # index of the joint, -1 for a point of a link
+    "link",  # index of the cover in arm.covers.names, -1 for a joint
+    "place",  # m along the cover; NaN of a force: the estimated place
+    "x",  # direction of the axis in the frame of the table; its length does not count
+    "y",
+    "z",
+    "value",  # N, m/s or m; of a joint N m, rad/s or rad; NaN of a position: where it is when the axis begins
+    "rate",  # m/s or rad/s at which a commanded position moves
+    "stiffness",  # N/m or N m/rad, of an impedance
+    "damping",  # N s/m or N m s/rad
+)
+TASK_AXIS_COLUMNS: Final = (
+    "kind",
+    "commanded",  # the value in force
+    "measured",  # N, m/s or m; of a joint N m, rad/s or rad
+    "force_sd",  # N or N m, standard deviation of the measured force; NaN for a motion
+    "independence",  # part of the axis that those before it leave, 0 to 1
+    "speed_fraction",  # velocity along the axis per commanded one, 0 to 1
+)
 
 # Magnitudes that no arm reaches, by quantity, also in an experiment without limits: a message with more is refused
 # whole.  What is computed from less stays finite.
@@ -77,6 +101,8 @@ class Column(NamedTuple):
 @cache
 def columns_of(names: tuple[str, ...]) -> tuple[Column, ...]:
     """The columns of a table by their names."""
+    if names == TASK_COLUMNS:
+        return tuple(Column(name, LARGEST_ESTIMATE, name in ("value", "place")) for name in names)
     known = HYPOTHESIS_COLUMNS
     return tuple(
         Column(name, LARGEST_ESTIMATE if name in known else LARGEST_ELSEWHERE, name not in _KNOWN) for name in names
@@ -111,6 +137,11 @@ class Topic(NamedTuple):
         return self.rate == "latched"
 
     @property
+    def is_replayed(self) -> bool:
+        """Whether a replay gives its messages to a node."""
+        return self.is_numbers or self.type == TRAJECTORY
+
+    @property
     def is_numbers(self) -> bool:
         """Whether a message is a stamp, a frame and numbers, which the simulation keeps and a replay compares."""
         return self.type in {JOINT_STATE, WRENCH, POINT, TABLE}
@@ -140,9 +171,37 @@ TOPICS: Final = (
     _joints("joint_effort_command", "outer", "feed-forward torque without gravity, N m"),
     _motors("motor_velocity_command", "outer", "rad/s; an empty velocity array commands torque only"),
     _motors("motor_effort_command", "outer", "feed-forward torque with gravity, N m"),
-    _joints("joint_posture_command", "outer", "posture held in the complement of the force, rad"),
+    _joints(
+        "joint_posture_command",
+        "outer",
+        "posture held in the complement of the force, rad; and, if it moves, its velocity, rad/s",
+    ),
+    Topic(
+        "joint_trajectory",
+        TRAJECTORY,
+        "outer",
+        "postures to go through, by your program, in place of `joint_posture_command`, rad; streamed, the same one "
+        "goes on",
+        "joints",
+    ),
     _joints("joint_torque_command", "outer", "joint torques commanded in the joint_torque mode, by your program, N m"),
     Topic("force_command", WRENCH, "outer", "force of the arm on the world, N; zero releases the force axis"),
+    Topic(
+        "task_command",
+        TABLE,
+        "outer",
+        "forces, velocities, positions and impedances along chosen axes, the first with priority, one row each; no row: "
+        "no task; float64 columns: see docs/task-frame.md",
+        columns=TASK_COLUMNS,
+    ),
+    Topic(
+        "task_axes",
+        TABLE,
+        "display",
+        "how well each axis of the task is measured and done, in the order of `task_command`; float64 columns: see "
+        "docs/task-frame.md",
+        columns=TASK_AXIS_COLUMNS,
+    ),
     Topic(
         "force_measured", WRENCH, "outer", "force of the arm on the world along the commanded direction, measured, N"
     ),
@@ -194,10 +253,18 @@ TOPICS: Final = (
     ),
     Topic("sim/contact/point", POINT, "outer", "truth: x = position along that link, NaN without contact"),
     Topic(
+        "sim/objects",
+        TABLE,
+        "outer",
+        "truth: one row per free body, door and moving obstacle, none published without any; frame base; float64 "
+        "columns: see docs/tasks.md",
+        columns=ObjectState._fields,
+    ),
+    Topic(
         "sim/disturbance",
         WRENCH,
         "outer",
-        "a push: force at and torque about the origin of the cover named by frame_id",
+        "a push: force at and torque about the origin of the cover named by frame_id; it ends `ages.command` after the last one",
     ),
     Topic("robot_description", "std_msgs/msg/String", "latched", "URDF of the arm"),
     Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node, latched by each"),

@@ -42,9 +42,9 @@ def urdf(arm: Arm) -> str:
 def _add_link(robot: Element, arm: Arm, i: int) -> None:
     link = SubElement(robot, "link", name=arm.links.names[i])
     inertial = SubElement(link, "inertial")
-    inertial.append(_origin(_triple(arm.links.centre, i), (0.0, 0.0, 0.0)))
-    SubElement(inertial, "mass", value=_numbers([arm.links.mass[i]]))
-    xx, yy, zz = (_numbers([value]) for value in _triple(arm.links.inertia, i))
+    inertial.append(_origin(_triple(arm.carried.centre, i), (0.0, 0.0, 0.0)))
+    SubElement(inertial, "mass", value=_numbers([arm.carried.mass[i]]))
+    xx, yy, zz = (_numbers([value]) for value in _triple(arm.carried.inertia, i))
     SubElement(inertial, "inertia", ixx=xx, ixy="0", ixz="0", iyy=yy, iyz="0", izz=zz)
     for cover, carrier in enumerate(arm.covers.links):
         if carrier == arm.links.names[i]:

@@ -34,10 +34,12 @@ topics : rows of the table of topics that this node adds.
 """
 
 import importlib
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from wam_description.arm import Shared
+from wam_description.parameters import ParameterError
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.topics import EVERY_NODE, Topic
@@ -146,6 +148,28 @@ class Declaration(NamedTuple):
         reacting = (topic for reaction in self.reactions for topic in reaction.outputs)
         return tuple(dict.fromkeys([*self.sources, *reacting]))
 
+    def make(self, *arguments: Any) -> Any:
+        """A node of the class.
+
+        Parameters
+        ----------
+        arguments : shared and own parameters, and what the class takes besides.
+
+        Raises
+        ------
+        ParameterError
+            where its constructor raises; names the class, the line of the code and what it raised.
+        """
+        try:
+            return self.node(*arguments)
+        except ParameterError as error:
+            raise ParameterError(f"node '{self.name}': {error}") from None
+        except Exception as error:
+            raise ParameterError(
+                f"node '{self.name}' cannot be made: {self.node.__module__}:{self.node.__qualname__} raised "
+                f"{raised(error)}; correct its __init__"
+            ) from error
+
     def require_declared(self, outputs: Outputs) -> None:
         """Refuse outputs on topics that the node does not declare.
 
@@ -165,6 +189,13 @@ class Declaration(NamedTuple):
         """Every topic that the node listens to, without status."""
         taken = (item.topic for reaction in self.reactions for item in (reaction.trigger, *reaction.inputs))
         return tuple(dict.fromkeys([*self.listens, *taken]))
+
+
+def raised(error: Exception) -> str:
+    """An exception in one line, with the last line of code that it passed through."""
+    text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{text}, at {frames[-1].filename}:{frames[-1].lineno}" if frames else text
 
 
 def mask(arrays: str) -> Callable[[State], State] | None:

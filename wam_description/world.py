@@ -1,7 +1,8 @@
-"""What the arm can touch: obstacles, springs and pushers."""
+"""What the arm can touch: obstacles, springs, pushers, and what it can move."""
 
 from dataclasses import dataclass
 
+from wam_description.movable import NO_BODIES, NO_DOORS, NO_MOTIONS, Doors, FreeBodies, Motions
 from wam_description.parameters import lengths, parameter, require
 
 SHAPES = {"box": 3, "cylinder": 2, "plane": 3}  # numbers that MuJoCo needs for the size of each
@@ -138,3 +139,36 @@ class World:
     obstacles: Obstacles
     springs: Springs
     pushers: Pushers = NO_PUSHERS
+    bodies: FreeBodies = NO_BODIES
+    doors: Doors = NO_DOORS
+    motions: Motions = NO_MOTIONS
+
+    def __post_init__(self) -> None:
+        known = self.obstacles.names
+        for i, name in enumerate(self.motions.obstacles):
+            require(
+                name in known or self.motions.frequency[i] == 0.0,
+                f"motions.obstacles names '{name}'; obstacles: {', '.join(known) or 'none'}",
+            )
+        pushing = [name for name, force in zip(self.pushers.names, self.pushers.force, strict=True) if force > 0.0]
+        bodies = [self.bodies.names[i] for i in self.bodies.present]
+        doors = [self.doors.names[i] for i in self.doors.present]
+        named = [*known, *pushing, *bodies, *doors]
+        doubled = sorted({name for name in (*bodies, *doors) if named.count(name) > 1})
+        require(
+            not doubled,
+            f"several of obstacles, pushers, bodies and doors are named {', '.join(doubled)}; "
+            "give each a name of its own",
+        )
+
+    @property
+    def moving(self) -> dict[str, int]:
+        """Obstacles that move, each with the index of its motion."""
+        return {self.motions.obstacles[i]: i for i in self.motions.present}
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """Names of the free bodies, doors and moving obstacles, in the order of `sim/objects`."""
+        bodies = [self.bodies.names[i] for i in self.bodies.present]
+        doors = [self.doors.names[i] for i in self.doors.present]
+        return (*bodies, *doors, *self.moving)

@@ -24,6 +24,10 @@ def parse(text: str) -> Any:
     Raises
     ------
     yaml.YAMLError
-        if it is not YAML, or a key is given twice in one mapping; names the line.
+        if it is not YAML, a key is given twice in one mapping, or blocks and brackets are nested too deeply for
+        Python; names the line where it is known.
     """
-    return yaml.load(text, _Strict)  # a safe loader
+    try:
+        return yaml.load(text, _Strict)  # a safe loader
+    except RecursionError:
+        raise yaml.YAMLError("its brackets or blocks are nested hundreds of levels deep; allowed: a few") from None

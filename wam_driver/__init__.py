@@ -14,7 +14,8 @@
 - step_size: which step fits the plant's stiffest mode
 - friction: laws of dry friction at motors and joints
 - circuits: creep, slack, torque and tension of the cable circuits
-- surfaces: contact forces of obstacles and pushers
+- surfaces: contact forces of all that a cover can touch
+- objects: moving obstacles; true pose, motion and contact forces of bodies and doors
 - loads: pushes, and the load on each cover
 - pusher: hands that follow a moving link and press on it
 """

@@ -31,19 +31,27 @@ class Amplifier:
 
     Parameters
     ----------
-    motors : torque constants and limits.
+    motors : torque constants and limits, as configured.
     parameters : deadband, ripple, noise, thermal time constant.
     random : source of the noise.
+    true_constant : torque of each true motor per current (n,), N m/A; None where it is as configured.
 
     Attributes
     ----------
     heat : w of each motor, 1 at the thermal limit.
     """
 
-    def __init__(self, motors: Motors, parameters: AmplifierParameters, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        motors: Motors,
+        parameters: AmplifierParameters,
+        random: np.random.Generator,
+        true_constant: Sequence[float] | None = None,
+    ) -> None:
         keys = ("deadband", "torque_ripple", "ripple_cycles", "current_noise")
         lengths("amplifier", motors.names, {key: getattr(parameters, key) for key in keys})
         self.torque_constant = list(motors.torque_constant)
+        self._true_constant = list(true_constant or motors.torque_constant)
         self.peak = [t / k for t, k in zip(motors.peak_torque, motors.torque_constant, strict=True)]
         self.continuous = [t / k for t, k in zip(motors.continuous_torque, motors.torque_constant, strict=True)]
         self.heat = [0.0] * len(self.peak)
@@ -77,7 +85,7 @@ class Amplifier:
 
     def torque(self, currents: Sequence[float], theta: Sequence[float]) -> list[float]:
         """Torque on the rotors at the angles theta, rad, with the ripple of the commutation, N m, (n,)."""
-        torque = self.nominal_torque(currents)
+        torque = [k * i for k, i in zip(self._true_constant, currents, strict=True)]
         for i, (ripple, cycles) in enumerate(
             zip(self._parameters.torque_ripple, self._parameters.ripple_cycles, strict=True)
         ):

@@ -12,7 +12,7 @@ from wam_description.arm import Shared
 from wam_description.effects import Effects
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import lengths, parameter
-from wam_description.signals import NO_LOAD, Answer, Load, State
+from wam_description.signals import BASE, NO_LOAD, Answer, Load, State, Table
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier, AmplifierParameters
 from wam_driver.friction import FrictionParameters
@@ -34,6 +34,13 @@ class DriverParameters:
     sensors: SensorParameters
     seed: int = parameter("seed of the random numbers of all noise", low=0, high=2**53)
     watchdog: float = parameter("age of the last command that is a fault", "s", low=0.002, high=0.05)
+    brake_torque: float = parameter(
+        "torque at which the brake of a rotor slips, so that it stops a moving arm without breaking a cable",
+        "N m",
+        low=0.1,
+        high=1e3,
+        before=1e3,
+    )
     elbow_speed_limit: float = parameter(
         "speed of the last joint's origin above which there is a fault", "m/s", low=0.0, high=100.0
     )
@@ -76,20 +83,24 @@ class Driver:
         arm, timing = shared.arm, shared.timing
         self.safety = Safety()
         random = np.random.Generator(np.random.PCG64(parameters.seed))
+        true = true_arm(arm, parameters.mismatch)
         self.plant = Plant(
-            true_arm(arm, parameters.mismatch),
+            true,
             parameters.world,
             parameters.effects,
             timing.substep,
             parameters.friction,
+            parameters.brake_torque,
         )
-        self.amplifier = Amplifier(arm.motors, parameters.amplifier, random)
+        self.amplifier = Amplifier(arm.motors, parameters.amplifier, random, true.motors.torque_constant)
         self._sensors = Sensors(arm, parameters.sensors, random)
         self.recent: deque[DriverSample] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str]
         self._arm, self._timing, self._parameters = arm, timing, parameters
         self._watch = LimitWatch(arm, parameters.elbow_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
+        self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
+        self._push_end = 0  # last tick of the present push
         self._tick = 1
         self._release()
         self._measure()
@@ -133,6 +144,8 @@ class Driver:
         arrival_age : time since the last command arrived, s, on the steady clock; 0 in lockstep.
         """
         enabled = self.safety.mode is Mode.ENABLED
+        if self._push_end and self._tick > self._push_end:
+            self.release_push()
         if enabled:
             age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
             if age >= self._parameters.watchdog:
@@ -159,11 +172,13 @@ class Driver:
         if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
             plant = self.plant
             self.recent.append(DriverSample(self.stamp, plant.theta, plant.thetad, self._command, self.currents))
-        if enabled:
-            tight = [tension for tension, _ in self.plant.tensions]
-            self._tightest = [max(pair) for pair in zip(self._tightest, tight, strict=True)]
-            if self.is_outer:
+        tight = [tension for tension, _ in self.plant.tensions]
+        self._tightest = [max(pair) for pair in zip(self._tightest, tight, strict=True)]
+        if self.is_outer:
+            if enabled:
                 self._watch_limits()
+            else:
+                self._watch_braking()
 
     def _watch_limits(self) -> None:
         """Trip on the first quantity above its limit; warn of those near it."""
@@ -179,6 +194,13 @@ class Driver:
         if fault:
             self._trip(fault)
 
+    def _watch_braking(self) -> None:
+        """Name the first cable that breaks under the brakes."""
+        broken = next(filter(None, (limit.excess for limit in self._watch.tensions(self._tightest))), "")
+        self._tightest = self._zero
+        if broken:
+            self.safety.damage(f"{broken} under the brakes; check the cable")
+
     def _trip(self, reason: str) -> None:
         self.safety.trip(reason)
         self._release()
@@ -188,7 +210,7 @@ class Driver:
         self._trip(reason)
 
     def push(self, cover: str, force: Sequence[float], torque: Sequence[float]) -> None:
-        """Push on a cover until the next push on it, see `Plant.push`.
+        """Push on a cover until the next push on it, for `ages.command` of the arm's time at most; see `Plant.push`.
 
         Raises
         ------
@@ -206,6 +228,12 @@ class Driver:
                     f"{what} is {size:.4g} {unit}; allowed: up to {name}, {limit:g} {unit}; the last push remains"
                 )
         self.plant.push(cover, np.array(force), np.array(torque))
+        self._push_end = self._tick + self._push_ticks
+
+    def release_push(self) -> None:
+        """End every push."""
+        self._push_end = 0
+        self.plant.release()
 
     def set_added_friction(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of the joints, (n,), N m, like the Teflon rod of section 5.6."""
@@ -260,3 +288,9 @@ class Driver:
     def true_contact(self) -> Load:
         """The simulator's largest load on a cover."""
         return max(self.plant.loads(), key=lambda load: sum(f * f for f in load.force), default=NO_LOAD)
+
+    @property
+    def true_objects(self) -> Table | None:
+        """The simulator's state of every free body, door and moving obstacle; None where there are none."""
+        states = self.plant.objects()
+        return Table(BASE, tuple(states)) if states else None

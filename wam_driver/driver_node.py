@@ -59,6 +59,7 @@ class DriverNode(TolerantNode):
                 self.driver,
                 shared.timing,
                 self._senders(shared.nodes),
+                ports.interface.unanswered,
                 self._session,
                 self._publish,
                 self._announce,
@@ -145,7 +146,7 @@ class DriverNode(TolerantNode):
         if wrench.frame == BASE:
             if any(wrench.force):
                 raise Refused(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
-            self.driver.plant.release()
+            self.driver.release_push()
         refusal = ""
         if wrench.frame != BASE:
             try:
@@ -164,7 +165,7 @@ class DriverNode(TolerantNode):
         if not self._connected or self._ports.absent:
             return
         if not self._started:
-            if not self._session.number:
+            if not self._session.number or self._session.is_overtaken:
                 self._session.begin()
                 self._announce()
             if self._session.silent:
@@ -204,6 +205,8 @@ class DriverNode(TolerantNode):
             ports.publish("sim/joint_states", stamp, driver.true_joint_state)
             ports.publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
             ports.publish("sim/contact/point", stamp, Point(frame, (load.place, 0.0, 0.0)))
+            if objects := driver.true_objects:
+                ports.publish("sim/objects", stamp, objects)
         if ports.report_due(stamp):
             ports.facts |= self.time.facts()
         ports.report(stamp)

@@ -14,6 +14,7 @@ class DriverInterface:
         "sim/joint_states",
         "sim/contact/wrench",
         "sim/contact/point",
+        "sim/objects",
         "robot_description",
         "/clock",
     )

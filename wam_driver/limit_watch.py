@@ -1,4 +1,4 @@
-"""What the driver watches while the brakes are off: each quantity, its limit, and the warning near it."""
+"""What the driver watches: each quantity, its limit, and the warning near it."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -31,11 +31,16 @@ class WatchedLimit(NamedTuple):
         return f"{self.quantity} {self.value:.2f} {self.unit} is near its limit {self.limit:g}"
 
     @property
-    def fault(self) -> str:
-        """Why the driver stops, '' while the quantity is within its limit."""
+    def excess(self) -> str:
+        """That the quantity is above its limit, '' while it is not."""
         if self.value <= self.limit:
             return ""
-        return f"{self.quantity} {self.value:.2f} {self.unit} is above its limit {self.limit:g}; command less"
+        return f"{self.quantity} {self.value:.2f} {self.unit} is above its limit {self.limit:g}"
+
+    @property
+    def fault(self) -> str:
+        """Why the driver stops, '' while the quantity is within its limit."""
+        return f"{self.excess}; command less" if self.excess else ""
 
 
 class LimitWatch:
@@ -80,6 +85,10 @@ class LimitWatch:
         yield from self._travels(q)
         for name, current, limit in zip(self._arm.motors.names, currents, self._peak, strict=True):
             yield WatchedLimit(f"current of {name}", abs(current), limit, "A")
+        yield from self.tensions(tensions)
+
+    def tensions(self, tensions: Sequence[float]) -> Iterator[WatchedLimit]:
+        """Tension of each cable with its breaking strength, also while the brakes stop the arm; (n,), N."""
         for name, tension, circuit in zip(self._arm.motors.names, tensions, self._arm.circuits, strict=True):
             yield WatchedLimit(f"cable tension of {name}", tension, circuit.breaking_strength, "N")
 

@@ -93,7 +93,9 @@ class CoverLoads:
             first, second = data.contact.geom[i].tolist()
             cover, sign = self._cover_of_geom.get(second), 1.0
             if cover is None:
-                cover, sign = self._cover_of_geom[first], -1.0
+                cover, sign = self._cover_of_geom.get(first), -1.0
+            if cover is None:  # between objects
+                continue
             mujoco.mj_contactForce(self._model, data, i, self._wrench)
             rotation = self._rotation[cover]
             force = rotation.T @ (sign * (data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3]))

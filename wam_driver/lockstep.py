@@ -1,6 +1,6 @@
 """The arm's time in lockstep: a period passes when the present state has been answered and the next one is due."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final
 
 from wam_description.arm import Timing
@@ -19,7 +19,8 @@ class Lockstep:
     """Advances the driver with the command that answers its present state, and says when none comes.
 
     Where no answer comes within `timing.timeout`, there is a fault that names the topic and the node: shortly before,
-    the roll is called with a new session, and a node that does not report that it follows has stopped.  From then on
+    the roll is called with a new session.  A node that does not report that it follows has stopped; of those that do,
+    the one that lacks nothing for its step has not answered.  From then on
     time creeps, a period every `WATCH`, braked: states go out, so that a node that was restarted finds its way in;
     with the next answer lockstep goes on.
 
@@ -28,6 +29,7 @@ class Lockstep:
     driver : to be advanced.
     timing : periods, pace and time-out.
     senders : by topic that a state is answered with, the node that sends it; `sim/disturbance` in outer periods only.
+    unanswered : the nodes that are the reason why topics do not come, as `Interface.unanswered`.
     session : that the nodes follow.
     publish : called after each period, to publish the new state.
     announce : called to publish the session.
@@ -41,6 +43,7 @@ class Lockstep:
         driver: Driver,
         timing: Timing,
         senders: Mapping[str, str],
+        unanswered: Callable[[Collection[str], Mapping[str, Collection[str]]], Mapping[str, Sequence[str]]],
         session: Session,
         publish: Callable[[], None],
         announce: Callable[[], None],
@@ -49,6 +52,7 @@ class Lockstep:
         now: Callable[[], float],
     ) -> None:
         self._driver, self._timing, self._senders = driver, timing, senders
+        self._unanswered = unanswered
         self._session, self._announce = session, announce
         self._publish, self._fault, self._now = publish, fault, now
         self.pacer = pacer
@@ -59,6 +63,7 @@ class Lockstep:
         self._patience = timing.timeout
         self._roll_call = timing.timeout - min(ROLL_CALL, 0.5 * timing.timeout)
         self._is_called = False
+        self._advice = ""  # what to do about an answer that is overdue
         self._waited, self._looked = 0.0, now()
 
     def start(self) -> None:
@@ -120,15 +125,23 @@ class Lockstep:
             self._one_period()
 
     def _overdue(self, missing: list[str]) -> str:
-        topics, silent = " and ".join(missing), ", ".join(self._session.silent)
-        senders = " and ".join(self._senders[topic] for topic in missing)
+        """Why time does not go on, and what to do."""
         stamp, limit = self._driver.stamp, self._timing.timeout
-        if silent:
-            return (
-                f"lockstep: no {topics} for the state of {stamp} ns within {limit:.1f} s; "
-                f"{silent} has stopped, start it again, then reset_fault"
-            )
-        return f"lockstep: no {topics} for the state of {stamp} ns within {limit:.1f} s; check that {senders} runs"
+        self._advice = self._cause(missing)
+        return (
+            f"lockstep: no {' and '.join(missing)} for the state of {stamp} ns within {limit:.1f} s; "
+            f"{self._advice}, then reset_fault"
+        )
+
+    def _cause(self, missing: list[str]) -> str:
+        """The node that is the reason, and what to do about it."""
+        if silent := ", ".join(self._session.silent):
+            return f"{silent} has stopped or is very slow, start it again"
+        found = self._unanswered(missing, self._session.awaited)
+        if not found or found.keys() - self._session.awaited.keys():
+            return f"check that {' and '.join(self._senders[topic] for topic in missing)} runs"
+        node, topics = next(iter(found.items()))
+        return f"{node} runs, but did not publish {' and '.join(topics)}: let each of its steps return that"
 
     @property
     def start_overdue(self) -> bool:
@@ -138,8 +151,7 @@ class Lockstep:
     def obstacle(self) -> str:
         """What speaks against a release of the brakes now, '' where nothing does."""
         if self._started and self._patience < self._timing.timeout:
-            topics, nodes = (" and ".join(names) for names in (self._senders, self._senders.values()))
-            return f"no {topics} comes in; start {nodes}, then enable"
+            return f"no {' and '.join(self._senders)} comes in; {self._advice}, then enable"
         return ""
 
     def pause(self, on: bool) -> None:

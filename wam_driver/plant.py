@@ -19,14 +19,15 @@ from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
-from wam_description.signals import Load
+from wam_description.signals import Load, ObjectState
 from wam_description.world import World
 from wam_driver.circuits import CableCircuits
 from wam_driver.friction import COULOMB_STICTION, DryFriction, FrictionParameters
 from wam_driver.loads import CoverLoads
+from wam_driver.objects import TrueObjects, moving_obstacles
 from wam_driver.pusher import pushers
 from wam_driver.step_size import require_fitting_step
-from wam_driver.surfaces import Surfaces
+from wam_driver.surfaces import Mover, Surfaces
 
 WARNINGS = {
     "inertia": "its inertia matrix is singular",
@@ -37,7 +38,7 @@ WARNINGS = {
     "badqacc": "an acceleration is not finite or huge",
     "badctrl": "a torque is not finite",
 }  # what MuJoCo's warnings say of the arm
-BRAKE_TORQUE = 1e3  # N m at a rotor, far above any cable
+RIGID = 1e3  # N m of a brake, far above any cable
 
 
 class Plant:
@@ -50,6 +51,7 @@ class Plant:
     effects : which effects of the transmission are on.
     step : length of a step, s.
     friction : law of the dry friction.
+    brake_torque : torque at which the brake of a rotor slips, N m.
 
     Raises
     ------
@@ -64,28 +66,39 @@ class Plant:
         effects: Effects,
         step: float,
         friction: FrictionParameters = COULOMB_STICTION,
+        brake_torque: float = RIGID,
     ) -> None:
         self.model = mujoco.MjModel.from_xml_string(mjcf(arm, step, world, effects))
         self.data = mujoco.MjData(self.model)
         mujoco.set_mju_user_warning(_unheard)
         n = len(arm.motors.names)
         self._n = n
+        self._brakes = [brake_torque] * n
         self._start = arm.joints.start
         self._slack = effects.slack
         self._arm = arm
         self._motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(n, n))
         self._circuits = CableCircuits(self.data, arm, effects, step)
-        self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0.tolist())
+        self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0[: 2 * n].tolist())
         self._loads = CoverLoads(self.model, self.data, arm, world.springs)
-        self._pushers = pushers(self.model, self.data, arm, world.pushers, step)
-        self._surfaces = Surfaces(self.model, self.data, world, len(arm.covers.names), self._pushers, step)
+        self._moving = moving_obstacles(self.model, self.data, world)
+        self._objects = TrueObjects(self.model, self.data, arm, world, {one.name: one for one in self._moving})
+        self._movers: list[Mover] = [*pushers(self.model, self.data, arm, world.pushers, step), *self._moving]
+        self._surfaces = Surfaces(self.model, self.data, arm, world, self._movers, step)
         # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
         data, model = self.data, self.model
-        self._qvel = data.qvel
-        self._theta, self._thetad, self._q, self._qd = data.qpos[:n], data.qvel[:n], data.qpos[n:], data.qvel[n:]
-        self._qdd, self._joint_damping, self._armature = data.qacc[n:], model.dof_damping[n:], model.dof_armature[n:]
+        joints = self._joints = slice(n, 2 * n)  # free bodies and doors come after rotors and joints
+        self._qvel, self._every_velocity = data.qvel[: 2 * n], data.qvel
+        self._theta, self._thetad, self._q, self._qd = (
+            data.qpos[:n],
+            data.qvel[:n],
+            data.qpos[joints],
+            data.qvel[joints],
+        )
+        self._qdd, self._joint_damping = data.qacc[joints], model.dof_damping[joints]
+        self._armature = model.dof_armature[joints]
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
-        self._frictionloss = self.model.dof_frictionloss
+        self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
         self._rest()
         self.keep()
@@ -93,14 +106,16 @@ class Plant:
 
     def _rest(self) -> None:
         """Put the arm at its start pose, braked, with the cables stretched so that they carry the links."""
-        data, n = self.data, self._n
+        data, joints = self.data, self._joints
         mujoco.mj_resetData(self.model, data)
-        data.qpos[n:] = self._start
-        data.qpos[:n] = self._motor_from_joint @ data.qpos[n:]
+        for one in self._moving:
+            one.lead(0.0)
+        self._q[:] = self._start
+        self._theta[:] = self._motor_from_joint @ self._q
         mujoco.mj_forward(self.model, data)
-        load = data.qfrc_bias[n:] - data.qfrc_spring[n:]
+        load = data.qfrc_bias[joints] - data.qfrc_spring[joints]
         torque = np.linalg.solve(self._motor_from_joint.T, load)
-        data.qpos[:n] = self._motor_from_joint @ data.qpos[n:] + [
+        self._theta[:] = self._motor_from_joint @ self._q + [
             _stretch(tau, circuit, self._slack)
             for tau, circuit in zip(torque.tolist(), self._arm.circuits, strict=True)
         ]
@@ -130,7 +145,7 @@ class Plant:
         if any(self._warnings.tolist()):
             names = [name for name, count in zip(WARNINGS, self._warnings.tolist(), strict=True) if count]
             return " and ".join(WARNINGS[name] for name in names)
-        if not math.isfinite(sum(self._qvel.tolist()) + sum(self._position.tolist())):
+        if not math.isfinite(sum(self._every_velocity.tolist()) + sum(self._position.tolist())):
             return WARNINGS["badqvel"]
         return ""
 
@@ -145,10 +160,12 @@ class Plant:
         mujoco.mj_resetData(self.model, self.data)
         self._position[:], self._plastic[:] = self._kept
         self.data.time = time
+        for one in self._moving:
+            one.lead(time)
         self._begin()
 
     def brake(self, on: bool) -> None:
-        """Put on or release the brakes, which hold the rotors."""
+        """Put on or release the brakes, which hold the rotors up to the torque at which they slip."""
         self._is_set = self._is_set and on == self._braked
         self._braked = on
 
@@ -186,8 +203,8 @@ class Plant:
         model, data, pushes = self.model, self.data, self._loads.pushes
         self._write_torque(0, *torque)
         self._set_friction()
-        for pusher in self._pushers:
-            pusher.lead(data.time)
+        for mover in self._movers:
+            mover.lead(data.time)
         mj_step1(model, data)
         if pushes:
             self._loads.apply_pushes()
@@ -212,7 +229,7 @@ class Plant:
         if changed or circuits.is_slack or not self._is_set:
             levels = friction.levels_with_slack(circuits.elastic_torque) if circuits.is_slack else friction.levels
             self._is_set = not circuits.is_slack
-            self._frictionloss[:] = [BRAKE_TORQUE] * self._n + levels[self._n :] if self._braked else levels
+            self._frictionloss[:] = self._brakes + levels[self._n :] if self._braked else levels
 
     def _transmitted_torque(self) -> list[float]:
         """Elastic torque of the cables on rotors, then on joints, N m, (2 n,), at the start of the last step."""
@@ -226,7 +243,8 @@ class Plant:
         torque = self._friction.elastic.copy() or [0.0] * (2 * self._n)
         dry = slice(data.ne, data.ne + data.nf)
         for dof, friction in zip(data.efc_id[dry].tolist(), data.efc_force[dry].tolist(), strict=True):
-            torque[dof] += friction
+            if dof < len(torque):  # not the hinge of a door
+                torque[dof] += friction
         return torque
 
     @property
@@ -281,6 +299,10 @@ class Plant:
     def loads(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
         return self._loads.measure()
+
+    def objects(self) -> list[ObjectState]:
+        """The true state of every free body, door and moving obstacle, in the order of `World.objects`."""
+        return self._objects.measure()
 
 
 def _unheard(_: str) -> None:

@@ -19,12 +19,13 @@ class Safety:
     Attributes
     ----------
     mode : present state.
-    fault : the first fault since the last reset, empty if there is none.
+    fault : the first fault since the last reset, and the first damage under the brakes; empty if there is none.
     """
 
     def __init__(self) -> None:
         self.mode = Mode.BRAKED
         self.fault = ""
+        self._is_damaged = False
 
     def enable(self, obstacle: str) -> Answer:
         """Release the brakes, unless `obstacle` names a reason against it."""
@@ -46,10 +47,19 @@ class Safety:
         if self.mode is not Mode.FAULT:
             self.mode, self.fault = Mode.FAULT, reason
 
+    def damage(self, reason: str) -> None:
+        """Latch the first damage done under the brakes, after the fault that has put them on."""
+        if self._is_damaged:
+            return
+        self._is_damaged = True
+        before = f"{self.fault}; then " if self.mode is Mode.FAULT else ""
+        self.mode, self.fault = Mode.FAULT, before + reason
+
     def reset_fault(self) -> Answer:
         """Clear the fault; the arm stays braked."""
         if self.mode is not Mode.FAULT:
             return Answer(True, f"{self.mode.value}: no fault was latched")
         cleared, self.fault = self.fault, ""
+        self._is_damaged = False
         self.mode = Mode.BRAKED
         return Answer(True, f"braked: fault '{cleared}' cleared; call enable to move")

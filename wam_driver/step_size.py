@@ -5,6 +5,7 @@ mode, with damping c on a mass m up to h = 2 m/c.  A contact begins and ends bet
 the more the larger h w is.
 """
 
+import itertools
 import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -14,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
+from wam_description.contact_pairs import contact_pairs
+from wam_description.mjcf_objects import hinge_name
 from wam_description.parameters import ParameterError
 from wam_description.world import World
 
@@ -79,17 +82,21 @@ def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
     """The arm alone, then with each cover pressed on each surface, at the start and with all joints at 0."""
     n = len(arm.joints.names)
     data, inertia = mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    cables = np.hstack([np.eye(n), -np.linalg.inv(np.reshape(arm.joint_from_motor, (n, n)))])
+    ratios = -np.linalg.inv(np.reshape(arm.joint_from_motor, (n, n)))
+    cables = np.hstack([np.eye(n), ratios, np.zeros((n, model.nv - 2 * n))])
     stiffness = cables.T @ np.diag([circuit.stiffness for circuit in arm.circuits]) @ cables
     damping = cables.T @ np.diag([circuit.damping for circuit in arm.circuits]) @ cables + np.diag(model.dof_damping)
     for joint, k, lever in zip(world.springs.joints, world.springs.stiffness, world.springs.lever, strict=True):
         at = n + arm.joints.names.index(joint)
         stiffness[at, at] += k * lever * lever
+    for i in world.doors.present:
+        at = int(model.joint(hinge_name(world.doors.names[i])).dofadr[0])
+        stiffness[at, at] += world.doors.spring[i]
     for q in (arm.joints.start, (0.0,) * n):
-        data.qpos[n:] = q
+        data.qpos[n : 2 * n] = q
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, inertia)
-        yield Linearised(inertia.copy(), stiffness, damping, "cables, rotors and springs")
+        yield Linearised(inertia.copy(), stiffness, damping, "cables, rotors, springs and hinges")
         for reach, k, b, where in _contacts(model, data, arm, world):
             square = np.outer(reach, reach)
             yield Linearised(inertia.copy(), stiffness + k * square, damping + b * square, where)
@@ -97,26 +104,48 @@ def _modes(model: Any, arm: Arm, world: World) -> Iterator[Linearised]:
 
 def _contacts(model: Any, data: Any, arm: Arm, world: World) -> Iterator[tuple[Array, float, float, str]]:
     """Velocity of both ends of each cover per joint velocity, (m,), along each axis, and the surface there."""
-    obstacles, pushers = world.obstacles, world.pushers
-    surfaces = [
-        (k * math.sqrt(1.0 + 4.0 * h * HARDENED_AT / k), b, f"obstacle '{name}'", arm.covers.names)
-        for name, k, b, h in zip(
-            obstacles.names, obstacles.stiffness, obstacles.damping, obstacles.hardening, strict=True
-        )
-    ]
-    surfaces += [
-        (k, b, f"pusher '{name}'", (cover,))
-        for name, k, b, cover, force in zip(
-            pushers.names, pushers.stiffness, pushers.damping, pushers.covers, pushers.force, strict=True
-        )
-        if force > 0.0
-    ]
+    touched = list(contact_pairs(arm, world))
+    loosest = {name: _loosest(model, data, name) for name in world.objects if name not in world.moving}
+    for one in touched:
+        if not one.is_shared:  # of one corner; where all others touch, too, the body moves as a whole
+            reach = loosest[one.first] - loosest.get(one.second, 0.0)
+            yield reach, one.stiffness, one.damping, one.what
     jacobian = np.zeros((3, model.nv))
     for i, (cover, link) in enumerate(zip(arm.covers.names, arm.covers.links, strict=True)):
         site = model.site(f"{cover}_frame").id
         rotation, origin = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
         for end in (arm.covers.start[3 * i : 3 * i + 3], arm.covers.end[3 * i : 3 * i + 3]):
             mujoco.mj_jac(model, data, jacobian, None, origin + rotation @ np.array(end), model.body(link).id)
-            for axis, (k, b, what, covers) in ((a, s) for a in range(3) for s in surfaces):
-                if cover in covers:
-                    yield rotation[:, axis] @ jacobian, k, b, f"{what} on {cover}"
+            for axis, one in ((a, s) for a in range(3) for s in touched):
+                if one.first == cover:
+                    k = one.stiffness * math.sqrt(1.0 + 4.0 * one.hardening * HARDENED_AT / one.stiffness)
+                    reach = rotation[:, axis] @ jacobian
+                    if one.second in loosest:
+                        reach = reach - loosest[one.second]
+                    yield reach, k, one.damping, f"{one.what} on {cover}"
+
+
+def _loosest(model: Any, data: Any, name: str) -> Array:
+    """Velocity per joint velocity, (m,), of the corner of an object, along the axis, where it has the least inertia."""
+    geom, body = model.geom(name).id, model.body(name).id
+    jacobian, found, most = np.zeros((3, model.nv)), np.zeros(model.nv), -1.0
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    half = _half_lengths(model, geom)
+    rotation = data.geom_xmat[geom].reshape(3, 3)
+    for signs in itertools.product((-1.0, 1.0), repeat=3):
+        mujoco.mj_jac(model, data, jacobian, None, data.geom_xpos[geom] + rotation @ (half * signs), body)
+        for reach in rotation.T @ jacobian:
+            mobility = float(reach @ np.linalg.solve(inertia, reach))
+            if mobility > most:
+                found, most = reach.copy(), mobility
+    return found
+
+
+def _half_lengths(model: Any, geom: int) -> Array:
+    """Half of the size of a geom along its axes, (3,), m."""
+    size: Array = np.array(model.geom_size[geom])
+    kind = int(model.geom_type[geom])
+    if kind == int(mujoco.mjtGeom.mjGEOM_SPHERE):
+        return size[[0, 0, 0]]
+    return size[[0, 0, 1]] if kind == int(mujoco.mjtGeom.mjGEOM_CYLINDER) else size

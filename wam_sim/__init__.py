@@ -5,5 +5,6 @@
 - recording, recorded_parameters: a recorded run, its steps, faults and parameters, read from a bag
 - replay: recorded inputs through a node again, its outputs compared with the recorded ones
 - batch: one function over many inputs on any executor; pieces: its finished results on disk
+- sweep: one scenario with many parameter sets
 - progress: how far a long computation is, for a terminal
 """

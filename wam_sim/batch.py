@@ -35,6 +35,7 @@ def results(
     executor: Executor,
     folder: Path | None = None,
     report: Report | None = None,
+    take: Callable[[int, Output], None] | None = None,
 ) -> list[Output]:
     """The function's result for each input, in order.
 
@@ -45,6 +46,7 @@ def results(
     executor : see `processes` and `dask`.
     folder : of finished pieces, owned by the user (`pieces.default_folder`); None keeps nothing.
     report : called with the numbers of finished and of all pieces, at the start and after each piece.
+    take : called with the number of an input and its result, as soon as it is computed.
 
     Raises
     ------
@@ -74,6 +76,8 @@ def results(
             for future in done:
                 i = pending.pop(future)
                 found[i] = _result(future, inputs[i])
+                if take is not None:
+                    take(i, found[i])
                 if (file := files[i]) is not None:
                     pieces.write(file, found[i])
                 progress(len(found), len(inputs))

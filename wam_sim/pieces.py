@@ -54,10 +54,10 @@ def file_of(folder: Path, function: Callable[..., Any], given: Any) -> Path:
 
 
 @cache
-def sources() -> str:
-    """Hash of every source file of the stack, and of the versions of NumPy and MuJoCo."""
+def sources(packages: str = "wam_*") -> str:
+    """Hash of the source files of the packages that a pattern names, and of the versions of NumPy and MuJoCo."""
     digest = hashlib.sha256(f"{version('numpy')} {version('mujoco')}".encode())
-    for path in sorted([*_ROOT.glob("wam_*/**/*.py"), *packaged("testbed").parent.glob("*.yaml")]):
+    for path in sorted([*_ROOT.glob(f"{packages}/**/*.py"), *packaged("testbed").parent.glob("*.yaml")]):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

@@ -15,16 +15,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_bag.bag import Bag, BagError, Columns, JointColumns, PointColumns, TableColumns, WrenchColumns, read
+from wam_bag.bag import (
+    Bag,
+    BagError,
+    Columns,
+    JointColumns,
+    Messages,
+    PointColumns,
+    TableColumns,
+    WrenchColumns,
+    read,
+)  # fmt: skip
 from wam_bag.losses import losses
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build_part
-from wam_description.signals import Point, State, Table, Wrench
+from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.synchroniser import OutOfTime
-from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, WRENCH, Topic
+from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, TRAJECTORY, WRENCH, Topic
 from wam_description.wiring import Declaration, mask
 from wam_sim.bus import TopicValue, flat
 from wam_sim.recording import RecordedRun, recorded_run
@@ -116,7 +126,7 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
     declaration = declared(node)
     rows = {**BY_NAME, **{topic.name: topic for topic in declaration.topics}}
     outputs = [topic for topic in declaration.outputs if rows[topic].is_numbers]
-    inputs = [topic for topic in declaration.inputs if rows[topic].is_numbers]
+    inputs = [topic for topic in declaration.inputs if rows[topic].is_replayed]
     bag = read(path, [*inputs, *outputs, STATUS], may_lack=True)
     if not any(name.endswith(f"/{topic}") for name in bag.topics for topic in (*inputs, *outputs)):
         raise BagError(f"{bag.path} has no topic of the node {node}; it has no arm, or another one recorded it")
@@ -188,7 +198,10 @@ def _run(
     own: Any,
     changes: list[tuple[int, Any]],
 ) -> dict[str, list[TopicValue]]:
-    interface, node = Interface(shared, started_by_hand=declaration), declaration.node(shared, own)
+    interface, node = Interface(shared, started_by_hand=declaration), declaration.make(shared, own)
+    for item in (item for reaction in declaration.reactions for item in reaction.inputs):
+        if item.age == "command" and f"{namespace}/{item.topic}" not in bag.topics:
+            interface.topics.pop(item.topic, None)  # the scenario that was recorded did not have this command
     feeds = {
         topic: [(feed.synchroniser.put, mask(feed.arrays), feed.work) for feed in found]
         for topic, found in interface.feeds(declaration, node).items()
@@ -216,6 +229,11 @@ def _messages(bag: Bag, namespace: str, inputs: Sequence[Topic], shared: Shared)
     found: list[tuple[int, int, str, int, Any]] = []
     for topic in inputs:
         columns = bag.topics.get(f"{namespace}/{topic.name}")
+        if isinstance(columns, Messages) and topic.type == TRAJECTORY:
+            for time, message in zip(columns.log_time_ns.tolist(), columns.messages, strict=True):
+                stamp = message.header.stamp
+                value = _trajectory(message, names["joints"])
+                found.append((time, len(found), topic.name, stamp.sec * 1_000_000_000 + stamp.nanosec, value))
         if not isinstance(columns, Numbers):
             continue
         values = _values(columns, names.get(topic.side, []))
@@ -229,6 +247,22 @@ def _messages(bag: Bag, namespace: str, inputs: Sequence[Topic], shared: Shared)
 def _names(shared: Shared) -> dict[str, list[str]]:
     """Names by side, in the order in which a JointState's arrays are compared."""
     return {"joints": list(shared.arm.joints.names), "motors": list(shared.arm.motors.names)}
+
+
+def _trajectory(message: Any, names: Sequence[str]) -> PosturePath:
+    """A recorded trajectory; one that the node refused has no points."""
+    if sorted(message.joint_names) != sorted(names):
+        return PosturePath(())
+    order = [list(message.joint_names).index(name) for name in names]
+    points = []
+    for point in message.points:
+        position, velocity = (
+            tuple(float(values[i]) for i in order) if len(values) == len(order) else ()
+            for values in (point.positions, point.velocities)
+        )
+        time = point.time_from_start
+        points.append(PathPoint(position, velocity, time.sec + time.nanosec * 1e-9))
+    return PosturePath(tuple(points))
 
 
 def _values(columns: Columns, names: Sequence[str]) -> list[Any]:

@@ -76,7 +76,8 @@ class Simulation:
     ) -> None:
         kind = declaration.parameter_class
         own = configuration.node(name, kind) if name in configuration.sections else build(kind, {})
-        node = declaration.node(shared, own, Scenario(steps)) if name == "scenario" else declaration.node(shared, own)
+        more = (Scenario(steps, shared),) if name == "scenario" else ()
+        node = declaration.make(shared, own, *more)
         self.nodes[name] = node
         self._settings[name] = dict(configuration.sections.get(name, {}))
         feeds = self._interface.feeds(declaration, node)
@@ -141,6 +142,8 @@ class Simulation:
         self._publish("sim/joint_states", stamp, self.driver.true_joint_state)
         self._publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
         self._publish("sim/contact/point", stamp, Point(frame, (load.place, 0.0, 0.0)))
+        if objects := self.driver.true_objects:
+            self._publish("sim/objects", stamp, objects)
 
     def _command(self, stamp: int, command: State) -> None:
         currents = command.effort
@@ -152,7 +155,7 @@ class Simulation:
 
     def _push(self, stamp: int, wrench: Wrench) -> None:
         if wrench.frame == BASE:
-            self.driver.plant.release()
+            self.driver.release_push()
         else:
             self.driver.push(wrench.frame, wrench.force, wrench.torque)
 

@@ -1,0 +1,67 @@
+"""Limit cycles of the measured force, forces that are not known well enough, and an arm that a dither shakes."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_force_loop import ARM, DT, GIVEN, OWN, World, ask, down, force_loop
+
+from wam_control.force_hold import ForceHold, ForceReaction
+from wam_control.force_swing import Reversals, Shake
+
+LIMITS = replace(GIVEN.limits, settling_time=0.5)
+PINNED = replace(OWN, limits=LIMITS, sensing=GIVEN.sensing, contact_source="pinned")
+
+
+def test_a_cycle_is_found_with_its_size_and_period_and_noise_and_a_drift_are_none() -> None:
+    turns, noise = Reversals(), np.random.default_rng(1).normal(0.0, 0.05, 400)
+    cycling = [turns.step(5.0 + math.sin(2.0 * math.pi * k * DT / 0.25), 0.5, 1.0, DT) for k in range(400)]
+    assert cycling[-1]
+    assert not any(cycling[:60])
+    assert turns.cycle == (pytest.approx(2.0, rel=0.02), pytest.approx(0.25, rel=0.02))
+    turns.reset()
+    assert not any(turns.step(5.0 + 0.01 * k + noise[k], 0.5, 1.0, DT) for k in range(400))
+
+
+def test_a_shake_is_measured_about_the_course_of_the_motion() -> None:
+    shake = Shake(8)
+    straight = [shake.step(0.003 * k) for k in range(30)]
+    assert max(straight) == pytest.approx(0.0, abs=1e-12)
+    shaken = [shake.step(0.003 * k + 1e-4 * math.sin(2.0 * math.pi * k / 8.0)) for k in range(30, 60)]
+    assert min(shaken[9:]) > 1.7e-4
+
+
+def test_a_force_that_cycles_is_reported_by_name_with_its_size() -> None:
+    loop = force_loop(ARM, PINNED)
+    for k in range(220):
+        ask(loop, World(400.0, force=5.0 + 0.4 * math.sin(2.0 * math.pi * k * DT / 0.2)), down(5.0))
+    assert loop.reaction is ForceReaction.CYCLE
+    assert "0.2 s about 5 N" in loop.reason
+    for _ in range(220):
+        ask(loop, World(400.0, force=5.0), down(5.0))
+    assert loop.reaction is ForceReaction.NONE
+
+
+def test_a_pinned_force_that_is_known_worse_than_ten_per_cent_is_reported_with_its_uncertainty() -> None:
+    loop = force_loop(ARM, PINNED)
+    for _ in range(200):
+        ask(loop, World(400.0, force=1.0), down(1.0))
+    assert loop.reaction is ForceReaction.UNCERTAIN
+    assert "the force is known to +-0.12 N" in loop.reason
+    for _ in range(200):
+        ask(loop, World(400.0, force=15.0), down(15.0))
+    assert loop.reaction is ForceReaction.NONE
+
+
+def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_commanded() -> None:
+    hold = ForceHold()
+    stiff = replace(PINNED, guard=replace(PINNED.guard, contact_stiffness=1e5))
+
+    def reason(force: float) -> str:
+        for k in range(80):
+            found = hold.shaken(5e-5 * math.cos(2.0 * math.pi * k / 8.0), force, stiff, DT)
+        return found
+
+    assert "declare a softer surface" in reason(3.0)
+    assert reason(10.0) == ""

@@ -1,0 +1,65 @@
+"""Swings: limit cycles of the measured force, and of the position under a dither."""
+
+from collections import deque
+
+CYCLES = 2  # that have to be seen
+
+
+class Reversals:
+    """Finds a cycle in a signal: it turns back again and again, by more than noise does."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all values."""
+        self._time, self._sense = 0.0, 0
+        self._extreme = self._before = self.peak_to_peak = 0.0
+        self._turns: deque[tuple[float, float]] = deque()
+
+    def step(self, value: float, least: float, window: float, dt: float) -> bool:
+        """Whether the signal has turned back by at least `least` for `CYCLES` cycles within `window`, s.
+
+        Afterwards `peak_to_peak` and `period` are the means of these cycles.
+        """
+        self._time += dt
+        if not self._sense:
+            self._sense, self._extreme, self._before = 1, value, value
+        if self._sense * (value - self._extreme) >= 0.0:
+            self._extreme = value
+        elif abs(value - self._extreme) >= least:
+            self._turns.append((self._time, abs(self._extreme - self._before)))
+            self._before, self._extreme, self._sense = self._extreme, value, -self._sense
+        while self._turns and self._turns[0][0] < self._time - window:
+            self._turns.popleft()
+        return len(self._turns) > 2 * CYCLES
+
+    @property
+    def cycle(self) -> tuple[float, float]:
+        """Mean peak to peak, in the unit of the signal, and period, s; zeros before two turns."""
+        if len(self._turns) < 2:
+            return 0.0, 0.0
+        (first, _), (last, _) = self._turns[0], self._turns[-1]
+        swings = [size for _, size in list(self._turns)[1:]]
+        return sum(swings) / len(swings), 2.0 * (last - first) / len(swings)
+
+
+class Shake:
+    """Peak to peak of a motion about its own course, over a window of whole cycles of a dither."""
+
+    def __init__(self, samples: int) -> None:
+        self._values: deque[float] = deque(maxlen=samples + 1)
+
+    def reset(self) -> None:
+        """Forget all values."""
+        self._values.clear()
+
+    def step(self, value: float) -> float:
+        """Peak to peak less the straight course from the first to the last value; 0 until the window is full."""
+        values = self._values
+        values.append(value)
+        if len(values) < (values.maxlen or 0):
+            return 0.0
+        first, slope = values[0], (values[-1] - values[0]) / (len(values) - 1)
+        rest = [v - first - slope * i for i, v in enumerate(values)]
+        return max(rest) - min(rest)

@@ -1,0 +1,312 @@
+"""Motions limited in speed, acceleration and jerk: through postures, and along a straight line of the tool.
+
+A motion is planned as a whole before it starts, from rest to rest, and refused with the number where it leaves the
+limits of the joints.
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+
+from wam_description.arm import Arm, MotionParameters
+from wam_description.parameters import require
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import PosturePath, Triple
+
+Array = NDArray[np.float64]
+NODES = 200  # of a line, between which the joint angles are interpolated
+STEEPEST = 15.0  # rad/m, of a joint on a line
+EXACT = 1e-10  # m, of the nodes of a line
+ROUNDING = 1e-9
+
+
+class Moving(NamedTuple):
+    """Joint angles (n,), rad, and their velocities (n,), rad/s."""
+
+    position: list[float]
+    velocity: list[float]
+
+
+class SCurve:
+    """From rest to rest over a distance in the shortest time within limits: seven parts of constant jerk.
+
+    Parameters
+    ----------
+    distance : above 0, m or rad or 1.
+    speed, acceleration, jerk : their limits, per s, s^2 and s^3.
+
+    Attributes
+    ----------
+    duration : s.
+    """
+
+    def __init__(self, distance: float, speed: float, acceleration: float, jerk: float) -> None:
+        rise = min((distance / (2.0 * jerk)) ** (1.0 / 3.0), math.sqrt(speed / jerk), acceleration / jerk)
+        ramp = 2.0 * rise
+        if rise == acceleration / jerk:
+            ramp = min(rise + speed / acceleration, rise / 2.0 + math.sqrt(rise * rise / 4.0 + distance / acceleration))
+        cruise = max(distance / (jerk * rise * (ramp - rise)) - ramp, 0.0)
+        steady = max(ramp - 2.0 * rise, 0.0)
+        parts = ((rise, jerk), (steady, 0.0), (rise, -jerk), (cruise, 0.0), (rise, -jerk), (steady, 0.0), (rise, jerk))
+        self._knots = [(0.0, 0.0, 0.0, 0.0, 0.0)]  # time, distance, speed, acceleration, jerk of each part
+        for time, jerk_of_part in parts:
+            begin, *state, _ = self._knots[-1]
+            self._knots[-1] = (begin, state[0], state[1], state[2], jerk_of_part)
+            self._knots.append((begin + time, *_on(state[0], state[1], state[2], jerk_of_part, time), 0.0))
+        self.duration, self._distance = self._knots[-1][0], distance
+
+    def at(self, time: float) -> tuple[float, float]:
+        """Distance and speed at a time, s, from the start."""
+        if time >= self.duration:
+            return self._distance, 0.0
+        begin, s, v, a, j = next(knot for knot in reversed(self._knots) if knot[0] <= max(time, 0.0))
+        s, v, _ = _on(s, v, a, j, max(time, 0.0) - begin)
+        return s, v
+
+
+def _on(s: float, v: float, a: float, j: float, t: float) -> tuple[float, float, float]:
+    """Distance, speed and acceleration after a time t of constant jerk."""
+    return s + t * (v + t * (a / 2.0 + t * j / 6.0)), v + t * (a + t * j / 2.0), a + t * j
+
+
+class PostureMotion:
+    """Through postures, in the given times or, without times, as fast as the limits allow with a stop at each.
+
+    With times each part is a polynomial of degree five between the positions and velocities of its ends, without
+    acceleration there; a posture without velocities is one at which the arm stops.
+
+    Parameters
+    ----------
+    start : joint angles (n,), rad, from which it starts at rest.
+    trajectory : postures, velocities and times.
+    arm : with the limits of the joints.
+    limits : of the motion.
+
+    Raises
+    ------
+    ParameterError
+        names the joint, the value and what is allowed.
+    """
+
+    def __init__(self, start: Sequence[float], trajectory: PosturePath, arm: Arm, limits: MotionParameters) -> None:
+        self._joints, self._limits = arm.joints, limits
+        points = trajectory.points
+        require(len(points) > 0, "the trajectory has no points; give at least one")
+        postures = [list(start), *(list(point.position) for point in points)]
+        times = [point.time for point in points]
+        for posture in postures[1:]:
+            self._require_inside(posture)
+        self._parts = self._timed(postures, trajectory) if any(times) else self._fast(postures)
+        self.duration = sum(part.duration for part in self._parts)
+
+    def at(self, time: float) -> Moving:
+        """The posture at a time, s, from the start."""
+        for part in self._parts:
+            if time < part.duration:
+                break
+            time -= part.duration
+        else:
+            time = part.duration
+        return part.at(time)
+
+    def _fast(self, postures: Sequence[list[float]]) -> list["_Part"]:
+        return [_Straight(a, b, self._limits) for a, b in pairwise(postures)]
+
+    def _timed(self, postures: Sequence[list[float]], trajectory: PosturePath) -> list["_Part"]:
+        parts: list[_Part] = []
+        rest = [0.0] * len(postures[0])
+        before, rate = 0.0, rest
+        for a, b, point in zip(postures, postures[1:], trajectory.points, strict=False):
+            require(
+                point.time > before,
+                f"a point of the trajectory is at {point.time:g} s, after one at {before:g} s; the times have to rise "
+                "from above 0, or all be 0",
+            )
+            parts.append(part := _Polynomials(a, rate, b, point.velocity or rest, point.time - before))
+            self._require_within(part)
+            before, rate = point.time, list(point.velocity) or rest
+        require(
+            not any(rate),
+            f"the trajectory ends with {max(map(abs, rate)):.3g} rad/s; it has to end at rest: leave out the "
+            "velocities of the last point",
+        )
+        return parts
+
+    def _require_inside(self, posture: Sequence[float]) -> None:
+        joints = self._joints
+        for name, low, angle, high in zip(joints.names, joints.lower, posture, joints.upper, strict=True):
+            require(
+                low <= angle <= high,
+                f"{name} of the trajectory is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad",
+            )
+
+    def _require_within(self, part: "_Polynomials") -> None:
+        limits = (self._limits.joint_speed, self._limits.joint_acceleration, self._limits.joint_jerk)
+        for order, (unit, most) in enumerate(zip(("rad/s", "rad/s^2", "rad/s^3"), limits, strict=True), start=1):
+            for name, largest, limit in zip(self._joints.names, part.largest(order), most, strict=True):
+                require(
+                    largest <= limit * (1.0 + ROUNDING),
+                    f"{name} of the trajectory reaches {largest:.3g} {unit}; allowed: {limit:g} {unit} (motion); give "
+                    f"it {(largest / limit) ** (1.0 / order):.3g} times the time, or no times",
+                )
+        for extreme in part.extremes():
+            self._require_inside(extreme)
+
+
+class LineMotion:
+    """The tool along a straight line, in the joint angles nearest to those at its start.
+
+    Parameters
+    ----------
+    start : joint angles (n,), rad, from which it starts at rest.
+    goal : of the tool (3,), base frame, m.
+    arm : with the limits of the joints.
+    body : its kinematics.
+    limits : of the motion, whose speed is reduced where a joint would be too fast.
+
+    Attributes
+    ----------
+    duration : s.
+
+    Raises
+    ------
+    ParameterError
+        names what the arm would reach, where on the line, and what is allowed.
+    """
+
+    def __init__(
+        self, start: Sequence[float], goal: Triple, arm: Arm, body: RigidBody, limits: MotionParameters
+    ) -> None:
+        begin = body.tool_pose(start).position
+        self._length = float(np.linalg.norm(np.array(goal) - begin))
+        self._angles = [np.array(start, float)]
+        self._slopes: list[Array] = []
+        self._profile: SCurve | None = None
+        self.duration = 0.0
+        if self._length < ROUNDING:
+            return
+        along = (np.array(goal) - begin) / self._length
+        for k in range(NODES + 1):
+            distance = self._length * k / NODES
+            if k:
+                self._angles.append(self._node(body, begin + along * distance))
+            self._slopes.append(self._slope(arm, body, along, distance))
+        steepest = np.abs(self._slopes).max(axis=0)
+        speed = min(limits.speed, *(np.array(limits.joint_speed) / np.maximum(steepest, ROUNDING)).tolist())
+        self._profile = SCurve(self._length, speed, limits.acceleration, limits.jerk)
+        self.duration = self._profile.duration
+
+    def at(self, time: float) -> Moving:
+        """The posture at a time, s, from the start."""
+        if self._profile is None:
+            return Moving(self._angles[0].tolist(), [0.0] * len(self._angles[0]))
+        distance, speed = self._profile.at(time)
+        step = self._length / NODES
+        k = min(int(distance / step), NODES - 1)
+        s = distance / step - k
+        (a, b), (c, d) = self._angles[k : k + 2], self._slopes[k : k + 2]
+        rest = b - a - step * c  # cubic through both nodes with their slopes
+        bend = step * (d - c)
+        position = a + s * (step * c + s * (3.0 * rest - bend + s * (bend - 2.0 * rest)))
+        slope = c + s * (2.0 * (3.0 * rest - bend) + 3.0 * s * (bend - 2.0 * rest)) / step
+        return Moving(position.tolist(), (speed * slope).tolist())
+
+    def _node(self, body: RigidBody, target: Array) -> Array:
+        """Joint angles for a place of the tool, nearest to those of the node before."""
+        step = self._length / NODES
+        q = self._angles[-1] + step * self._slopes[-1]
+        for _ in range(10):
+            error = target - body.tool_pose(q).position
+            if float(np.abs(error).max()) < EXACT:
+                break
+            q = q + np.linalg.pinv(body.tool_jacobian(q)) @ error
+        return q
+
+    def _slope(self, arm: Arm, body: RigidBody, along: Array, distance: float) -> Array:
+        """Joint velocity per speed of the tool (n,), rad/m, at the last node."""
+        q, joints = self._angles[-1], arm.joints
+        where = f"at {distance:.3g} m of the line of {self._length:.3g} m"
+        for name, low, angle, high in zip(joints.names, joints.lower, q, joints.upper, strict=True):
+            require(
+                low <= angle <= high,
+                f"{where} {name} would be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad: start in another "
+                "posture, or go another way",
+            )
+        result: Array = np.linalg.pinv(body.tool_jacobian(q)) @ along
+        steepest = float(np.abs(result).max())
+        require(
+            steepest < STEEPEST,
+            f"{where} a joint would turn by {steepest:.3g} rad per metre; allowed: less than {STEEPEST:g} rad/m: the "
+            "line goes to where the arm is straight or folded, or out of its reach; go another way",
+        )
+        return result
+
+
+class _Straight:
+    """Straight from one posture to another, from rest to rest, all joints with the same part of their way."""
+
+    def __init__(self, a: Sequence[float], b: Sequence[float], limits: MotionParameters) -> None:
+        self._from, self._way = a, [y - x for x, y in zip(a, b, strict=True)]
+        allowed = (limits.joint_speed, limits.joint_acceleration, limits.joint_jerk)
+        ways = [abs(way) for way in self._way]
+        self._profile = None
+        if max(ways) > ROUNDING:
+            most = [min(m / way for m, way in zip(limit, ways, strict=True) if way > ROUNDING) for limit in allowed]
+            self._profile = SCurve(1.0, *most)
+        self.duration = self._profile.duration if self._profile else 0.0
+
+    def at(self, time: float) -> Moving:
+        part, rate = self._profile.at(time) if self._profile else (1.0, 0.0)
+        position = [x + part * way for x, way in zip(self._from, self._way, strict=True)]
+        return Moving(position, [rate * way for way in self._way])
+
+
+class _Polynomials:
+    """A polynomial of degree five for each joint, without acceleration at its ends."""
+
+    def __init__(
+        self, a: Sequence[float], va: Sequence[float], b: Sequence[float], vb: Sequence[float], duration: float
+    ) -> None:
+        self.duration = duration
+        self._orders = [[_quintic(*ends, duration) for ends in zip(a, va, b, vb, strict=True)]]
+        for _ in range(3):
+            self._orders.append([one.deriv() for one in self._orders[-1]])
+
+    def at(self, time: float) -> Moving:
+        return Moving(*([float(one(time)) for one in order] for order in self._orders[:2]))
+
+    def largest(self, order: int) -> list[float]:
+        """Largest size of a derivative of each joint."""
+        return [max(abs(float(one(t))) for t in self._turns(one)) for one in self._orders[order]]
+
+    def extremes(self) -> list[list[float]]:
+        """The least and the largest angle of each joint."""
+        found = [[float(one(t)) for t in self._turns(one)] for one in self._orders[0]]
+        return [[min(values) for values in found], [max(values) for values in found]]
+
+    def _turns(self, one: Polynomial) -> list[float]:
+        roots: list[complex] = one.deriv().roots().astype(complex).tolist()
+        real = [r.real for r in roots if abs(r.imag) < ROUNDING * (1.0 + abs(r))]
+        return [0.0, self.duration, *(r for r in real if 0.0 < r < self.duration)]
+
+
+_Part = _Straight | _Polynomials
+
+
+def _quintic(a: float, va: float, b: float, vb: float, t: float) -> Polynomial:
+    way = b - a
+    return Polynomial(
+        [
+            a,
+            va,
+            0.0,
+            (10.0 * way - (6.0 * va + 4.0 * vb) * t) / t**3,
+            (-15.0 * way + (8.0 * va + 7.0 * vb) * t) / t**4,
+            (6.0 * way - 3.0 * (va + vb) * t) / t**5,
+        ]
+    )

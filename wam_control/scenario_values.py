@@ -1,0 +1,31 @@
+"""Values of a scenario file, each refused with the step, the key and what is allowed."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from wam_description.parameters import ParameterError, require
+
+
+def known(where: str, body: Any, allowed: Sequence[str], needed: Sequence[str]) -> None:
+    """Refuse what is no mapping with these keys."""
+    if not isinstance(body, Mapping):
+        raise ParameterError(f"{where} is {body!r}; it must be a mapping with {', '.join(needed)}")
+    for key in body:
+        require(key in allowed, f"{where}: unknown key '{key}'; allowed: {', '.join(allowed)}")
+    for key in needed:
+        require(key in body, f"{where}: '{key}' is missing")
+
+
+def number(where: str, key: str, value: Any) -> float:
+    """A finite number."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ParameterError(f"{where}: {key} is {value!r}; it must be a finite number")
+    return float(value)
+
+
+def numbers(where: str, key: str, value: Any, length: int) -> tuple[float, ...]:
+    """A list of finite numbers."""
+    if not isinstance(value, list) or len(value) != length:
+        raise ParameterError(f"{where}: {key} is {value!r}; it must be a list of {length} numbers")
+    return tuple(number(where, key, element) for element in value)

@@ -1,0 +1,225 @@
+"""A task as data: what is commanded along each of its axes, in the order of priority; as a table and back.
+
+An axis is a direction at a point of a link, or a joint.  Along it the task commands a force, a velocity, a
+position, or an impedance, which is free to be led by hand where its stiffness is zero [Raibert 81, Hogan 85].
+"""
+
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import NamedTuple
+
+from wam_description.arm import Arm
+from wam_description.parameters import ParameterError, require
+from wam_description.signals import BASE, ZERO, Table, Triple
+
+
+class AxisKind(IntEnum):
+    """What is commanded along an axis, as a number for a topic."""
+
+    FORCE = 1  # of the arm on the world, N or N m
+    VELOCITY = 2  # m/s or rad/s
+    POSITION = 3  # coordinate along the axis, from the origin of the base, m; or joint angle, rad
+    IMPEDANCE = 4  # spring about a position, and damper
+
+
+class TaskAxis(NamedTuple):
+    """One axis of a task.
+
+    Attributes
+    ----------
+    kind : what is commanded.
+    joint : index of the joint; -1 for a point of a link.
+    cover, place : link and place along it, m, of the point; '' and 0 for a joint; None for the estimated place.
+    direction : unit vector in the frame of the task (3,); zeros for a joint.
+    value : N, m/s or m; of a joint N m, rad/s or rad; None for the position where the axis is when it begins.
+    rate : at which a commanded position moves, m/s or rad/s.
+    stiffness, damping : of an impedance, N/m and N s/m; of a joint N m/rad and N m s/rad.
+    """
+
+    kind: AxisKind
+    joint: int = -1
+    cover: str = ""
+    place: float | None = 0.0
+    direction: Triple = ZERO
+    value: float | None = 0.0
+    rate: float = 0.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+
+    @property
+    def is_sensed(self) -> bool:
+        """Whether a force is measured along it."""
+        return self.kind in (AxisKind.FORCE, AxisKind.IMPEDANCE)
+
+    @property
+    def name(self) -> str:
+        """The axis in words."""
+        kind = self.kind.name.lower()
+        if self.joint >= 0:
+            return f"{kind} of joint {self.joint + 1}"
+        x, y, z = self.direction
+        place = "the estimated place" if self.place is None else f"{self.place:.3g} m"
+        return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place} of {self.cover}"
+
+
+class TaskCommand(NamedTuple):
+    """Axes in the order of their priority; their directions are in `frame`, 'base' or a cover."""
+
+    frame: str
+    axes: tuple[TaskAxis, ...]
+
+
+def joint_axes(kind: AxisKind, values: Sequence[float | None], damping: float = 0.0) -> tuple[TaskAxis, ...]:
+    """The same for every joint; joint torques, for example, or a free arm that is led by hand."""
+    return tuple(TaskAxis(kind, i, value=value, damping=damping) for i, value in enumerate(values))
+
+
+def line_axes(arm: Arm, cover: str, point: Triple, along: Triple) -> tuple[TaskAxis, ...]:
+    """The axis of a link on a line, free to slide along it (section 7.2.1): four axes in the base frame.
+
+    Two across the line at the beginning of the cover, two at its end.
+
+    Parameters
+    ----------
+    arm : the arm.
+    cover : the link.
+    point : on the line (3,), base frame, m.
+    along : direction of the line (3,), base frame.
+    """
+    length = arm.covers.length[arm.covers.names.index(cover)]
+    first, second = across(along)
+    return tuple(
+        TaskAxis(AxisKind.POSITION, -1, cover, place, axis, _dot(axis, point))
+        for place in (0.0, length)
+        for axis in (first, second)
+    )
+
+
+def across(along: Triple) -> tuple[Triple, Triple]:
+    """Two unit vectors across a direction (3,) and each other; the first one is level."""
+    x, y, z = unit(along)
+    level = unit((-y, x, 0.0)) if math.hypot(x, y) > 1e-6 else (0.0, 1.0, 0.0)
+    a, b, c = level
+    return level, unit((y * c - z * b, z * a - x * c, x * b - y * a))
+
+
+def table_of(task: TaskCommand | None, covers: Sequence[str]) -> Table:
+    """A task as the rows of the topic task_command; no row for none."""
+    if task is None:
+        return Table(BASE, ())
+    return Table(task.frame, tuple(_row(axis, covers) for axis in task.axes))
+
+
+def _row(axis: TaskAxis, covers: Sequence[str]) -> tuple[float, ...]:
+    link = float(covers.index(axis.cover)) if axis.cover else -1.0
+    value = math.nan if axis.value is None else axis.value
+    place = (math.nan if axis.place is None else axis.place, *axis.direction)
+    motion = (value, axis.rate, axis.stiffness, axis.damping)
+    return (float(axis.kind), float(axis.joint), link, *place, *motion)
+
+
+def task_of(table: Table | None, arm: Arm) -> TaskCommand | None:
+    """The task of a message, None for none.
+
+    Raises
+    ------
+    ParameterError
+        names the row and the value that is not allowed.
+    """
+    if table is None or not table.rows:
+        return None
+    return checked_task(
+        TaskCommand(table.frame, tuple(_axis(f"row {i + 1}", row, arm) for i, row in enumerate(table.rows)))
+    )
+
+
+def _axis(where: str, row: Sequence[float], arm: Arm) -> TaskAxis:
+    number, joint, link, place, x, y, z, value, rate, stiffness, damping = row
+    require(
+        number in tuple(AxisKind),
+        f"{where}: kind is {number:g}; allowed: {', '.join(f'{k.value} {k.name.lower()}' for k in AxisKind)}",
+    )
+    kind = AxisKind(int(number))
+    joints, covers = arm.joints.names, arm.covers
+    wanted = None if math.isnan(value) else value
+    motion = (wanted, rate, stiffness, damping)
+    if joint != -1:
+        require(
+            joint in range(len(joints)) and link == -1,
+            f"{where}: joint is {joint:g} and link {link:g}; allowed: joint 0 to {len(joints) - 1} with link -1, or "
+            "joint -1 with a link",
+        )
+        return checked(where, TaskAxis(kind, int(joint), "", 0.0, ZERO, *motion), arm)
+    require(
+        link in range(len(covers.names)),
+        f"{where}: link is {link:g}; allowed: 0 to {len(covers.names) - 1}, for {', '.join(covers.names)}",
+    )
+    require(math.hypot(x, y, z) > 0.0, f"{where}: the direction is zero; give one that is not")
+    where_on = None if math.isnan(place) else place
+    return checked(where, TaskAxis(kind, -1, covers.names[int(link)], where_on, unit((x, y, z)), *motion), arm)
+
+
+def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
+    """An axis as it is, or refused.
+
+    Raises
+    ------
+    ParameterError
+        names the value that is not allowed.
+    """
+    is_place = axis.kind in (AxisKind.POSITION, AxisKind.IMPEDANCE)
+    require(axis.value is not None or is_place, f"{where}: value is not a number; only a position may be left out")
+    require(
+        axis.kind is AxisKind.IMPEDANCE or not (axis.stiffness or axis.damping),
+        f"{where}: stiffness and damping belong to an impedance; it is a {axis.kind.name.lower()}",
+    )
+    require(
+        axis.stiffness >= 0.0 and axis.damping >= 0.0,
+        f"{where}: stiffness is {axis.stiffness:g} and damping {axis.damping:g}; allowed: 0 and above",
+    )
+    require(axis.rate == 0.0 or is_place, f"{where}: rate is {axis.rate:g}; it belongs to a position")
+    if axis.joint >= 0:
+        low, high = arm.joints.lower[axis.joint], arm.joints.upper[axis.joint]
+        require(
+            not is_place or axis.value is None or low <= axis.value <= high or not _is_held(axis),
+            f"{where}: {arm.joints.names[axis.joint]} is to be at {axis.value} rad; allowed: {low:.4g} to {high:.4g}",
+        )
+        return axis
+    length = arm.covers.length[arm.covers.names.index(axis.cover)]
+    require(axis.place is not None or axis.is_sensed, f"{where}: no place is given; only that of a force is estimated")
+    require(
+        axis.place is None or 0.0 <= axis.place <= length,
+        f"{where}: place is {axis.place} m; allowed: 0 to {length:g} m, on {axis.cover}",
+    )
+    return axis
+
+
+def checked_task(task: TaskCommand) -> TaskCommand:
+    """A task as it is, or refused where it has positions along axes that turn with a link.
+
+    Raises
+    ------
+    ParameterError
+        names the axis.
+    """
+    for axis in task.axes:
+        if task.frame != BASE and axis.joint < 0 and _is_held(axis):
+            raise ParameterError(
+                f"{axis.name} is in the frame of {task.frame}, which turns with it; command positions in the base frame"
+            )
+    return task
+
+
+def _is_held(axis: TaskAxis) -> bool:
+    return axis.kind is AxisKind.POSITION or axis.stiffness > 0.0
+
+
+def _dot(a: Triple, b: Triple) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def unit(vector: Triple) -> Triple:
+    """The vector (3,), which is not zero, scaled to length 1."""
+    size = math.hypot(*vector)
+    return vector[0] / size, vector[1] / size, vector[2] / size

@@ -1,0 +1,274 @@
+"""Control of a task in one outer period: whether it can be done here, the velocities of its axes, what they do."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.contact_position import ForcePoint, position_is_certain
+from wam_control.force_axis import ForceAxes
+from wam_control.force_hold import ForceHold, ForceReaction
+from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.guard_supervision import Supervision
+from wam_control.hybrid_velocity import posture_velocity
+from wam_control.stability_guard import GuardedContact
+from wam_control.task import AxisKind, TaskCommand
+from wam_control.task_frame import HAND, AxisState, TaskFrame, force_speed
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import Contact
+
+Array = NDArray[np.float64]
+AxisRow = tuple[float, float, float, float, float, float]  # under TASK_AXIS_COLUMNS
+
+
+class TaskOutput(NamedTuple):
+    """What a task commands in one period.
+
+    Attributes
+    ----------
+    velocity, effort : of the joints (n,), rad/s and N m.
+    measured, error : sum of the forces along the force axes, and of their errors, in the frame of the task (3,), N.
+    rows : of each axis, as the topic task_axes has them.
+    reaction, reason : what is done instead of what is commanded, and why.
+    has_changed : whether the law has changed since the period before.
+    """
+
+    velocity: list[float]
+    effort: list[float]
+    measured: Array
+    error: Array
+    rows: tuple[AxisRow, ...]
+    reaction: ForceReaction
+    reason: str
+    has_changed: bool
+
+
+class TaskControl:
+    """Controls one task after the other.
+
+    A task that cannot be done where it begins is refused, and one that can no longer be done stops; the arm then
+    holds its position until the task is changed.
+
+    Parameters
+    ----------
+    arm : the arm as the controller knows it.
+    body : its kinematics and dynamics.
+    axes : of forces, with their sensing.
+    parameters : of the force loop.
+    supervision : the guard of its gains.
+    """
+
+    def __init__(
+        self, arm: Arm, body: RigidBody, axes: ForceAxes, parameters: ForceLoopParameters, supervision: Supervision
+    ) -> None:
+        self._frame = TaskFrame(arm, body, axes, parameters.task, parameters.sensing)
+        self._covers, self._parameters, self._supervision = arm.covers, parameters, supervision
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the task."""
+        self._task: TaskCommand | None = None
+        self._anchors: dict[object, float] = {}
+        self._holds: list[ForceHold] = []
+        self._held_at: list[float] | None = None
+        self._refusal = ""
+        self._places: dict[str, tuple[float, float]] = {}  # m, of the last certain estimate, and its sd, by cover
+
+    def step(
+        self,
+        task: TaskCommand,
+        q: Sequence[float],
+        torques: tuple[Array, Array],
+        contact: Contact,
+        posture: Sequence[float],
+        rate: Sequence[float] | None,
+        dt: float,
+    ) -> TaskOutput:
+        """One outer period.
+
+        Parameters
+        ----------
+        task : what is commanded.
+        q : joint angles (n,), rad.
+        torques : filtered torques of the world on the joints (n,), N m, now and a period ago.
+        contact : estimated contact.
+        posture, rate : joint angles to hold in what the task leaves (n,), rad, and their velocity, rad/s.
+        dt : outer period, s.
+        """
+        own = self._parameters
+        has_changed = self._begin(task)
+        states = self._frame.states(task, q, self._points(task, contact))
+        anchors = self._find_anchors(states)
+        forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
+        self._refusal = self._refusal or self._beyond(task) or self._frame.refusal(states)
+        reaction, reason = (
+            (ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")
+            if self._refusal
+            else self._watch(states, forces, torques[0], dt)
+        )
+        if reaction.holds != (self._held_at is not None):
+            self._held_at, has_changed = (list(q) if reaction.holds else None), True
+        factor, is_other = self._supervision.factor(lambda: self._contacts(states, q), dt)
+        speeds = [
+            self._speed(state, force, anchor, torques[1], hold, factor, dt)
+            for state, force, anchor, hold in zip(states, forces, anchors, self._holds, strict=True)
+        ]
+        held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, rate)
+        resolved = self._frame.resolve(states, speeds, held, q)
+        velocity = _limited(resolved.velocity, own.joint_speed_limit)
+        effort = np.sum([_desired(state) * state.row for state in states], axis=0)
+        if self._held_at is not None:
+            velocity = posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
+            effort = np.zeros(len(q))
+        for state, hold in zip(states, self._holds, strict=True):
+            hold.travel(float(state.row @ velocity) * dt)
+        rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
+        measured, error = _vectors(states, forces)
+        return TaskOutput(velocity, effort.tolist(), measured, error, rows, reaction, reason, has_changed or is_other)
+
+    def _begin(self, task: TaskCommand) -> bool:
+        """Take a task; whether it has other axes than the one before."""
+        before, self._task = self._task, task
+        if before == task:
+            return False
+        self._refusal = ""
+        if before is not None and _axes(before) == _axes(task):
+            return False
+        self._anchors = {key: self._anchors[key] for key in _axes(task) if key in self._anchors}
+        self._holds = [ForceHold() for _ in task.axes]
+        return True
+
+    def _find_anchors(self, states: Sequence[AxisState]) -> list[float]:
+        """Commanded position of each axis; where none is, the position at which it has begun."""
+        assert self._task is not None
+        found = []
+        for key, state in zip(_axes(self._task), states, strict=True):
+            begun = self._anchors.setdefault(key, state.coordinate)
+            found.append(begun if state.axis.value is None else state.axis.value)
+        return found
+
+    def _beyond(self, task: TaskCommand) -> str:
+        """Why a task is refused: the first axis beyond a limit; '' if there is none."""
+        own = self._parameters
+        for axis in task.axes:
+            value, is_joint = abs(axis.value or 0.0), axis.joint >= 0
+            if axis.kind is AxisKind.FORCE:
+                name, limit, unit = "force_limit", own.force_limit, "N"
+                if is_joint:
+                    name, limit, unit = "torque_limit", own.torque_limit, "N m"
+            elif axis.kind is AxisKind.VELOCITY:
+                name, limit, unit = "task.speed_limit", own.task.speed_limit, "m/s"
+                if is_joint:
+                    name, limit, unit = "task.joint_speed_limit", own.task.joint_speed_limit, "rad/s"
+            else:
+                continue
+            if value > limit:
+                return f"{axis.name}: {value:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} {unit}"
+        return ""
+
+    def _watch(
+        self, states: Sequence[AxisState], forces: Sequence[float], external: Array, dt: float
+    ) -> tuple[ForceReaction, str]:
+        """What the force axes report, the most serious first."""
+        found = [(ForceReaction.NONE, "")]
+        for state, force, hold in zip(states, forces, self._holds, strict=True):
+            desired = _desired(state)
+            if state.sensed and state.point and desired:
+                found.append(hold.step(state.sensed, state.point, external, force, desired, self._parameters, dt))
+        return max(found, key=lambda one: (one[0].holds, one[0] is not ForceReaction.NONE))
+
+    def _points(self, task: TaskCommand, contact: Contact) -> list[ForcePoint]:
+        """Where each axis acts; an estimated place is the last certain one, at first the middle of the link."""
+        own = self._parameters
+        known = [axis.cover for axis in task.axes if axis.is_sensed and axis.cover]
+        conflict = ""
+        if contact.cover and contact.cover not in known and contact.probability >= own.link_probability_limit:
+            conflict = f"{contact.cover} is touched, and no force of the task acts on it"
+        limit = own.position_uncertainty_limit
+        if position_is_certain(contact.place, contact.position_sd, limit) and not (
+            contact.probability < own.link_probability_limit
+        ):
+            sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
+            self._places[contact.cover] = contact.place, sd
+        found = []
+        for axis in task.axes:
+            if axis.place is not None:
+                found.append(ForcePoint(axis.cover, axis.place, 0.0, True, True, False, "", conflict))
+                continue
+            length = self._covers.length[self._covers.names.index(axis.cover)]
+            place, sd = self._places.get(axis.cover, (length / 2.0, limit))
+            is_assumed = axis.cover not in self._places
+            found.append(ForcePoint(axis.cover, place, sd, not is_assumed, False, is_assumed, "", conflict))
+        return found
+
+    def _contacts(self, states: Sequence[AxisState], q: Sequence[float]) -> list[GuardedContact]:
+        contacts = []
+        for state in states:
+            if state.point:
+                x, y, z = state.direction.tolist()
+                point, force = state.point, _desired(state) or HAND
+                where = (point.cover, point.position, point.position_sd)
+                contacts.append(GuardedContact(tuple(q), *where, (x, y, z), force))
+        return self._supervision.known(contacts)
+
+    def _speed(
+        self,
+        state: AxisState,
+        force: float,
+        anchor: float,
+        before: Array,
+        hold: ForceHold,
+        factor: float,
+        dt: float,
+    ) -> float:
+        """Velocity along one axis, m/s or rad/s."""
+        if state.axis.kind is not AxisKind.FORCE:
+            return self._frame.velocity(state, force, anchor)
+        laws = self._supervision.force_law, self._supervision.torque_law
+        speed = factor * force_speed(state, *laws, force, state.force(before), dt)
+        if state.sensed and (desired := _desired(state)):
+            speed = min(speed, hold.approach_speed(state.sensed, desired, self._parameters))
+        fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
+        return min(max(speed, -fastest), fastest)
+
+
+def _axes(task: TaskCommand) -> list[object]:
+    """What makes an axis the same as before, whatever is commanded along it."""
+    return [(task.frame, axis.kind, axis.joint, axis.cover, axis.place, axis.direction) for axis in task.axes]
+
+
+def _desired(state: AxisState) -> float:
+    """Force along the axis, N or N m; 0 where it is no force axis.  That of a point is along its direction."""
+    axis = state.axis
+    if axis.kind is not AxisKind.FORCE:
+        return 0.0
+    return (axis.value or 0.0) if axis.joint >= 0 else abs(axis.value or 0.0)
+
+
+def _limited(velocity: Array, limit: float) -> list[float]:
+    """All velocities reduced by one factor, so that no joint is faster than the limit, rad/s."""
+    fastest = float(np.abs(velocity).max())
+    limited: list[float] = (velocity * (limit / fastest) if fastest > limit else velocity).tolist()
+    return limited
+
+
+def _row(state: AxisState, anchor: float, force: float, independence: float, fraction: float) -> AxisRow:
+    axis = state.axis
+    is_place = axis.kind in (AxisKind.POSITION, AxisKind.IMPEDANCE)
+    commanded = anchor if is_place else _desired(state) if axis.kind is AxisKind.FORCE else axis.value or 0.0
+    measured = force if axis.is_sensed else state.coordinate
+    return float(axis.kind), commanded, measured, state.force_sd, independence, fraction
+
+
+def _vectors(states: Sequence[AxisState], forces: Sequence[float]) -> tuple[Array, Array]:
+    """Sum of the measured forces of the arm on the world, and of their errors, frame of the task (3,), N."""
+    measured, error = np.zeros(3), np.zeros(3)
+    for state, force in zip(states, forces, strict=True):
+        if state.axis.kind is AxisKind.FORCE and state.sensed:
+            along = np.array(state.axis.direction) * math.copysign(1.0, state.axis.value or 0.0)
+            measured += along * force
+            error += along * (_desired(state) - force)
+    return measured, error

@@ -1,0 +1,243 @@
+"""The law of a task: each axis its own control, in strict priority, the posture in what they leave.
+
+For each axis in turn, with its row r (velocity along it per joint velocity) and the projector N onto what the
+axes before it leave: a = N r, qd += a (v - r.qd)/(|a|^2 + lambda^2), N -= a a'/|a|^2; at the end qd += N qd_posture.
+A force axis is sensed by its own generalised least squares (`wam_control.force_axis`), with the forces of the other
+axes as unknowns.  lambda is zero except near singular poses: for a force it limits the mass of the arm that
+appears in the measured force, for a motion it begins where the lever is shorter than `SHORT`.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.contact_position import ForcePoint
+from wam_control.force_axis import ForceAxes, ForceAxis, SensingParameters
+from wam_control.force_law import ForceLaw
+from wam_control.task import AxisKind, TaskAxis, TaskCommand
+from wam_control.task_parameters import TaskParameters
+from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import BASE
+
+Array = NDArray[np.float64]
+SHORT = 0.05  # m or 1, lever below which a motion along an axis is slowed down
+LOST = 1e-3  # part of an axis that the others have to leave it
+HAND = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
+
+
+class AxisState(NamedTuple):
+    """One axis in one pose.
+
+    Attributes
+    ----------
+    axis : what is commanded.
+    row : velocity along the axis per joint velocity, and torque on the joints per force (n,), m or 1.
+    direction : in the base frame (3,); zeros for a joint.
+    coordinate : present position along the axis, m or rad.
+    sensed, point : how the force along it is measured, and where it acts; None for a motion or a joint.
+    """
+
+    axis: TaskAxis
+    row: Array
+    direction: Array
+    coordinate: float
+    sensed: ForceAxis | None
+    point: ForcePoint | None = None
+
+    @property
+    def force_sd(self) -> float:
+        """Standard deviation of the measured force, N; NaN where none is measured at a point."""
+        return self.sensed.force_sd if self.sensed else math.nan
+
+    def force(self, external: Array) -> float:
+        """Force of the arm on the world along the axis, from torques of the world on the joints (n,), N m."""
+        return -float((self.sensed.sense if self.sensed else self.row) @ external)
+
+
+class Resolved(NamedTuple):
+    """Joint velocities (n,), rad/s, and for each axis what was left of it, and its speed per commanded one."""
+
+    velocity: Array
+    independence: tuple[float, ...]
+    speed_fraction: tuple[float, ...]
+
+
+class TaskFrame:
+    """The axes of tasks of one arm.
+
+    Parameters
+    ----------
+    arm : the arm as the controller knows it.
+    body : its kinematics and dynamics.
+    axes : of forces, with their sensing.
+    parameters : limits of tasks.
+    sensing : limits of the measured force.
+    """
+
+    def __init__(
+        self, arm: Arm, body: RigidBody, axes: ForceAxes, parameters: TaskParameters, sensing: SensingParameters
+    ) -> None:
+        self._arm, self._body, self._axes = arm, body, axes
+        self._parameters, self._sensing = parameters, sensing
+
+    def states(self, task: TaskCommand, q: Sequence[float], points: Sequence[ForcePoint]) -> list[AxisState]:
+        """Every axis of a task.
+
+        Parameters
+        ----------
+        task : what is commanded.
+        q : joint angles (n,), rad.
+        points : where each axis acts.
+        """
+        n = len(q)
+        rotation = np.eye(3) if task.frame == BASE else self._body.cover_pose(q, task.frame).rotation
+        directions = [rotation @ np.array(axis.direction) for axis in task.axes]
+        # a force is positive along its direction, which is the normal of the surface
+        directions = [-d if _pulls(axis) else d for axis, d in zip(task.axes, directions, strict=True)]
+        levers = [
+            self._axes.lever(q, axis.cover, point.position, u) if axis.is_sensed and axis.joint < 0 else None
+            for axis, u, point in zip(task.axes, directions, points, strict=True)
+        ]
+        found = []
+        for i, (axis, u, lever) in enumerate(zip(task.axes, directions, levers, strict=True)):
+            if axis.joint >= 0:
+                found.append(AxisState(axis, np.eye(n)[axis.joint], u, q[axis.joint], None))
+                continue
+            place, place_sd = points[i].position, points[i].position_sd
+            axis_point = np.array([place, *self._arm.covers.aside(axis.cover, place)])
+            coordinate = float(u @ self._body.point(q, axis.cover, axis_point))
+            if lever is None:
+                row: Array = u @ self._body.point_jacobian(q, axis.cover, axis_point)
+                found.append(AxisState(axis, row, u, coordinate, None))
+                continue
+            others = [_size(task.axes[k]) * o for k, o in enumerate(levers) if k != i and o is not None]
+            sensed = self._axes.axis(q, axis.cover, place, place_sd, u, _size(axis), others)
+            found.append(AxisState(axis, sensed.lever, u, coordinate, sensed, points[i]))
+        return found
+
+    def refusal(self, states: Sequence[AxisState]) -> str:
+        """Why this task cannot be done in this pose, with the number; '' where it can."""
+        own, joints = self._parameters, len(self._arm.joints.names)
+        for state in states:
+            lever = float(np.linalg.norm(state.row))
+            if lever < SHORT:
+                return (
+                    f"{state.axis.name}: its lever on the joints is {lever:.2g} m; allowed: {SHORT:g} m and above; "
+                    "bend the arm, or command another axis"
+                )
+        limit = own.condition_limit
+        rank, condition = rank_and_condition([state.row for state in states], limit)
+        if rank < len(states):
+            return (
+                f"the task has {len(states)} axes and {joints} joints; here they can do {rank} at once (condition "
+                f"number {condition:.3g}, allowed: task.condition_limit, {limit:g}); leave out an axis, or "
+                "go to another posture"
+            )
+        for state in states:
+            most = self._sensing.sd_limit(abs(state.axis.value or 0.0) if state.axis.kind is AxisKind.FORCE else 0.0)
+            if state.sensed and state.force_sd > most:
+                return (
+                    f"{state.axis.name}: the force is measured with a standard deviation of {state.force_sd:.3g} N; "
+                    f"allowed: {most:g} N (sensing.force_sd_limit, force_sd_fraction); bend the arm, or command "
+                    "another direction or place"
+                )
+        return next((reason for state in states if (reason := self._too_stiff(state.axis))), "")
+
+    def _too_stiff(self, axis: TaskAxis) -> str:
+        """Why an impedance is refused; '' where it is not, or the axis is none."""
+        own = self._parameters
+        if axis.kind is not AxisKind.IMPEDANCE:
+            return ""
+        name, least = ("least_damping", own.least_damping)
+        if axis.joint >= 0:
+            name, least = "least_joint_damping", own.least_joint_damping
+        if axis.damping and axis.damping < least:
+            return f"{axis.name}: damping is {axis.damping:g}; allowed: task.{name}, {least:g}, and above"
+        damping = axis.damping or least
+        if axis.stiffness > own.largest_rate * damping:
+            return (
+                f"{axis.name}: stiffness is {axis.stiffness:g} at a damping of {damping:g}; allowed: up to "
+                f"{own.largest_rate * damping:g} (task.largest_rate); give it more damping"
+            )
+        return ""
+
+    def velocity(self, state: AxisState, force: float, anchor: float) -> float:
+        """Velocity along a motion or an impedance, m/s or rad/s.
+
+        Parameters
+        ----------
+        state : of the axis.
+        force : of the arm on the world along it, N or N m.
+        anchor : position to hold, m or rad.
+        """
+        axis, own = state.axis, self._parameters
+        is_joint = axis.joint >= 0
+        fastest = own.joint_speed_limit if is_joint else own.speed_limit
+        if axis.kind is AxisKind.VELOCITY:
+            speed = axis.value or 0.0
+        elif axis.kind is AxisKind.POSITION:
+            speed = axis.rate + own.largest_rate * (anchor - state.coordinate)
+        else:
+            damping = axis.damping or (own.least_joint_damping if is_joint else own.least_damping)
+            drive = axis.stiffness * (anchor - state.coordinate) - force
+            deadband = own.joint_deadband if is_joint else own.deadband
+            speed = axis.rate + math.copysign(max(abs(drive) - deadband, 0.0), drive) / damping
+        return min(max(speed, -fastest), fastest)
+
+    def resolve(
+        self, states: Sequence[AxisState], speeds: Sequence[float], posture: Sequence[float], q: Sequence[float]
+    ) -> Resolved:
+        """Joint velocities that move each axis with its speed, m/s or rad/s, the posture (n,), rad/s, in the rest."""
+        inertia, most = self._axes.inertia(q), self._sensing.apparent_mass_limit
+        n = len(q)
+        left, velocity = np.eye(n), np.zeros(n)
+        independence, fractions = [], []
+        for state, speed in zip(states, speeds, strict=True):
+            a = left @ state.row
+            square, whole = float(a @ a), float(state.row @ state.row)
+            independence.append(math.sqrt(square / whole) if whole else 0.0)
+            if square <= (LOST * LOST) * max(whole, SHORT * SHORT):
+                fractions.append(0.0)
+                continue
+            damped = max(square, SHORT * SHORT)
+            if state.sensed is not None:
+                damped = max(square, abs(float(state.sensed.sense @ inertia @ a)) / most if most else 0.0)
+            velocity += a * ((speed - float(state.row @ velocity)) / damped)
+            left -= np.outer(a, a) / square
+            fractions.append(square / damped)
+        return Resolved(velocity + left @ np.array(posture), tuple(independence), tuple(fractions))
+
+
+def rank_and_condition(rows: Sequence[Array], limit: float) -> tuple[int, float]:
+    """How many of these rows (m, n), scaled to length 1, are independent up to a condition number; that number."""
+    scaled = np.array([row / np.linalg.norm(row) for row in rows])
+    found = np.linalg.svd(scaled, compute_uv=False)
+    smallest = float(found[-1]) if len(found) == len(rows) else 0.0
+    condition = float(found[0]) / smallest if smallest > 1e-12 else math.inf
+    return int(np.sum(found > found[0] / limit)), condition
+
+
+def force_speed(
+    state: AxisState, frame_law: ForceLaw, joint_law: ForceLaw, force: float, before: float, dt: float
+) -> float:
+    """Velocity of a force axis, m/s or rad/s; `force` and `before` are measured along it now and a period ago, N."""
+    axis = state.axis
+    wanted = axis.value or 0.0
+    if axis.joint >= 0:
+        return joint_law.velocity(axis.joint, wanted - force, wanted - before, dt)
+    law = frame_law.along(axis.direction)
+    return law.velocity(0, abs(wanted) - force, abs(wanted) - before, dt)
+
+
+def _pulls(axis: TaskAxis) -> bool:
+    """Whether the commanded force is against the direction of the axis."""
+    return axis.kind is AxisKind.FORCE and axis.joint < 0 and (axis.value or 0.0) < 0.0
+
+
+def _size(axis: TaskAxis) -> float:
+    """Size of the force along an axis, N, as an unknown of the others."""
+    return abs(axis.value or 0.0) if axis.kind is AxisKind.FORCE else HAND

@@ -1,0 +1,122 @@
+"""A task as a scenario writes it, in YAML.
+
+One task as an example::
+
+    task:
+      frame: base                      # or a cover, or {of: base, rpy: [0, 0, 0.3]}: axes of a frame of your own
+      axes:                            # in the order of their priority
+        - {force: 10.0, along: [0, 0, -1], cover: outer_link, place: 0.28}       # or place: estimated
+        - {velocity: 0.04, along: [0, 1, 0], cover: outer_link, place: 0.28}
+        - {position: here, along: [1, 0, 0], cover: outer_link, place: 0.4}
+        - {impedance: here, stiffness: 400, damping: 100, along: [1, 0, 0], cover: outer_link, place: 0.4}
+        - {free: 100, along: [1, 0, 0], cover: outer_link, place: 0.4}           # led by hand, with this damping
+        - {position: 0.3, joint: joint3}
+        - {line: outer_link, point: [0.4, 0, -0.2], along: [0, 1, 0], hold: [start_up, end_up]}
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import pinocchio as pin
+
+from wam_control.scenario_values import known, number, numbers
+from wam_control.task import AxisKind, TaskAxis, TaskCommand, checked, checked_task, joint_axes, line_axes, unit
+from wam_description.arm import Arm
+from wam_description.parameters import ParameterError, require
+from wam_description.signals import BASE, Triple
+
+PARTS: Final = ("start_side", "start_up", "end_side", "end_up")  # of a line: where, and which way across it
+HERE: Final = "here"
+ESTIMATED: Final = "estimated"
+KINDS: Final = (*(kind.name.lower() for kind in AxisKind), "free")
+
+
+def torque_task(where: str, body: Any, arm: Arm) -> TaskCommand:
+    """A torque of each joint, N m."""
+    return TaskCommand(BASE, joint_axes(AxisKind.FORCE, numbers(where, "torque", body, len(arm.joints.names))))
+
+
+def task_of_text(where: str, body: Any, arm: Arm) -> TaskCommand:
+    """The task of a step.
+
+    Raises
+    ------
+    ParameterError
+        names the step, the axis and the value that is not allowed.
+    """
+    known(f"{where}, task", body, ("frame", "axes"), ("axes",))
+    frame, rotation = _frame(where, body.get("frame", BASE), arm)
+    axes = body["axes"]
+    require(isinstance(axes, list) and len(axes) > 0, f"{where}: axes of the task is {axes!r}; give a list of them")
+    found: list[TaskAxis] = []
+    for i, one in enumerate(axes):
+        place = f"{where}, axis {i + 1}"
+        require(isinstance(one, Mapping), f"{place} is {one!r}; it must be a mapping")
+        found += _line(place, one, frame, arm) if "line" in one else [_axis(place, one, rotation, arm)]
+    return checked_task(TaskCommand(frame, tuple(found)))
+
+
+def _frame(where: str, given: Any, arm: Arm) -> tuple[str, Any]:
+    """Frame of the table, and the rotation into it from the frame in which the axes are written."""
+    angles: tuple[float, ...] = (0.0, 0.0, 0.0)
+    if isinstance(given, Mapping):
+        known(f"{where}, frame", given, ("of", "rpy"), ("of", "rpy"))
+        angles = numbers(where, "rpy", given["rpy"], 3)
+        given = given["of"]
+    frames = (BASE, *arm.covers.names)
+    require(given in frames, f"{where}: frame is {given!r}; allowed: {', '.join(frames)}, or of one of them with rpy")
+    return given, pin.rpy.rpyToMatrix(*angles)
+
+
+def _line(where: str, body: Mapping[str, Any], frame: str, arm: Arm) -> list[TaskAxis]:
+    known(where, body, ("line", "point", "along", "hold"), ("line", "point", "along"))
+    require(frame == BASE, f"{where}: a line is given in the base frame; the task is in that of {frame}")
+    cover = _cover(where, body["line"], arm)
+    held = body.get("hold", list(PARTS))
+    require(
+        isinstance(held, list) and len(held) > 0 and all(part in PARTS for part in held),
+        f"{where}: hold is {held!r}; allowed: a list of {', '.join(PARTS)}",
+    )
+    point, along = _triple(where, "point", body["point"]), _direction(where, body["along"])
+    return [axis for part, axis in zip(PARTS, line_axes(arm, cover, point, along), strict=True) if part in held]
+
+
+def _axis(where: str, body: Mapping[str, Any], rotation: Any, arm: Arm) -> TaskAxis:
+    kinds = [name for name in KINDS if name in body]
+    require(len(kinds) == 1, f"{where} has {', '.join(kinds) or 'no kind'}; give one of {', '.join((*KINDS, 'line'))}")
+    name = kinds[0]
+    is_joint = "joint" in body
+    given = ("joint",) if is_joint else ("along", "cover", "place")
+    extra = ("stiffness", "damping") if name == "impedance" else ("rate",) if name == "position" else ()
+    known(where, body, (name, *given, *extra), (name, *given))
+    kind = AxisKind.IMPEDANCE if name == "free" else AxisKind[name.upper()]
+    value = None if body[name] == HERE or name == "free" else number(where, name, body[name])
+    damping = body[name] if name == "free" else body.get("damping", 0.0)
+    stiffness, rate = (number(where, key, body.get(key, 0.0)) for key in ("stiffness", "rate"))
+    motion = (value, rate, stiffness, number(where, "damping", damping))
+    if is_joint:
+        names = arm.joints.names
+        require(body["joint"] in names, f"{where}: joint is {body['joint']!r}; allowed: {', '.join(names)}")
+        return checked(where, TaskAxis(kind, names.index(body["joint"]), "", 0.0, (0.0, 0.0, 0.0), *motion), arm)
+    cover = _cover(where, body["cover"], arm)
+    place = None if body["place"] == ESTIMATED else number(where, "place", body["place"])
+    x, y, z = (rotation @ _direction(where, body["along"])).tolist()
+    return checked(where, TaskAxis(kind, -1, cover, place, (x, y, z), *motion), arm)
+
+
+def _cover(where: str, name: Any, arm: Arm) -> str:
+    if name not in arm.covers.names:
+        raise ParameterError(f"{where}: cover is {name!r}; allowed: {', '.join(arm.covers.names)}")
+    return str(name)
+
+
+def _direction(where: str, body: Any) -> Triple:
+    direction = _triple(where, "along", body)
+    require(any(direction), f"{where}: along is {body!r}; give a direction that is not zero")
+    return unit(direction)
+
+
+def _triple(where: str, key: str, body: Any) -> Triple:
+    values: Sequence[float] = numbers(where, key, body, 3)
+    x, y, z = values
+    return x, y, z

@@ -1,0 +1,186 @@
+"""What the controllers know of the arm: their model, apart from the plant, whose parameters are in `arm`.
+
+The values that a configuration does not give are those of `arm`.  ``wam identify`` writes them from a recording, with
+their covariance.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.parameters import copy_of, lengths, one_each, parameter, require
+
+FROM_ARM: Final = "arm"  # source of a model that was not identified
+UNKNOWN: Final = "none"  # in place of the names of identified parameters, where there are none
+
+
+@dataclass(frozen=True)
+class LinkModel:
+    """The links as the controllers model them; of identified ones only the base set counts."""
+
+    mass: tuple[float, ...] = parameter("mass", "kg", low=1e-6, high=500.0, derived=copy_of("arm.links.mass"))
+    centre: tuple[float, ...] = parameter(
+        "centre of mass in the link's frame, x y z of each link",
+        "m",
+        low=-3.0,
+        high=3.0,
+        derived=copy_of("arm.links.centre"),
+    )
+    inertia: tuple[float, ...] = parameter(
+        "principal inertia about the centre of mass, x y z",
+        "kg m^2",
+        low=0.0,
+        high=100.0,
+        derived=copy_of("arm.links.inertia"),
+    )
+
+
+@dataclass(frozen=True)
+class MotorModel:
+    """Inertia and friction of the rotors.
+
+    Friction against positive motion v is F_c + (F_s - F_c) exp(-(v/v_s)^2) + k |tau| + b v with the torque tau that the
+    cables transmit; F_c, F_s and k have a value for each direction.
+    """
+
+    inertia: tuple[float, ...] = parameter(
+        "rotor inertia", "kg m^2", low=1e-9, high=1e5, derived=copy_of("arm.motors.inertia")
+    )
+    coulomb_positive: tuple[float, ...] = parameter(
+        "dynamic friction F_c in positive motion",
+        "N m",
+        low=0.0,
+        high=100.0,
+        derived=copy_of("arm.motors.dynamic_friction"),
+    )
+    coulomb_negative: tuple[float, ...] = parameter(
+        "the same in negative motion", "N m", low=0.0, high=100.0, derived=copy_of("arm.motors.dynamic_friction")
+    )
+    static_positive: tuple[float, ...] = parameter(
+        "friction F_s towards zero speed, in positive motion",
+        "N m",
+        low=0.0,
+        high=100.0,
+        derived=copy_of("arm.motors.static_friction"),
+    )
+    static_negative: tuple[float, ...] = parameter(
+        "the same in negative motion", "N m", low=0.0, high=100.0, derived=copy_of("arm.motors.static_friction")
+    )
+    viscous: tuple[float, ...] = parameter(
+        "viscous friction b", "N m s/rad", low=0.0, high=10.0, derived=copy_of("arm.motors.viscous_friction")
+    )
+    stribeck_velocity: tuple[float, ...] = parameter(
+        "v_s", "rad/s", low=1e-6, high=1e3, before=one_each("arm.motors.names", 0.5)
+    )
+    load_positive: tuple[float, ...] = parameter(
+        "friction k per transmitted torque, in positive motion",
+        low=0.0,
+        high=0.9,
+        before=one_each("arm.motors.names", 0.0),
+    )
+    load_negative: tuple[float, ...] = parameter(
+        "the same in negative motion", low=0.0, high=0.9, before=one_each("arm.motors.names", 0.0)
+    )
+    torque_offset: tuple[float, ...] = parameter(
+        "measured less true torque", "N m", low=-10.0, high=10.0, before=one_each("arm.motors.names", 0.0)
+    )
+
+
+@dataclass(frozen=True)
+class JointModel:
+    """Pulleys and friction that a joint adds; the friction law is that of `MotorModel`, alike in both directions."""
+
+    armature: tuple[float, ...] = parameter(
+        "inertia of the pulleys that turn with the joint",
+        "kg m^2",
+        low=0.0,
+        high=1e3,
+        derived=copy_of("arm.joints.armature"),
+    )
+    coulomb: tuple[float, ...] = parameter(
+        "dynamic friction F_c; identified: 0 at a joint with a motor of its own, where it is part of the motor's",
+        "N m",
+        low=0.0,
+        high=1e3,
+        derived=copy_of("arm.joints.dynamic_friction"),
+    )
+    static: tuple[float, ...] = parameter(
+        "friction F_s towards zero speed", "N m", low=0.0, high=1e3, derived=copy_of("arm.joints.static_friction")
+    )
+    viscous: tuple[float, ...] = parameter(
+        "viscous friction b", "N m s/rad", low=0.0, high=1e3, derived=copy_of("arm.joints.viscous_friction")
+    )
+    stribeck_velocity: tuple[float, ...] = parameter(
+        "v_s", "rad/s", low=1e-6, high=1e3, before=one_each("arm.joints.names", 0.02)
+    )
+    load: tuple[float, ...] = parameter(
+        "friction k per transmitted torque", low=0.0, high=0.9, before=one_each("arm.joints.names", 0.0)
+    )
+
+
+@dataclass(frozen=True)
+class ModelCovariance:
+    """Covariance of what was identified."""
+
+    parameters: tuple[str, ...] = parameter(
+        "identified parameters, as motors.coulomb_positive.motor1; none: nothing was identified", before=(UNKNOWN,)
+    )
+    values: tuple[float, ...] = parameter(
+        "their covariance, row by row", "products of their units", low=-1e9, high=1e9, before=(0.0,)
+    )
+
+    def __post_init__(self) -> None:
+        count = len(self.parameters)
+        require(
+            len(self.values) == count * count,
+            f"parameter 'model.covariance.values' has {len(self.values)} values; {count} parameters need {count**2}",
+        )
+        diagonal = self.values[:: count + 1]
+        require(min(diagonal) >= 0.0, f"parameter 'model.covariance.values' has the variance {min(diagonal):g}")
+
+
+@dataclass(frozen=True)
+class ArmModel:
+    """The arm as the controllers model it."""
+
+    links: LinkModel
+    motors: MotorModel
+    joints: JointModel
+    covariance: ModelCovariance
+    source: str = parameter("recording that the values were identified from; arm: those of arm", before=FROM_ARM)
+
+    def __post_init__(self) -> None:
+        n = len(self.motors.inertia)
+        size = ("",) * n
+        lengths("model.links", size, {"mass": self.links.mass})
+        lengths("model.links", size, {"centre": self.links.centre, "inertia": self.links.inertia}, width=3)
+        lengths("model.motors", size, dataclasses.asdict(self.motors))
+        lengths("model.joints", size, dataclasses.asdict(self.joints))
+        pairs = {
+            "motors.static_positive": (self.motors.static_positive, self.motors.coulomb_positive),
+            "motors.static_negative": (self.motors.static_negative, self.motors.coulomb_negative),
+            "joints.static": (self.joints.static, self.joints.coulomb),
+        }
+        for name, (static, coulomb) in pairs.items():
+            for f_static, f_coulomb in zip(static, coulomb, strict=True):
+                require(
+                    f_coulomb <= f_static,
+                    f"model.{name} {f_static:g} N m is below dynamic friction, {f_coulomb:g} N m",
+                )
+
+    @property
+    def is_identified(self) -> bool:
+        """Whether the values come from a recording, with their covariance."""
+        return self.covariance.parameters != (UNKNOWN,)
+
+    def covariance_of(self, parameters: Sequence[str]) -> NDArray[np.float64] | None:
+        """Covariance (k, k) of k parameters by name, in SI units; None where one of them was not identified."""
+        names, values = self.covariance.parameters, self.covariance.values
+        if not set(parameters) <= set(names):
+            return None
+        rows = [names.index(name) for name in parameters]
+        return np.reshape(values, (len(names), len(names)))[np.ix_(rows, rows)]
