@@ -1,0 +1,97 @@
+"""The surface of a task: where the plane or the rod is, and whether the arm is clear of it at the start."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.rigid_body import RigidBody
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+GAP = 0.002  # m, between link and surface at the start
+CLEARANCE = 0.03  # m, between the surface and the rest of the arm
+ROD = (0.02, 0.08)  # m, radius and half length of a rod that the link touches at one position
+PLANE = 0.5  # m, half length
+POINTS = 20  # along each cover, at which the distance is checked
+
+
+class Surface(NamedTuple):
+    """What is touched, and where.
+
+    Attributes
+    ----------
+    cover, place : where the link touches, m along the cover.
+    direction : of the force of the arm on the surface (3,), base frame.
+    stiffness : N/m.
+    friction : coefficient.
+    is_plane : whether it is a plane, else a rod across the link.
+    """
+
+    cover: str
+    place: float
+    direction: Triple
+    stiffness: float
+    friction: float
+    is_plane: bool
+
+
+def is_clear(body: RigidBody, q: Sequence[float], surface: Surface) -> bool:
+    """Whether it touches nothing in the pose q, rad, and no other part of the arm is nearer than `CLEARANCE`."""
+    covers = body.arm.covers
+    centre, axis, into = position(body, q, surface), rotation(body, q, surface)[:, 2], np.array(surface.direction)
+    for name, radius, length in zip(covers.names, covers.radius, covers.length, strict=True):
+        for place in np.linspace(0.0, length, POINTS):
+            apart = centre - body.point(q, name, (place, *covers.aside(name, place)))
+            if surface.is_plane:
+                distance = float(apart @ into)
+            else:
+                along = min(max(float(-apart @ axis), -ROD[1]), ROD[1])
+                distance = float(np.linalg.norm(apart + along * axis)) - ROD[0]
+            if distance < radius + (0.9 * GAP if name == surface.cover else CLEARANCE):
+                return False
+    return True
+
+
+def position(body: RigidBody, q: Sequence[float], surface: Surface) -> Array:
+    """A point of the plane, or the centre of the rod, (3,), m, base frame."""
+    covers = body.arm.covers
+    radius = covers.radius[covers.names.index(surface.cover)]
+    point = body.point(q, surface.cover, (surface.place, *covers.aside(surface.cover, surface.place)))
+    return point + (radius + GAP + (0.0 if surface.is_plane else ROD[0])) * np.array(surface.direction)
+
+
+def rotation(body: RigidBody, q: Sequence[float], surface: Surface) -> Array:
+    """Rotation (3, 3): z against the force for a plane; along the rod, across the link, for a rod."""
+    direction = np.array(surface.direction)
+    across = np.cross(direction, body.cover_pose(q, surface.cover).rotation[:, 0])
+    across /= np.linalg.norm(across)
+    if surface.is_plane:
+        return np.column_stack([across, np.cross(-direction, across), -direction])
+    return np.column_stack([-direction, np.cross(across, -direction), across])
+
+
+def obstacle(body: RigidBody, q: Sequence[float], surface: Surface) -> dict[str, Any]:
+    """Values of a configuration whose world is this surface alone."""
+    soft = surface.stiffness < 4000.0
+    values = {
+        "names": ["surface"],
+        "shapes": ["plane" if surface.is_plane else "cylinder"],
+        "positions": position(body, q, surface).tolist(),
+        "rotations": _angles(rotation(body, q, surface)),
+        "sizes": [PLANE, PLANE, 0.0] if surface.is_plane else [*ROD, 0.0],
+        "stiffness": [surface.stiffness],
+        "damping": [0.005 * surface.stiffness if soft else 20.0],
+        "hardening": [0.0],
+        "friction": [surface.friction],
+    }
+    return {f"driver:world.obstacles.{name}": value for name, value in values.items()}
+
+
+def _angles(turned: Array) -> list[float]:
+    """Roll, pitch and yaw about fixed axes, rad."""
+    pitch = math.asin(min(max(-turned[2, 0], -1.0), 1.0))
+    return [math.atan2(turned[2, 1], turned[2, 2]), pitch, math.atan2(turned[1, 0], turned[0, 0])]

@@ -1,0 +1,198 @@
+"""The tasks of the benchmark, each drawn from the seed and its number alone, and as configurations of the stack.
+
+Wider than the design: singular poses, surfaces a hundred times stiffer than the foam that the defaults are for,
+contacts anywhere on both links, and a true arm that differs from the configured one.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wam_control.scenario import ScenarioStep
+from wam_description.arm import Arm
+from wam_description.configuration import Configuration
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import ForceCommand
+from wam_experiments.force_benchmark.surfaces import Surface, Triple, is_clear, obstacle
+
+# model mismatch, uniform in +- this
+MASS, FRICTION, CABLES, TORQUE = 0.03, 0.2, 0.1, 0.03
+FORCES, STIFFNESSES = (1.0, 40.0), (400.0, 4e5)  # N and N/m, uniform in the logarithm
+FRICTIONS, STEEPEST = (0.0, 0.8), math.radians(75.0)  # of the surface; lean of a plane from the side of the link
+MARGIN = 0.1  # rad, of a start from the ends of the joints
+NEAR = 0.3  # rad, of a singular pose
+POSES = {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}  # shares
+ON_OUTER, AT_A_PLANE, DITHERED, PINNED, TARED, RAMPED = 0.85, 0.3, 0.4, 0.5, 0.5, 0.5  # shares
+LONGEST_RAMP, FIRST = 1.0, 0.2  # s, and the fraction of the force that it starts with
+RAMP_STEP = 0.02  # s
+DITHER_CYCLE = 40  # inner periods: 25 Hz
+RELEASE = 0.5  # s, until the force is commanded
+SECONDS = 4.0  # s of the whole force
+
+
+class TaskConditions(NamedTuple):
+    """How the force is measured and commanded, and how the true arm differs from the configured one.
+
+    Attributes
+    ----------
+    is_dithered : feedback from the motors with dither, else from the joint sensors.
+    is_pinned : whether the contact position is configured, else estimated.
+    is_tared : whether the external torques are tared before the force is commanded.
+    ramp : time in which the commanded force rises, s.
+    mass, motor_friction, joint_friction, cables, torque_constant : factors of the true arm; () for none.
+    """
+
+    is_dithered: bool
+    is_pinned: bool
+    is_tared: bool
+    ramp: float
+    mass: tuple[float, ...] = ()
+    motor_friction: tuple[float, ...] = ()
+    joint_friction: tuple[float, ...] = ()
+    cables: tuple[float, ...] = ()
+    torque_constant: tuple[float, ...] = ()
+
+
+NOMINAL = TaskConditions(is_dithered=False, is_pinned=True, is_tared=False, ramp=0.0)
+
+
+class Task(NamedTuple):
+    """One force on one surface: joint angles at the start (n,), rad; surface; force, N; conditions."""
+
+    q: tuple[float, ...]
+    surface: Surface
+    force: float
+    conditions: TaskConditions = NOMINAL
+
+    @property
+    def pose(self) -> str:
+        """The class of the pose, one of `POSES`."""
+        if abs(self.q[3] - math.pi / 2.0) < NEAR:
+            return "elbow nearly straight"
+        if abs(self.q[1]) < NEAR:
+            return "theta2 near 0"
+        return "elbow near 90 deg" if abs(self.q[3]) < NEAR else "any"
+
+
+def draw(arm: Arm, seed: int, number: int) -> Task:
+    """The task of a number: it depends on the seed and the number alone."""
+    random = np.random.Generator(np.random.PCG64((seed, number)))
+    body = RigidBody(arm)
+    conditions = _conditions(arm, random)
+    force = _log_uniform(random, *FORCES)
+    q = _pose(arm, random)
+    surface = _surface(body, q, random)
+    while not is_clear(body, q, surface):
+        q = _pose(arm, random)
+        surface = _surface(body, q, random)
+    return Task(q, surface, force, conditions)
+
+
+def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
+    def factors(width: float, count: int) -> tuple[float, ...]:
+        return tuple((1.0 + width * random.uniform(-1.0, 1.0, count)).tolist())
+
+    motors, joints = len(arm.motors.names), len(arm.joints.names)
+    return TaskConditions(
+        is_dithered=bool(random.random() < DITHERED),
+        is_pinned=bool(random.random() < PINNED),
+        is_tared=bool(random.random() < TARED),
+        ramp=float(random.uniform(0.0, LONGEST_RAMP)) if random.random() < RAMPED else 0.0,
+        mass=factors(MASS, len(arm.links.names)),
+        motor_friction=factors(FRICTION, motors),
+        joint_friction=factors(FRICTION, joints),
+        cables=factors(CABLES, motors),
+        torque_constant=factors(TORQUE, motors),
+    )
+
+
+def _pose(arm: Arm, random: np.random.Generator) -> tuple[float, ...]:
+    joints = arm.joints
+    ends = zip(joints.lower, joints.upper, strict=True)
+    q = [float(random.uniform(low + MARGIN, high - MARGIN)) for low, high in ends]
+    kind, near = random.choice(list(POSES), p=list(POSES.values())), float(random.uniform(-NEAR, NEAR))
+    if kind == "elbow nearly straight":
+        q[3] = math.pi / 2.0 + near
+    elif kind == "theta2 near 0":
+        q[1] = near
+    elif kind == "elbow near 90 deg":
+        q[3] = near
+    return tuple(q)
+
+
+def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -> Surface:
+    covers = body.arm.covers
+    cover = covers.names[-1 if random.random() < ON_OUTER else 0]
+    length = covers.length[covers.names.index(cover)]
+    is_plane = cover == covers.names[-1] and bool(random.random() < AT_A_PLANE)
+    lean = float(random.uniform(0.0, STEEPEST)) if is_plane else 0.0
+    place = length if is_plane else float(random.uniform(0.1 * length, 0.97 * length))
+    about = float(random.uniform(-math.pi, math.pi))
+    local = np.array([math.sin(lean), math.cos(lean) * math.cos(about), math.cos(lean) * math.sin(about)])
+    stiffness = _log_uniform(random, *STIFFNESSES)
+    direction = triple(body.cover_pose(q, cover).rotation @ local)
+    return Surface(cover, place, direction, stiffness, float(random.uniform(*FRICTIONS)), is_plane)
+
+
+def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
+    return math.exp(random.uniform(math.log(low), math.log(high)))
+
+
+def configured(base: Configuration, task: Task) -> Configuration:
+    """The configuration of a task: its surface in the world, what a user declares of it, the true arm."""
+    surface, conditions = task.surface, task.conditions
+    n = len(task.q)
+    values: dict[str, Any] = {
+        "arm.joints.start": list(task.q),
+        "force_loop:guard.contact_stiffness": surface.stiffness,
+        "force_loop:guard.posture": list(task.q),
+        "force_loop:contact_source": "pinned" if conditions.is_pinned else "estimated",
+        "contact_estimator:observer.mass_scale": [1.0] * n,
+        "contact_estimator:observer.friction_scale": 1.0,
+        **obstacle(RigidBody(base.shared.arm), task.q, surface),
+        **{f"driver:mismatch.{name}": list(factors) for name, factors in _mismatch(conditions).items() if factors},
+    }
+    if conditions.is_pinned:
+        values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": surface.place}
+    if conditions.is_dithered:
+        values |= {
+            "arm.joint_sensors": False,
+            "contact_estimator:use_joint_sensors": False,
+            "force_loop:feedback": "contact_estimate",
+            "timing.dither_cycle": DITHER_CYCLE,
+        }
+    return base.with_values(values)
+
+
+def _mismatch(conditions: TaskConditions) -> dict[str, tuple[float, ...]]:
+    return {
+        "mass": conditions.mass,
+        "motor_friction": conditions.motor_friction,
+        "joint_friction": conditions.joint_friction,
+        "stiffness": conditions.cables,
+        "torque_constant": conditions.torque_constant,
+    }
+
+
+def steps(task: Task, seconds: float) -> list[ScenarioStep]:
+    """Release, ramp in small steps, and `seconds` of the whole force."""
+    count = round(task.conditions.ramp / RAMP_STEP)
+    rising = [FIRST + (1.0 - FIRST) * i / count for i in range(count)]
+    ramp = [ScenarioStep("ramp", RAMP_STEP, force=_command(task, fraction)) for fraction in rising]
+    return [
+        ScenarioStep("release", RELEASE, request="enable"),
+        *ramp,
+        ScenarioStep("press", seconds, force=_command(task, 1.0)),
+    ]
+
+
+def _command(task: Task, fraction: float) -> ForceCommand:
+    return ForceCommand("base", triple(fraction * task.force * np.array(task.surface.direction)))
+
+
+def triple(values: Any) -> Triple:
+    """Three numbers of an array (3,)."""
+    x, y, z = values.tolist()
+    return x, y, z
