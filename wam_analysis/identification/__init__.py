@@ -1,0 +1,11 @@
+"""From a recording of free motion to the model of the controllers: friction and inertial parameters, with covariance.
+
+motion      recorded motor states, checked, filtered and thinned
+parameters  what is estimated: names, present values, prior standard deviations
+regressor   motor torques per parameter
+fit         estimate, covariance by jackknife, cross-validation
+stribeck    the Stribeck velocity of each motor
+base_set    combinations of inertial parameters that gravity depends on
+overlay     the estimate as a configuration for --config
+report      the table, and the warnings
+"""

@@ -1,0 +1,216 @@
+"""Estimate of the parameters: robust least squares with a prior; covariance by jackknife; cross-validation.
+
+The residuals are coloured, and what the model lacks does not average out: the variance of white residuals would be far
+too small.  So parts of the motion are left out in turn (delete-a-group jackknife, Efron & Stein 1981), and each is
+predicted from all others.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.identification.motion import MotionSamples
+from wam_analysis.identification.parameters import Unknowns, unknowns
+from wam_analysis.identification.regressor import Equations, Regressor
+from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_velocities
+from wam_description.arm import Shared
+
+Array = NDArray[np.float64]
+
+PARTS = 20  # of the motion
+ITERATIONS = 5  # the load on friction and the links' inertia are not linear in the parameters
+HUBER = 1.5  # standard deviations from which a residual counts less
+LAW = 0.003  # standard deviation of friction, per friction, by what its law leaves out
+WARM = 2  # iterations that start near the solution
+IDENTIFIED = 0.3  # standard deviation per prior one, up to which the motion shows a parameter
+NOT_NEGATIVE = ("motors.static_", "motors.load_", "motors.viscous", "joints.")
+PINNED = 1e-6  # prior standard deviation, of its own, of a parameter at its limit
+
+
+class Identification(NamedTuple):
+    """What was identified.
+
+    Attributes
+    ----------
+    unknowns : names, present values, prior.
+    values, sd : (p,).
+    covariance : (p, p).
+    alone : (p,), standard deviation if all other parameters were known.
+    stribeck_velocity : (n,), v_s of each motor, rad/s.
+    residual, held_out, before : (n,), rms torque of each motor that the estimate, the estimate from the other parts of
+        the motion, and the present model do not explain, N m.
+    seconds : of the motion that was used, of each motor, (n,).
+    condition : of the identified combinations of parameters, scaled by the prior.
+    rank : number of those combinations.
+    both_directions : (n,), parts of the motion in which each motor turns both ways.
+    """
+
+    unknowns: Unknowns
+    values: Array
+    sd: Array
+    covariance: Array
+    alone: Array
+    stribeck_velocity: Array
+    residual: Array
+    held_out: Array
+    before: Array
+    seconds: Array
+    condition: float
+    rank: int
+    both_directions: Array
+
+    @property
+    def is_identified(self) -> NDArray[np.bool_]:
+        """(p,), whether the motion shows a parameter by itself."""
+        return self.sd <= IDENTIFIED * self.unknowns.prior_sd
+
+    @property
+    def is_combined(self) -> NDArray[np.bool_]:
+        """(p,), whether the motion shows a parameter only together with others."""
+        return ~self.is_identified & (self.alone <= IDENTIFIED * self.unknowns.prior_sd)
+
+
+class _Normal(NamedTuple):
+    """Normal equations by part of the motion: (parts, p, p) and (parts, p)."""
+
+    information: Array
+    vector: Array
+
+
+class _Estimate(NamedTuple):
+    """One fit, with the v_s of its regressor; `errors` (parts, n) are squared ones of held-out motion."""
+
+    equations: Equations
+    part: NDArray[np.int64]
+    values: Array
+    without: Array  # (parts, p), estimates without each part
+    prior_sd: Array
+    normal: _Normal
+    held_out: Array
+    errors: Array
+
+
+def identify(shared: Shared, motion: MotionSamples) -> Identification:
+    """Identify the model of the controllers from a motion.
+
+    Parameters
+    ----------
+    shared : the arm and its present model, which is the prior.
+    motion : free motion, without contacts.
+    """
+    sought = unknowns(shared)
+    present = np.array(shared.model.motors.stribeck_velocity)
+
+    def estimate(velocity: Array, start: Array | None = None) -> _Estimate:
+        return _estimate(Regressor(shared, sought, motion, velocity), sought, start)
+
+    first = estimate(present)
+    tried = [estimate(np.full(len(present), velocity), first.values) for velocity in VELOCITIES]
+    chosen = stribeck_velocities(present, first.errors, np.array([one.errors for one in tried]))
+    best = estimate(chosen.velocity)
+    # the uncertainty of v_s is part of that of the friction of its motor
+    slope = slopes(np.array([one.values for one in tried]), chosen.velocity)
+    off = np.log(chosen.without / chosen.velocity)
+    for i, name in enumerate(shared.arm.motors.names):
+        own = [k for k, each in enumerate(sought.names) if each.endswith(f".{name}")]
+        best.without[:, own] += np.outer(off[:, i], slope[i, own])
+    return _result(sought, best, chosen.velocity)
+
+
+def _estimate(regressor: Regressor, sought: Unknowns, start: Array | None = None) -> _Estimate:
+    values, prior_sd, centre = sought.present, sought.prior_sd.copy(), sought.present.copy()
+    if start is not None:
+        values = start
+    limited = np.array([name.startswith(NOT_NEGATIVE) for name in sought.names])
+    part = _parts(regressor.equations(values))
+    for _ in range(ITERATIONS if start is None else WARM):
+        equations = regressor.equations(values)
+        normal = _normal(equations, part, values)
+        prior = prior_sd**-2
+        values = _solve(normal.information.sum(0), normal.vector.sum(0), prior, centre)
+        below = limited & (values < 0.0)
+        prior_sd[below], centre[below] = PINNED * sought.prior_sd[below], 0.0
+        values = np.where(below, 0.0, values)
+    information, vector = normal.information.sum(0), normal.vector.sum(0)
+    without = np.array(
+        [_solve(information - i, vector - v, prior_sd**-2, centre) for i, v in zip(*normal, strict=True)]
+    )
+    left = equations.torque - np.einsum("knp,kp->kn", equations.columns, without[part])
+    squares = left**2 * equations.is_used
+    errors = np.array([squares[part == i].sum(0) for i in range(PARTS)])
+    return _Estimate(equations, part, values, without, prior_sd, normal, _rms(left, equations.is_used), errors)
+
+
+def _parts(equations: Equations) -> NDArray[np.int64]:
+    """Part of the motion that each sample belongs to, (k,), of equal numbers of samples."""
+    k = len(equations.time)
+    found: NDArray[np.int64] = np.arange(k) * PARTS // k
+    return found
+
+
+def _normal(equations: Equations, part: NDArray[np.int64], values: Array) -> _Normal:
+    """Weighted normal equations; rows far from the present estimate count less (Huber)."""
+    left = equations.torque - equations.columns @ values
+    scale = np.array([_deviation(left[used, i]) for i, used in enumerate(equations.is_used.T)])
+    weight = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-12)) / scale**2 * equations.is_used
+    p = equations.columns.shape[2]
+    information, vector = np.zeros((PARTS, p, p)), np.zeros((PARTS, p))
+    for i in range(PARTS):
+        rows = equations.columns[part == i].reshape(-1, p)
+        weighted = rows * weight[part == i].reshape(-1, 1)
+        information[i] = weighted.T @ rows
+        vector[i] = weighted.T @ equations.torque[part == i].ravel()
+    return _Normal(information, vector)
+
+
+def _deviation(residuals: Array) -> float:
+    """Standard deviation of residuals by their median, N m."""
+    return max(1.4826 * float(np.median(np.abs(residuals))), 1e-6) if len(residuals) else 1.0
+
+
+def _solve(information: Array, vector: Array, prior: Array, centre: Array) -> Array:
+    return np.asarray(np.linalg.solve(information + np.diag(prior), vector + prior * centre), np.float64)
+
+
+def _rms(left: Array, is_used: NDArray[np.bool_]) -> Array:
+    counts = np.maximum(is_used.sum(0), 1)
+    found: Array = np.sqrt((left**2 * is_used).sum(0) / counts)
+    return found
+
+
+def _result(sought: Unknowns, best: _Estimate, velocity: Array) -> Identification:
+    equations, information = best.equations, best.normal.information.sum(0)
+    before = equations.torque - equations.columns @ sought.present
+    left = equations.torque - equations.columns @ best.values
+    posterior = np.linalg.inv(information + np.diag(sought.prior_sd**-2))
+    jackknife = best.without - best.without.mean(0)
+    sd = np.sqrt(np.maximum((PARTS - 1) / PARTS * (jackknife**2).sum(0), posterior.diagonal()))
+    coulomb = [i for i, name in enumerate(sought.names) if name.startswith("motors.coulomb")]
+    sd[coulomb] = np.hypot(sd[coulomb], LAW * best.values[coulomb])
+    # standard deviations of the jackknife, which 20 parts give well; correlations, which they do not, of the posterior
+    unit = sd / np.sqrt(posterior.diagonal())
+    scaled = information * np.outer(sought.prior_sd, sought.prior_sd)
+    strength = np.linalg.eigvalsh(scaled)
+    shown = strength[strength >= IDENTIFIED**-2]
+    step = float(np.median(np.diff(equations.time)))
+    moves = equations.columns[:, :, sought.places("motors.viscous")].diagonal(axis1=1, axis2=2)
+    both = [
+        sum(bool((moves[best.part == i, m] > 0).any() and (moves[best.part == i, m] < 0).any()) for i in range(PARTS))
+        for m in range(moves.shape[1])
+    ]
+    return Identification(
+        sought,
+        best.values,
+        sd,
+        posterior * np.outer(unit, unit),
+        1.0 / np.sqrt(np.maximum(information.diagonal(), 1e-300)),
+        velocity,
+        _rms(left, equations.is_used),
+        best.held_out,
+        _rms(before, equations.is_used),
+        equations.is_used.sum(0) * step,
+        float(np.sqrt(shown[-1] / shown[0])) if len(shown) else float("inf"),
+        len(shown),
+        np.array(both),
+    )

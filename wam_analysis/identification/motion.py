@@ -1,0 +1,172 @@
+"""Recorded motor states as samples for an identification: checked, filtered and thinned without delay.
+
+Angle, velocity and acceleration are the coefficients of a cubic that is fitted to the angles of each window (Savitzky &
+Golay 1964); the torque goes through the same window, so that the equation of motion still holds (Gautier 1997).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_bag.bag import BagError
+from wam_description.arm import Arm
+from wam_sim.recording import RecordedRun
+
+Array = NDArray[np.float64]
+
+WINDOW = 0.05  # s
+THINNING = 0.5  # windows from one sample to the next
+SHORTEST = 10.0  # s of motion
+LARGEST_GAP = 3.5  # periods that are bridged
+BRAKED = 1e-9  # N m; the torque of a motor that has no current
+
+
+class MotorRecord(NamedTuple):
+    """Motor states at a constant rate.
+
+    Attributes
+    ----------
+    time : (k,), s.
+    theta : (k, n), rad.
+    torque : (k, n), of the motors at these times, N m.
+    is_used : (k,), False where states are missing or the brakes hold.
+    """
+
+    time: Array
+    theta: Array
+    torque: Array
+    is_used: NDArray[np.bool_]
+
+
+class MotionSamples(NamedTuple):
+    """Samples of the motion, thinned.
+
+    Attributes
+    ----------
+    time : (k,), s.
+    theta, thetad, thetadd : (k, n), rad, rad/s, rad/s^2.
+    torque : (k, n), N m.
+    velocities : (k, w, n), velocity at each state of the window, rad/s.
+    torques : (k, w, n), torque at each state of the window, N m, each smoothed.
+    weights : (w,), of the states in the mean of a window.
+    """
+
+    time: Array
+    theta: Array
+    thetad: Array
+    thetadd: Array
+    torque: Array
+    velocities: Array
+    torques: Array
+    weights: Array
+
+
+def recorded_motion(run: RecordedRun, arm: Arm) -> MotionSamples:
+    """The motion in a bag.
+
+    Raises
+    ------
+    BagError
+        if the bag lacks motor states, or they are of another arm, too slow or too short.
+    """
+    columns = run.joints("motor_states")
+    where = run.bag.path
+    if columns is None:
+        raise BagError(f"{where} has no motor_states with values; record the topic of the driver ('wam record')")
+    names = arm.motors.names
+    if not set(names) <= set(columns.names):
+        raise BagError(
+            f"{where}: motor_states are of {', '.join(columns.names)}; the configuration has {', '.join(names)}"
+        )
+    if not columns.position.shape[1] or not columns.effort.shape[1]:
+        raise BagError(f"{where}: motor_states lack position or effort; both are needed")
+    order = [columns.names.index(name) for name in names]
+    try:
+        return motion(evenly(columns.stamp_ns / 1e9, columns.position[:, order], columns.effort[:, order]))
+    except ValueError as error:
+        raise BagError(f"{where}: {error}") from None
+
+
+def evenly(stamps: Array, theta: Array, effort: Array) -> MotorRecord:
+    """States at a constant rate; where a few are missing, interpolated ones.
+
+    Parameters
+    ----------
+    stamps : (k,), s.
+    theta, effort : (k, n), rad, and torque in the period that ends, N m.
+
+    Raises
+    ------
+    ValueError
+        if there are too few states, or stamps do not rise.
+    """
+    good = np.isfinite(theta).all(1) & np.isfinite(effort).all(1)
+    stamps, theta, effort = stamps[good], theta[good], effort[good]
+    if (np.diff(stamps) < 0.0).any():
+        raise ValueError("the stamps of motor_states go back; give a bag with one session")
+    _, first = np.unique(stamps, return_index=True)
+    if len(first) < 3 or stamps[first[-1]] - stamps[first[0]] < SHORTEST:
+        span = stamps.max() - stamps.min() if len(stamps) else 0.0
+        raise ValueError(f"{len(first)} motor states over {span:.3g} s; identification needs {SHORTEST:g} s or more")
+    stamps, theta, effort = stamps[first], theta[first], effort[first]
+    period = float(np.median(np.diff(stamps)))
+    if period > WINDOW / 4.0:
+        raise ValueError(f"motor_states have a period of {period:g} s; identification needs {WINDOW / 4.0:g} s or less")
+    time = np.arange(stamps[0], stamps[-1], period)
+    # torque acts in the period that ends at its stamp: it is that of the middle of the period
+    theta = np.column_stack([np.interp(time, stamps, column) for column in theta.T])
+    torque = np.column_stack([np.interp(time, stamps - 0.5 * period, column) for column in effort.T])
+    late = np.diff(stamps, append=stamps[-1])[np.searchsorted(stamps, time + 0.01 * period, side="right") - 1]
+    is_used = (late <= LARGEST_GAP * period) & (np.abs(torque) > BRAKED).any(1)
+    return MotorRecord(time, theta, torque, is_used)
+
+
+def motion(record: MotorRecord) -> MotionSamples:
+    """Filtered and thinned samples of a record.
+
+    Raises
+    ------
+    ValueError
+        if less than `SHORTEST` of it can be used.
+    """
+    period = float(record.time[1] - record.time[0])
+    half = max(2, round(0.5 * WINDOW / period))
+    angle, rate, acceleration = _cubic(half, period)
+    step = max(1, round(THINNING * 2 * half))
+    centres = np.arange(2 * half, len(record.time) - 2 * half, step)
+    spans = centres[:, None] + np.arange(-2 * half, 2 * half + 1)
+    centres = centres[record.is_used[spans].all(1)]
+    if len(centres) * step * period < SHORTEST:
+        raise ValueError(
+            f"{len(centres) * step * period:.3g} s of free states without brakes and gaps; "
+            f"identification needs {SHORTEST:g} s or more"
+        )
+    windows = centres[:, None] + np.arange(-half, half + 1)
+    torques = _smoothed(record.torque, angle)
+    # the velocity at each state: also from angles, because that of an encoder is a difference of counts
+    velocities = _smoothed(record.theta, rate)
+    theta = record.theta[windows]
+    return MotionSamples(
+        record.time[centres],
+        np.einsum("w,kwn->kn", angle, theta),
+        np.einsum("w,kwn->kn", rate, theta),
+        np.einsum("w,kwn->kn", acceleration, theta),
+        np.einsum("w,kwn->kn", angle, record.torque[windows]),
+        velocities[windows],
+        torques[windows],
+        angle,
+    )
+
+
+def _cubic(half: int, period: float) -> Sequence[Array]:
+    """Weights, (2 half + 1,), of value, first and second derivative in the middle of a window."""
+    at = np.arange(-half, half + 1) * period
+    solved = np.linalg.pinv(np.vander(at / (half * period), 4, increasing=True))
+    return [math.factorial(i) * solved[i] / (half * period) ** i for i in range(3)]
+
+
+def _smoothed(values: Array, weights: Array) -> Array:
+    return np.column_stack([np.convolve(column, weights[::-1], mode="same") for column in values.T])

@@ -1,0 +1,136 @@
+"""The identified model as a configuration: what differs from the present one, with the covariance."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from wam_analysis.identification.fit import Identification
+from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
+from wam_description.arm import Shared
+from wam_description.configuration import PARAMETERS, SHARED, Configuration
+
+Array = NDArray[np.float64]
+
+DIGITS = 6
+LIGHTEST = 1e-6  # kg m^2; an inertia that came out negative
+DEVIATIONS = ("observer.mass_scale", "observer.friction_scale")
+IN_COVARIANCE = ("motors.", "joints.", "links.moment")
+
+
+class Identified(NamedTuple):
+    """Parameters as the model has them: of friction towards zero speed F_s instead of F_s - F_c.
+
+    Attributes
+    ----------
+    names : p.
+    present, values, sd : (p,).
+    covariance : (p, p).
+    """
+
+    names: tuple[str, ...]
+    present: Array
+    values: Array
+    sd: Array
+    covariance: Array
+
+
+def identified(found: Identification) -> Identified:
+    """The result in the parameters of the model."""
+    names = found.unknowns.names
+    mixing = np.eye(len(names))
+    for way in DIRECTIONS:
+        rows, columns = (found.unknowns.places(f"motors.{what}_{way}") for what in ("static", "coulomb"))
+        mixing[rows, columns] = 1.0
+    covariance = mixing @ found.covariance @ mixing.T
+    return Identified(
+        names, mixing @ found.unknowns.present, mixing @ found.values, np.sqrt(covariance.diagonal()), covariance
+    )
+
+
+def model_values(shared: Shared, found: Identification, source: str) -> dict[str, Any]:
+    """Values of the shared parameters `model.*`, by name.
+
+    Parameters
+    ----------
+    source : the recording.
+    """
+    result = identified(found)
+    groups = _by_group(result)
+    values: dict[str, Any] = {"model.source": source}
+    for group, each in groups.items():
+        if group.startswith("motors."):
+            values[f"model.{group}"] = _numbers(each)
+    values["model.motors.stribeck_velocity"] = _numbers(found.stribeck_velocity)
+    values |= _joint_values(shared, found.unknowns, groups)
+    values |= _link_values(groups)
+    chosen = [i for i, name in enumerate(result.names) if name.startswith(IN_COVARIANCE)]
+    values["model.covariance.parameters"] = [result.names[i] for i in chosen]
+    values["model.covariance.values"] = _numbers(result.covariance[np.ix_(chosen, chosen)].ravel(), 4)
+    return values
+
+
+def estimator_values(configuration: Configuration) -> dict[str, Any]:
+    """Values of the contact estimator, by 'node:name', that switch off its own deviations from the model."""
+    own = configuration.sections.get("contact_estimator", {})
+    neutral = {name: own[name] for name in DEVIATIONS if name in own}
+    return {
+        f"contact_estimator:{name}": [1.0] * len(value) if isinstance(value, list) else 1.0
+        for name, value in neutral.items()
+    }
+
+
+def _by_group(result: Identified) -> dict[str, Array]:
+    """Values by group, as 'motors.viscous', in the order of motors, joints or links."""
+    found: dict[str, list[float]] = {}
+    for name, value in zip(result.names, result.values.tolist(), strict=True):
+        found.setdefault(name.rpartition(".")[0], []).append(value)
+    return {group: np.array(values) for group, values in found.items()}
+
+
+def _joint_values(shared: Shared, unknowns: Unknowns, groups: Mapping[str, Array]) -> dict[str, Any]:
+    """Friction of the joints: none at joints whose motor has it."""
+    model = shared.model.joints
+    found: dict[str, Array] = {}
+    for name in ("coulomb", "load", "viscous"):
+        found[name] = np.zeros(len(model.coulomb))
+        found[name][list(unknowns.joints)] = groups.get(f"joints.{name}", np.zeros(0))
+    drop = np.subtract(model.static, model.coulomb)
+    found["static"] = found["coulomb"] + np.where(np.isin(np.arange(len(drop)), unknowns.joints), drop, 0.0)
+    return {f"model.joints.{name}": _numbers(each) for name, each in found.items()}
+
+
+def _link_values(groups: Mapping[str, Array]) -> dict[str, Any]:
+    mass = groups["links.mass"]
+    centre = np.column_stack([groups[f"links.moment_{axis}"] / mass for axis in AXES])
+    inertia = np.maximum(np.column_stack([groups[f"links.inertia_{axis}"] for axis in AXES]), LIGHTEST)
+    named = {"mass": mass, "centre": centre.ravel(), "inertia": inertia.ravel()}
+    return {f"model.links.{name}": _numbers(each, 9) for name, each in named.items()}
+
+
+def _numbers(values: Array, digits: int = DIGITS) -> list[float]:
+    return [float(f"{value:.{digits}g}") for value in values.tolist()]
+
+
+def write_overlay(file: Path, base: str, values: Mapping[str, Any], command: str) -> None:
+    """Write a configuration that changes these values of another one.
+
+    Parameters
+    ----------
+    base : the other one, by name or path.
+    values : by dotted name of a shared parameter, or 'node:name'.
+    command : that made them.
+    """
+    tree: dict[str, Any] = {"base": base}
+    for key, value in values.items():
+        node, _, name = key.rpartition(":")
+        *path, leaf = name.split(".")
+        branch = tree
+        for part in (f"{SHARED}/{node}" if node else SHARED, PARAMETERS, *path):
+            branch = branch.setdefault(part, {})
+        branch[leaf] = value
+    body = yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, width=120)
+    file.write_text(f"# The controllers' model as identified: {command}\n{body}", encoding="utf-8")

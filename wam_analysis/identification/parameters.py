@@ -1,0 +1,105 @@
+"""What is estimated: the parameters of the controllers' model by name, their present values, how far they may be off.
+
+Friction of a joint with a motor of its own cannot be separated from that of the motor and is counted there.  Friction
+of the other joints is alike in both directions: a constant torque looks the same from the motor and from the joint.
+So does a torque offset, which is counted as a difference between the directions of the motor.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.arm import Shared
+from wam_description.transmission_map import TransmissionMap
+
+Array = NDArray[np.float64]
+
+DIRECTIONS = ("positive", "negative")
+AXES = ("x", "y", "z")
+# standard deviations of the prior, which decides only what the motion does not show
+FRICTION = 0.5  # of the present Coulomb friction
+LOAD = 0.1  # friction per transmitted torque
+VISCOUS = 1.0  # of the present viscous friction
+ROTOR = 0.2  # of the present rotor inertia
+MASS = 0.3  # of the present mass
+CENTRE = 0.05  # m
+INERTIA = 0.5  # of the present inertia of the link
+LEAST = 1e-6  # of everything whose present value is 0
+
+
+class Unknowns(NamedTuple):
+    """The estimated parameters.
+
+    Attributes
+    ----------
+    names : p, as in `model.covariance.parameters`.
+    present : (p,), values before the identification.
+    prior_sd : (p,).
+    joints : indices of the joints whose friction is estimated.
+    """
+
+    names: tuple[str, ...]
+    present: Array
+    prior_sd: Array
+    joints: tuple[int, ...]
+
+    def places(self, group: str) -> list[int]:
+        """Where the parameters of a group are, as 'motors.viscous'."""
+        return [i for i, name in enumerate(self.names) if name.rpartition(".")[0] == group]
+
+
+def shared_joints(matrix: Array) -> tuple[int, ...]:
+    """Indices of the joints that several motors move together."""
+    return tuple(int(j) for j in np.flatnonzero(np.count_nonzero(matrix, axis=1) > 1))
+
+
+def unknowns(shared: Shared) -> Unknowns:
+    """The estimated parameters of an arm, with the values of its present model.
+
+    'static' is F_s - F_c here, which the torque is linear in, until `static_friction` adds F_c.
+    """
+    arm, model = shared.arm, shared.model
+    matrix = TransmissionMap.of(arm).joint_from_motor
+    joints = shared_joints(matrix)
+    lumped = np.abs(matrix) * [[j not in joints] for j in range(len(matrix))]
+    motors, at_joints, links = model.motors, model.joints, model.links
+    names: list[str] = []
+    present: list[float] = []
+    sd: list[float] = []
+
+    def add(group: str, of: list[str], values: Array, sds: Array) -> None:
+        names.extend(f"{group}.{name}" for name in of)
+        present.extend(values)
+        sd.extend(np.maximum(sds, LEAST))
+
+    every = list(arm.motors.names)
+    through = lumped.T @ at_joints.coulomb
+    level = (np.array(motors.coulomb_positive) + motors.coulomb_negative) / 2.0 + through
+    drop_at_joints = np.subtract(at_joints.static, at_joints.coulomb)
+    for way in DIRECTIONS:
+        coulomb = np.array(getattr(motors, f"coulomb_{way}"))
+        add(f"motors.coulomb_{way}", every, coulomb + through, FRICTION * level)
+    for way in DIRECTIONS:
+        drop = np.subtract(getattr(motors, f"static_{way}"), getattr(motors, f"coulomb_{way}"))
+        add(f"motors.static_{way}", every, drop + lumped.T @ drop_at_joints, FRICTION * level)
+    for way in DIRECTIONS:
+        load = np.array(getattr(motors, f"load_{way}"))
+        add(f"motors.load_{way}", every, load + (lumped.T > 0.0) @ at_joints.load, np.full(len(every), LOAD))
+    viscous = np.array(motors.viscous) + (lumped**2).T @ at_joints.viscous
+    add("motors.viscous", every, viscous, VISCOUS * viscous)
+    add("motors.inertia", every, np.array(motors.inertia), ROTOR * np.array(motors.inertia))
+    chosen = [arm.joints.names[j] for j in joints]
+    here = list(joints)
+    add("joints.coulomb", chosen, np.array(at_joints.coulomb)[here], FRICTION * np.array(at_joints.coulomb)[here])
+    add("joints.load", chosen, np.array(at_joints.load)[here], np.full(len(here), LOAD))
+    add("joints.viscous", chosen, np.array(at_joints.viscous)[here], VISCOUS * np.array(at_joints.viscous)[here])
+    mass, n = np.array(links.mass), len(links.mass)
+    centre, inertia = np.reshape(links.centre, (n, 3)), np.reshape(links.inertia, (n, 3))
+    of_links = list(arm.links.names)
+    add("links.mass", of_links, mass, MASS * mass)
+    for i, axis in enumerate(AXES):
+        add(f"links.moment_{axis}", of_links, mass * centre[:, i], CENTRE * mass)
+    for i, axis in enumerate(AXES):
+        add(f"links.inertia_{axis}", of_links, inertia[:, i], INERTIA * inertia[:, i])
+    return Unknowns(tuple(names), np.array(present), np.array(sd), joints)

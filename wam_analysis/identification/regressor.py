@@ -1,0 +1,156 @@
+"""Motor torques per parameter: tau = M^T (Y(q, qd, qdd) phi + J qdd + friction of joints) + I thetadd + friction.
+
+The friction of a window is the mean over its states, each with the direction, speed and load of its own.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.identification.motion import MotionSamples
+from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
+from wam_description.arm import Shared
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+
+Array = NDArray[np.float64]
+
+SLOWEST_MOTOR = 0.3  # rad/s; below it, friction depends on what a shaft did before
+SLOWEST_JOINT = 0.02  # rad/s
+DIAGONAL = (4, 6, 9)  # inertia xx, yy, zz among the ten parameters of a link
+PRODUCTS = ((5, 0, 1), (7, 0, 2), (8, 1, 2))  # inertia xy, xz, yz: place, axes
+
+
+class Equations(NamedTuple):
+    """Rows of the least squares problem.
+
+    Attributes
+    ----------
+    time : (k,), s.
+    torque : (k, n), of each motor, less what is not estimated, N m.
+    columns : (k, n, p), torque per parameter.
+    is_used : (k, n), whether the motor, and each joint that it moves, turns in one direction.
+    """
+
+    time: Array
+    torque: Array
+    columns: Array
+    is_used: NDArray[np.bool_]
+
+
+class Regressor:
+    """The equations of a motion, linearised about values of the parameters.
+
+    Parameters
+    ----------
+    shared : arm and present model.
+    unknowns : what is estimated.
+    motion : samples.
+    stribeck_velocity : (n,), v_s of each motor, rad/s.
+    """
+
+    def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples, stribeck_velocity: Array) -> None:
+        self._shared, self._unknowns, self._motion = shared, unknowns, motion
+        self._matrix = TransmissionMap.of(shared.arm).joint_from_motor
+        self._stribeck = stribeck_velocity
+        self._qd = motion.velocities @ self._matrix.T  # of each state
+        q, qd, qdd = (values @ self._matrix.T for values in (motion.theta, motion.thetad, motion.thetadd))
+        body = RigidBody(shared.arm)
+        links = np.array([body.inverse_dynamics_regressor(*state) for state in zip(q, qd, qdd, strict=True)])
+        self._links = np.einsum("ji,kjp->kip", self._matrix, links)
+        self._carried = (qdd * shared.model.joints.armature) @ self._matrix
+        self._is_used = self._steady()
+
+    def _steady(self) -> NDArray[np.bool_]:
+        """(k, n), whether a motor and its joints turn in one direction during the window."""
+        v, qd = self._motion.velocities, self._qd
+        motor = np.abs(v).min(1) > SLOWEST_MOTOR
+        motor &= np.abs(np.sign(v).sum(1)) == v.shape[1]
+        joint = np.abs(qd).min(1) > SLOWEST_JOINT
+        joint &= np.abs(np.sign(qd).sum(1)) == v.shape[1]
+        return motor & ~(~joint @ (self._matrix != 0.0))
+
+    def equations(self, values: Array) -> Equations:
+        """The equations about the values, (p,), of the parameters."""
+        motion, unknowns = self._motion, self._unknowns
+        n = motion.theta.shape[1]
+        columns = np.zeros((*motion.theta.shape, len(unknowns.names)))
+        load = self.load(values)
+        for group, each in self._friction(load).items():
+            found = np.einsum("w,kwn->kn", motion.weights, each)
+            columns[:, range(n), unknowns.places(group)] = found
+        columns[:, range(n), unknowns.places("motors.inertia")] = motion.thetadd
+        self._add_joints(columns, load)
+        at, jacobian, constant = self._inertial(values)
+        columns[:, :, at] = self._links @ jacobian
+        torque = motion.torque - self._carried - self._links @ constant
+        return Equations(motion.time, torque, columns, self._is_used)
+
+    def _friction(self, load: Array) -> dict[str, Array]:
+        """Torque per parameter at each state, (k, w, n), by group."""
+        v = self._motion.velocities
+        slow = np.exp(-((v / self._stribeck) ** 2))
+        found = {"motors.viscous": v}
+        for way, sign in zip(DIRECTIONS, (1.0, -1.0), strict=True):
+            moves = np.where(sign * v > 0.0, sign, 0.0)
+            found[f"motors.coulomb_{way}"] = moves
+            found[f"motors.static_{way}"] = moves * slow
+            found[f"motors.load_{way}"] = moves * np.abs(load)
+        return found
+
+    def load(self, values: Array) -> Array:
+        """Torque that the cables transmit to each rotor at each state, (k, w, n), N m."""
+        motion, unknowns = self._motion, self._unknowns
+        rotor = values[unknowns.places("motors.inertia")] * motion.thetadd
+        load = motion.torques - rotor[:, None, :]
+        friction = self._friction(load)
+        return load - sum(each * values[unknowns.places(group)] for group, each in friction.items())
+
+    def _add_joints(self, columns: Array, load: Array) -> None:
+        weights, matrix, unknowns = self._motion.weights, self._matrix, self._unknowns
+        at_joints = np.abs(load @ np.linalg.inv(matrix))  # tau = M^-T tau_motor
+        sign = np.sign(self._qd)
+        found = {"joints.coulomb": sign, "joints.load": sign * at_joints, "joints.viscous": self._qd}
+        for group, each in found.items():
+            mean = np.einsum("w,kwn->kn", weights, each)
+            for at, j in zip(unknowns.places(group), unknowns.joints, strict=True):
+                columns[:, :, at] = mean[:, j, None] * matrix[j]
+
+    def _inertial(self, values: Array) -> tuple[list[int], Array, Array]:
+        """Where the parameters of the links are, and the ten of each link as jacobian @ parameters + constant."""
+        unknowns, n = self._unknowns, len(self._shared.arm.links.names)
+        groups = ["mass", *(f"moment_{axis}" for axis in AXES), *(f"inertia_{axis}" for axis in AXES)]
+        at = np.array([unknowns.places(f"links.{group}") for group in groups])  # (7, n)
+        jacobian, constant = np.zeros((10 * n, 7 * n)), np.zeros(10 * n)
+        for i in range(n):
+            ten, slope = about_origin(values[at[:, i]])
+            rows, own = slice(10 * i, 10 * i + 10), np.arange(7) * n + i
+            jacobian[rows, own] = slope
+            constant[rows] = ten - slope @ values[at[:, i]]
+        return at.ravel().tolist(), jacobian, constant
+
+
+def about_origin(link: Array) -> tuple[Array, Array]:
+    """The ten parameters of a link about its frame's origin, (10,), and their slopes, (10, 7).
+
+    Parameters
+    ----------
+    link : (7,), mass, kg; mass times centre, kg m; principal inertia about the centre, kg m^2.
+    """
+    mass, moment, inertia = float(link[0]), link[1:4], link[4:]
+    ten, slope = np.zeros(10), np.zeros((10, 7))
+    ten[0], slope[0, 0] = mass, 1.0
+    ten[1:4], slope[1:4, 1:4] = moment, np.eye(3)
+    for i, place in enumerate(DIAGONAL):
+        others = [axis for axis in range(3) if axis != i]
+        square = float(moment[others] @ moment[others])
+        ten[place] = inertia[i] + square / mass
+        slope[place, 0], slope[place, 4 + i] = -square / mass**2, 1.0
+        for axis in others:
+            slope[place, 1 + axis] = 2.0 * moment[axis] / mass
+    for place, a, b in PRODUCTS:
+        ten[place] = -moment[a] * moment[b] / mass
+        slope[place, 0] = moment[a] * moment[b] / mass**2
+        slope[place, 1 + a], slope[place, 1 + b] = -moment[b] / mass, -moment[a] / mass
+    return ten, slope

@@ -1,0 +1,82 @@
+"""The identification as text: one table, what is identifiable, and warnings."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from wam_analysis.identification.base_set import gravity_base_set
+from wam_analysis.identification.fit import PARTS, Identification
+from wam_analysis.identification.overlay import identified
+from wam_analysis.table import plain
+from wam_description.arm import Shared
+
+UNITS = {
+    "coulomb": "N m", "static": "N m", "load": "", "viscous": "N m s/rad", "inertia": "kg m^2", "mass": "kg",
+    "moment": "kg m",
+}  # fmt: skip
+SHORT = 20.0  # s of motion in one direction, less of which is warned about
+FEW = 6  # parts of the motion in which a motor turns both ways
+UNEXPLAINED = 1.5  # rms of held-out motion per rms of the estimate's own
+LEFT = 0.1  # rms that stays unexplained, per Coulomb friction
+NOTES = """{rank} combinations of {count} parameters are identified, condition {condition:.3g}.
+'In combination': only together with others.
+Friction of a joint with a motor of its own is part of that motor's friction; a torque offset is part of the difference
+between its directions."""
+
+
+def report(shared: Shared, found: Identification, label: str) -> str:
+    """Table, fit and warnings.
+
+    Parameters
+    ----------
+    label : of the recording.
+    """
+    result = identified(found)
+    rows = []
+    for i, name in enumerate(result.names):
+        unit = UNITS[name.split(".")[1].partition("_")[0]]
+        state = "yes" if found.is_identified[i] else "in combination" if found.is_combined[i] else "no"
+        cells = [f"{value:.4g}" for value in (result.values[i], result.sd[i], result.present[i])]
+        rows.append([name, *cells, unit, state])
+    head = [["parameter", "value", "standard error", "previous", "unit", "identifiable"]]
+    lines = [f"{label}: model of the controllers from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
+    parts = (found.before, found.residual, found.held_out)
+    lines += plain(
+        [["motor", "motion", "left by the present model", "by the estimate", "held out"]],
+        [
+            [name, f"{found.seconds[i]:.1f} s", *(f"{1e3 * rms[i]:.3g} mN m" for rms in parts)]
+            for i, name in enumerate(shared.arm.motors.names)
+        ],
+    )
+    lines += ["", NOTES.format(rank=found.rank, count=len(result.names), condition=found.condition)]
+    lines += [f"Gravity depends on {'; '.join(gravity_base_set(shared.arm))}."]
+    return "\n".join([*lines, *(f"warning: {text}" for text in warnings(shared, found)), ""])
+
+
+def warnings(shared: Shared, found: Identification) -> Iterator[str]:
+    """What the recording is too short or too slow for, and where the model does not fit."""
+    level = np.array([found.values[found.unknowns.places(f"motors.coulomb_{way}")] for way in ("positive", "negative")])
+    for i, name in enumerate(shared.arm.motors.names):
+        if found.seconds[i] < SHORT:
+            yield f"{name} turns freely for {found.seconds[i]:.1f} s only; record {SHORT:g} s or more"
+        if found.both_directions[i] < FEW:
+            yield (
+                f"{name} turns both ways in {found.both_directions[i]} of {PARTS} parts of the recording only; "
+                "its standard errors are uncertain: let it reverse more often"
+            )
+        if found.held_out[i] > UNEXPLAINED * found.residual[i] + 1e-4:
+            yield (
+                f"{name}: motion that was held out is predicted to {1e3 * found.held_out[i]:.3g} mN m, the rest to "
+                f"{1e3 * found.residual[i]:.3g}: too little motion for so many parameters"
+            )
+        share = found.residual[i] / max(level[:, i].mean(), 1e-9)
+        if share > LEFT:
+            yield (
+                f"{name}: {1e3 * found.residual[i]:.3g} mN m remain unexplained, {share:.0%} of its friction: "
+                "was the motion free of contact?"
+            )
+    offset = level[0] - level[1]
+    sums = level.sum(0)
+    for i, name in enumerate(shared.arm.motors.names):
+        if abs(offset[i]) > 0.3 * sums[i] / 2.0:
+            yield f"{name}: directions differ by {abs(offset[i]):.3g} N m; a torque offset of half of it looks the same"

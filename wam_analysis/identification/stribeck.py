@@ -1,0 +1,59 @@
+"""The Stribeck velocity v_s of each motor: that by which held-out motion is predicted best, and its uncertainty."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+VELOCITIES: Final = np.geomspace(0.4, 8.0, 9)  # rad/s, of the motors
+WORTH: Final = 0.04  # part of the squared error by which another v_s must be better than the present one
+
+
+class StribeckVelocities(NamedTuple):
+    """v_s of each motor, (n,), rad/s; and as it is without each part of the motion, (parts, n)."""
+
+    velocity: Array
+    without: Array
+
+
+def stribeck_velocities(present: Array, present_errors: Array, errors: Array) -> StribeckVelocities:
+    """Velocities by the squared errors of held-out motion.
+
+    Parameters
+    ----------
+    present : (n,), rad/s; it is kept where no other one is clearly better.
+    present_errors : (parts, n), squared errors with it, N^2 m^2.
+    errors : (c, parts, n), those with each of `VELOCITIES`.
+    """
+    total = errors.sum(1)
+    is_better = total.min(0) < (1.0 - WORTH) * present_errors.sum(0)
+    best = np.where(is_better, _minimum(total), present)
+    left_out = np.array([_minimum(total - part) for part in errors.transpose(1, 0, 2)])
+    return StribeckVelocities(best, np.where(is_better, left_out, present))
+
+
+def slopes(values: Array, velocity: Array) -> Array:
+    """Change of parameters per change of ln v_s about the v_s of each motor, (n, p).
+
+    Parameters
+    ----------
+    values : (c, p), parameters with each of `VELOCITIES`.
+    velocity : (n,), rad/s.
+    """
+    upper = np.clip(np.searchsorted(VELOCITIES, velocity), 1, len(VELOCITIES) - 1)
+    found: Array = (values[upper] - values[upper - 1]) / np.log(VELOCITIES[upper] / VELOCITIES[upper - 1])[:, None]
+    return found
+
+
+def _minimum(total: Array) -> Array:
+    """Where a parabola through the least of the errors, (c, n), and its neighbours is least, (n,), rad/s."""
+    at = np.clip(total.argmin(0), 1, len(total) - 2)
+    motor = np.arange(total.shape[1])
+    below, least, above = (total[at + i, motor] for i in (-1, 0, 1))
+    curvature = below - 2.0 * least + above
+    shift = np.where(curvature > 0.0, 0.5 * (below - above) / np.where(curvature > 0.0, curvature, 1.0), 0.0)
+    step = np.log(VELOCITIES[1] / VELOCITIES[0])
+    found: Array = VELOCITIES[at] * np.exp(step * np.clip(shift, -1.0, 1.0))
+    return found

@@ -1,0 +1,9 @@
+"""A benchmark of contact estimation that is wider than the estimator's design (`wam evaluate robustness`).
+
+degradations   how the true arm and its signals differ from what the estimator states, one at a time and mixed
+touches        contacts: strong, rough, on the ends, sliding, two at once, impacts
+recording      play one drawn arm without ROS; keep the motors' signals and the truth
+replay         the estimator on a recording
+rows           the table, by degradation and by kind of contact
+evaluation     all degradations of some seeds on an executor, and the page
+"""

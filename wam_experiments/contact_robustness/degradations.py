@@ -1,0 +1,182 @@
+"""How the true arm and its signals differ from what the estimator states, one degradation at a time and mixed.
+
+Nothing here is read by the estimator, and nothing is read from its parameters: what it states is in the section
+`contact_estimator` of the configuration, what is drawn is this table.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wam_description.arm import Arm
+
+Random = np.random.Generator
+Values = tuple[tuple[str, Any], ...]  # of a configuration, by name
+TURN = 2.0 * math.pi
+
+
+class Degradation(NamedTuple):
+    """One drawn arm and its signals.
+
+    Attributes
+    ----------
+    plant : values of the configuration that is simulated.
+    model : values of the configuration of which the estimator has its arm.
+    torque_scale : (n,), measured over true torque of each motor.
+    torque_noise : sd of the measured torque, per torque.
+    delay : samples by which measured torques are late.
+    dropped : share of samples that do not arrive.
+    drift : Coulomb friction that joints gain from the start to the end of a recording, per nominal friction.
+    """
+
+    plant: Values
+    model: Values = ()
+    torque_scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
+    torque_noise: float = 0.0
+    delay: int = 0
+    dropped: float = 0.0
+    drift: float = 0.0
+
+
+def _degraded(plant: dict[str, Any], model: dict[str, Any] | None = None, **signals: Any) -> Degradation:
+    return Degradation(tuple(plant.items()), tuple((model or {}).items()), **signals)
+
+
+def _around(random: Random, low: float, high: float, count: int = 4) -> list[float]:
+    return random.uniform(low, high, count).tolist()
+
+
+def _level(random: Random, low: float, high: float) -> dict[str, Any]:
+    return {
+        "driver:mismatch.motor_friction": _around(random, low, high),
+        "driver:mismatch.joint_friction": _around(random, low, high),
+    }
+
+
+def _stribeck(arm: Arm, excess: float) -> dict[str, Any]:
+    return {
+        "driver:friction.law": "stribeck",
+        "arm.motors.static_friction": [excess * f for f in arm.motors.static_friction],
+        "arm.joints.static_friction": [excess * f for f in arm.joints.static_friction],
+    }
+
+
+def _asymmetric(random: Random, size: float) -> dict[str, Any]:
+    keys = ("motor_asymmetry", "joint_asymmetry")
+    return {f"driver:friction.{key}": (size * random.choice((-1.0, 1.0), 4)).tolist() for key in keys}
+
+
+def _load(factor: float) -> dict[str, Any]:
+    return {"driver:friction.motor_load_factor": [factor], "driver:friction.joint_load_factor": [factor]}
+
+
+def _encoder(counts: int) -> dict[str, Any]:
+    return {"driver:sensors.encoder_resolution": [TURN / counts] * 4}
+
+
+def _cogging(random: Random, amplitude: float) -> dict[str, Any]:
+    return {
+        "driver:effects.ripples.amplitude": [amplitude] * 4,
+        "driver:effects.ripples.phase": _around(random, -math.pi, math.pi),
+    }
+
+
+def _masses(random: Random, width: float) -> dict[str, Any]:
+    return {"driver:mismatch.mass": _around(random, 1.0 - width, 1.0 + width)}
+
+
+def _centre(random: Random, arm: Arm, metres: float) -> dict[str, Any]:
+    return {"arm.links.centre": (np.array(arm.links.centre) + random.uniform(-metres, metres, 12)).tolist()}
+
+
+def _constant(random: Random, width: float) -> tuple[float, ...]:
+    return tuple(_around(random, 1.0 - width, 1.0 + width))
+
+
+def _mix(random: Random, arm: Arm) -> Degradation:
+    plant = {
+        **_level(random, 0.8, 1.3),
+        **_stribeck(arm, 1.1),
+        **_asymmetric(random, 0.1),
+        **_load(0.03),
+        **_encoder(16384),
+        **_cogging(random, 0.003),
+        **_masses(random, 0.02),
+        "driver:amplifier.torque_ripple": [0.01] * 4,
+        "driver:amplifier.current_noise": [0.02] * 4,
+    }
+    return _degraded(
+        plant,
+        _centre(random, arm, 0.003),
+        torque_scale=_constant(random, 0.02),
+        torque_noise=0.005,
+        delay=1,
+        dropped=0.02,
+        drift=0.1,
+    )
+
+
+NAMES = (
+    "as stated",
+    "friction 0.8 to 1.3",
+    "friction 40 %",
+    "asymmetric 25 %",
+    "Stribeck, F_s + 20 %",
+    "presliding",
+    "load-dependent 6 %",
+    "friction drifts 20 %",
+    "mass 5 %, centre 5 mm",
+    "torque constant 3 %",
+    "payload 0.1 kg",
+    "payload 0.3 kg",
+    "encoder 4096",
+    "encoder 16384",
+    "encoder 65536",
+    "torque noise, ripple, cogging",
+    "delay 2 ms",
+    "10 % dropped",
+    "realistic mix",
+)
+
+
+def drawn(name: str, arm: Arm, random: Random) -> Degradation:
+    """The degradation of this name, its size fixed, its directions drawn.
+
+    `as stated` draws friction within 10 % and masses within 2 %, which is what the configured estimator states.
+    """
+    stated = {**_level(random, 0.9, 1.1), **_masses(random, 0.02)}
+    signs = random.choice((-1.0, 1.0), 8)
+    forty = {
+        "driver:mismatch.motor_friction": (1.0 + 0.4 * signs[:4]).tolist(),
+        "driver:mismatch.joint_friction": (1.0 + 0.4 * signs[4:]).tolist(),
+    }
+    presliding = {
+        "driver:friction.motor_presliding_stiffness": [4.0],
+        "driver:friction.joint_presliding_stiffness": [500.0],
+    }
+    noisy = {**stated, **_cogging(random, 0.004), "driver:amplifier.torque_ripple": [0.02] * 4}
+    noisy["driver:amplifier.current_noise"] = [0.04] * 4
+    heavy = {**stated, **_masses(random, 0.05)}
+    of = {
+        "as stated": _degraded(stated),
+        "friction 0.8 to 1.3": _degraded({**stated, **_level(random, 0.8, 1.3)}),
+        "friction 40 %": _degraded({**stated, **forty}),
+        "asymmetric 25 %": _degraded({**stated, **_asymmetric(random, 0.25)}),
+        "Stribeck, F_s + 20 %": _degraded({**stated, **_stribeck(arm, 1.2)}),
+        "presliding": _degraded({**stated, **presliding}),
+        "load-dependent 6 %": _degraded({**stated, **_load(0.06)}),
+        "friction drifts 20 %": _degraded(stated, drift=0.2),
+        "mass 5 %, centre 5 mm": _degraded(heavy, _centre(random, arm, 0.005)),
+        "torque constant 3 %": _degraded(stated, torque_scale=_constant(random, 0.03)),
+        "payload 0.1 kg": _degraded({**stated, "driver:mismatch.payload": 0.1}),
+        "payload 0.3 kg": _degraded({**stated, "driver:mismatch.payload": 0.3}),
+        "encoder 4096": _degraded({**stated, **_encoder(4096)}),
+        "encoder 16384": _degraded({**stated, **_encoder(16384)}),
+        "encoder 65536": _degraded({**stated, **_encoder(65536)}),
+        "torque noise, ripple, cogging": _degraded(noisy, torque_noise=0.01),
+        "delay 2 ms": _degraded(stated, delay=2),
+        "10 % dropped": _degraded(stated, dropped=0.1),
+        "realistic mix": _mix(random, arm),
+    }
+    return of[name]

@@ -1,0 +1,243 @@
+"""Run the contact estimator on a recording: what it reports of each contact, and between contacts."""
+
+import copy
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact_inference import MORE
+from wam_description.arm import seconds
+from wam_description.configuration import Configuration
+from wam_description.signals import State
+from wam_experiments.contact_benchmark.contacts import EDGE, MOVING
+from wam_experiments.contact_benchmark.scenarios import base_values
+from wam_experiments.contact_robustness.recording import DriveRecording
+from wam_experiments.contact_robustness.touches import Touch
+
+SETTLED, LATE = 0.2, 0.45  # s after the start of a contact
+SECOND_WITHIN = 0.25  # s
+HIT = 0.1  # s after the start of a contact in which a change is its own
+START_AFTER = 0.1  # s, of an estimator that starts in contact
+START_WITHIN = 0.3  # s
+
+
+class TouchOutcome(NamedTuple):
+    """What was reported of one contact.
+
+    Attributes
+    ----------
+    kind, cover, place, force, friction : true, of the contact; m, N.
+    moving : whether the arm moved at the start and when the estimate is evaluated.
+    latency : s to the detection, inf without, NaN if there was one already.
+    detected, probability, right_link : when evaluated, 0.2 s after the start.
+    error, position_sd : m; inf on the wrong link or without an estimate; NaN sd without a position.
+    late_error : m, 0.45 s after the start.
+    in_set, set_length : whether the 90 % set holds the truth, and its length, m.
+    reason : as reported.
+    """
+
+    kind: str
+    cover: str
+    place: float
+    force: float
+    friction: float
+    moving: bool
+    latency: float
+    detected: bool
+    probability: float
+    right_link: bool
+    error: float
+    position_sd: float
+    late_error: float
+    in_set: bool
+    set_length: float
+    reason: str
+
+
+class ReplayScore(NamedTuple):
+    """One recording, scored.
+
+    Attributes
+    ----------
+    degradation : its name.
+    outcomes : of the contacts.
+    free_seconds, alarms : time without contact; detections that start in it.
+    warnings : share of that time with a warning that the model is off.
+    torque_z : rms of error over stated sd of the external torques in free motion.
+    steady_seconds, changes : time in single contacts; second contacts that are reported in it.
+    second : latency of each second contact, s, inf if it is not reported.
+    started : whether a contact in which the estimator starts is detected: (warm, cold) of each.
+    failure : of the recording.
+    """
+
+    degradation: str
+    outcomes: list[TouchOutcome]
+    free_seconds: float
+    alarms: int
+    warnings: float
+    torque_z: float
+    steady_seconds: float
+    changes: int
+    second: list[float]
+    started: list[tuple[bool, bool]]
+    failure: str
+
+
+class _Row(NamedTuple):
+    """One outer period."""
+
+    time: float
+    sample: int
+    estimate: ContactEstimate
+
+
+class SignalFaults:
+    """Samples as the estimator gets them: state, torque, time since the last sample that arrived."""
+
+    def __init__(self, recording: DriveRecording, period: float, seed: int) -> None:
+        self._recording, self._period = recording, period
+        self._random = np.random.default_rng((seed, 3))
+
+    def __iter__(self) -> Iterator[tuple[int, State, float]]:
+        recording, given, random = self._recording, self._recording.degradation, self._random
+        k = len(recording.theta)
+        noise = 1.0 + given.torque_noise * random.standard_normal(recording.torque.shape)
+        late = np.concatenate((np.zeros((given.delay, recording.torque.shape[1])), recording.torque))[:k]
+        torque = (late * np.array(given.torque_scale) * noise).tolist()
+        arrives = random.random(k) >= given.dropped
+        theta, thetad, gap = recording.theta.tolist(), recording.thetad.tolist(), 0.0
+        for i in range(k):
+            gap += self._period
+            if arrives[i]:
+                yield i, State(theta[i], thetad[i], torque[i]), gap
+                gap = 0.0
+
+
+def replay(configuration: Configuration, name: str, recording: DriveRecording, seed: int) -> ReplayScore:
+    """Score the estimator of a configuration on a recording."""
+    configured = configuration.with_values({**base_values(configuration, False), **dict(recording.degradation.model)})
+    shared, own = configured.shared, configured.node("contact_estimator", ContactEstimatorParameters)
+    period, outer = seconds(shared.timing.period_ns), shared.timing.outer_divisor
+    estimator = ContactEstimator(shared.model_arm, shared.timing, own)
+    rows: list[_Row] = []
+    singles = [t for t in recording.touches if t.kind in ("outer", "inner") and np.linalg.norm(t.force) >= 9.0]
+    trials: dict[int, tuple[ContactEstimator, ContactEstimator]] = {}
+    started: dict[int, tuple[bool, bool]] = {}
+    for i, state, dt in SignalFaults(recording, period, seed):
+        time = i * period
+        estimator.observe(state, None, dt)
+        for number, touch in enumerate(singles):
+            if touch.begin + START_AFTER <= time < touch.begin + START_AFTER + START_WITHIN:
+                if number not in trials:
+                    trials[number] = copy.deepcopy(estimator), ContactEstimator(shared.model_arm, shared.timing, own)
+                    trials[number][0].reset()
+                for trial in trials[number]:
+                    trial.observe(state, None, dt)
+                if i % outer == 0:
+                    warm, cold = (trial.estimate().in_contact for trial in trials[number])
+                    before = started.get(number, (False, False))
+                    started[number] = before[0] or warm, before[1] or cold
+        if i % outer == 0:
+            rows.append(_Row(time, i, estimator.estimate()))
+    return _scored(name, recording, rows, list(started.values()), dict(_lengths(configured)))
+
+
+def _lengths(configuration: Configuration) -> Iterator[tuple[str, float]]:
+    covers = configuration.shared.arm.covers
+    return zip(covers.names, covers.length, strict=True)
+
+
+def _scored(
+    name: str,
+    recording: DriveRecording,
+    rows: Sequence[_Row],
+    started: list[tuple[bool, bool]],
+    lengths: dict[str, float],
+) -> ReplayScore:
+    step = rows[1].time - rows[0].time
+    ended = rows[-1].time
+    touches = [touch for touch in recording.touches if touch.end < ended]
+    busy = np.zeros(len(rows), bool)
+    for touch in touches:
+        busy |= _during(rows, touch.begin, touch.end + EDGE)
+    moving = np.array([recording.speed[row.sample] > MOVING for row in rows])
+    alarm = np.array([row.estimate.in_contact for row in rows])
+    # a detection that continues from a true contact ends late, and is no new alarm
+    alarms = int((alarm[1:] & ~alarm[:-1] & ~busy[1:]).sum())
+    free = ~busy & moving & (np.array([row.time for row in rows]) > 1.0)
+    z = [
+        np.array(row.estimate.external_torques) / np.array(row.estimate.torque_sd)
+        for row, take in zip(rows, free, strict=True)
+        if take
+    ]
+    warned = [bool(getattr(row.estimate, "warning", "")) for row, take in zip(rows, ~busy, strict=True) if take]
+    flagged = np.array([MORE in row.estimate.reason for row in rows])
+    steady, changes, second = 0.0, 0, []
+    for touch in touches:
+        if touch.kind == "second":
+            within = _during(rows, touch.begin, touch.begin + SECOND_WITHIN)
+            times = [row.time - touch.begin for row, hit, on in zip(rows, within, flagged, strict=True) if hit and on]
+            second.append(times[0] if times else math.inf)
+        elif not touch.kind.startswith("second") and touch.end - touch.begin > HIT:
+            during = _during(rows, touch.begin + HIT, touch.end)
+            steady += step * int(during.sum())
+            changes += int(flagged[during].any())
+    return ReplayScore(
+        degradation=name,
+        outcomes=[_outcome(touch, rows, moving, lengths) for touch in touches if touch.kind != "second"],
+        free_seconds=step * int((~busy).sum()),
+        alarms=alarms,
+        warnings=sum(warned) / max(1, len(warned)),
+        torque_z=float(np.sqrt(np.mean(np.square(z)))) if z else math.nan,
+        steady_seconds=steady,
+        changes=changes,
+        second=second,
+        started=started,
+        failure=recording.failure,
+    )
+
+
+def _during(rows: Sequence[_Row], begin: float, end: float) -> np.ndarray:
+    time = np.array([row.time for row in rows])
+    return (time >= begin) & (time <= end)
+
+
+def _outcome(touch: Touch, rows: Sequence[_Row], moving: np.ndarray, lengths: dict[str, float]) -> TouchOutcome:
+    first = next(i for i, row in enumerate(rows) if row.time >= touch.begin)
+    due = next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + SETTLED, touch.end)), len(rows) - 1)
+    late = next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + LATE, touch.end)), len(rows) - 1)
+    now = rows[due].estimate
+    best = now.hypotheses[0] if now.hypotheses else None
+    right = best is not None and best.cover == touch.cover
+    own = [h for h in now.hypotheses if h.cover == touch.cover]
+    true = touch.place_at(rows[due].time)
+    sizes = [h.high - h.low for h in now.hypotheses if not math.isnan(h.low)]
+    already = first > 0 and rows[first - 1].estimate.in_contact
+    times = [row.time - touch.begin for row in rows[first : late + 1] if row.estimate.in_contact]
+    return TouchOutcome(
+        kind=touch.kind,
+        cover=touch.cover,
+        place=true,
+        force=float(np.linalg.norm(touch.force)),
+        friction=touch.friction,
+        moving=bool(moving[first] and moving[due]),
+        latency=math.nan if already else times[0] if times else math.inf,
+        detected=now.in_contact,
+        probability=now.probability,
+        right_link=right,
+        error=_error(now, touch.cover, true),
+        position_sd=now.position_sd if right else math.nan,
+        late_error=_error(rows[late].estimate, touch.cover, touch.place_at(rows[late].time)),
+        in_set=any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
+        set_length=sum(sizes),
+        reason=now.reason,
+    )
+
+
+def _error(estimate: ContactEstimate, cover: str, true: float) -> float:
+    if estimate.link != cover or math.isnan(estimate.place):
+        return math.inf
+    return abs(estimate.place - true)

@@ -1,0 +1,170 @@
+"""The table: one row per degradation, counts first."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from wam_analysis.table import markdown
+from wam_experiments.contact_benchmark.statistics import quantile
+from wam_experiments.contact_robustness.replay import SECOND_WITHIN, ReplayScore, TouchOutcome
+
+NEAR = 0.2  # of a force: 5 N are 4 to 6 N
+SURE, SMALL_SD = 0.95, 0.02
+Scores = Sequence[ReplayScore]
+
+
+class ScoreColumn(NamedTuple):
+    """A column: its head, and its text for the scores of one degradation."""
+
+    head: str
+    of: Callable[[Scores], str]
+
+
+def outcomes(scores: Scores, *kinds: str) -> list[TouchOutcome]:
+    """Contacts in motion, of some kinds or of all."""
+    every = [one for score in scores for one in score.outcomes if one.moving]
+    return [one for one in every if not kinds or one.kind in kinds]
+
+
+def percent(hits: int, count: int) -> str:
+    """A share as text."""
+    return f"{100.0 * hits / count:.0f} ({count})" if count else "none"
+
+
+def alarms(scores: Scores) -> str:
+    """False alarms per minute without contact."""
+    seconds = sum(score.free_seconds for score in scores)
+    return f"{60.0 * sum(score.alarms for score in scores) / seconds:.1f}" if seconds else "none"
+
+
+def _near(found: Sequence[TouchOutcome], force: float) -> list[TouchOutcome]:
+    return [one for one in found if abs(one.force - force) <= NEAR * force]
+
+
+def fast(scores: Scores) -> str:
+    """Contacts of 5 N on the outer link that are detected within 30 ms."""
+    times = [one.latency for one in _near(outcomes(scores, "outer"), 5.0) if not math.isnan(one.latency)]
+    return percent(sum(time <= 0.03 + 1e-9 for time in times), len(times))
+
+
+def position(level: float, forces: Sequence[float] = (5.0, 10.0, 20.0)) -> Callable[[Scores], str]:
+    """Quantiles of the position error on the outer link, cm, at each force."""
+
+    def of(scores: Scores) -> str:
+        values = [
+            quantile([one.error for one in _near(outcomes(scores, "outer"), force)], level).value for force in forces
+        ]
+        return " / ".join("-" if math.isnan(value) else f"{100.0 * value:.1f}" for value in values)
+
+    return of
+
+
+def small(scores: Scores) -> str:
+    """Contacts on the outer link with a stated standard deviation below 2 cm."""
+    found = outcomes(scores, "outer")
+    return percent(sum(one.position_sd < SMALL_SD for one in found), len(found))
+
+
+def calibration(scores: Scores) -> str:
+    """68 % quantile of position error over stated sd, right link."""
+    found = [one for one in outcomes(scores, "outer") if one.position_sd > 0.0 and math.isfinite(one.error)]
+    value = quantile([one.error / one.position_sd for one in found], 0.683).value
+    return "none" if math.isnan(value) else f"{value:.1f}"
+
+
+def covered(*kinds: str) -> Callable[[Scores], str]:
+    """Detected contacts that the 90 % set holds."""
+
+    def of(scores: Scores) -> str:
+        found = [one for one in outcomes(scores, *kinds) if one.detected]
+        return percent(sum(one.in_set for one in found), len(found))
+
+    return of
+
+
+def length(scores: Scores) -> str:
+    """Length of the 90 % set, median and 95 %, cm."""
+    sizes = [one.set_length for one in outcomes(scores) if one.detected]
+    return " / ".join(f"{100.0 * quantile(sizes, level).value:.0f}" for level in (0.5, 0.95)) if sizes else "none"
+
+
+def wrong(least: float, *kinds: str) -> Callable[[Scores], str]:
+    """Wrong links among the detected contacts with at least a probability."""
+
+    def of(scores: Scores) -> str:
+        found = [one for one in outcomes(scores, *kinds) if one.detected and one.probability > least]
+        return percent(sum(not one.right_link for one in found), len(found))
+
+    return of
+
+
+def inner(scores: Scores) -> str:
+    """Contacts of 10 N on the inner link that are detected within 200 ms."""
+    found = _near(outcomes(scores, "inner"), 10.0)
+    return percent(sum(one.latency <= 0.2 + 1e-9 or math.isnan(one.latency) for one in found), len(found))
+
+
+def seconds_contact(scores: Scores) -> str:
+    """Second contacts that are reported in time; false ones per minute of contact."""
+    times = [time for score in scores for time in score.second]
+    minutes = sum(score.steady_seconds for score in scores) / 60.0
+    false = f"{sum(score.changes for score in scores) / minutes:.1f}" if minutes else "none"
+    return f"{percent(sum(time <= SECOND_WITHIN for time in times), len(times))}; {false}/min"
+
+
+def start(scores: Scores) -> str:
+    """Contacts in which an estimator starts, detected within 0.3 s: with its model's errors known, and without."""
+    found = [pair for score in scores for pair in score.started]
+    return " / ".join(percent(sum(pair[k] for pair in found), len(found)) for k in (0, 1))
+
+
+def torque_z(scores: Scores) -> str:
+    """Worst rms of error over stated sd of the torques in free motion."""
+    return f"{max((score.torque_z for score in scores), default=math.nan):.1f}"
+
+
+def warned(scores: Scores) -> str:
+    """Share of the contact-free time with a warning, %."""
+    return f"{100.0 * sum(score.warnings for score in scores) / max(1, len(scores)):.0f}"
+
+
+DETECTION = (
+    ScoreColumn("false alarms/min", alarms),
+    ScoreColumn("5 N within 30 ms, %", fast),
+    ScoreColumn("inner link, 10 N, %", inner),
+    ScoreColumn("torque error / stated sd", torque_z),
+    ScoreColumn("warned, %", warned),
+    ScoreColumn("start in contact, warm / cold, %", start),
+    ScoreColumn("second contact, %; false", seconds_contact),
+)
+POSITION = (
+    ScoreColumn("median 5/10/20 N, cm", position(0.5)),
+    ScoreColumn("95 %", position(0.95)),
+    ScoreColumn("sd < 2 cm, %", small),
+    ScoreColumn("error / stated sd", calibration),
+    ScoreColumn("90 % set holds, %", covered()),
+    ScoreColumn("its length 50/95 %, cm", length),
+    ScoreColumn("wrong link, %", wrong(0.0)),
+    ScoreColumn("wrong, p > .95, %", wrong(SURE)),
+)
+
+
+def table(columns: Sequence[ScoreColumn], groups: dict[str, list[ReplayScore]]) -> str:
+    """Markdown table of some columns, a row per group."""
+    heads = ("degradation", *(column.head for column in columns))
+    return markdown(heads, [(name, *(column.of(own) for column in columns)) for name, own in groups.items()])
+
+
+def kinds_table(scores: Scores) -> str:
+    """Markdown table by kind of contact, all degradations together."""
+    names = sorted({one.kind for one in outcomes(scores)})
+    rows = [
+        (kind, wrong(0.0, kind)(scores), wrong(SURE, kind)(scores), covered(kind)(scores), _detected(scores, kind))
+        for kind in names
+    ]
+    return markdown(("contact", "wrong link, %", "wrong, p > .95, %", "90 % set holds, %", "detected, %"), rows)
+
+
+def _detected(scores: Scores, kind: str) -> str:
+    found = outcomes(scores, kind)
+    return percent(sum(one.latency < math.inf or math.isnan(one.latency) for one in found), len(found))

@@ -1,0 +1,162 @@
+"""Contacts drawn wider than the estimator's prior: strong, rough, on the ends, sliding, two at once, impacts."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_description.arm import Arm
+
+LEVELS = (5.0, 10.0, 20.0)  # N, half of all contacts
+WEAKEST, STRONGEST = 1.0, 60.0  # N, the other half, uniform in the logarithm
+ROUGHEST = 0.8  # coefficient of friction
+RISE = 0.005  # s
+MARGIN, NEAR_ELBOW = 0.02, 0.01  # m
+SLIDE = 0.2  # m/s
+# how often each kind is drawn
+KINDS = {
+    "outer": 0.38,
+    "inner": 0.17,
+    "tip along the tube": 0.07,
+    "end cap, oblique": 0.06,
+    "elbow": 0.06,
+    "drag along the tube": 0.05,
+    "twist": 0.03,
+    "sliding": 0.05,
+    "impact": 0.03,
+    "second on the same link": 0.05,
+    "second on the other link": 0.05,
+}
+HOLD, HOLD_OF_FIRST, IMPACT = 0.5, 1.0, 0.03  # s
+SECOND_AFTER, SECOND_HOLD = 0.5, 0.4  # s, of the second contact after the first
+
+
+class Touch(NamedTuple):
+    """One contact, an exact force.
+
+    Attributes
+    ----------
+    kind : of `KINDS`; 'second' for the second of two.
+    cover : name of the cover.
+    place : m along the cover at the start.
+    force : (3,), N, of the world on the cover, in its frame.
+    arm : (3,), m, from the axis at `place` to the point of the force.
+    twist : N m about the cover's x axis.
+    speed : m/s, of the place.
+    begin, end : s.
+    friction : coefficient; tangential over normal force.
+    """
+
+    kind: str
+    cover: str
+    place: float
+    force: tuple[float, float, float]
+    arm: tuple[float, float, float]
+    twist: float
+    speed: float
+    begin: float
+    end: float
+    friction: float
+
+    def share(self, time: float) -> float:
+        """Fraction of the force that acts at a time, s."""
+        rise = min(RISE, 0.5 * (self.end - self.begin))
+        return max(0.0, min(1.0, (time - self.begin) / rise, (self.end - time) / rise))
+
+    def place_at(self, time: float) -> float:
+        """Contact position, m."""
+        return self.place + self.speed * max(0.0, time - self.begin)
+
+    def wrench(self, time: float, axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+        """Force, N, and moment about the origin of the cover, N m; `axis` is the tube's axis at the place, m."""
+        share = self.share(time)
+        force = share * np.array(self.force)
+        return force, np.cross(np.array(axis) + np.array(self.arm), force) + np.array([share * self.twist, 0.0, 0.0])
+
+
+def axis_of(arm: Arm, cover: str, place: float) -> tuple[float, float, float]:
+    """Point of the tube's axis at a place along the cover, m."""
+    i = arm.covers.names.index(cover)
+    start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (arm.covers.start, arm.covers.end))
+    x, y, z = (start + (place - start[0]) / (end[0] - start[0]) * (end - start)).tolist()
+    return x, y, z
+
+
+def touches(arm: Arm, random: np.random.Generator, times: Sequence[float]) -> list[Touch]:
+    """A contact at each time, s; two where a second one is drawn."""
+    found: list[Touch] = []
+    for begin in times:
+        kind = str(random.choice(list(KINDS), p=np.array(list(KINDS.values())) / sum(KINDS.values())))
+        found += _drawn(arm, random, kind, begin)
+    return found
+
+
+def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float) -> list[Touch]:
+    inner, outer = arm.covers.names
+    size = _size(random)
+    if kind.startswith("second"):
+        first_cover = str(random.choice((inner, outer)))
+        same = kind.endswith("same link")
+        second_cover = first_cover if same else outer if first_cover == inner else inner
+        first = _side(arm, random, first_cover, max(size, 4.0), begin, HOLD_OF_FIRST)._replace(kind=kind)
+        second = _side(arm, random, second_cover, max(_size(random), 4.0), begin + SECOND_AFTER, SECOND_HOLD)
+        return [first, second._replace(kind="second")]
+    if kind in ("tip along the tube", "end cap, oblique"):
+        lean = 0.0 if kind == "tip along the tube" else float(random.uniform(0.1, 1.0))
+        angle = float(random.uniform(-math.pi, math.pi))
+        length = arm.covers.length[1]
+        force = (
+            -size * math.cos(lean),
+            size * math.sin(lean) * math.cos(angle),
+            size * math.sin(lean) * math.sin(angle),
+        )
+        return [Touch(kind, outer, length, force, (0.0, 0.0, 0.0), 0.0, 0.0, begin, begin + HOLD, 0.0)]
+    if kind == "elbow":
+        cover = str(random.choice((inner, outer)))
+        touch = _side(arm, random, cover, size, begin, HOLD)
+        place = float(random.uniform(0.0, NEAR_ELBOW))
+        return [touch._replace(kind=kind, place=place if cover == outer else arm.covers.length[0] - place)]
+    if kind == "drag along the tube":
+        touch = _side(arm, random, outer, size, begin, HOLD)
+        along = float(random.choice((-1.0, 1.0))) * size
+        return [touch._replace(kind=kind, force=(along, 0.0, 0.0), friction=math.inf)]
+    touch = _side(arm, random, inner if kind == "inner" else outer, size, begin, HOLD)
+    if kind == "twist":
+        touch = touch._replace(twist=float(random.choice((-0.5, 0.5))))
+    if kind == "sliding":
+        middle = 0.5 * arm.covers.length[1]
+        touch = touch._replace(speed=SLIDE if touch.place < middle else -SLIDE)
+    if kind == "impact":
+        touch = touch._replace(end=begin + IMPACT)
+    return [touch._replace(kind=kind)]
+
+
+def _size(random: np.random.Generator) -> float:
+    if random.random() < 0.5:
+        return float(random.choice(LEVELS)) * float(random.uniform(0.95, 1.05))
+    return float(np.exp(random.uniform(math.log(WEAKEST), math.log(STRONGEST))))
+
+
+def _side(arm: Arm, random: np.random.Generator, cover: str, size: float, begin: float, hold: float) -> Touch:
+    """A normal force with friction in any direction, at the surface of the tube."""
+    i = arm.covers.names.index(cover)
+    angle, way = random.uniform(-math.pi, math.pi, 2)
+    friction = ROUGHEST if random.random() < 0.2 else float(random.uniform(0.0, 0.5))
+    normal = np.array([0.0, math.cos(angle), math.sin(angle)])
+    around = np.array([0.0, -math.sin(angle), math.cos(angle)])
+    tangent = math.cos(way) * np.array([1.0, 0.0, 0.0]) + math.sin(way) * around
+    force = size * (normal + friction * tangent)
+    lever = -arm.covers.radius[i] * normal
+    return Touch(
+        kind="outer" if i else "inner",
+        cover=cover,
+        place=float(random.uniform(MARGIN, arm.covers.length[i] - MARGIN)),
+        force=(float(force[0]), float(force[1]), float(force[2])),
+        arm=(float(lever[0]), float(lever[1]), float(lever[2])),
+        twist=0.0,
+        speed=0.0,
+        begin=begin,
+        end=begin + hold,
+        friction=friction,
+    )

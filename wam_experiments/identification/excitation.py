@@ -1,0 +1,184 @@
+"""A scenario for the identification: from posture to posture, each chosen for what it adds to the known parameters.
+
+Of several random moves the one is taken that reduces the volume of the parameters' covariance most (D-optimal design;
+Swevers et al. 1997), within limits of joints and speed, away from obstacles.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.identification.motion import MotionSamples
+from wam_analysis.identification.parameters import unknowns
+from wam_analysis.identification.regressor import Regressor
+from wam_description.arm import Arm, Shared
+from wam_description.configuration import Configuration
+from wam_description.parameters import ParameterError, build_part
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_description.world import Obstacles
+
+Array = NDArray[np.float64]
+
+CANDIDATES = 6  # random moves of which one is taken
+TRIALS = 400  # random postures without an allowed move, after which there is none
+MARGIN = 0.2  # rad, from the ends of the joints
+SPEED = 0.8  # of the force loop's joint speed limit, and of the driver's limits of elbow and tip
+SLOWEST = 0.25  # of that speed
+QUICKEST = 0.6  # s of a move
+CLEARANCE = 0.15  # m, from obstacles
+RATE = 0.05  # s, between the points of a move that are checked
+TORQUE_SD = 0.002  # N m, of a motor: what the parameters are worth
+PEAK = 1.875  # peak speed of a minimum-jerk move per mean speed
+
+
+class ExcitingMove(NamedTuple):
+    """One step of the scenario: posture at its end, rad, and its time, s."""
+
+    posture: tuple[float, ...]
+    seconds: float
+
+
+def scenario(configuration: Configuration, seed: int, seconds: float) -> dict[str, Any]:
+    """The scenario as its YAML has it.
+
+    Parameters
+    ----------
+    configuration : arm, limits, obstacles, present model.
+    seed : of the random moves.
+    seconds : of motion.
+
+    Raises
+    ------
+    ParameterError
+        if no move is allowed.
+    """
+    steps: list[dict[str, Any]] = [{"name": "release the brakes", "seconds": 0.5, "request": "enable"}]
+    for i, move in enumerate(moves(configuration, seed, seconds)):
+        steps.append(
+            {
+                "name": f"move {i + 1}",
+                "seconds": round(move.seconds, 2),
+                "posture": [round(angle, 3) for angle in move.posture],
+            }
+        )
+    return {"steps": [*steps, {"name": "brake", "seconds": 0.5, "request": "disable"}]}
+
+
+def moves(configuration: Configuration, seed: int, seconds: float) -> Iterator[ExcitingMove]:
+    """Moves of a seed, one after the other."""
+    shared = configuration.shared
+    random = np.random.Generator(np.random.PCG64(seed))
+    space = _Space(configuration)
+    sought = unknowns(shared)
+    information = np.diag(sought.prior_sd**-2)
+    posture, spent = np.array(shared.arm.joints.start), 0.0
+    while spent < seconds:
+        found = []
+        for _ in range(TRIALS):
+            move = space.draw(random, posture)
+            if move is not None:
+                found.append(move)
+            if len(found) == CANDIDATES:
+                break
+        if not found:
+            raise ParameterError(
+                f"no move from {posture.round(2).tolist()} rad is allowed by joint limits, speed limits and obstacles"
+            )
+        gains = [information + _information(shared, path(posture, move)) for move in found]
+        known = np.linalg.slogdet(information)[1]
+        rates = [(np.linalg.slogdet(g)[1] - known) / move.seconds for g, move in zip(gains, found, strict=True)]
+        best = int(np.argmax(rates))
+        information, move = gains[best], found[best]
+        posture, spent = np.array(move.posture), spent + move.seconds
+        yield move
+
+
+class MovePoints(NamedTuple):
+    """Points of a move: (k,) s; (k, n) rad, rad/s, rad/s^2."""
+
+    time: Array
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+def path(begin: Array, move: ExcitingMove, period: float = RATE) -> MovePoints:
+    """Points, each `period` seconds, of the minimum-jerk path that a scenario plays."""
+    time = np.arange(0.5 * period, move.seconds, period)
+    s = (time / move.seconds)[:, None]
+    way = np.array(move.posture) - begin
+    return MovePoints(
+        time,
+        begin + way * s**3 * (10.0 - 15.0 * s + 6.0 * s**2),
+        way * 30.0 * s**2 * (1.0 - s) ** 2 / move.seconds,
+        way * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / move.seconds**2,
+    )
+
+
+class _Space:
+    """What the arm may do."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        self._arm: Arm = configuration.shared.arm
+        self._body = RigidBody(self._arm)
+        driver = configuration.sections["driver"]
+        self._obstacles = build_part(Obstacles, driver, "world.obstacles.")
+        self._speed = SPEED * float(configuration.sections["force_loop"]["joint_speed_limit"])
+        self._tip = SPEED * float(driver["tip_speed_limit"])
+        self._elbow = SPEED * float(driver["elbow_speed_limit"])
+
+    def draw(self, random: np.random.Generator, begin: Array) -> ExcitingMove | None:
+        """A random move, None if it is not allowed."""
+        joints = self._arm.joints
+        posture = random.uniform(np.array(joints.lower) + MARGIN, np.array(joints.upper) - MARGIN)
+        speed = self._speed * random.uniform(SLOWEST, 1.0)
+        move = ExcitingMove(tuple(posture.tolist()), max(QUICKEST, PEAK * float(np.abs(posture - begin).max()) / speed))
+        points = path(begin, move)
+        allowed = all(self._allows(q, qd) for q, qd in zip(points.q, points.qd, strict=True))
+        return move if allowed else None
+
+    def _allows(self, q: Array, qd: Array) -> bool:
+        covers = self._arm.covers
+        tip = np.linalg.norm(self._body.tool_jacobian(q) @ qd)
+        elbow = np.linalg.norm(self._body.point_jacobian(q, covers.names[-1], np.zeros(3)) @ qd)
+        if tip > self._tip or elbow > self._elbow:
+            return False
+        for i, name in enumerate(covers.names):
+            start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (covers.start, covers.end))
+            for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+                point = self._body.point(q, name, start + share * (end - start))
+                if _distance(self._obstacles, point) < CLEARANCE + covers.radius[i]:
+                    return False
+        return True
+
+
+def _distance(obstacles: Obstacles, point: Array) -> float:
+    """Distance from the spheres about the obstacles, m; from the plane through the origin of a plane."""
+    found = [np.inf]
+    for i, shape in enumerate(obstacles.shapes):
+        centre, size = (np.array(values[3 * i : 3 * i + 3]) for values in (obstacles.positions, obstacles.sizes))
+        if shape == "plane":
+            found.append(float(point[2] - centre[2]))
+        else:
+            found.append(float(np.linalg.norm(np.maximum(np.abs(point - centre) - size.max(), 0.0))))
+    return float(min(found))
+
+
+def _information(shared: Shared, points: MovePoints) -> Array:
+    """Information that a move gives about the parameters."""
+    inverse = TransmissionMap.of(shared.arm).motor_from_joint
+    theta, thetad, thetadd = (values @ inverse.T for values in points[1:])
+    body = RigidBody(shared.arm)
+    joints = np.array([body.inverse_dynamics(*each) for each in zip(*points[1:], strict=True)])
+    torque = joints @ np.linalg.inv(inverse)
+    motion = MotionSamples(points.time, theta, thetad, thetadd, torque, thetad[:, None], torque[:, None], np.ones(1))
+    sought = unknowns(shared)
+    equations = Regressor(shared, sought, motion, np.array(shared.model.motors.stribeck_velocity)).equations(
+        sought.present
+    )
+    rows = equations.columns[equations.is_used]
+    found: Array = rows.T @ rows / TORQUE_SD**2
+    return found

@@ -1,0 +1,110 @@
+"""Plants that differ from the model, and what an identification has to find of them."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.identification.parameters import shared_joints
+from wam_description.configuration import Configuration
+from wam_description.mismatch import true_arm
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.driver import DriverParameters
+
+Array = NDArray[np.float64]
+
+KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, real sensors")
+FACTOR = (0.8, 1.3)  # of the friction of each motor and joint
+STRIBECK = (0.5, 3.0)  # rad/s, v_s of the motors
+ASYMMETRY = 0.15
+LOAD = 0.06
+MASS = 0.03
+COUNTS = 16384  # of the encoder per turn
+CURRENT_NOISE = 0.02  # A
+
+
+class TrueFriction(NamedTuple):
+    """Friction of the motors, with that of joints with a motor of their own, (n,) each; by direction (2, n)."""
+
+    coulomb: Array  # without link load, N m
+    at_joint: Array  # friction of the joints among it, which the cables transmit, N m
+    drop: Array  # F_s - F_c, N m
+    load: Array
+    viscous: Array  # N m s/rad
+    stribeck_velocity: Array  # rad/s
+
+    def level(self, way: int, speed: float, load: Array, moves: NDArray[np.bool_]) -> Array:
+        """Mean friction of each motor, (n,), N m, in a direction at a speed, rad/s.
+
+        Parameters
+        ----------
+        way : 0 positive, 1 negative.
+        load : (k, n), transmitted torque apart from the friction of own joints, N m.
+        moves : (k, n), where a motor moves in this direction.
+        """
+        sign = 1.0 - 2.0 * way
+        transmitted = np.abs(load + sign * self.at_joint[way]) - self.at_joint[way]
+        mean = (transmitted * moves).sum(0) / moves.sum(0)
+        slow = np.exp(-((speed / self.stribeck_velocity) ** 2))
+        found: Array = self.coulomb[way] + self.drop[way] * slow + self.load[way] * mean + self.viscous * speed
+        return found
+
+
+def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
+    """A plant of a kind, drawn from a seed; the controllers' model stays as it is."""
+    n = len(configuration.shared.arm.motors.names)
+    random = np.random.Generator(np.random.PCG64([seed, KINDS.index(kind)]))
+    values: dict[str, Any] = {
+        "arm.joint_sensors": False,  # not used here
+        "driver:mismatch.motor_friction": random.uniform(*FACTOR, n).tolist(),
+        "driver:mismatch.joint_friction": random.uniform(*FACTOR, n).tolist(),
+    }
+    every = kind.startswith("all")
+    if every or kind == "Stribeck":
+        values["driver:friction.law"] = "stribeck"
+        values["driver:friction.motor_stribeck_velocity"] = random.uniform(*STRIBECK, n).tolist()
+    if every or kind == "asymmetry":
+        values["driver:friction.motor_asymmetry"] = random.uniform(-ASYMMETRY, ASYMMETRY, n).tolist()
+        values["driver:friction.joint_asymmetry"] = random.uniform(-ASYMMETRY, ASYMMETRY, n).tolist()
+    if every or kind == "load":
+        values["driver:friction.motor_load_factor"] = random.uniform(0.0, LOAD, n).tolist()
+        values["driver:friction.joint_load_factor"] = random.uniform(0.0, LOAD, n).tolist()
+    if every:
+        values["driver:mismatch.mass"] = random.uniform(1.0 - MASS, 1.0 + MASS, n).tolist()
+    if kind == "all, real sensors":
+        values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / COUNTS] * n
+        values["driver:amplifier.current_noise"] = [CURRENT_NOISE] * n
+    return configuration.with_values(values)
+
+
+def true_friction(configuration: Configuration) -> TrueFriction:
+    """What the motors of a plant resist with."""
+    driver = configuration.node("driver", DriverParameters)
+    shared, law = configuration.shared, driver.friction
+    arm = true_arm(shared.arm, driver.mismatch)
+    matrix = TransmissionMap.of(arm).joint_from_motor
+    n = len(matrix)
+    own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(n)]
+    lean, joint_lean = _each(law.motor_asymmetry, n), _each(law.joint_asymmetry, n)
+    load, joint_load = _each(law.motor_load_factor, n), _each(law.joint_load_factor, n)
+    coulomb, joint_coulomb = np.array(arm.motors.dynamic_friction), np.array(arm.joints.dynamic_friction)
+    drop = np.subtract(arm.motors.static_friction, coulomb) * (law.law == "stribeck")
+    signs = np.array([1.0, -1.0])[:, None]
+    # of an asymmetric joint: a torque that does not change with its direction, in each direction of the motor
+    constant = matrix.T @ (joint_lean * joint_coulomb)
+    at_joint = own.T @ joint_coulomb + signs * ((own.T * np.sign(matrix.T)) @ (joint_lean * joint_coulomb))
+    factor = load * (1.0 + signs * lean) + (own.T > 0.0) @ joint_load
+    factor += signs * (np.sign(own.T * matrix.T) @ (joint_lean * joint_load))
+    return TrueFriction(
+        # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
+        coulomb * (1.0 + signs * lean) + own.T @ joint_coulomb + signs * constant + factor * at_joint,
+        at_joint,
+        drop * (1.0 + signs * lean),
+        factor,
+        np.array(arm.motors.viscous_friction) + (own**2).T @ arm.joints.viscous_friction,
+        _each(law.motor_stribeck_velocity, n),
+    )
+
+
+def _each(values: tuple[float, ...], n: int) -> Array:
+    return np.array(values * n if len(values) == 1 else values)
