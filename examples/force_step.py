@@ -51,7 +51,7 @@ class ForceStep(Node):
         facts = {item.key: item.value for item in message.values}
         if message.name != "driver":
             return
-        if facts["mode"] == "enabled":
+        if facts.get("mode") == "enabled":
             self.is_enabled = True
         elif self.is_enabled and facts.get("fault"):
             sys.exit(f"the driver stopped: {facts['fault']}; call reset_fault, then start again")

@@ -38,7 +38,9 @@ class Impedance:
     name, parameters = "impedance", ImpedanceParameters
 
     def __init__(self, shared: Shared, own: ImpedanceParameters) -> None:
-        self._body = RigidBody(shared.arm)
+        self._body, self._joints = RigidBody(shared.arm), shared.arm.joints
+        self._rest: list[float] = []  # posture that the spring pulls to, rad
+        self.refusals: dict[str, str] = {}
         self.tune(own)
 
     def tune(self, own: ImpedanceParameters) -> None:
@@ -55,7 +57,7 @@ class Impedance:
         joints, posture = inputs["joint_states"], inputs["joint_posture_command"]
         q = joints.position
         jacobian = self._body.tool_jacobian(q)
-        rest = self._body.tool_pose(posture.position if posture else q).position
+        rest = self._body.tool_pose(self._admitted(posture.position if posture else [], q)).position
         force = self._stiffness * (rest - self._body.tool_pose(q).position) - self._damping * (
             jacobian @ joints.velocity
         )
@@ -63,6 +65,13 @@ class Impedance:
             "joint_velocity_command": State([], [], []),
             "joint_effort_command": State([], [], (force @ jacobian).tolist()),
         }
+
+    def _admitted(self, posture: list[float], q: list[float]) -> list[float]:
+        """The commanded posture, in place of one beyond the stops the last good one; without a command where it is."""
+        beyond = self._joints.beyond(posture) if posture else ""
+        self.refusals = {"joint_posture_command": beyond} if beyond else {}
+        self._rest = [] if not posture else self._rest if beyond else posture
+        return self._rest or q
 
 
 PUSH = Push("outer_link", 0.4, (0.0, 20.0, 0.0), begin=0.5, end=2.0)

@@ -56,6 +56,11 @@ class Bag(NamedTuple):
     metadata: dict[str, dict[str, str]]
     counts: Mapping[str, int] = MappingProxyType({})
 
+    def __repr__(self) -> str:
+        """Path and counts, not every array."""
+        messages = sum(len(columns.log_time_ns) for columns in self.topics.values())
+        return f"Bag({str(self.path)!r}, {len(self.topics)} topics, {messages} messages)"
+
     @property
     def first_ns(self) -> int:
         """Log time of the first message that was read, 0 if none was."""

@@ -329,15 +329,16 @@ class BagWriter:
     def _give_up(self, error: OSError) -> None:
         """Close the bag with what is on disk, in the space that was reserved for it."""
         reason = error.strerror or str(error)
-        hint = "; free some space" if error.errno in (errno.ENOSPC, errno.EDQUOT) else ""
+        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        reason, hint = (f"the disk is full ({reason})", "; free some space") if is_full else (reason, "")
         try:
             self._finish_bag()
         except OSError as second:
             raise RecordingError(
-                f"{reason}, and it could not be closed ({second.strerror}); "
-                f"'wam bag repair {self.path}' closes it{hint}"
+                f"{reason}, and the bag could not be closed ({second.strerror}){hint}; "
+                f"then 'wam bag repair {self.path}' closes it"
             ) from None
-        raise RecordingError(f"{reason}; it was closed with what was recorded before{hint}") from None
+        raise RecordingError(f"{reason}; the bag is closed, what was recorded until then can be read{hint}") from None
 
     def _finish_bag(self) -> None:
         self.closed = True

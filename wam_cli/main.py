@@ -2,11 +2,13 @@
 
 import argparse
 import contextlib
+import difflib
 import importlib
 import os
 import signal
 import sys
 from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TextIO
 
 from wam_bag.printable import printable
@@ -14,7 +16,7 @@ from wam_ros.program import end_at_once_on_signals, ignore_signals
 
 # each command is the module of its name in wam_cli.commands, imported when it is called
 COMMANDS = {
-    "demo": "run the demonstration, record it and print its report",
+    "demo": "run the demonstration or a whole-arm task, record it and print its report",
     "up": "start the nodes and run them until Ctrl-C",
     "node": "start one node, with ROS arguments if needed",
     "call": "call a service of a running stack: enable, disable, estop, reset_fault, reset, tare",
@@ -22,26 +24,44 @@ COMMANDS = {
     "bag": "print the contents of a bag, or repair a broken bag",
     "report": "print the demo report again",
     "analyse": "analyse a recording and compare it with theory (text, HTML, JSON)",
+    "identify": "identify the controllers' model (friction, gravity, inertia) from a recording of free motion",
     "live": "show a running stack in the browser: watch it, push it, press its buttons",
     "view": "show a recording in the browser or in the Rerun viewer, or save it as a Rerun file",
     "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
     "experiment": "run an experiment of the thesis, record it and print predicted against measured",
-    "samples": "check the sample bags, one of each experiment, or record them again",
+    "samples": "check the sample bags, one of each experiment and task, or record them again",
     "figures": "draw the figures of chapters 3 to 6 with points of the simulated plant",
     "map": "compute the stability map of figure 5.8: the largest stable step over gamma and zeta",
     "scorecard": "compare the arm with the requisites of chapter 3",
     "plant": "draw the plant's effects with the theory and print the differences",
-    "guard": "validate the stability guard by Monte Carlo simulation",
-    "evaluate": "evaluate a part of the stack in a seeded benchmark: contact, faults, soak",
+    "sweep": "play a scenario with many parameter sets: a table and a plot",
+    "guard": "validate the stability guard by Monte Carlo simulation, or assess a force loop of your own",
+    "conform": "test a driver, the simulated one or yours, against the contract of drivers",
+    "evaluate": "seeded benchmarks: contact, robustness, force, faults, identify, soak",
     "model": "print the arm's model as URDF or MJCF",
 }
+
+ALIASES = {"analyze": "analyse"}
+# the extras of setup.py, and the modules that come with them
+EXTRAS = {
+    "ros": (
+        "rclpy", "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "rcl_interfaces", "rosgraph_msgs",
+        "sensor_msgs", "std_msgs", "std_srvs", "visualization_msgs",
+    ),
+    "live": ("viser",),
+    "view": ("rerun",),
+    "dask": ("distributed", "dask"),
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; exits with 0 on success."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    command: Any = importlib.import_module(f"wam_cli.commands.{words[0]}") if words and words[0] in COMMANDS else None
+    if words and words[0] in ALIASES:
+        words[0] = ALIASES[words[0]]
+    command = _command(words)
     parser = _parser(command)
+    _check_name(parser, words)
     given, rest = parser.parse_known_args(words)
     if rest and not getattr(command, "TAKES_ROS_ARGUMENTS", False):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
@@ -56,6 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the pipe was closed: `wam ... | head`
         code = 128 + signal.SIGPIPE
+    except ModuleNotFoundError as error:
+        sys.exit(_missing(given.command, error))
     except (ValueError, OSError) as error:
         parser.exit(1, printable(f"wam {given.command}: {error}{_hint(error, given.command)}", kept="\n") + "\n")
     except KeyboardInterrupt:
@@ -94,6 +116,50 @@ def _end(number: int, frame: object) -> None:
     sys.exit(128 + number)
 
 
+def _unknown(word: str) -> str:
+    """What to say about a command that does not exist."""
+    near = difflib.get_close_matches(word, [*COMMANDS, *ALIASES], n=1)
+    meant = f"; did you mean '{ALIASES.get(near[0], near[0])}'?" if near else ""
+    return f"no command '{word}'" + (meant or f"; choose from {', '.join(COMMANDS)}")
+
+
+def _command(words: list[str]) -> Any:
+    """The module of the command that is called, if there is one."""
+    if not words or words[0] not in COMMANDS:
+        return None
+    try:
+        return importlib.import_module(f"wam_cli.commands.{words[0]}")
+    except ModuleNotFoundError as error:
+        sys.exit(_missing(words[0], error))
+
+
+def _check_name(parser: argparse.ArgumentParser, words: list[str]) -> None:
+    """End with the help where no command is given, and with what was meant where there is none of that name."""
+    if not words:
+        parser.print_help()
+        sys.exit(0)
+    if words[0] not in COMMANDS and not words[0].startswith("-"):
+        parser.error(_unknown(words[0]))
+
+
+def _missing(command: str, error: ModuleNotFoundError) -> int:
+    """Say which extra of the package has a module that is not installed; raise the error for a module of none."""
+    module = (error.name or "").partition(".")[0]
+    extra = next((extra for extra, modules in EXTRAS.items() if module in modules), None)
+    if extra is None:
+        raise error
+    needs = f"it needs '{module}', which is not installed; install it with: pip install 'wam_stack[{extra}]'"
+    sys.stderr.write(f"wam {command}: {needs}\n")
+    return 1
+
+
+def _version() -> str:
+    try:
+        return version("wam_stack")
+    except PackageNotFoundError:
+        return "not installed"
+
+
 def _hint(error: Exception, command: str) -> str:
     """What the user can do about an error of the system."""
     if not isinstance(error, PermissionError) or error.filename is None:
@@ -108,6 +174,7 @@ def _parser(command: Any) -> argparse.ArgumentParser:
         description="Force control of the cable-driven MIT/WAM arm, simulated down to its motor shafts.",
         epilog="Start with: wam demo.  With ROS 2 sourced, 'ros2 run wam_stack <node>' starts a single node.",
     )
+    parser.add_argument("--version", action="version", version=f"wam_stack {_version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, text in COMMANDS.items():
         own = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")

@@ -9,3 +9,7 @@ def main() -> None:
     from wam_cli.main import program  # imports argparse and more: an interrupted import would print a traceback
 
     program()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,11 +1,15 @@
 """What is measured on the whole stack: the thesis's experiments and figures, the contact benchmark, studies.
 
 thesis              experiments of the thesis: runs as YAML, evaluations as functions, predicted against measured
+tasks               whole-arm tasks: pushing, sweeping, holding, a door, a moving surface
 figures             the thesis's figures that carry data: theory as lines, the plant as circles
 contact_benchmark   scenarios with true contacts, and the metrics of contact estimation
+contact_robustness  contact estimation on arms and signals that differ from what the estimator states
+identification      a motion that shows the arm's parameters; identified against true ones
 faults              broken messages, parameters and bags; when a trial of faults has escaped; docs/reliability.md
 plant               the plant's effects, each measured alone and compared with theory
-force_benchmark     random forces on random surfaces: true force against the commanded one
+force_benchmark     random forces on random surfaces: outcomes, true force against the commanded one
 stability           the stability guard validated by Monte Carlo simulation; the stability map of figure 5.8
+design_choices      4.4 and 5.7 with numbers: stiffness of the arm, less friction against more stiffness
 scorecard           the arm of a configuration compared with the requisites of chapter 3
 """

@@ -15,6 +15,7 @@ from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_theory.cable import efficiency, stage_loss, tensions
 from wam_theory.requisites import Measures, Requisite, scorecard
+from wam_theory.stiction import stiction_cycle_force
 
 Array = NDArray[np.float64]
 POSES = 15  # of each joint apart from the first, which does not change the torques
@@ -61,6 +62,7 @@ def measures(configuration: Configuration) -> Measures:
         steady_force=steady_force(arm),
         steady_force_required=printed("steady contact force at any point, any pose")[0],
         least_force=masked_force(levers, friction),
+        cycle_force=cycle_force(arm, levers, stiffness),
         friction_share=tuple((friction / (np.abs(gears.T) @ arm.motors.peak_torque)).tolist()),
         friction_required=printed("joint friction, of peak torque; 2 to 4 are bounds"),
         impact_speed=driver.tip_speed_limit,
@@ -106,6 +108,24 @@ def masked_force(levers: Array, friction: Array) -> float:
     """Greatest push, N, normal to the link at the tip that moves no joint, each held by its own friction only."""
     needed = friction / np.maximum(np.abs(levers), 1e-12)
     return float(needed.min(axis=1).max())
+
+
+def cycle_force(arm: Arm, levers: Array, stiffness: float) -> float:
+    """Greatest stiction cycle (5.8) at the tip, peak to peak, N, over joints and directions, undamped: Omega is 2.
+
+    The friction of the joints; that of the motors is within their velocity loops.
+
+    Parameters
+    ----------
+    arm : with the friction and the cables.
+    levers : of directions at the tip, (directions, joints), m.
+    stiffness : of the contact, N/m.
+    """
+    gears, joints = TransmissionMap.of(arm).motor_from_joint, arm.joints
+    cables = np.square(gears.T) @ [circuit.stiffness for circuit in arm.circuits]
+    lever = np.maximum(np.abs(levers), 1e-9)
+    torque = stiction_cycle_force(cables, stiffness * lever**2, joints.static_friction, joints.dynamic_friction, 0.0)
+    return float((torque / lever).max())
 
 
 def effective_mass(levers: Array, inertia: Array) -> float:

@@ -10,6 +10,7 @@
 - recorder, recorder_node, recorder_interface: every topic into a bag
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals
 - program: ends a program quietly whose imports are interrupted
-- call: one request to a service
+- requests: requests to services and their answers; call: one request from a shell
+- conformance: a running driver tested against its contract; driver_probe: the node that does it
 - network: limits ROS to this machine; one node of a name in each place
 """

@@ -117,7 +117,7 @@ class Processes:
     @property
     def failures(self) -> list[str]:
         """Nodes that have ended and should not have; why, they have printed themselves."""
-        return [f"node {name} ended with code {code}" for name, code in self.ended().items() if code]
+        return [f"node {name} {_ending(code)}" for name, code in self.ended().items() if code]
 
     def stop(self) -> None:
         """Stop every node that runs, the hard way where one does not end by itself; the recorder when it has written.
@@ -174,6 +174,43 @@ class Processes:
         process.wait()
 
 
+class NodeProcess:
+    """One node of a configuration as a process, which can be ended as SIGTERM does and started again.
+
+    Parameters
+    ----------
+    configuration : values for the node.
+    entry : of the parameter `nodes`.
+    namespace : of the node.
+    """
+
+    def __init__(self, configuration: Configuration, entry: str, namespace: str) -> None:
+        self._stack = ExitStack()
+        prepare_logging_directory()
+        file = self._stack.enter_context(parameter_file(configuration))
+        place = f"__ns:=/{namespace.strip('/')}"
+        self._entry, self._arguments = entry, ["--params-file", str(file), "-r", place, "--log-level", "error"]
+        self.start()
+
+    def start(self) -> None:
+        """Start the node."""
+        self._process = _start(self._entry, self._arguments)
+
+    def stop(self) -> None:
+        """End the node, the hard way where it does not end by itself."""
+        self._process.terminate()
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+
+    def close(self) -> None:
+        """End the node for good."""
+        self.stop()
+        self._stack.close()
+
+
 def _start(entry: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
     # a session of its own: Ctrl-C reaches the parent alone, which stops the nodes in order
     return subprocess.Popen(
@@ -181,6 +218,16 @@ def _start(entry: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
         start_new_session=True,
         env={**os.environ, PARENT: str(os.getpid())},
     )
+
+
+def _ending(code: int) -> str:
+    """How a process ended that should not have, in words."""
+    if code > 0:
+        return f"ended by itself with code {code}; why, it has printed above"
+    number = -code
+    name = signal.Signals(number).name if number in signal.valid_signals() else f"signal {number}"
+    cause = "; the system does that where memory is short" if name == "SIGKILL" else ""
+    return f"was ended from outside by {name}{cause}"
 
 
 def _work_of(pid: int) -> tuple[str, ...]:

@@ -13,23 +13,41 @@ from geometry_msgs.msg import PointStamped, WrenchStamped
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, PointCloud2, PointField
 from std_msgs.msg import Bool, String
+from trajectory_msgs.msg import JointTrajectory
 
 from wam_bag.printable import printable
 from wam_description.arm import Shared
-from wam_description.signals import BASE, NodeStatus, Point, State, Table, Wrench
+from wam_description.signals import BASE, NodeStatus, PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.status import pairs, parse
-from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, columns_of
+from wam_description.topics import (
+    JOINT_STATE,
+    LARGEST,
+    LINK,
+    POINT,
+    TABLE,
+    TRAJECTORY,
+    WRENCH,
+    Topic,
+    columns_of,
+)  # fmt: skip
 from wam_ros.header import header
 from wam_ros.markers import contact_markers
 
+LONGEST_TRAJECTORY: Final = 1000  # points
 LONGEST_REASON: Final = 400  # characters; a message may hold a name of any length
 
 
 class Refused(ValueError):
-    """A message that is refused; the text names the value, what is allowed and what to do."""
+    """A message that is refused; the text names the value, what is allowed and what to do.
 
-    def __init__(self, reason: str) -> None:
+    Attributes
+    ----------
+    kind : what is refused in the same way on many topics at once, and so reported together; '' where it is not.
+    """
+
+    def __init__(self, reason: str, kind: str = "") -> None:
         super().__init__(printable(reason, LONGEST_REASON))
+        self.kind = kind
 
 
 def joint_state(stamp: int, names: Sequence[str], state: State) -> JointState:
@@ -197,6 +215,32 @@ def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[st
     return Table(frame, rows)
 
 
+def read_trajectory(message: JointTrajectory, names: list[str]) -> PosturePath:
+    """Points of a JointTrajectory in the order of `names`; accelerations do not count.
+
+    Raises
+    ------
+    Refused
+        names the first thing that is wrong.
+    """
+    order = list(range(len(names))) if message.joint_names == names else _order(list(message.joint_names), names)
+    if not 0 < len(message.points) <= LONGEST_TRAJECTORY:
+        raise Refused(f"{len(message.points)} points; send 1 to {LONGEST_TRAJECTORY}")
+    found = []
+    for i, point in enumerate(message.points):
+        arrays = [point.positions.tolist(), point.velocities.tolist()]
+        for name, values in zip(("position", "velocity"), arrays, strict=True):
+            if len(values) != len(names) and (values or name == "position"):
+                raise Refused(f"{name} of point {i} has {len(values)} values; send {len(names)}")
+            for value in values:
+                if not abs(value) <= LARGEST[name]:  # NaN, too
+                    raise Refused(f"{name} of point {i} is {value:g}; send at most {LARGEST[name]:g}")
+        position, velocity = (tuple(values[k] for k in order) if values else () for values in arrays)
+        time = point.time_from_start
+        found.append(PathPoint(position, velocity, time.sec + time.nanosec * 1e-9))
+    return PosturePath(tuple(found))
+
+
 def diagnostic_status(status: NodeStatus, hardware: str) -> DiagnosticStatus:
     """DiagnosticStatus message of a node's status; `hardware` is the name of the arm."""
     return DiagnosticStatus(
@@ -235,6 +279,9 @@ def reader(topic: Topic, shared: Shared, arrays: str) -> Read:
         return lambda message: read_wrench(message, frames)
     if topic.type == POINT:
         return lambda message: read_point(message, frames)
+    if topic.type == TRAJECTORY:
+        joints = list(shared.arm.joints.names)
+        return lambda message: read_trajectory(message, joints)
     if topic.type == TABLE:
         return lambda message: read_table(message, topic.columns, frames)
     raise TypeError(f"topic '{topic.name}' of type {topic.type} cannot be the input of a step")

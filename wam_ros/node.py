@@ -9,12 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rcl_interfaces.srv import SetParameters as SetParametersService
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.timer import Timer
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 
 from wam_description.interface import Feed, Interface, declared
 from wam_description.parameters import ParameterError
@@ -26,10 +24,14 @@ from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow_other, follow_together
 from wam_ros.ports import SECOND, Ports
+from wam_ros.requests import refusal_of, service_request
 from wam_ros.run import raise_priority, run
 from wam_ros.tolerance import TolerantNode
 
 REPEATED = 10  # steps, after which a loss is reported again while the arm is enabled
+OUT_OF_TIME = "out of time"  # on a loaded machine all topics are, at once
+SLOW_STEP = 0.5  # s, from which a step is reported
+SLOW_STEP_REPORTS = 5.0  # s between two of these reports
 PATIENCE = 2.0  # s, after which a request reports that it still waits for its service
 
 
@@ -51,10 +53,7 @@ class AdaptedNode(TolerantNode):
         self._place = take_place(self, declaration.name)
         owned: str | None = getattr(declaration.node, "owns", None)
         shared, own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
-        try:
-            self.node = declaration.node(shared, own)
-        except ParameterError as error:
-            raise ParameterError(f"node '{self.get_name()}': {error}") from None
+        self.node = declaration.make(shared, own)
         self._declaration, self._outputs = declaration, frozenset(declaration.outputs)
         self._is_realtime = shared.timing.mode == "realtime"
         if self._is_realtime and getattr(self.node, "high_priority", False):
@@ -71,11 +70,12 @@ class AdaptedNode(TolerantNode):
         self._ports = Ports(self, declaration, shared, interface)
         self._waiting: deque[Callable[[], None]] = deque()  # what follows a request that is under way
         self._asking = False
-        self._service_clients: dict[tuple[str, str], Any] = {}
+        self._service_clients: dict[tuple[str, Any], Any] = {}  # by name and type
         self._refused: dict[str, int] = {}
         self._starts_with_all = getattr(self.node, "starts_with_all", False)
         self._interface, self._since, self._is_enabled = interface, 0, False
         self._synchronisers: set[Synchroniser] = set()
+        self._failing: set[Callable[[Inputs], Outputs]] = set()  # steps that raised when they were last tried
         self._ports.watch_peers(self._take_status)
         for topic, feeds in interface.feeds(declaration, self.node).items():
             self._connect(topic, feeds)
@@ -86,6 +86,11 @@ class AdaptedNode(TolerantNode):
     def done(self) -> bool:
         """Whether the node has finished, with nothing left to publish."""
         return getattr(self.node, "done", False) and not self._asking and not self._waiting
+
+    @property
+    def is_failing(self) -> bool:
+        """Whether a step raised when it was last tried."""
+        return bool(self._failing)
 
     @property
     def failure(self) -> str:
@@ -126,7 +131,7 @@ class AdaptedNode(TolerantNode):
         try:
             complete = synchroniser.put(topic, stamp, value)
         except OutOfTime as reason:
-            raise Refused(str(reason)) from None
+            raise Refused(str(reason), kind=OUT_OF_TIME) from None
         for inputs in complete:
             self._step(inputs, feed.work)
             if feed.essential and self._is_realtime:
@@ -157,7 +162,8 @@ class AdaptedNode(TolerantNode):
             if status.session and status.session != self._ports.session:
                 for synchroniser in self._synchronisers:
                     synchroniser.follow(status.stamp)
-                self._ports.follow(status.session)
+                awaited = [one.awaited(status.stamp) for one in self._synchronisers]
+                self._ports.follow(status.session, sorted({topic for topics in awaited for topic in topics}))
             if status.since != self._since:
                 self._since = status.since
                 for synchroniser in self._synchronisers:
@@ -179,7 +185,22 @@ class AdaptedNode(TolerantNode):
         if self._starts_with_all and self._is_realtime and ports.absent:
             return  # in lockstep the driver waits for all
         ports.counts["steps"] += 1
+        try:
+            self._work(inputs, work)
+        except Exception:
+            self._failing.add(work)
+            raise
+        self._failing.discard(work)
+
+    def _work(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
+        began = time.monotonic()
         outputs = work(inputs)
+        if (taken := time.monotonic() - began) > SLOW_STEP:
+            self.get_logger().warning(
+                f"node {self.get_name()}: a step took {taken:.1f} s; the other nodes wait for it, and an enabled arm "
+                "brakes if they wait too long: let its steps compute less",
+                throttle_duration_sec=SLOW_STEP_REPORTS,
+            )
         self._report_refusals(inputs)
         requests: list[Call | SetParameters] = getattr(self.node, "requests", [])
         if requests or self._asking:
@@ -234,14 +255,10 @@ class AdaptedNode(TolerantNode):
         return lambda: self._make(request)
 
     def _make(self, request: Call | SetParameters) -> None:
-        message: Any
-        if isinstance(request, SetParameters):
-            client = self._client(request.node, "set_parameters", SetParametersService)
-            parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in request.values.items()]
-            message = SetParametersService.Request(parameters=parameters)
-        else:
-            client = self._client(request.node, request.service, Trigger if request.data is None else SetBool)
-            message = Trigger.Request() if request.data is None else SetBool.Request(data=request.data)
+        service, kind, message = service_request(request)
+        client = self._service_clients.get((service, kind))
+        if client is None:
+            client = self._service_clients[service, kind] = self.create_client(kind, service)
         self._asking = True
         began, is_reported = time.monotonic(), False
         timer: Timer
@@ -260,19 +277,11 @@ class AdaptedNode(TolerantNode):
 
         timer = self.create_timer(0.005, ask_when_found, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _client(self, node: str, service: str, kind: Any) -> Any:
-        if (node, service) not in self._service_clients:
-            self._service_clients[node, service] = self.create_client(kind, f"{node}/{service}")
-        return self._service_clients[node, service]
-
     def _answered(self, request: Call | SetParameters, answer: Any) -> None:
         self._asking = False
-        if isinstance(request, SetParameters):
-            reasons = [result.reason for result in answer.results if not result.successful]
-            refusal = f"{request.node} refuses: {'; '.join(reasons)}" if reasons else ""
-        else:
-            refusal = "" if answer.success else answer.message
-        if refusal:
+        if refusal := refusal_of(request, answer):
+            if isinstance(request, SetParameters):
+                refusal = f"{request.node} refuses: {refusal}"
             self._waiting.clear()
             self.get_logger().error(refusal)
             if refused := getattr(self.node, "refused", None):

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -16,7 +16,7 @@ from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.interface import Interface
 from wam_description.signals import Level, NodeStatus
-from wam_description.status import diagnosed_name, guidance
+from wam_description.status import AWAITED, diagnosed_name, guidance
 from wam_description.topics import STATUS, Topic
 from wam_description.wiring import Declaration
 from wam_ros.claims import Claims
@@ -85,7 +85,8 @@ class Ports:
         self._wanted: NodeStatus | None = None
         self._next_report = self._last_report = 0
         self._absent: set[str] = set()
-        self._logged: dict[str, tuple[float, int]] = {}  # by topic: when, and how many had been refused by then
+        self._refused: Counter[str] = Counter()  # by kind
+        self._logged: dict[str, tuple[float, int]] = {}  # by kind: when, and how many had been refused by then
         self._subscriptions: dict[str, Subscription] = {}
         self._claimed: dict[str, Subscription] = {}
         self.claims = Claims(node, self._claimed)
@@ -98,7 +99,7 @@ class Ports:
         self._full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in [*rows, *own]}
         self._encoders = {row.name: encoder(row, shared) for row in rows}
         self._last_steps = self._seconds_without_step = 0
-        self._told = ("", True)  # mode of the driver, whether nodes are missing
+        self._told: tuple[str, bool, tuple[str, ...]] = ("", True, ())  # mode, whether nodes are missing, faulty nodes
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._readiness = node.create_timer(0.02, self._look_for_peers, clock=steady)
         node.create_timer(CLAIM_PERIOD, self._look_for_rivals, clock=steady)
@@ -155,7 +156,7 @@ class Ports:
             try:
                 take(message)
             except Refused as reason:
-                self.refuse(topic, str(reason))
+                self.refuse(topic, str(reason), reason.kind)
 
         row = self.interface.topics[topic]
         profile = qos(row)
@@ -167,19 +168,17 @@ class Ports:
         name = topic_name(self.node, row)
         self._subscriptions[topic] = self.node.create_subscription(kind, name, receive, profile, raw=raw)
 
-    def publisher_count(self, topic: str) -> int:
-        """How many publishers feed a topic that this node listens to."""
-        return int(self._subscriptions[topic].get_publisher_count())
-
-    def refuse(self, topic: str, reason: str) -> None:
-        """Count a refused message; one a second of each topic is logged."""
+    def refuse(self, topic: str, reason: str, kind: str = "") -> None:
+        """Count a refused message; one a second of each kind, or of each topic without one, is logged."""
         self.refusals[topic] += 1
+        kind = kind or topic
+        self._refused[kind] += 1
         now = time.monotonic()
-        since, count = self._logged.get(topic, (-LOG_PERIOD, 0))
+        since, count = self._logged.get(kind, (-LOG_PERIOD, 0))
         if now - since >= LOG_PERIOD:
-            others = self.refusals[topic] - count - 1
+            others = self._refused[kind] - count - 1
             more = f" ({others} more were refused before)" if others else ""
-            self._logged[topic] = now, self.refusals[topic]
+            self._logged[kind] = now, self._refused[kind]
             self.node.get_logger().warning(f"{topic}: refused: {printable(reason, LONGEST_REASON)}{more}")
 
     def repeat_status(self) -> None:
@@ -203,13 +202,16 @@ class Ports:
         """The first problem that there is, '' where there is none."""
         return next(filter(None, self.problems.values()), "")
 
-    def follow(self, session: int) -> None:
-        """Say that this node follows another session of the driver."""
+    def follow(self, session: int, awaited: Collection[str]) -> None:
+        """Say that this node follows another session of the driver, and which topics it lacks for its next step."""
+        facts = {AWAITED: " ".join(awaited)} if self.session else {}  # at the start nobody asks
         self.session = session
         self.claims.restart()
         if self.ready:
             self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_ECHO))  # only the last one is kept
-            self.publish_status(self._plain._replace(connected=True))
+            plain = self._plain._replace(connected=True)
+            self.publish_status(plain._replace(facts={**plain.facts, **facts}))
+            self._plain = plain
 
     def _look_for_rivals(self) -> None:
         for topic in self._claimed:
@@ -236,12 +238,14 @@ class Ports:
 
     def _tell(self) -> None:
         """Say on the console what the driver's state is and what to call next, where that has changed."""
-        state = (self._status.mode, bool(self._absent))
+        mode = self._status.mode
+        faulty = tuple(sorted(node for node, fault in self.faults.items() if fault)) if mode == "braked" else ()
+        state = (mode, bool(self._absent), faulty)
         if not self._status.mode or state == self._told:
             return
         before, self._told = self._told[0], state
         is_played = "scenario" in self.shared.nodes
-        self.node.get_logger().info(guidance(state[0], before, self.absent, self.node.get_namespace(), is_played))
+        self.node.get_logger().info(guidance(mode, before, self.absent, faulty, self.node.get_namespace(), is_played))
 
     def wait_for_delivery(self) -> None:
         """Report how much was published, then wait until the recorder and all others have the last messages.
@@ -268,13 +272,14 @@ class Ports:
 
         def receive(message: Any) -> None:
             status = read_status(message)
+            is_peer = status.node in self.interface.declarations and status.node != self._name
+            if is_peer:
+                self.faults[status.node] = status.fault
             if status.connected:
                 self._absent.discard(status.node)
                 self._tell()
-            if status.node in self.interface.declarations and status.node != self._name:
-                self.faults[status.node] = status.fault
-                if take is not None:
-                    take(status)
+            if is_peer and take is not None:
+                take(status)
 
         self.listen(STATUS, receive)
 

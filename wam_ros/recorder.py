@@ -243,7 +243,7 @@ class Recorder:
         return not self.failure
 
     def _fail(self, error: RecordingError) -> None:
-        self.failure = f"bag {self._bag.path} can no longer be written: {error}; start a new recording"
+        self.failure = f"recording into {self._bag.path} has stopped: {error}; then start a new recording"
 
 
 def summary(counts: Iterable[Count], unfinished: Sequence[str] = ()) -> str:

@@ -220,8 +220,8 @@ class RecorderNode(TolerantNode):
         self.recorder.finish(unfinished)
         counts = summary(self.recorder.counts(), unfinished)
         if self.recorder.failure:
-            lost = f"; {self.recorder.lost_at_disk} messages could not be written"
-            self.get_logger().error(f"{self.recorder.failure}{lost}; {counts}")
+            lost = f"{self.recorder.lost_at_disk} of the messages that came are not in it"
+            self.get_logger().error(f"{self.recorder.failure}; {lost}; that came: {counts} on the way")
         elif self.recorder.lost_at_end() or unfinished:
             self.get_logger().warning(f"{self.bag.path}: {counts}")
         else:

@@ -1,5 +1,6 @@
 """A ROS node that no message, request or timer ends: what a callback raises is a fault with the node's name."""
 
+import difflib
 import functools
 import time
 import traceback
@@ -24,7 +25,8 @@ class TolerantNode(Node):
 
     A node that ends at an exception leaves the arm enabled until a watchdog sees it, and anybody could end it who
     finds a message that it cannot bear.  Here the exception goes to `take_fault`, which reports a status of level
-    ERROR with a `fault`: the driver brakes and names it.
+    ERROR with a `fault`: the driver brakes and names it.  The fault is over when the node has worked for a second
+    without another exception, and not before a step that raised has gone well.
     """
 
     _has_ended = False
@@ -41,6 +43,11 @@ class TolerantNode(Node):
     def take_fault(self, reason: str) -> None:
         """Report a fault of this node; '' where it is over."""
 
+    @property
+    def is_failing(self) -> bool:
+        """Whether the work of this node is known to fail still, though it has not been tried for a while."""
+        return False
+
     def create_subscription(self, msg_type: Any, topic: str, callback: Any, *more: Any, **options: Any) -> Any:
         """As that of rclpy."""
         bearing = self._bearing(callback, f"a message on {topic}")
@@ -54,7 +61,7 @@ class TolerantNode(Node):
     def create_service(self, srv_type: Any, srv_name: str, callback: Any, **options: Any) -> Any:
         """As that of rclpy."""
         if srv_type in (SetParameters, SetParametersAtomically):
-            callback = _refusing_unknown_types(callback)
+            callback = _refusing_unknown_types(self._refusing_unknown_names(callback))
         return super().create_service(
             srv_type, srv_name, self._serving(callback, f"a request to {srv_name}"), **options
         )
@@ -85,6 +92,32 @@ class TolerantNode(Node):
 
         return serve
 
+    def _refusing_unknown_names(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        """The reason that rclpy gives for a name that no parameter has lists nothing."""
+
+        def answer(request: Any, response: Any) -> Any:
+            response = callback(request, response)
+            unknown = [found.name for found in request.parameters if not self.has_parameter(found.name)]
+            if hasattr(response, "results"):
+                for found, result in zip(request.parameters, response.results, strict=True):
+                    if found.name in unknown and not result.successful:
+                        result.reason = self._unknown(found.name)
+            elif unknown and not response.result.successful:
+                response.result.reason = self._unknown(unknown[0])
+            return response
+
+        return answer
+
+    def _unknown(self, name: str) -> str:
+        names = sorted(self.list_parameters([], 0).names)
+        live = [one for one in names if not self.describe_parameter(one).read_only]
+        near = difflib.get_close_matches(name, live, 1)
+        meant = f"did you mean '{near[0]}'? " if near else ""
+        return (
+            f"unknown parameter '{printable(name, 100)}'; {meant}allowed, as they can change while node "
+            f"{self.get_name()} runs: {', '.join(live) or 'none'}"
+        )
+
     def _take_exception(self, what: str, error: Exception) -> None:
         self._exceptions += 1
         self._exception_time = time.monotonic()
@@ -100,7 +133,7 @@ class TolerantNode(Node):
 
     def _look_for_end(self) -> None:
         """Report that the fault is over, when callbacks have gone well for a while."""
-        if time.monotonic() - self._exception_time < HELD:
+        if time.monotonic() - self._exception_time < HELD or self.is_failing:
             return
         self._exception_fault = ""
         self.destroy_timer(self._exception_timer)

@@ -12,7 +12,9 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import yaml
 
 from wam_description.configuration import Configuration, packaged
 from wam_sim.batch import executor
@@ -43,12 +45,41 @@ def take_configuration(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config", default=BASE_CONFIGURATION, help="configuration: a YAML file, or the name of one that is installed"
     )
+    parser.add_argument(
+        "--set",
+        dest="values",
+        action="append",
+        default=[],
+        metavar="[NODE:]PARAMETER=VALUE",
+        help="change a number of it, e.g. force_loop:force_gain=[0.01] or timing.period=0.002; may be repeated",
+    )
 
 
 def configuration_of(given: argparse.Namespace) -> Configuration:
     """The configuration that --config names."""
     name: str = given.config
-    return Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
+    loaded = Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
+    values = getattr(given, "values", [])
+    return loaded.with_values(dict(map(_value, values))) if values else loaded
+
+
+def _value(text: str) -> tuple[str, Any]:
+    """Parameter and value of an option --set; a whole number is what the parameter's class makes of it.
+
+    Raises
+    ------
+    ValueError
+        where it is none.
+    """
+    name, equals, value = text.partition("=")
+    if not (name.strip() and equals and value.strip()):
+        raise ValueError(f"--set is '{text}'; write [node:]parameter=value, e.g. force_loop:force_gain=[0.01]")
+    try:
+        return name.strip(), yaml.safe_load(value)
+    except yaml.YAMLError as error:
+        raise ValueError(
+            f"--set {name.strip()}: '{value}' is no value of YAML: {str(error).partition(chr(10))[0]}"
+        ) from error
 
 
 class BatchOptions(NamedTuple):
@@ -59,12 +90,17 @@ class BatchOptions(NamedTuple):
     report: Progress
 
 
-def take_batch(parser: argparse.ArgumentParser) -> None:
-    """Give a command the options of a long computation."""
+def take_executor(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options of where it computes."""
     parser.add_argument("--workers", type=int, help="processes; default: one for each core")
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, for example tcp://10.0.0.1:8786"
     )
+
+
+def take_batch(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options of a long computation."""
+    take_executor(parser)
     parser.add_argument(
         "--keep",
         type=Path,
@@ -84,6 +120,18 @@ def batch_of(given: argparse.Namespace) -> Iterator[BatchOptions]:
         writable_directory("--keep", given.keep)
     with executor(given.workers, given.dask) as found:
         yield BatchOptions(found, None if given.fresh else given.keep, Progress(given.command, sys.stderr))
+
+
+def take_seeds(parser: argparse.ArgumentParser, seeds: Sequence[int], of: str) -> None:
+    """Let a command take several seeds of what is drawn; `require_seeds` checks them."""
+    words = f"seeds of {of}, default {' '.join(str(seed) for seed in seeds)}"  # `map` is a command here
+    parser.add_argument("--seed", type=int, nargs="+", default=list(seeds), help=words)
+
+
+def require_seeds(given: argparse.Namespace) -> None:
+    """Refuse a seed that is negative; errors as those of `at_least`."""
+    for seed in given.seed:
+        at_least("--seed", seed, 0)
 
 
 def at_least(option: str, value: float, low: float) -> None:
@@ -147,3 +195,16 @@ def writable_directory(option: str, directory: Path) -> None:
     else:
         return
     raise ValueError(f"cannot write into {directory}: {why}; give another directory as {option}")
+
+
+def new_bag(path: Path) -> Path:
+    """The path of a bag that is to be recorded, refused before the work where something is there.
+
+    Raises
+    ------
+    ValueError
+        which names it, and what to do.
+    """
+    if path.exists():
+        raise ValueError(f"bag {path} exists already; give another name as --name, or move it away")
+    return path

@@ -1,6 +1,7 @@
 """`wam call`: one service of a running stack, called."""
 
 import argparse
+import sys
 
 from wam_cli.commands import namespace
 from wam_ros.call import call
@@ -24,6 +25,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Call the service and print its answer."""
     node, service, switch = REQUESTS[given.request]
-    answer = call(f"/{given.namespace.strip('/')}/{node}/{service}", switch)
-    print(answer.message)
+    answer = call(f"/{given.namespace}/{node}/{service}", switch)
+    print(answer.message, file=sys.stdout if answer.success else sys.stderr)
     return 0 if answer.success else 1

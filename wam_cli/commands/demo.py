@@ -1,39 +1,61 @@
-"""`wam demo`: the demonstration from start to report."""
+"""`wam demo`: the demonstration, or a whole-arm task, from start to report."""
 
 import argparse
+import math
+import os
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
 from wam_bag.errors import BagError
-from wam_cli.commands import configuration_of, take_configuration, writable_directory
+from wam_cli.commands import configuration_of, new_bag, take_configuration, writable_directory
 from wam_cli.commands.live import page_beside, take_page
 from wam_cli.commands.up import import_nodes, runs_apart, take_time, timed
+from wam_control.scenario import load as steps_of
+from wam_control.scenario import script_file
+from wam_description.configuration import Configuration
+from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
 from wam_ros.bring_up import start
 from wam_ros.network import move_to_free_domain
 from wam_ros.program import end_at_once_on_signals
 from wam_ros.run import NAMESPACE, Stop
 
+PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
 LONGEST_START = 120.0  # s, until all nodes are connected, on a machine that is busy
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_time(parser)
-    parser.add_argument("--name", default="", help="name of the bag; default: demo, date and time")
+    played = parser.add_mutually_exclusive_group()
+    played.add_argument(
+        "--task",
+        default="",
+        metavar="NAME",
+        help=f"play this task instead of the demonstration: {', '.join(tasks())}, or a YAML file of your own",
+    )
+    played.add_argument("--scenario", default="", help="play these steps instead of the demonstration: a YAML file")
+    parser.add_argument("--name", default="", help="name of the bag; default: demo or the task, date and time")
     take_page(parser, default=None)
     take_configuration(parser)
 
 
 def run(given: argparse.Namespace) -> int:
     """Play, record, report."""
+    task = load(given.task) if given.task else None
     base = timed(configuration_of(given), given)
-    name = given.name or f"demo_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-    configuration = base.with_values({"nodes": [*base.shared.nodes, "scenario", "recorder"], "recorder:name": name})
-    directory = Path(str(configuration.sections["recorder"]["directory"]))
+    if given.scenario:
+        base = base.with_values({"scenario:script": given.scenario})
+    name = given.name or f"{task.name if task else 'demo'}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    directory = Path(str(base.sections["recorder"]["directory"]))
     writable_directory("recorder:directory in the file of --config, or run it elsewhere", directory)
-    bag = directory / name
+    bag = new_bag(directory / name)
+    if task:
+        base = with_run(base, task.runs[0]._replace(name=name), directory)
+    configuration = base.with_values({"nodes": [*base.shared.nodes, "scenario", "recorder"], "recorder:name": name})
+    tell_task(configuration, bag, task.name if task else "")
+    os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
     end_at_once_on_signals()
     import_nodes(configuration, given)
     stop = Stop()
@@ -53,6 +75,8 @@ def run(given: argparse.Namespace) -> int:
         failures = stack.failures
         if not ended and not stop.is_set:
             failures = [f"not ready within {LONGEST_START:g} s: {driver.awaited}"]
+        for failure in failures:  # before the others end and print what follows from it
+            print(f"error: {failure}; all others are stopped now", file=sys.stderr, flush=True)
         close_page()
     if stack.bag_failure:
         failures = [*failures, stack.bag_failure]
@@ -60,20 +84,43 @@ def run(given: argparse.Namespace) -> int:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130
     end_at_once_on_signals()  # the bag is closed
-    told = _report(bag, bool(failures))
+    told = _report(bag, bool(failures), task)
     if failures:
-        print(f"the demonstration failed: {', '.join(failures)}", file=sys.stderr)
-        print(f"next: {_next(configuration.shared.timing.mode, bag if told else None)}", file=sys.stderr)
+        print(f"\nthe demonstration failed: {', '.join(failures)}", file=sys.stderr)
+        for command in _next(configuration.shared.timing.mode, bag if told else None):
+            print(f"next: {command}", file=sys.stderr)
         return 1
+    print(f"next     wam view {bag}       # the recording in the browser, to play and to scrub")
+    print(f"         wam analyse {bag}    # measured and compared with theory")
     return 0
 
 
-def _report(bag: Path, failed: bool) -> bool:
-    """Print the report; of a demonstration that failed, as far as there is one."""
-    from wam_analysis.demo_report import report  # imports matplotlib: not before the nodes
+def tell_task(configuration: Configuration, bag: Path, task: str = "") -> None:
+    """Print what is about to happen, and refuse a task that cannot be played before anything is started.
 
+    Raises
+    ------
+    ParameterError
+        which names the file, the step and the value.
+    """
+    script = script_file(str(configuration.sections["scenario"]["script"]))
+    steps = steps_of(script, configuration.shared.arm)
+    seconds = sum(step.seconds for step in steps)
+    pushes = [step.push for step in steps if step.push]
+    presses = [math.hypot(*step.force.force) for step in steps if any(step.force.force)]
+    pushed = ", ".join(f"{math.hypot(*push.force):g} N on the {push.cover.replace('_', ' ')}" for push in pushes)
+    print(f"Task {task or script.stem}: {len(steps)} steps, up to {seconds:g} s of the arm's time")
+    if pushes:
+        print(f"  the simulator pushes the arm: {pushed}; the contact estimator has to find where, from the torques")
+    if presses:
+        print(f"  the force loop presses with {', '.join(f'{newtons:g}' for newtons in presses)} N")
+    print(f"  every topic is recorded in {bag}", flush=True)
+
+
+def _report(bag: Path, failed: bool, task: Experiment | None) -> bool:
+    """Print the report; of a demonstration that failed, as far as there is one."""
     try:
-        print(report(bag), flush=True)
+        print(_report_of_task(task, bag) if task else _report_of_demonstration(bag), flush=True)
     except (BagError, OSError) as error:
         if not failed:
             raise
@@ -82,10 +129,24 @@ def _report(bag: Path, failed: bool) -> bool:
     return True
 
 
-def _next(mode: str, bag: Path | None) -> str:
+def _report_of_demonstration(bag: Path) -> str:
+    from wam_analysis.demo_report import report  # imports matplotlib: not before the nodes
+
+    return report(bag)
+
+
+def _report_of_task(task: Experiment, bag: Path) -> str:
+    from wam_experiments.tasks.pictures import save  # for the same reason
+    from wam_experiments.thesis.evaluation import evaluate, text
+
+    result = evaluate(task, bag)
+    save(task, bag, result, bag / "task.png")
+    return f"{text(task, result)}\nbag      {bag}\npicture  {bag / 'task.png'}"
+
+
+def _next(mode: str, bag: Path | None) -> list[str]:
     """What the user can do after a failure."""
+    commands = [f"wam analyse {bag}"] if bag else []
     if mode == "realtime":
-        return "wam demo    # without --realtime: lockstep waits for a busy machine"
-    if bag:
-        return f"wam analyse {bag}"
-    return "end what else runs in this ROS domain, or set another ROS_DOMAIN_ID; then wam demo"
+        commands.append("wam demo    # without --realtime: lockstep waits for a busy machine")
+    return commands or ["end what else runs in this ROS domain, or set another ROS_DOMAIN_ID; then wam demo"]

@@ -9,8 +9,20 @@ from typing import Any
 
 import yaml
 
-from wam_cli.commands import at_least, batch_of, configuration_of, take_batch, take_configuration, writable_file
+from wam_cli.commands import (
+    at_least,
+    batch_of,
+    configuration_of,
+    require_seeds,
+    take_batch,
+    take_configuration,
+    take_seeds,
+    writable_file,
+)
 from wam_cli.commands import evaluate_faults as faults
+from wam_cli.commands import evaluate_force as force
+from wam_cli.commands import evaluate_identify as identify
+from wam_cli.commands import evaluate_robustness as robustness
 from wam_cli.commands import evaluate_soak as soak
 from wam_description.configuration import Configuration
 from wam_experiments.contact_benchmark.evaluation import BenchmarkExtent, BenchmarkResult, evaluate, scenarios
@@ -66,14 +78,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parts = parser.add_subparsers(dest="part", required=True, metavar="PART")
     _contact_arguments(parts.add_parser("contact", help="contact estimation on the whole arm"))
+    robustness.arguments(
+        parts.add_parser("robustness", help="contact estimation on arms that differ from what the estimator states")
+    )
+    force.arguments(parts.add_parser("force", help="force control on random surfaces in random poses"))
     faults.arguments(parts.add_parser("faults", help="wrong messages, lost nodes, full disks, Ctrl-C"))
+    identify.arguments(parts.add_parser("identify", help="identified against true friction of many plants"))
     soak.arguments(parts.add_parser("soak", help="a long run: memory and lost messages"))
 
 
 def _contact_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--seed", type=int, nargs="+", default=list(SEEDS), help="seeds of the scenarios, default 1 2 3"
-    )
+    take_seeds(parser, SEEDS, "the scenarios")
     parser.add_argument("--contacts", type=int, default=200, help="contacts in motion per seed, default 200")
     parser.add_argument("--resting", type=int, default=30, help="contacts at rest per seed, default 30")
     parser.add_argument("--free", type=float, default=200.0, help="seconds of motion without contact per seed")
@@ -107,7 +122,14 @@ def _write(
 
 def run(given: argparse.Namespace) -> int:
     """Evaluate; 1 if a required value is missed."""
-    parts = {"contact": _run_contact, "faults": faults.run, "soak": soak.run}
+    parts = {
+        "contact": _run_contact,
+        "force": force.run,
+        "robustness": robustness.run,
+        "faults": faults.run,
+        "identify": identify.run,
+        "soak": soak.run,
+    }
     return parts[given.part](given)
 
 
@@ -115,8 +137,7 @@ def _run_contact(given: argparse.Namespace) -> int:
     at_least("--contacts", given.contacts, 1)
     at_least("--resting", given.resting, 0)
     at_least("--free", given.free, 0.0)
-    for seed in given.seed:
-        at_least("--seed", seed, 0)
+    require_seeds(given)
     if given.write:
         writable_file("--write", given.write)
     configuration = configuration_of(given)

@@ -10,7 +10,7 @@ from pathlib import Path
 from wam_cli.commands import at_least, configuration_of, take_configuration, writable_file
 from wam_cli.faults import interruptions
 from wam_cli.faults.kinds import REPLAYED, kinds
-from wam_experiments.faults.page import faults_section, report, with_section
+from wam_experiments.faults.page import INTERRUPTIONS, faults_section, report, section_of, with_section
 from wam_experiments.faults.trials import FaultKind, KindResult, played
 from wam_sim.progress import Progress
 
@@ -45,9 +45,11 @@ def run(given: argparse.Namespace) -> int:
     print(report(results))
     if given.write:
         section = "faults" if given.ctrl_c is None else "interruptions"
-        given.write.write_text(
-            with_section(given.write, section, faults_section(results, _command(given))), encoding="utf-8"
-        )
+        command = f"wam evaluate faults --write {given.write}"
+        if given.ctrl_c is not None:
+            command += f" --ctrl-c {given.ctrl_c}"
+        text = faults_section(results, command, section_of(given.write, section))
+        given.write.write_text(with_section(given.write, section, text), encoding="utf-8")
     return 1 if any(result.escaped for result in results) else 0
 
 
@@ -66,7 +68,7 @@ def _played(given: argparse.Namespace) -> list[KindResult]:
 def _interrupted(given: argparse.Namespace) -> list[KindResult]:
     at_least("--ctrl-c", given.ctrl_c, 1)
     kind = FaultKind(
-        "interruptions",
+        INTERRUPTIONS,
         "Ctrl-C during `wam demo`",
         "interruptions",
         100,
@@ -75,11 +77,3 @@ def _interrupted(given: argparse.Namespace) -> list[KindResult]:
     )
     progress = Progress(kind.name, sys.stderr)
     return [played(kind, configuration_of(given), given.seed, given.first, given.ctrl_c, time.monotonic, progress)]
-
-
-def _command(given: argparse.Namespace) -> str:
-    words = ["wam evaluate faults", f"--seed {given.seed}"]
-    words += [f"--first {given.first}"] * bool(given.first) + [f"--count {given.count}"] * bool(given.count)
-    words += [f"--only {' '.join(given.only)}"] * bool(given.only) + ["--short"] * given.short
-    words += [f"--ctrl-c {given.ctrl_c}"] * (given.ctrl_c is not None)
-    return " ".join([*words, f"--write {given.write}"])

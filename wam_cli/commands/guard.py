@@ -1,10 +1,24 @@
-"""`wam guard`: the stability guard validated by Monte Carlo simulation."""
+"""`wam guard`: the stability guard validated by Monte Carlo simulation, or a force loop of your own assessed."""
 
 import argparse
+import math
 import sys
+from pathlib import Path
 
-from wam_cli.commands import at_least
+from wam_cli.commands import at_least, writable_file
+from wam_control.loop_design import loop_design
 from wam_experiments.stability.guard_validation import Trial, exact_trials, table, testbed_trials
+from wam_experiments.stability.map_picture import draw
+from wam_theory.stick_slip import FrictionNode, IntegralLoop
+
+PLANT = {  # option: what it is
+    "inertia": "of the driven link, kg m^2 or kg",
+    "damping": "viscous, N m s/rad or N s/m",
+    "transmission": "stiffness k_tr, N m/rad or N/m",
+    "contact": "stiffness k_c of the stiffest surface, N m/rad or N/m",
+    "friction": "dynamic (Coulomb) friction, N m or N",
+    "gain": "G_I, rad/s per N m or m/s per N",
+}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -12,10 +26,26 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sets", type=int, default=200, help="random sets for the exact integrator; default: 200")
     parser.add_argument("--testbed", type=int, default=40, help="random sets for the testbed in MuJoCo; default: 40")
     parser.add_argument("--seed", type=int, default=1, help="seed of the random sets; default: 1")
+    own = parser.add_argument_group("a force loop of your own", "all but the last six are needed; consistent units")
+    for name, text in PLANT.items():
+        own.add_argument(f"--{name}", type=float, help=text)
+    own.add_argument("--stiction", type=float, help="static friction; default: the dynamic one")
+    own.add_argument("--limit", type=float, default=math.inf, help="saturation of the error; default: none")
+    own.add_argument("--deadband", type=float, default=0.0, help="of the error; default: 0")
+    own.add_argument("--rate", type=float, default=0.0, help="of the samples, Hz; default: 0, a continuous loop")
+    own.add_argument("--delay", type=float, default=0.0, help="from sample to command, s; default: 0")
+    own.add_argument("--picture", type=Path, help="write the stability map with the loop on it, PNG, PDF or SVG")
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the two tables; 1 where a set was accepted that diverges."""
+    """Print the two tables, 1 where a set was accepted that diverges; or assess a loop, 1 where it is not safe."""
+    missing = [name for name in PLANT if getattr(given, name) is None]
+    if len(missing) < len(PLANT):
+        if missing:
+            raise ValueError(f"--{missing[0]} is missing, {PLANT[missing[0]]}; give all of --{', --'.join(PLANT)}")
+        return _assess(given)
+    if given.picture:
+        raise ValueError(f"--picture shows a loop of your own; give --{', --'.join(PLANT)}")
     at_least("--sets", given.sets, 1)
     at_least("--testbed", given.testbed, 1)
     at_least("--seed", given.seed, 0)
@@ -29,6 +59,19 @@ def run(given: argparse.Namespace) -> int:
         sys.stderr.write("\n")
         print(f"{name}\n{found.text()}\n")
     return int(bad > 0)
+
+
+def _assess(given: argparse.Namespace) -> int:
+    stiction = given.friction if given.stiction is None else given.stiction
+    node = FrictionNode(given.inertia, given.damping, given.transmission, given.contact, given.friction, stiction)
+    loop = IntegralLoop(given.gain, error_limit=given.limit, deadband=given.deadband)
+    if given.picture:
+        writable_file("--picture", given.picture)
+    design = loop_design(node, loop, given.rate, given.delay)
+    print(design.text())
+    if given.picture:
+        draw(design, given.picture)
+    return int(not design.is_safe)
 
 
 def _show(trial: Trial) -> None:

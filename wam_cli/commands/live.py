@@ -10,6 +10,7 @@ from typing import Final
 
 from wam_cli.commands import namespace
 from wam_live.page import PORT, NoPageError, needing_viser, obstacle
+from wam_ros.program import end_at_once_on_signals
 from wam_ros.run import NAMESPACE, PARENT, Stop, die_with_parent
 
 PATIENCE: Final = 1.0  # s, in which a page ends by itself
@@ -68,7 +69,7 @@ class PageProcess:
     """The page as a process of its own, which can neither delay nor fail the stack."""
 
     def __init__(self, port: int, namespace: str) -> None:
-        command = [sys.executable, "-m", "wam_cli.main", "live", "--port", str(port), "--namespace", namespace]
+        command = [sys.executable, "-m", "wam_cli.program", "live", "--port", str(port), "--namespace", namespace]
         # a session of its own: Ctrl-C reaches the parent alone
         self._process = subprocess.Popen(
             command, start_new_session=True, stdin=subprocess.DEVNULL, env={**os.environ, PARENT: str(os.getpid())}
@@ -87,10 +88,11 @@ class PageProcess:
 
 def run(given: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C."""
+    end_at_once_on_signals()  # an exception amid the imports would be swallowed by one of the libraries
     die_with_parent()
     with needing_viser():
         from wam_live.live_page import LivePage
     stop = Stop()
-    page = LivePage(given.namespace.strip("/"), given.port, lambda line: print(line, flush=True))
+    page = LivePage(given.namespace, given.port, lambda line: print(line, flush=True))
     page.run(lambda: stop.is_set)
     return 0

@@ -4,7 +4,7 @@ import argparse
 from functools import partial
 from pathlib import Path
 
-from wam_cli.commands import configuration_of, take_configuration, writable_directory
+from wam_cli.commands import configuration_of, new_bag, take_configuration, writable_directory
 from wam_ros.bring_up import parameter_file
 from wam_ros.node import make_node
 from wam_ros.run import run as run_node
@@ -23,7 +23,10 @@ def run(given: argparse.Namespace) -> int:
     if given.directory:
         values["recorder:directory"] = given.directory
     configuration = configuration_of(given).with_values(values)
-    writable_directory("--directory", Path(str(configuration.sections["recorder"]["directory"])))
+    directory = Path(str(configuration.sections["recorder"]["directory"]))
+    writable_directory("--directory", directory)
+    if given.name:
+        new_bag(directory / given.name)
     with parameter_file(configuration) as file:
         run_node(partial(make_node, "recorder"), ["wam", "--ros-args", "--params-file", str(file)])
     return 0

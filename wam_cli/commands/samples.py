@@ -1,4 +1,4 @@
-"""`wam samples`: the small bags in `bags/sample`, one of each experiment, checked or recorded again."""
+"""`wam samples`: the small bags in `bags/sample`, one of each experiment and task, checked or recorded again."""
 
 import argparse
 import contextlib
@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 from wam_cli.commands.experiment import play
-from wam_experiments.thesis.definition import Experiment, load, names
+from wam_experiments.thesis.definition import Experiment, load, names, tasks
 from wam_experiments.thesis.samples import FOLDER, LIMIT, Entry, check, make, read_index, write_index
 from wam_ros.run import Stop
 
@@ -15,7 +15,7 @@ RECORDED = "recorded"  # in the directory of the samples: what they are cut from
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("name", nargs="*", help="experiments whose samples are checked; default: all")
+    parser.add_argument("name", nargs="*", help="experiments and tasks whose samples are checked; default: all")
     parser.add_argument("--make", action="store_true", help="record and cut them again and write the index")
     parser.add_argument(
         "--directory",
@@ -27,7 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Check or record; 0 if every sample is as the index lists it."""
     directory = Path(given.directory)
-    chosen = [load(name) for name in given.name or names()]
+    chosen = [load(name) for name in given.name or [*names(), *tasks()]]
     if given.make and not _make(chosen, directory):
         return 130
     entries = read_index(directory)

@@ -5,6 +5,7 @@ import sys
 
 from wam_cli.commands import configuration_of, namespace, take_configuration
 from wam_cli.commands.live import page_beside, take_page
+from wam_control.scenario import load, script_file
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import start
 from wam_ros.node import node_factory
@@ -79,6 +80,7 @@ def run(given: argparse.Namespace) -> int:
     configuration = configuration.with_values({"nodes": [*configuration.shared.nodes, *extra]})
     if given.scenario:
         configuration = configuration.with_values({"scenario:script": given.scenario})
+        load(script_file(given.scenario), configuration.shared.arm)  # refused before any node starts
     end_at_once_on_signals()
     import_nodes(configuration, given)
     stop = Stop()
@@ -92,12 +94,14 @@ def run(given: argparse.Namespace) -> int:
             print(f"{len(configuration.shared.nodes)} nodes started in {where}; Ctrl-C stops them", flush=True)
         ended = stack.wait(lambda ended: stop.is_set or bool(ended))
         failures = stack.failures
+        for failure in failures:  # before the others end and print what follows from it
+            print(f"error: {failure}; all others are stopped now", file=sys.stderr, flush=True)
         close_page()
     for node, code in ended.items():
         if not code:
             print(f"node {node} has ended; all were stopped")
     for failure in failures:
-        print(f"error: {failure}; all were stopped", file=sys.stderr)
+        print(f"error: {failure}; all others were stopped", file=sys.stderr)
     if stack.bag_failure:
         print(f"error: {stack.bag_failure}", file=sys.stderr)
     return max([abs(code) for code in ended.values()], default=0) or int(bool(stack.killed or stack.bag_failure))

@@ -18,6 +18,7 @@ from wam_cli.faults.soak import lost_in
 from wam_experiments.faults.trials import FaultTrial
 
 MARK: Final = "WAM_STACK_INTERRUPTED"  # environment variable by which the processes of a trial are found
+PYTHON: Final = 0.3  # s, in which Python starts; a Ctrl-C before the first line of the program is its own
 STARTING, PLAYING = 4.0, 12.0  # s; one half of the moments is before the first, the other before the second
 LONGEST_END: Final = 30.0  # s, on a busy machine
 
@@ -26,7 +27,7 @@ def play(seed: int, first: int, count: int) -> Iterator[FaultTrial]:
     """Trials `first` to `first + count`, a demonstration each."""
     for index in range(first, first + count):
         chance = Random(f"interruptions {seed} {index}")
-        moment = chance.uniform(0.0, STARTING if index % 2 else PLAYING)
+        moment = chance.uniform(PYTHON, STARTING if index % 2 else PLAYING)
         with TemporaryDirectory(prefix="wam_faults_") as folder:
             escapes = tuple(_interrupted(Path(folder), moment, f"{os.getpid()}.{index}"))
         yield FaultTrial(index, f"Ctrl-C after {moment:.2f} s", 1, escapes)
@@ -36,7 +37,7 @@ def _interrupted(folder: Path, moment: float, mark: str) -> Iterator[str]:
     """What is wrong after one interrupted demonstration."""
     with (folder / "output.txt").open("w+", encoding="utf-8") as output:
         demo = subprocess.Popen(
-            [sys.executable, "-P", "-m", "wam_cli.main", "demo", "--name", "interrupted"],
+            [sys.executable, "-P", "-m", "wam_cli.program", "demo", "--name", "interrupted"],
             cwd=folder,
             stdout=output,
             stderr=subprocess.STDOUT,

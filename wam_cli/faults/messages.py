@@ -9,11 +9,13 @@ from rclpy.publisher import Publisher
 
 from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.configuration import Configuration
+from wam_driver.driver import DriverParameters
 from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
 from wam_experiments.faults.trials import HELD_MOTION, MOTION, FaultTrial
 
 MESSAGES: Final = 20  # of one trial
 BETWEEN: Final = 0.001  # s of the arm's time between two of them
+PUSH: Final = "sim/disturbance"
 AFTER: Final = 0.03  # s of the arm's time after the last
 
 
@@ -55,6 +57,8 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     stack.allowed_motion = MOTION if todo.is_foreign else HELD_MOTION
     if publisher is None:
         return 1
+    if todo.topic == PUSH and not todo.is_foreign:  # bytes may be those of a push, and pushing is what it is for
+        stack.allowed_force = stack.configuration.node("driver", DriverParameters).disturbance_force_limit
     for _ in range(MESSAGES):
         message = stack.newest(todo.topic)
         if todo.fault.moves:

@@ -21,6 +21,7 @@ from wam_description.signals import NodeStatus, State, Wrench
 from wam_ros.bring_up import parameter_file
 from wam_ros.messages import message_type, read_status
 from wam_ros.qos import qos
+from wam_ros.requests import answer_of, switch_request
 from wam_ros.run import NAMESPACE, Connection
 from wam_ros.wire import Decode, decoder, encoder, stamp_of
 
@@ -41,7 +42,7 @@ PRELOADED: Final = [
     "wam_driver.driver",
     "wam_control.force_loop",
 ]
-ANSWERED, ATTEMPTS = 0.5, 6  # s; an answer can be lost while the service still discovers who asks
+ANSWERED, ATTEMPTS = 0.5, 6  # s, for each attempt to ask a service
 COMMANDS: Final = ("joint_posture_command", "force_command")
 
 
@@ -230,12 +231,8 @@ class NodeProcesses:
         client = self._clients[service]
         if not self.wait(client.service_is_ready, 5.0):
             return f"no service {service}"
-        request = client.srv_type.Request() if switch is None else client.srv_type.Request(data=switch)
-        for _ in range(ATTEMPTS):
-            future = client.call_async(request)
-            if self.wait(future.done, ANSWERED):
-                return str(future.result().message)
-        return "no answer"
+        answer = answer_of(client, switch_request(switch)[1], ATTEMPTS, lambda future: self.wait(future.done, ANSWERED))
+        return "no answer" if answer is None else str(answer.message)
 
     def enabled(self, patience: float) -> str:
         """Do what an operator does; returns why the arm cannot be enabled, '' where it is and stays so."""

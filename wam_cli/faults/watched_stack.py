@@ -24,12 +24,13 @@ from wam_experiments.faults.trials import FORCE, MOTION, FaultTrial
 from wam_ros.bring_up import Composition
 from wam_ros.messages import message_type
 from wam_ros.qos import qos
+from wam_ros.requests import answer_of, switch_request
 from wam_ros.run import NAMESPACE
 from wam_ros.wire import Encode, encoder, stamp_of
 
 LONGEST_START: Final = 120.0  # s of wall time
 PATIENCE: Final = 15.0  # s of wall time without progress and without a fault that is a hang
-ANSWERED, ATTEMPTS = 0.5, 20  # s; an answer can be lost while the service still discovers who asks
+ANSWERED, ATTEMPTS = 0.5, 20  # s, for each attempt to ask a service
 REST: Final = 0.2  # s of wall time after which the time of an arm in fault is known to be at rest
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
 UNEXPECTED: Final = "unexpected "  # in the status of a node whose callback raised (wam_ros.tolerance)
@@ -233,7 +234,7 @@ class WatchedStack:
     def begin(self) -> str:
         """Start a trial with an enabled arm at rest; returns why that is not possible, '' where it is."""
         self._injected.clear()
-        self.allowed_motion = MOTION
+        self.allowed_force, self.allowed_motion = FORCE, MOTION
         self.driver.plant.release()
         if reason := self.recover():
             return reason
@@ -264,12 +265,8 @@ class WatchedStack:
     def ask(self, service: str, switch: bool | None = None) -> str:
         """Call a service of the driver; returns its message."""
         client = self._clients[service]
-        request = client.srv_type.Request() if switch is None else client.srv_type.Request(data=switch)
-        for _ in range(ATTEMPTS):
-            future = client.call_async(request)
-            if self.wait(future.done, ANSWERED):
-                return str(future.result().message)
-        return "no answer"
+        answer = answer_of(client, switch_request(switch)[1], ATTEMPTS, lambda future: self.wait(future.done, ANSWERED))
+        return "no answer" if answer is None else str(answer.message)
 
     # faults
 

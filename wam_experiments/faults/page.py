@@ -18,6 +18,7 @@ HEAD = (
     "seed",
     "time [s]",
 )
+INTERRUPTIONS = "interruptions"  # the kind with a section of its own
 LISTED = 10  # escapes of one kind that are printed
 
 
@@ -41,23 +42,36 @@ def _number(value: float, factor: float, digits: int) -> str:
     return "–" if math.isnan(value) else f"{value * factor:.{digits}f}"
 
 
+def _chosen(kind: str) -> str:
+    """Options for one trial of a kind."""
+    return "--ctrl-c 1" if kind == INTERRUPTIONS else f"--only {kind} --count 1"
+
+
 def report(results: Sequence[KindResult]) -> str:
     """The output of the command: the table, then the first escapes of each kind."""
     lines = plain([HEAD], _rows(results), left=(0, 1))
     for result in results:
         for trial in result.escaped[:LISTED]:
             lines += [f"{result.kind} {trial.number}: {trial.name}: {'; '.join(trial.escapes)}"]
-            lines += [
-                f"    wam evaluate faults --only {result.kind} --seed {result.seed} --first {trial.number} --count 1"
-            ]
+            lines += [f"    wam evaluate faults {_chosen(result.kind)} --seed {result.seed} --first {trial.number}"]
         if len(result.escaped) > LISTED:
             lines.append(f"{result.kind}: {len(result.escaped) - LISTED} more escapes")
     return "\n".join(lines)
 
 
-def faults_section(results: Sequence[KindResult], command: str) -> str:
-    """The section of the page on faults."""
-    return "\n".join([f"Written by `{command}`.", "", markdown(HEAD, _rows(results)).rstrip()])
+def faults_section(results: Sequence[KindResult], command: str, before: str) -> str:
+    """A section of the page on faults: the kinds that were played, then the rows of others in the text `before` it."""
+    rows = _rows(results)
+    played = {HEAD[0], *(row[0] for row in rows)}
+    table = [[cell.strip() for cell in line.strip("| ").split("|")] for line in before.splitlines() if line[:2] == "| "]
+    rows += [row for row in table if row[0] not in played and not row[0].startswith("---")]
+    return "\n".join([f"Written by `{command}`, kind by kind.", "", markdown(HEAD, rows).rstrip()])
+
+
+def section_of(file: Path, name: str) -> str:
+    """What a section of the page holds, '' where there is no page."""
+    page = file.read_text(encoding="utf-8") if file.exists() else ""
+    return page.partition(f"<!-- written: {name} -->")[2].partition("<!-- end of what is written -->")[0]
 
 
 def with_section(file: Path, name: str, text: str) -> str:
@@ -86,7 +100,7 @@ those of the simulated plant, currents and texts those that arrive over topics.
 
 * A joint moves by more than {MOTION:g} rad, or the arm presses with more than {FORCE:g} N, without a legitimate
   command. A wrong number from the node whose command it is, with a stamp of the present, is a command until it is too
-  old: {HELD_MOTION:g} rad are allowed for it.
+  old: {HELD_MOTION:g} rad are allowed for it. The simulated hand, `sim/disturbance`, may push with up to its limit.
 * A node ends, or raises an exception.
 * A number in any output is not finite, or a current is above the peak of its motor.
 * The loss of a node is not reported by its name, or a current is not zero {ZERO_CURRENT * 1e3:g} ms of the arm's time
@@ -102,7 +116,7 @@ process, on a clock that waits for the answers, so a busy machine is slower and 
 processes.
 
 Each trial depends on its kind, seed and number alone. An escape is repeated with the line that the command prints
-for it, `wam evaluate faults --only KIND --seed SEED --first NUMBER --count 1`.
+for it, `wam evaluate faults --only KIND --count 1 --seed SEED --first NUMBER`.
 
 ## Interruption
 

@@ -1,0 +1,106 @@
+"""Sweeps: parameter sets, equal results on every executor, what was finished is kept, a refused set fails alone."""
+
+import csv
+import subprocess
+import sys
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from wam_control.scenario import load
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
+from wam_sim import batch
+from wam_sim.sweep import Axis, SweepPoint, drawn, grid, listed, points, sweep
+
+ROOT = Path(__file__).resolve().parents[1]
+GAIN = "force_loop:force_gain"
+STEPS = """
+steps:
+  - {name: release, seconds: 0.1, request: enable}
+  - {name: press, seconds: 0.4, force: {frame: link, newtons: [0.0, -20.0, 0.0]}}
+"""
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Path:
+    file = tmp_path / "short.yaml"
+    file.write_text(STEPS)
+    return file
+
+
+def runs(script: Path, gains: tuple[float, ...]) -> list[SweepPoint]:
+    configuration = Configuration.load(packaged("testbed"))
+    axes = [Axis(GAIN, gains)]
+    return points(configuration, load(script, configuration.shared.arm), axes, grid(axes))
+
+
+def test_a_grid_has_every_combination_and_a_list_goes_in_step() -> None:
+    axes = [Axis("a", (1, 2)), Axis("b", (3, 4))]
+    assert grid(axes) == [(1, 3), (1, 4), (2, 3), (2, 4)]
+    assert listed(axes) == [(1, 3), (2, 4)]
+    with pytest.raises(ValueError, match="a: 2, b: 1"):
+        listed([axes[0], Axis("b", (3,))])
+
+
+def test_random_sets_are_repeatable_and_between_the_ends() -> None:
+    axes = [Axis("a", (1e-3, 1.0)), Axis("b", (-1.0, 2.0))]
+    found = drawn(axes, 200, 4)
+    assert found == drawn(axes, 200, 4) != drawn(axes, 200, 5)
+    assert all(1e-3 <= a <= 1.0 and -1.0 <= b <= 2.0 for a, b in found)
+    assert 60 < sum(a < 10**-1.5 for a, _ in found) < 140, "by the logarithm"
+    with pytest.raises(ValueError, match="needs two numbers"):
+        drawn([Axis("a", (1.0, 2.0, 3.0))], 1, 1)
+
+
+def test_an_unknown_parameter_is_refused_before_anything_runs(script: Path) -> None:
+    configuration = Configuration.load(packaged("testbed"))
+    with pytest.raises(ParameterError, match="no parameter 'nothing'"):
+        points(configuration, load(script, configuration.shared.arm), [Axis("force_loop:nothing", (1,))], [(1,)])
+
+
+@pytest.mark.slow
+def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_path: Path) -> None:
+    given = runs(script, (0.004, 0.02, 5.0))
+    with ThreadPoolExecutor(1) as one:
+        found = sweep(given, one, tmp_path / "kept")
+    assert [bool(result.failure) for result in found] == [False, False, True]
+    assert found[2].failure
+    assert found[0].force_rms > found[1].force_rms, "a small gain is slower"
+    again: list[tuple[int, int]] = []
+    with ThreadPoolExecutor(1) as one:
+        kept = sweep(given, one, tmp_path / "kept", lambda done, of: again.append((done, of)))
+    assert again == [(3, 3)]
+    assert kept[:2] == found[:2]
+
+
+@pytest.mark.slow
+def test_processes_and_a_local_cluster_give_the_same(script: Path) -> None:
+    given = runs(script, (0.004, 0.02))
+    with ThreadPoolExecutor(1) as one:
+        expected = sweep(given, one)
+    with batch.processes(2) as two:
+        assert sweep(given, two) == expected
+    distributed = pytest.importorskip("distributed")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with (
+            distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
+            batch.dask(cluster.scheduler_address) as workers,
+        ):
+            assert sweep(given, workers) == expected
+
+
+@pytest.mark.slow
+def test_the_command_writes_the_table_and_the_plot(script: Path, tmp_path: Path) -> None:
+    table, plot = tmp_path / "sweep.csv", tmp_path / "sweep.png"
+    command = [sys.executable, "-m", "wam_cli.main", "sweep", str(table), "--config", "testbed", "--fresh"]
+    command += ["--workers", "1", "--scenario", str(script), "--vary", f"{GAIN}=0.004:0.02:2", "--picture", str(plot)]
+    subprocess.run(command, check=True, capture_output=True)
+    with table.open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row[GAIN]) for row in rows] == pytest.approx([0.004, 0.02])
+    assert all(float(row["force_rms"]) > 0.0 for row in rows)
+    assert plot.stat().st_size > 5000

@@ -1,0 +1,106 @@
+"""`wam conform`: a driver, tested against the contract of docs/driver.md."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from wam_cli.commands import at_least, configuration_of, namespace, take_configuration
+from wam_description.configuration import Configuration
+from wam_description.driver_contract import DriverContract
+from wam_description.interface import declared
+from wam_ros.bring_up import NodeProcess
+from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
+from wam_ros.driver_probe import DriverProbe
+from wam_ros.network import require_places
+from wam_ros.run import Connection
+
+LEAST_SHARE = 0.9
+ATTEMPTS = 5
+TEST_CURRENT = 0.4  # A
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    take_configuration(parser)
+    parser.add_argument("--namespace", type=namespace, default="wam", help="namespace of the driver; default: wam")
+    parser.add_argument(
+        "--running",
+        action="store_true",
+        help="test a driver that runs already, with nodes [driver, velocity_loop] and timing.mode realtime",
+    )
+    parser.add_argument(
+        "--current",
+        type=float,
+        default=TEST_CURRENT,
+        metavar="A",
+        help="current on the first motor beyond what carries the links, with a changing sign; default: %(default)s",
+    )
+    parser.add_argument(
+        "--share",
+        type=float,
+        default=LEAST_SHARE,
+        metavar="FRACTION",
+        help="of the periods in which a state has to come; default: %(default)s",
+    )
+    parser.add_argument(
+        "--attempts",
+        type=int,
+        default=ATTEMPTS,
+        metavar="N",
+        help="at each row, as a busy machine delays a driver that is right; default: %(default)s",
+    )
+    parser.epilog = (
+        "The brakes are released several times and small currents flow: on a real arm keep its range clear and the "
+        "emergency stop in your hand."
+    )
+
+
+def run(given: argparse.Namespace) -> int:
+    """Print the rows as they are found; 1 where one is wrong."""
+    at_least("--attempts", given.attempts, 1)
+    at_least("--share", given.share, 0.0)
+    configuration = driver_alone(configuration_of(given))
+    print(f"driver under test: {configuration.shared.nodes[0]}{', which runs already' if given.running else ''}")
+    require_places(["velocity_loop"] if given.running else ["driver", "velocity_loop"], given.namespace)
+    counts = {OK: 0, WRONG: 0, NOT_TESTED: 0}
+    with connected(given.namespace, configuration, given.current) as probe:
+        driver = None if given.running else NodeProcess(configuration, configuration.shared.nodes[0], given.namespace)
+        try:
+            control = (driver.stop, driver.start) if driver else (None, None)
+            contract = DriverContract.of(configuration.shared, given.share)
+            for row in Conformance(probe, contract, given.attempts, *control).rows():
+                counts[row.verdict] += 1
+                print(row.text)
+                sys.stdout.flush()
+        finally:
+            if driver:
+                driver.close()
+    print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    return int(counts[WRONG] > 0)
+
+
+def driver_alone(configuration: Configuration) -> Configuration:
+    """A configuration with its driver and a velocity loop only, in realtime."""
+    drivers = [entry for entry in configuration.shared.nodes if declared(entry).name == "driver"]
+    if not drivers:
+        raise ValueError("no entry of the parameter 'nodes' is a driver; list one, as 'driver' or 'my_module:MyDriver'")
+    return configuration.with_values({"nodes": [drivers[0], "velocity_loop"], "timing.mode": "realtime"})
+
+
+@contextmanager
+def connected(where: str, configuration: Configuration, current: float) -> Iterator[DriverProbe]:
+    """A probe on the network of the driver."""
+    connection = Connection()
+    try:
+        probe = DriverProbe(
+            configuration.shared,
+            current,
+            lambda seconds: connection.executor.spin_once(timeout_sec=seconds),
+            context=connection.context,
+            namespace=where,
+        )
+        connection.add(probe)
+        yield probe
+    finally:
+        connection.close()

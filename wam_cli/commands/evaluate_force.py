@@ -1,0 +1,91 @@
+"""`wam evaluate force`: random forces on random surfaces, true force against commanded."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from wam_cli.commands import (
+    at_least,
+    configuration_of,
+    take_configuration,
+    take_executor,
+    writable_directory,
+    writable_file,
+)
+from wam_experiments.force_benchmark.evaluation import ForceTrial, evaluate
+from wam_experiments.force_benchmark.figure import figure
+from wam_experiments.force_benchmark.page import details, page, report, required
+from wam_experiments.force_benchmark.tasks import SECONDS
+from wam_sim.batch import executor
+from wam_sim.pieces import default_folder
+from wam_sim.progress import Progress
+
+RESULTS = default_folder().parent / "force-benchmark.jsonl"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("--seed", type=int, default=1, help="seed of the tasks, default 1")
+    parser.add_argument("--tasks", type=int, default=100, help="number of tasks, default 100")
+    parser.add_argument(
+        "--only", type=int, nargs="+", metavar="NUMBER", help="instead: tasks of these numbers, each in full"
+    )
+    parser.add_argument(
+        "--seconds", type=float, default=SECONDS, help="time of the whole force in each task, default %(default)g"
+    )
+    parser.add_argument(
+        "--results",
+        type=Path,
+        default=RESULTS,
+        metavar="FILE",
+        help="finished tasks, a line each; those in it are not done again; default: %(default)s",
+    )
+    parser.add_argument("--write", type=Path, help="page to write, for example docs/force-benchmark.md")
+    take_configuration(parser)
+    take_executor(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Do the tasks; 1 if a required value is missed."""
+    at_least("--seed", given.seed, 0)
+    at_least("--tasks", given.tasks, 1)
+    at_least("--seconds", given.seconds, 1.0)
+    for number in given.only or ():
+        at_least("--only", number, 0)
+    if given.workers is not None:
+        at_least("--workers", given.workers, 1)
+    writable_directory("--results", given.results.parent)
+    if given.write:
+        writable_file("--write", given.write)
+    trials = _trials(given)
+    if given.only:
+        print("\n".join(details(given.seed, trial) for trial in trials))
+    else:
+        print(report(given.seed, trials))
+    if given.write:
+        _write(given, trials)
+    return 0 if all(met for _, _, _, met in required(trials)) else 1
+
+
+def _trials(given: argparse.Namespace) -> list[ForceTrial]:
+    numbers = given.only or range(given.tasks)
+    with executor(given.workers, given.dask) as found:
+        return evaluate(
+            configuration_of(given),
+            given.seed,
+            numbers,
+            given.seconds,
+            found,
+            given.results,
+            Progress("tasks", sys.stderr),
+        )
+
+
+def _write(given: argparse.Namespace, trials: list[ForceTrial]) -> None:
+    """Write the page, and its figure into a folder of the page's name."""
+    file = Path(given.write)
+    picture = file.with_suffix("") / "benchmark.png"
+    figure(trials, picture)
+    seconds = f" --seconds {given.seconds:g}" * (given.seconds != SECONDS)
+    repeat = f"wam evaluate force --seed {given.seed} --tasks {given.tasks}{seconds} --write {file}"
+    file.write_text(page(trials, given.seed, repeat, f"{picture.parent.name}/{picture.name}"), encoding="utf-8")

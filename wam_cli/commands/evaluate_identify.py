@@ -1,0 +1,54 @@
+"""`wam evaluate identify`: identified against true friction, over plants and seeds."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from wam_cli.commands import (
+    at_least,
+    batch_of,
+    configuration_of,
+    require_seeds,
+    take_batch,
+    take_configuration,
+    take_seeds,
+    writable_file,
+)
+from wam_experiments.faults.page import with_section
+from wam_experiments.identification.evaluation import missed, run_trial, table, trials
+from wam_sim.batch import results
+
+SEEDS = (1, 2, 3)
+SHORTEST = 20.0  # s of motion
+SECTION = "identification"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    take_seeds(parser, SEEDS, "plants and motions")
+    parser.add_argument("--seconds", type=float, default=60.0, help="length of each motion, default 60")
+    parser.add_argument("--write", type=Path, help="page to update, for example docs/identify.md")
+    take_configuration(parser)
+    take_batch(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Play, identify, compare; 1 if a required value is missed."""
+    at_least("--seconds", given.seconds, SHORTEST)
+    require_seeds(given)
+    if given.write:
+        writable_file("--write", given.write)
+        with_section(given.write, SECTION, "")  # refuses a page without the section, before the work
+    with batch_of(given) as batch:
+        found = results(run_trial, trials(configuration_of(given), given.seed, given.seconds), *batch)
+    text, short = table(found), list(missed(found))
+    print(text)
+    if given.write:
+        seeds = " ".join(map(str, given.seed))
+        command = f"wam evaluate identify --seed {seeds} --seconds {given.seconds:g} --write {given.write}"
+        lines = f"Missed: {'; '.join(short)}." if short else "Every required value is met."
+        page = with_section(given.write, SECTION, f"Written by `{command}`.\n\n{text}\n{lines}")
+        given.write.write_text(page, encoding="utf-8")
+    if short:
+        print(f"missed: {'; '.join(short)}", file=sys.stderr)
+    return 1 if short else 0

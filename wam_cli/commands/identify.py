@@ -1,0 +1,141 @@
+"""`wam identify`: from a recording of free motion to the model of the controllers."""
+
+import argparse
+import os
+import shlex
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from wam_analysis.identification.fit import identify
+from wam_analysis.identification.motion import recorded_motion
+from wam_analysis.identification.overlay import estimator_values, model_values, write_overlay
+from wam_analysis.identification.report import report
+from wam_bag.bag import read
+from wam_cli.commands import at_least, configuration_of, take_configuration, writable_directory, writable_file
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration
+from wam_experiments.identification.excitation import scenario
+from wam_ros.bring_up import Composition
+from wam_ros.network import move_to_free_domain
+from wam_ros.run import NAMESPACE, Stop
+from wam_sim.progress import Progress
+from wam_sim.recording import RecordedRun, recorded_run
+
+TOPICS = ("motor_states", "status")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("bag", nargs="?", type=Path, help="recording of free motion, without contact")
+    parser.add_argument(
+        "--excite",
+        metavar="SCENARIO",
+        type=Path,
+        help="write a scenario of moves that show the parameters, play it in the simulation and identify from its bag",
+    )
+    parser.add_argument("--seconds", type=float, default=60.0, help="with --excite: length of the motion, default 60")
+    parser.add_argument("--seed", type=int, default=1, help="with --excite: seed of the moves, default 1")
+    parser.add_argument("--only-write", action="store_true", help="with --excite: write the scenario, play nothing")
+    parser.add_argument("--directory", type=Path, default=Path("bags"), help="with --excite: of the bag, default bags")
+    parser.add_argument("--write", type=Path, metavar="YAML", help="configuration to write, for --config or base:")
+    take_configuration(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Identify."""
+    if (given.bag is None) == (given.excite is None):
+        raise ValueError("give a bag, or --excite SCENARIO to make one")
+    configuration = configuration_of(given)
+    for option, file in (("--write", given.write), ("--excite", given.excite)):
+        if file is not None:
+            writable_file(option, file)
+    bag = given.bag
+    if given.excite is not None:
+        bag = _excite(configuration, given)
+        if bag is None:
+            return 0 if given.only_write else 130
+    run_in_bag = recorded_run(read(bag, TOPICS, may_lack=True))
+    shared = configuration.shared
+    _refuse_other_arm(run_in_bag, shared)
+    found = identify(shared, recorded_motion(run_in_bag, shared.arm))
+    print(report(shared, found, str(bag)))
+    if given.write is not None:
+        command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
+        values = model_values(shared, found, bag.name) | estimator_values(configuration)
+        write_overlay(given.write, _base(given), values, command)
+        print(f"written: {given.write}; use it with --config {given.write}, or as base: of a configuration of yours")
+    return 0
+
+
+def _refuse_other_arm(run: RecordedRun, shared: Shared) -> None:
+    """Refuse a bag of an arm with another transmission, as far as the bag has it."""
+    if "driver" not in run.parameters.nodes:
+        return
+    there = tuple(run.parameters.node("driver").get("arm.joint_from_motor", shared.arm.joint_from_motor))
+    if there != shared.arm.joint_from_motor:
+        raise ValueError(
+            f"{run.bag.path} is of an arm with joint_from_motor {list(there)}; the configuration has "
+            f"{list(shared.arm.joint_from_motor)}; give the configuration of that arm as --config"
+        )
+
+
+def _base(given: argparse.Namespace) -> str:
+    """The present configuration as the overlay names it."""
+    name: str = given.config
+    if not name.endswith((".yaml", ".yml")):
+        return name
+    return os.path.relpath(Path(name).resolve(), given.write.resolve().parent)
+
+
+def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | None:
+    """Write the scenario and play it; the bag, None where it was not played to its end."""
+    at_least("--seconds", given.seconds, 10.0)
+    at_least("--seed", given.seed, 0)
+    if not given.only_write:
+        writable_directory("--directory", given.directory)
+    text = yaml.safe_dump(scenario(configuration, given.seed, given.seconds), sort_keys=False, default_flow_style=None)
+    command = f"wam identify --excite {given.excite} --seed {given.seed} --seconds {given.seconds:g}"
+    given.excite.write_text(f"# Moves that show the arm's parameters: {command}\n{text}", encoding="utf-8")
+    print(f"written: {given.excite}; on an arm of yours: wam up --record --scenario {given.excite}", flush=True)
+    if given.only_write:
+        return None
+    name = f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    values = {
+        "nodes": [*configuration.shared.nodes, "scenario", "recorder"],
+        "timing.mode": "lockstep",
+        "timing.real_time_factor": 0.0,
+        "scenario:script": str(given.excite.resolve()),
+        "recorder:directory": str(given.directory),
+        "recorder:name": name,
+    }
+    return given.directory / name if _play(configuration.with_values(values), given.seconds) else None
+
+
+def _play(configuration: Configuration, seconds: float) -> bool:
+    """Play the scenario in lockstep and record it; False where it was interrupted.
+
+    Raises
+    ------
+    ValueError
+        where it failed.
+    """
+    stop, progress = Stop(), Progress("seconds of motion", sys.stderr)
+    if moved := move_to_free_domain(NAMESPACE):
+        print(moved, flush=True)
+    with Composition(configuration) as composition:
+        player: Any = composition.nodes["scenario"]
+        driver: Any = composition.nodes["driver"]
+
+        def is_over() -> bool:
+            progress(min(int(driver.driver.stamp / 1e9), int(seconds)), int(seconds))
+            return stop.is_set or bool(player.done)
+
+        composition.spin(is_over)
+        failure = str(player.failure) or driver.driver.safety.fault
+    if failure:
+        raise ValueError(f"the motion failed: {failure}")
+    return not stop.is_set

@@ -1,0 +1,107 @@
+"""`wam sweep`: a scenario with many parameter sets, as a table and a plot."""
+
+import argparse
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from wam_analysis.drawing import MEASURED, TRUE
+from wam_cli.commands import at_least, batch_of, configuration_of, take_batch, take_configuration, writable_file
+from wam_control.scenario import load
+from wam_description.configuration import packaged
+from wam_experiments.figures.style import panels
+from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
+
+RANDOM_RUNS = 100
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("file", type=Path, help="table to write, for example sweep.csv")
+    take_configuration(parser)
+    parser.add_argument("--scenario", default="demo_scenario", help="YAML file, or the name of one that is installed")
+    parser.add_argument(
+        "--vary",
+        action="append",
+        required=True,
+        type=_axis,
+        metavar="NAME=VALUES",
+        help="parameter and its values, for example 'force_loop:force_gain=0.005,0.01'; LOW:HIGH:N for N values that "
+        "rise by a constant factor; may be repeated",
+    )
+    kind = parser.add_mutually_exclusive_group()
+    kind.add_argument("--list", action="store_true", help="first values together, then the second ones and so on")
+    kind.add_argument("--random", action="store_true", help="draw between the two values of each parameter")
+    parser.add_argument("--runs", type=int, default=RANDOM_RUNS, help="of --random; default: %(default)s")
+    parser.add_argument("--seed", type=int, default=1, help="of --random; default: 1")
+    parser.add_argument("--picture", type=Path, help="plot of the force error over each parameter, PNG, PDF or SVG")
+    take_batch(parser)
+
+
+def run(given: argparse.Namespace) -> int:
+    """Compute what is not kept from before, write table and plot; 1 where every run failed."""
+    at_least("--runs", given.runs, 1)
+    at_least("--seed", given.seed, 0)
+    writable_file("FILE", given.file)
+    if given.picture:
+        writable_file("--picture", given.picture)
+    configuration = configuration_of(given)
+    name: str = given.scenario
+    path = Path(name) if name.endswith((".yaml", ".yml")) else packaged(name, "scenario")
+    axes: list[Axis] = given.vary
+    sets = drawn(axes, given.runs, given.seed) if given.random else listed(axes) if given.list else grid(axes)
+    runs = points(configuration, load(path, configuration.shared.arm), axes, sets)
+    with batch_of(given) as batch:
+        found = sweep(runs, *batch)
+    _write(given.file, axes, sets, found)
+    if given.picture:
+        _draw(given.picture, axes, sets, found)
+    failed = sum(bool(result.failure) for result in found)
+    print(f"{len(found)} runs, {failed} failed, in {given.file}")
+    return int(failed == len(found))
+
+
+def _axis(text: str) -> Axis:
+    name, equals, values = text.partition("=")
+    ends = values.split(":")
+    if equals and len(ends) == 3:
+        try:
+            low, high, count = float(ends[0]), float(ends[1]), int(ends[2])
+        except ValueError:
+            low, high, count = 0.0, 0.0, 0
+        if not (0.0 < low < high and count > 1):
+            raise argparse.ArgumentTypeError(f"'{values}' is no LOW:HIGH:N with 0 < LOW < HIGH and N of 2 or more")
+        return Axis(name, tuple(low * (high / low) ** (i / (count - 1)) for i in range(count)))
+    try:
+        parsed: Any = yaml.safe_load(f"[{values}]")
+    except yaml.YAMLError:
+        parsed = []
+    if not (name and parsed):
+        raise argparse.ArgumentTypeError(f"'{text}' is no NAME=VALUES; write for example servo.gain=1,2 or 1:2:5")
+    return Axis(name, tuple(parsed))
+
+
+def _write(file: Path, axes: list[Axis], sets: list[tuple[Any, ...]], found: list[SweepResult]) -> None:
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow([*(axis.name for axis in axes), *SweepResult._fields])
+        writer.writerows([*values, *result] for values, result in zip(sets, found, strict=True))
+
+
+def _draw(file: Path, axes: list[Axis], sets: list[tuple[Any, ...]], found: list[SweepResult]) -> None:
+    """One panel for each parameter; runs that failed are crosses on the axis."""
+    with panels(file, 1, len(axes), 3.6 * len(axes), 3.0) as (_, shown):
+        for i, (axis, part) in enumerate(zip(axes, shown, strict=True)):
+            values = [row[i] if isinstance(row[i], (int, float)) else str(row[i]) for row in sets]
+            rows = list(zip(values, found, strict=True))
+            good = [(value, r.force_rms) for value, r in rows if not r.failure and math.isfinite(r.force_rms)]
+            bad = [(value, 0.0) for value, r in rows if r.failure]
+            for pairs, marker, colour, label in ((good, "o", TRUE, "held"), (bad, "x", MEASURED, "failed")):
+                if pairs:
+                    across, up = zip(*pairs, strict=True)
+                    part.scatter(across, up, s=14, label=label, marker=marker, color=colour)
+            part.set(xlabel=axis.name, ylabel="rms of the settled force error, N")
+            part.legend()
