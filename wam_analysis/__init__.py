@@ -3,11 +3,12 @@
 recorded        the arm and its controllers, built from the parameters in a bag
 measures        step responses, limit cycles, friction ...: functions of arrays
 findings        the analysis behind `wam analyse`: sections of sentences and numbers, as text, HTML and JSON
+identification  from a recording of free motion to the controllers' model, behind `wam identify`
 demo_traces     forces and contacts of a run on one time base
 demo_summary    the demonstration in numbers
 demo_report     its report, as text
 demo_figure     its picture
-colours         one meaning per colour in every picture
+drawing         colours and sizes that all pictures share
 arm_picture     the arm and its obstacles from the side
 arm_render      the process that renders it with MuJoCo
 rerun_view      a bag for the Rerun viewer

@@ -20,12 +20,13 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from wam_analysis.colours import BLOCK_COLOUR, PEDESTAL_COLOUR, TUBE_COLOURS
+from wam_analysis.drawing import BLOCK_COLOUR, OBJECT_COLOUR, PEDESTAL, PEDESTAL_COLOUR, TUBE_COLOURS
 from wam_description.arm import Arm
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf, rotation_xyz
+from wam_description.mjcf_objects import hinge_name
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import Contact
+from wam_description.signals import Contact, ObjectState
 from wam_description.world import NO_SPRINGS, Obstacles, World
 
 Array = NDArray[np.float64]
@@ -33,7 +34,6 @@ Array = NDArray[np.float64]
 GL = ("egl", "osmesa")
 RENDER_TIMEOUT = 30.0  # s
 PIXELS_PER_METRE = 1500
-PEDESTAL = 0.07  # m, radius; of the drawn base, which is not in the parameters
 OUTLINE = "#3b4148"
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, base frame
 
@@ -151,12 +151,20 @@ def _faces(shape: str, size: Array) -> Iterator[tuple[Array, Array]]:
             yield corners, np.array([*(a + b), 0.0]) / np.linalg.norm(a + b)
 
 
-def side_view(arm: Arm, q: Sequence[float], obstacles: Obstacles, aspect: float, margin: float = 0.08) -> View:
+def side_view(
+    arm: Arm,
+    q: Sequence[float],
+    obstacles: Obstacles,
+    aspect: float,
+    margin: float = 0.08,
+    azimuth: float = 112.0,
+    elevation: float = -14.0,
+) -> View:
     """A view from the side and a little from above that shows arm and obstacles; aspect is width by height."""
     points = [point for tube in tubes(arm, q) for point in (tube.start, tube.end)]
     points += [corner for face in faces(obstacles) for corner in face.corners if face.shape != "plane"]
     points += [np.array([0.0, 0.0, floor_height(obstacles)])]
-    view = View(azimuth=112.0, elevation=-14.0, centre=np.zeros(3), width=1.0, height=1.0)
+    view = View(azimuth=azimuth, elevation=elevation, centre=np.zeros(3), width=1.0, height=1.0)
     projected = view.project(np.array(points))
     low, high = projected.min(axis=0), projected.max(axis=0)
     centre = ((low + high) / 2.0) @ view.axes[:2]
@@ -171,7 +179,12 @@ def floor_height(obstacles: Obstacles) -> float:
 
 
 def render(
-    arm: Arm, q: Sequence[float], obstacles: Obstacles, view: View, gl: Sequence[str] = GL
+    arm: Arm,
+    q: Sequence[float],
+    obstacles: Obstacles,
+    view: View,
+    gl: Sequence[str] = GL,
+    moved: tuple[World, Sequence[ObjectState]] | None = None,
 ) -> NDArray[np.uint8] | None:
     """The scene rendered by MuJoCo in a separate process, because a broken OpenGL can crash it.
 
@@ -180,6 +193,7 @@ def render(
     arm, q, obstacles : the scene, q in rad.
     view : the camera.
     gl : values of MUJOCO_GL to try in this order.
+    moved : the world with the states of its objects; without it the obstacles alone are drawn.
 
     Returns
     -------
@@ -187,8 +201,9 @@ def render(
         RGB; None if none of them works.
     """
     scene = {
-        "xml": mjcf(arm, 0.001, World(obstacles, NO_SPRINGS), no_effects(arm)),
+        "xml": mjcf(arm, 0.001, moved[0] if moved else World(obstacles, NO_SPRINGS), no_effects(arm)),
         "joints": dict(zip(arm.joints.names, map(float, q), strict=True)),
+        "objects": _placed(*moved) if moved else [],
         "azimuth": view.azimuth,
         "elevation": view.elevation,
         "centre": view.centre.tolist(),
@@ -199,6 +214,11 @@ def render(
         "colours": {
             **{name: to_rgb(TUBE_COLOURS[i % 2]) for i, name in enumerate(arm.covers.names)},
             **{name: to_rgb(BLOCK_COLOUR) for name in obstacles.names},
+            **{
+                name: to_rgb(OBJECT_COLOUR)
+                for name in (moved[0].objects if moved else ())
+                if name not in obstacles.names
+            },
             "pedestal": to_rgb(PEDESTAL_COLOUR),
         },
     }
@@ -224,6 +244,19 @@ def render(
                 if np.ptp(pixels) > 0:
                     return pixels
     return None
+
+
+def _placed(world: World, states: Sequence[ObjectState]) -> list[dict[str, object]]:
+    """Where the objects are, as `wam_analysis.arm_render` reads it."""
+    return [
+        {
+            "name": name,
+            "hinge": hinge_name(name) if math.isfinite(state.angle) else "",
+            "angle": state.angle if math.isfinite(state.angle) else 0.0,
+            "pose": [state.x, state.y, state.z, state.qw, state.qx, state.qy, state.qz],
+        }
+        for name, state in zip(world.objects, states, strict=True)
+    ]
 
 
 def draw(axes: Axes, arm: Arm, q: Sequence[float], obstacles: Obstacles, view: View) -> None:

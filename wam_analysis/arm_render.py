@@ -24,6 +24,14 @@ def _render(scene: dict[str, Any]) -> np.ndarray:
     data = mujoco.MjData(model)
     for joint, angle in scene["joints"].items():
         data.joint(joint).qpos[0] = angle
+    for placed in scene["objects"]:
+        body = model.body(placed["name"])
+        if placed["hinge"]:
+            data.joint(placed["hinge"]).qpos[0] = placed["angle"]
+        elif body.mocapid[0] >= 0:
+            data.mocap_pos[body.mocapid[0]] = placed["pose"][:3]
+        else:
+            data.qpos[model.jnt_qposadr[body.jntadr[0]] :][:7] = placed["pose"]
     mujoco.mj_kinematics(model, data)
     mujoco.mj_camlight(model, data)
     camera = mujoco.MjvCamera()

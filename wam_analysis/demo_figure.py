@@ -15,9 +15,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
-from wam_analysis.colours import COMMANDED, ESTIMATED, MEASURED, TRUE
 from wam_analysis.demo_summary import DemoSummary, StepContact
 from wam_analysis.demo_traces import ForceSignal, Numbers, Traces
+from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, TRUE
 from wam_analysis.recorded import RecordedArm
 from wam_description.arm import Arm
 from wam_description.signals import Contact
@@ -26,7 +26,6 @@ from wam_sim.recording import RecordedStep
 DPI = 200
 SIZE = (10.0, 4.3)  # inches
 INK = "#222222"
-METRES_PER_NEWTON = 0.015
 STYLE: Any = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",

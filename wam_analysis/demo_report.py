@@ -37,7 +37,7 @@ def report(bag: Path) -> str:
     Returns
     -------
     str
-        tables and verdict, at most 100 columns wide.
+        verdict and tables, at most 100 columns wide.
 
     Raises
     ------
@@ -71,12 +71,13 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     """
     lines = [line for lost in summary.lost for line in _wrapped(f"INCOMPLETE: {lost}")]
     lines += _wrapped(f"Demonstration of {summary.namespace or '/'}: {_played(summary)}")
+    worst = "Result, worst case in brackets" + (", for what is left of the recording" if summary.lost else "")
+    lines += ["", worst, *(f"  {answer}" for answer in verdict(summary).split(" | "))]
     lines += ["", *_presses(summary.presses), "", *_touches(summary.touches, summary.period)]
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
     lines += [line for note in (*summary.notes, *notes) for line in _wrapped(f"Note     {note}")]
-    worst = "Result, worst case in brackets" + (", for what is left of the recording" if summary.lost else "")
-    return "\n".join([*lines, "", worst, f"  {verdict(summary)}"])
+    return "\n".join(lines)
 
 
 def verdict(summary: DemoSummary) -> str:

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.arm_picture import side_view
-from wam_analysis.colours import COLOURS, channels
-from wam_analysis.demo_figure import METRES_PER_NEWTON
 from wam_analysis.demo_traces import ForceSignal
+from wam_analysis.drawing import COLOURS, METRES_PER_NEWTON, channels
 from wam_analysis.findings.analysed_run import AnalysedRun, by_names
 from wam_analysis.findings.timing import STAMPED
 from wam_analysis.recorded import RecordedArm, recorded_arm

@@ -2,6 +2,7 @@
 
 - snapshot: what the page shows at one instant
 - scene: the three-dimensional picture: links, surroundings, contact arrows, dragging a link
+- object_meshes: free bodies, doors and moving obstacles in that picture
 - panel: status, buttons, sliders and plots
 - page: the web server that holds both, reachable from this machine alone
 - stack_source: a running stack as the source

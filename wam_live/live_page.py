@@ -7,18 +7,16 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from rcl_interfaces.srv import SetParameters as SetParametersService
 from rclpy.node import Node
-from rclpy.parameter import Parameter
-from std_srvs.srv import SetBool, Trigger
 
 from wam_description.arm import Shared
-from wam_description.parameters import build, build_part, fields
+from wam_description.parameters import build_part
 from wam_description.signals import Wrench
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
-from wam_description.world import Obstacles
+from wam_description.world import World
 from wam_live.hold import HeldTopic
+from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import quiet, serve
 from wam_live.panel import NO_PRESS, SLIDERS, Controls, Press, Request, mode_of
 from wam_live.scene import RELEASE, LinkPush, Scene
@@ -27,6 +25,7 @@ from wam_live.stack_source import RunningStack
 from wam_ros.messages import message_type
 from wam_ros.qos import qos
 from wam_ros.remote_parameters import RemoteParameters
+from wam_ros.requests import refusal_of, service_request
 from wam_ros.run import Connection
 from wam_ros.wire import stamp_of
 
@@ -46,10 +45,11 @@ class LivePage:
 
     Attributes
     ----------
-    scene, panel : what the page shows, None before the stack has answered.
+    scene, objects, panel : what the page shows, None before the stack has answered.
     """
 
     scene: Scene | None = None
+    objects: ObjectMeshes | None = None
     panel: Controls | None = None
 
     def __init__(self, namespace: str, port: int, say: Callable[[str], None], domain_id: int | None = None) -> None:
@@ -57,7 +57,7 @@ class LivePage:
         self._connection = Connection(domain_id=domain_id)
         self._asking = Node("live", context=self._connection.context, namespace=namespace)
         self._connection.add(self._asking)
-        self._clients: dict[tuple[str, str], Any] = {}
+        self._clients: dict[tuple[str, Any], Any] = {}  # by name and type
         self._server: Any = None
         self._press: Press | None = None
         self._push: LinkPush | None = None
@@ -72,18 +72,18 @@ class LivePage:
             flat = self._parameters(until)
             if flat is None:
                 return
-            names = {field.name.partition(".")[0] for field in fields(Shared)}
             driver = flat["driver"]
-            shared = build(Shared, {k: v for k, v in driver.items() if k.partition(".")[0] in names})
-            obstacles = build_part(Obstacles, driver, "world.obstacles.")
+            shared = build_part(Shared, driver)
+            world = build_part(World, driver, "world.")
             source = RunningStack(self._connection.context, self._namespace, shared)
             self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
-            self.scene = scene = Scene(self._server, shared.arm, obstacles, self._take_push)
+            self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
+            self.objects = objects = ObjectMeshes(self._server, world)
             self._live = {key: flat[key[0]][key[1]] for key in SLIDERS if key[1] in flat.get(key[0], {})}
             self.panel = panel = Controls(self._server, shared.arm, self._live)
             self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
             self._say(f"live page: http://{self._server.get_host()}:{self._port}")
-            self._draw(source, scene, panel, until)
+            self._draw(source, scene, objects, panel, until)
             self._release(source.stamp)
         finally:
             self.close()
@@ -107,7 +107,14 @@ class LivePage:
                 return asked.found
         return None
 
-    def _draw(self, source: RunningStack, scene: Scene, panel: Controls, until: Callable[[], bool]) -> None:
+    def _draw(
+        self,
+        source: RunningStack,
+        scene: Scene,
+        objects: ObjectMeshes,
+        panel: Controls,
+        until: Callable[[], bool],
+    ) -> None:
         count, next_time = 0, time.monotonic()
         while not until():
             next_time = max(next_time + 1.0 / RATE, time.monotonic())
@@ -116,6 +123,7 @@ class LivePage:
             snapshot = source.snapshot()
             with self._server.atomic():
                 scene.show(snapshot)
+                objects.show(snapshot.objects)
                 pushing = scene.drag()
                 if count % PANEL_EVERY == 0:
                     panel.show(snapshot, pushing)
@@ -193,15 +201,7 @@ class LivePage:
                 self._end_press()
                 panel.say("letting go")
             return
-        if isinstance(request, SetParameters):
-            kind: Any = SetParametersService
-            service = f"{request.node}/set_parameters"
-            sent = [Parameter(name, value=value).to_parameter_msg() for name, value in request.values.items()]
-            message: Any = SetParametersService.Request(parameters=sent)
-        else:
-            kind = Trigger if request.data is None else SetBool
-            service = f"{request.node}/{request.service}"
-            message = Trigger.Request() if request.data is None else SetBool.Request(data=request.data)
+        service, kind, message = service_request(request)
         if (service, kind) not in self._clients:
             self._clients[service, kind] = self._asking.create_client(kind, service)
             self._clients[service, kind].wait_for_service(0.5)
@@ -212,10 +212,10 @@ class LivePage:
         client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result(), panel))
 
     def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls) -> None:
+        reasons = refusal_of(request, answer)
         if isinstance(request, Call):
             panel.say(answer.message, refused=not answer.success)
             return
-        reasons = "; ".join(result.reason for result in answer.results if not result.successful)
         for name, value in request.values.items():
             if reasons:
                 panel.set_slider(request.node, name, self._live[request.node, name])

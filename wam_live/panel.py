@@ -11,7 +11,7 @@ import numpy as np
 import viser
 from viser import uplot
 
-from wam_analysis.colours import COLOURS
+from wam_analysis.drawing import COLOURS
 from wam_description.arm import Arm
 from wam_description.signals import BASE, Level, NodeStatus, Triple
 from wam_description.wiring import Call, SetParameters

@@ -12,9 +12,11 @@ from wam_analysis.demo_traces import ForceSignal
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.rerun_view import joint_motion
-from wam_bag.bag import TableColumns
+from wam_bag.bag import BagError, TableColumns
 from wam_control.contact_table import contact_of, likely_of
-from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, NodeStatus
+from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, NodeStatus, ObjectState
+from wam_description.world import NO_SPRINGS, World
+from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import quiet, serve
 from wam_live.panel import POINTS, WINDOW, Controls
 from wam_live.scene import Scene
@@ -41,6 +43,10 @@ class BagSource:
 
     def __init__(self, recording: AnalysedRun) -> None:
         self.recorded = recorded_arm(recording.run.parameters)
+        try:
+            self.world = recording.run.parameters.part("driver", World, "world.")
+        except BagError:  # a bag without parameters
+            self.world = World(self.recorded.obstacles, NO_SPRINGS)
         joints = joint_motion(recording, self.recorded.arm)
         if joints is None or not len(joints[0]):
             raise ValueError(f"{recording.bag.path} has no joint states of this arm; nothing can be shown")
@@ -59,6 +65,7 @@ class BagSource:
             self._likely = [likely_of(table, self._covers) for table in read]
             self._estimated = [contact_of(table, self._covers) for table in read]
             self._likely_stamps = columns.stamp_ns.tolist()
+        self._objects = recording.bag.topics.get(f"{recording.namespace}/sim/objects")
         self.begin, self.end = int(self._stamps[0]), int(self._stamps[-1])
 
     def snapshot(self, stamp: int) -> Snapshot:
@@ -78,7 +85,16 @@ class BagSource:
             commanded=float(traces.commanded.size[row]) if known else NAN,
             measured=float(traces.measured.size[row]) if known else NAN,
             statuses={status.node: status for status in self._statuses[:until]},
+            objects=self._objects_at(stamp),
         )
+
+    def _objects_at(self, stamp: int) -> tuple[ObjectState, ...]:
+        """The objects of the world at a time of the arm, ns; none where they were not recorded."""
+        found = self._objects
+        if not isinstance(found, TableColumns) or not found.columns:
+            return ()
+        there = found.message == max(int(np.searchsorted(found.stamp_ns, stamp, side="right")) - 1, 0)
+        return tuple(map(ObjectState._make, zip(*(found.columns[name][there] for name in ObjectState._fields))))  # noqa: B905 - columns of one table
 
     def past(self, stamp: int) -> Iterator[Snapshot]:
         """What the plots show before a time of the arm, ns, oldest first."""
@@ -110,7 +126,8 @@ def play(
     source = BagSource(recording)
     server = serve(port)
     try:
-        scene = Scene(server, source.recorded.arm, source.recorded.obstacles, None)
+        scene = Scene(server, source.recorded.arm, at_rest(source.world), None)
+        objects = ObjectMeshes(server, source.world)
         length = (source.end - source.begin) / 1e9
         place, then = min(max(at or 0.0, 0.0), length), time.monotonic()
         slider = server.gui.add_slider("time [s]", 0.0, max(length, 0.01), 0.01, place)
@@ -141,6 +158,7 @@ def play(
                 snapshot = source.snapshot(source.begin + round(place * 1e9))
                 with server.atomic():
                     scene.show(snapshot)
+                    objects.show(snapshot.objects)
                     panel.show(snapshot)
     finally:
         with quiet():

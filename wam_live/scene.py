@@ -13,16 +13,22 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
-from wam_analysis.colours import BLOCK_COLOUR, COLOURS, PEDESTAL_COLOUR, TUBE_COLOURS, channels
+from wam_analysis.drawing import (
+    BLOCK_COLOUR,
+    COLOURS,
+    METRES_PER_NEWTON,
+    PEDESTAL,
+    PEDESTAL_COLOUR,
+    TUBE_COLOURS,
+    channels,
+)
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, Contact, LikelyRange, Triple
 from wam_description.world import Obstacles
 from wam_live.snapshot import Snapshot, size
 
-METRES_PER_NEWTON = 0.015
 LONGEST_ARROW = 0.6  # m
-PEDESTAL = 0.07  # m, radius of the drawn base, which is not in the parameters
 STIFFNESS = 60.0  # N/m, of the rubber band between the pointer and the link
 STRONGEST = 40.0  # N, that a drag pushes with
 BANDS = 4  # parts of the 90 % set that are drawn

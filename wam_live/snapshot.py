@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from wam_description.signals import NO_CONTACT, Contact, LikelyRange, NodeStatus, Triple
+from wam_description.signals import NO_CONTACT, Contact, LikelyRange, NodeStatus, ObjectState, Triple
 
 NAN = math.nan
 
@@ -20,6 +20,7 @@ class Snapshot(NamedTuple):
     commanded, measured : size of the force of the arm on the world, N, NaN where there is none.
     statuses : of the nodes, by name.
     real_time_factor : simulated time per wall time, NaN where it is not known.
+    objects : of the world, in the order of `World.objects`; none where they are not known.
     """
 
     stamp: int = 0
@@ -31,6 +32,7 @@ class Snapshot(NamedTuple):
     measured: float = NAN
     statuses: dict[str, NodeStatus] = {}  # noqa: RUF012 - never changed
     real_time_factor: float = NAN
+    objects: tuple[ObjectState, ...] = ()
 
     @property
     def seconds(self) -> float:

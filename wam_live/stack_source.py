@@ -12,7 +12,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from wam_control.contact_table import contact_of, likely_of
 from wam_description.arm import Shared
-from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, State, Table
+from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, ObjectState, State, Table
 from wam_description.topics import BY_NAME, STATUS
 from wam_live.snapshot import NAN, Snapshot, size
 from wam_ros.messages import Refused, message_type, read_status
@@ -23,6 +23,7 @@ TOPICS: Final = (
     "sim/joint_states",
     "sim/contact/wrench",
     "sim/contact/point",
+    "sim/objects",
     "contact/hypotheses",
     "force_command",
     "force_measured",
@@ -92,6 +93,7 @@ class RunningStack:
             measured=self._force("force_measured"),
             statuses=self.statuses,
             real_time_factor=self._real_time_factor(),
+            objects=objects_of(self._newest.get("sim/objects")),
         )
 
     @property
@@ -116,6 +118,11 @@ class RunningStack:
                 self._factor = (self.stamp - stamp) / 1e9 / (now - then)
             self._pace = now, self.stamp
         return self._factor
+
+
+def objects_of(table: Table | None) -> tuple[ObjectState, ...]:
+    """The states in a table of objects."""
+    return tuple(ObjectState._make(row) for row in table.rows) if table else ()
 
 
 def _taken(subscription: Any, raw: bool) -> Any:

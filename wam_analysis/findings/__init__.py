@@ -4,12 +4,19 @@ analysis               reads a bag and makes all sections
 analysed_run           a bag prepared for analysis, with the forces that were held
 finding                one number with its prediction; a section
 held_force             each commanded force: measures and predictions
-force                  sections about force, stability and contact
+force                  sections about force and stability
+swinging               cycles of motors and joints where no force was recorded
+contact                section about contacts, estimated and true
 prediction             the friction node at the contact and what chapter 5 predicts for it
 guarded                the stability guard on a recorded press
 transmission_signals   motors, cables and joints on one time base
-motion                 sections about stick and slip, friction, ripple and power
+motion                 sections about stick and slip, friction and ripple
+power                  section about efficiency and backdrivability
+other_robots           joints and forces of another robot, and their friction
 frequency              section about the velocity loops
 timing                 section about the loop, and provenance
+tabulated              tables of subjects and quantities
+signals                the signals that the pictures show
+charts                 pictures of the page that can be zoomed
 text, page, plots      the analysis as text and JSON, as HTML, and its pictures
 """

@@ -5,13 +5,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
+from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.finding import Section, shown, times
-from wam_analysis.findings.force import contact_section, cycle_section, force_section
+from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.held_force import HeldForce, held_forces
 from wam_analysis.findings.motion import MotionFindings, motion_sections
+from wam_analysis.findings.other_robots import friction_of_others, signals_of_others
+from wam_analysis.findings.swinging import cycles_of_others
 from wam_analysis.findings.timing import extent, provenance, timing_section
 from wam_bag.bag import Bag, JointColumns, WrenchColumns, read
 
+LONGEST = 160  # characters of a note on the parameters
 Progress = Callable[[str], None]
 
 # the topics that are analysed; reading others would only cost time
@@ -37,7 +41,7 @@ class Analysis(NamedTuple):
     recording, held, motion : what the sections are made from, for the pictures.
     duration : s.
     provenance : origin of the bag and of the numbers.
-    sections : one for each subject; "happened" is the first.
+    sections : one for each subject; "verdict" is the first.
     """
 
     recording: AnalysedRun
@@ -74,19 +78,32 @@ def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
     progress("forces and contacts")
     recording = analysed_run(bag)
     held = held_forces(recording)
-    forces = force_section(recording, held), cycle_section(recording, held), contact_section(recording)
+    foreign = _foreign(bag)
+    others = signals_of_others(bag) if foreign else {}
+    if foreign:
+        middle: tuple[Section, ...] = (cycles_of_others(others),)
+    else:
+        middle = (force_section(recording, held), cycle_section(recording, held), contact_section(recording))
     progress("friction, ripple, power and frequency")
     motion = motion_sections(recording)
+    moved = motion.sections if not foreign else (*motion.sections[:1], friction_of_others(others))
     progress("timing")
     timing = timing_section(recording)
     duration = extent(bag.topics)
-    sections = (_happened(recording, duration), *forces, *motion.sections, timing)
-    return Analysis(recording, held, motion, duration, provenance(recording), sections)
+    sections = (_happened(recording, duration, foreign), *middle, *moved, timing)
+    return Analysis(recording, held, motion, duration, provenance(recording), (_verdict(sections), *sections))
 
 
-def _happened(recording: AnalysedRun, duration: float) -> Section:
+def _verdict(sections: tuple[Section, ...]) -> Section:
+    """What every section says of importance, in a few sentences."""
+    said = [sentence for section in sections for sentence in section.verdict]
+    silent = "No force, contact, cycle or fault was recorded that could be evaluated."
+    return Section("verdict", "Verdict", tuple(said) or (silent,), ())
+
+
+def _happened(recording: AnalysedRun, duration: float, foreign: list[str]) -> Section:
     """What happened, in a few sentences."""
-    summary, bag = recording.summary, recording.bag
+    summary = recording.summary
     sentences = [f"INCOMPLETE: {line}" for line in summary.lost]
     sentences.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {recording.mode}.")
     if summary.steps:
@@ -100,14 +117,21 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
         sentences.append(f"It touched something in {_count(len(touches), 'step')}.")
     faults = [note for note in summary.notes if note.startswith("driver fault")]
     sentences += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
-    foreign = _foreign(bag)
-    if foreign:
-        sentences += foreign
+    sentences += foreign
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
-    sentences += [f"{note[0].upper()}{note[1:]}." for note in recording.run.parameters.notes]
+    sentences += [_brief(f"{note[0].upper()}{note[1:]}.") for note in recording.run.parameters.notes]
     lacking = recording.lacking("motor_states", "joint_states", "force_command", "contact/wrench", "status")
-    return Section("happened", "What happened", tuple(sentences), (), lacking)
+    verdict = [f"INCOMPLETE: {line}" for line in summary.lost]
+    verdict += [f"STOPPED: {fault}." for fault in faults]
+    if summary.steps and summary.outcome != "done" and not faults:
+        verdict.append(f"Of the scenario: {summary.outcome}.")
+    return Section("happened", "What happened", tuple(sentences), (), lacking, tuple(verdict))
+
+
+def _brief(note: str) -> str:
+    """A note on the parameters in one line; the whole of it is in the provenance."""
+    return note if len(note) <= LONGEST else f"{note[:LONGEST].rpartition(',')[0]}, ... (all under Provenance)."
 
 
 def _count(number: int, name: str) -> str:

@@ -3,17 +3,21 @@
 import math
 from typing import NamedTuple
 
+NEGLECTED = 2e-3  # of a prediction: what its fit neglects, where a recording without noise has next to no error
+SIGMAS = 3.0  # standard errors by which a number may differ from its prediction
+
 
 class Finding(NamedTuple):
     """One number.
 
     Attributes
     ----------
-    name : what it is, with the part of the arm.
+    name : 'subject: quantity', or the quantity alone.
     unit : '' for a pure number.
     measured : from the recording; NaN if it could not be measured.
     predicted : by the theory for the recorded parameters; NaN if there is no prediction.
     note : qualification of either, '' if there is none.
+    error : standard error of `measured`; NaN if it is not known.
     """
 
     name: str
@@ -21,6 +25,23 @@ class Finding(NamedTuple):
     measured: float
     predicted: float = math.nan
     note: str = ""
+    error: float = math.nan
+
+    @property
+    def subject(self) -> str:
+        """The hold, motor, joint or topic; '' for none."""
+        return self.name.rpartition(": ")[0]
+
+    @property
+    def quantity(self) -> str:
+        """What was measured."""
+        return self.name.rpartition(": ")[2]
+
+    @property
+    def deviates(self) -> bool:
+        """Whether it differs from its prediction by more than three standard errors."""
+        error = math.hypot(self.error, NEGLECTED * self.predicted)
+        return bool(abs(self.measured - self.predicted) > SIGMAS * error)  # not with NaN
 
 
 class Section(NamedTuple):
@@ -33,6 +54,7 @@ class Section(NamedTuple):
     sentences : sentences, the most important first.
     findings : numbers.
     lacking : topics that are not in the bag and would add to the section.
+    verdict : what of it belongs to the verdict, the worst first.
     """
 
     key: str
@@ -40,6 +62,20 @@ class Section(NamedTuple):
     sentences: tuple[str, ...]
     findings: tuple[Finding, ...]
     lacking: tuple[str, ...] = ()
+    verdict: tuple[str, ...] = ()
+
+
+def deviations(findings: tuple[Finding, ...]) -> tuple[str, ...]:
+    """A sentence on the numbers that differ from their predictions by more than three standard errors, or none."""
+    found = [one for one in findings if one.deviates]
+    if not found:
+        return ()
+    found.sort(key=lambda one: -abs(one.measured - one.predicted) / max(abs(one.predicted), 1e-300))
+    words = [
+        f"{one.name} {shown(one.measured)} +- {shown(one.error, one.unit)}, predicted {shown(one.predicted)}"
+        for one in found
+    ]
+    return (f"More than {SIGMAS:g} standard errors from the prediction: {'; '.join(words)}.",)
 
 
 def shown(value: float, unit: str = "") -> str:

@@ -1,20 +1,19 @@
-"""Sections about force: how it was reached and held, stability and limit cycles, contacts."""
+"""Sections about force: how it was reached and held, stability and limit cycles."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED
 from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.guarded import Guarded
 from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import CYCLING, HeldForce
 from wam_analysis.findings.prediction import LargestForce
+from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
-from wam_analysis.measures.runs import runs
 from wam_analysis.measures.stability import StabilityVerdict
 from wam_control.stability_guard import LARGEST
 
@@ -32,7 +31,23 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     if not held:
         sentences.append("No constant force was commanded.")
     range_said, range_findings = _dynamic_range(held)
-    return Section("force", "Force", (*sentences, *range_said), (*findings, *range_findings), lacking)
+    verdict = _forces_verdict(held)
+    return Section("force", "Force", (*sentences, *range_said), (*findings, *range_findings), lacking, verdict)
+
+
+def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
+    """How far the held forces were from the commanded ones, in a sentence."""
+    known = [(one, accuracy.bias) for one in held if math.isfinite((accuracy := _accuracy(one)).bias)]
+    if not known:
+        return ()
+    worst, bias = max(known, key=lambda item: abs(item[1]) / item[0].hold.commanded)
+    whose = "true" if len(worst.true) else "measured"
+    text = (
+        f"{len(known)} of {len(held)} commanded forces were recorded; the worst {whose} one in the steady state is "
+        f"{100.0 * bias / worst.hold.commanded:+.1f} % off ({worst.hold.name}, "
+        f"{shown(worst.hold.commanded, 'N')} commanded)."
+    )
+    return (text,)
 
 
 def _dynamic_range(held: Sequence[HeldForce]) -> tuple[list[str], list[Finding]]:
@@ -124,7 +139,7 @@ def _press_findings(one: HeldForce) -> list[Finding]:
     ):
         if there:
             found += [
-                Finding(f"{name}: bias of the {whose} force", "N", accuracy.bias, 0.0, "integral control"),
+                Finding(f"{name}: bias of the {whose} force", "N", accuracy.bias),
                 Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
             ]
     return found
@@ -134,17 +149,27 @@ def cycle_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     """Stability and limit cycles of the force loop, compared with chapter 5."""
     sentences: list[str] = []
     findings: list[Finding] = []
+    verdict: list[str] = []
     seen: set[str] = set()
     for one in held:
         sentences += [sentence for sentence in _cycle_sentences(one) if sentence not in sentences]
+        verdict += filter(None, [_fate(one)[1]])
         findings += [*_cycle_findings(one), *_theory_findings(one, seen)]
     if not held:
         sentences.append("No constant force was commanded, so stability cannot be evaluated.")
-    return Section("stability", "Stability and limit cycles", tuple(sentences), tuple(findings))
+    settled = sum(one.is_recorded and one.stability.verdict is StabilityVerdict.SETTLES for one in held)
+    if settled and not verdict:
+        verdict.append(f"{settled} of {len(held)} forces settle, none cycles.")
+    return Section("stability", "Stability and limit cycles", tuple(sentences), tuple(findings), (), tuple(verdict))
 
 
-def _cycle_sentences(one: HeldForce) -> list[str]:
-    name, cycle, predicted, verdict = one.hold.name, one.cycle, one.predicted, one.stability
+def _fate(one: HeldForce) -> tuple[str, str]:
+    """A sentence on whether the force settles or cycles, and the same for the verdict ('' where all is well)."""
+    name, cycle, verdict = one.hold.name, one.cycle, one.stability
+    if not one.is_recorded:
+        if one.swinging is not None:
+            return swinging_words(name, one.swinging)
+        return f"{name}: neither the force nor a motor or joint was recorded; its stability is not known.", ""
     words = {
         StabilityVerdict.SETTLES: "settles",
         StabilityVerdict.CYCLES: "oscillates with constant amplitude",
@@ -152,6 +177,7 @@ def _cycle_sentences(one: HeldForce) -> list[str]:
         StabilityVerdict.UNDECIDED: "is recorded too briefly to decide on its stability",
     }
     text = f"{name}: the force {words[verdict.verdict]}"
+    is_bad = verdict.verdict in (StabilityVerdict.CYCLES, StabilityVerdict.DIVERGES)
     if cycle.confidence >= SURE and cycle.peak_to_peak > SEEN * one.hold.commanded:
         if verdict.verdict is not StabilityVerdict.DIVERGES:
             text = f"{name}: the force oscillates"
@@ -159,9 +185,15 @@ def _cycle_sentences(one: HeldForce) -> list[str]:
             f"; limit cycle of {shown(cycle.peak_to_peak, 'N')} peak to peak, period {shown(cycle.period, 's')} "
             f"(confidence {cycle.confidence:.2f})"
         )
+        is_bad = True
     else:
         text += "; no limit cycle detected"
-    sentences = [text + "."]
+    return f"{text}.", f"{text}." if is_bad else ""
+
+
+def _cycle_sentences(one: HeldForce) -> list[str]:
+    predicted = one.predicted
+    sentences = [_fate(one)[0]]
     if one.guarded is not None:
         sentences.append(guard_sentence(one.guarded))
     if predicted is not None and math.isfinite(predicted.gamma):
@@ -190,19 +222,24 @@ def _cycle_findings(one: HeldForce) -> list[Finding]:
     force = period = soft_force = soft_period = math.nan
     note = ""
     if predicted is not None:
-        force, period = predicted.force_peak_to_peak, predicted.period
+        if math.isfinite(predicted.period):
+            force, period = predicted.force_peak_to_peak, predicted.period
         soft_force, soft_period = predicted.driven_peak_to_peak, predicted.driven_period
         note = "(5.8), (5.9) corrected" + (
             "" if predicted.is_certain else "; (5.11) is not small, so they are approximate"
         )
     soft = f"with the velocity loops in series, {shown(soft_force, 'N')}; " if math.isfinite(soft_force) else ""
     slow = f"with the velocity loops in series, {shown(soft_period, 's')}" if math.isfinite(soft_period) else ""
-    size, time = (cycle.peak_to_peak, cycle.period) if seen else (0.0, math.nan)
+    size, time, sure = (cycle.peak_to_peak, cycle.period, cycle.confidence) if seen else (math.nan,) * 3
     return [
         Finding(f"{name}: limit cycle, peak to peak", "N", size, force, soft + note),
         Finding(f"{name}: period of the limit cycle", "s", time, period, slow),
-        Finding(f"{name}: confidence of the limit cycle", "", cycle.confidence),
-        Finding(f"{name}: growth per half cycle", "", one.stability.growth, note=str(one.stability.verdict)),
+        Finding(f"{name}: confidence of the limit cycle", "", sure),
+        *(
+            swinging_findings(name, one.swinging)
+            if one.swinging is not None
+            else [Finding(f"{name}: growth per half cycle", "", one.stability.growth, note=str(one.stability.verdict))]
+        ),
     ]
 
 
@@ -218,10 +255,11 @@ def _theory_findings(one: HeldForce, seen: set[str]) -> list[Finding]:
     if predicted is None:
         return found
     actuator = 1e3 * predicted.actuator_peak_to_peak
+    moved = 1e3 * one.moved_at_contact
     ideal = "for an ideal velocity source, without friction"
     return [
         *found,
-        Finding(f"{name}: actuator cycle at the contact, peak to peak", "mm", math.nan, actuator, "(5.20)"),
+        Finding(f"{name}: actuator cycle at the contact, peak to peak", "mm", moved, actuator, "(5.20)"),
         Finding(f"{name}: gamma", "", math.nan, predicted.gamma, f"(5.15), {ideal}"),
         Finding(
             f"{name}: largest stable gain, continuous", "m/s/N", math.nan, predicted.routh_gain, f"(5.15), {ideal}"
@@ -247,51 +285,3 @@ def _margin_findings(name: str, found: Guarded | None) -> list[Finding]:
         label = f"{name}: largest stable gain, with the velocity loops"
         sentences.append(Finding(label, "m/s/N", math.nan, scale * found.gain, "sampled; no friction"))
     return sentences
-
-
-def contact_section(recording: AnalysedRun) -> Section:
-    """Estimated contacts, compared with the true ones."""
-    summary = recording.summary
-    traces = summary.traces
-    lacking = recording.lacking("contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point")
-    sentences, findings = [], []
-    for touch in summary.touches:
-        if NOT_RECORDED in (touch.link_true, touch.link_estimated):
-            continue
-        missed = touch.link_estimated in ("base", NO_LINK, "")
-        text = f"{touch.step}: contact of {touch.link_true} with {shown(touch.force_true, 'N')}"
-        text += ", missed" if missed else f"; estimated on {touch.link_estimated}"
-        if math.isfinite(touch.force_estimated):
-            text += f" with {shown(touch.force_estimated, 'N')}"
-        if touch.reason:
-            text += f" ({touch.reason})"
-        elif math.isfinite(touch.position_estimated):
-            text += f", position error {100.0 * abs(touch.position_estimated - touch.position_true):.1f} cm"
-        sentences.append(text + ".")
-    true, sensed = traces.true, traces.estimated
-    known = true.is_known & sensed.is_known
-    touching = known & true.acts
-    if np.any(touching):
-        both = touching & sensed.acts & (sensed.frame == true.frame)
-        position = np.abs(sensed.position - true.position)[both]
-        position = position[np.isfinite(position)]
-        force = np.linalg.norm(sensed.force - true.force, axis=1)[both]
-        findings += [
-            Finding("contact on the right link", "%", 100.0 * float(np.mean(both[touching])), 100.0),
-            Finding(
-                "position error, median", "cm", 100.0 * float(np.median(position)) if len(position) else math.nan, 0.0
-            ),
-            Finding("force error, median", "N", float(np.median(force)) if len(force) else math.nan, 0.0),
-        ]
-    if np.any(known):
-        false = known & sensed.acts & ~true.acts
-        count = len(runs(false))
-        seconds = float(np.sum(false)) * summary.period
-        findings.append(Finding("false detections", "s", seconds, 0.0, times(count)))
-        if count:
-            sentences.append(f"False detections: {count}, {shown(seconds, 's')} in all.")
-    elif np.any(sensed.is_known):
-        sentences.append(f"Contact was detected {times(len(runs(sensed.acts)))}; the true contact is not in this bag.")
-    if not sentences:
-        sentences.append("No contact was recorded.")
-    return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking)

@@ -12,11 +12,13 @@ from wam_analysis.demo_traces import ForceSignal
 from wam_analysis.findings.analysed_run import AnalysedRun, Hold, by_names
 from wam_analysis.findings.guarded import Guarded, guarded
 from wam_analysis.findings.prediction import LargestForce, Node, Predicted, largest_force, node_at, predict
+from wam_analysis.findings.swinging import Swinging, at_the_contact, swinging
 from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.stability import Stability, StabilityVerdict, stability
+from wam_description.transmission_map import TransmissionMap
 
 Numbers = NDArray[np.float64]
 
@@ -46,6 +48,8 @@ class HeldForce(NamedTuple):
     node, predicted, largest : by theory; None if the bag has too few parameters.
     guarded : by the stability guard; None likewise.
     position : of the contact, m.
+    swinging : of a motor or joint, where neither the measured nor the true force was recorded; None otherwise.
+    moved_at_contact : size of its cycle as a motion of the contact along the force, m; NaN if it is not known.
     """
 
     hold: Hold
@@ -64,6 +68,13 @@ class HeldForce(NamedTuple):
     largest: LargestForce | None
     guarded: Guarded | None
     position: float
+    swinging: Swinging | None
+    moved_at_contact: float
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether a force was recorded."""
+        return bool(len(self.measured) or len(self.true))
 
 
 def held_forces(recording: AnalysedRun) -> tuple[HeldForce, ...]:
@@ -88,6 +99,7 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
     theory = _theory(recording, hold, cover, position)
+    swung = None if len(measured) or len(true) else swinging(recording, hold)
     return HeldForce(
         hold=hold,
         time=time,
@@ -105,7 +117,16 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
         largest=theory.largest,
         guarded=theory.guarded,
         position=position,
+        swinging=swung,
+        moved_at_contact=_moved(recording, theory.node, swung),
     )
+
+
+def _moved(recording: AnalysedRun, node: Node | None, found: Swinging | None) -> float:
+    arm = recording.parameters.arm
+    if arm is None or node is None or found is None or found.swings.verdict is not StabilityVerdict.CYCLES:
+        return math.nan
+    return at_the_contact(found, arm.motors.names, TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre)
 
 
 def _measured(recording: AnalysedRun, hold: Hold) -> tuple[Numbers, Numbers]:

@@ -1,4 +1,4 @@
-"""Sections about the transmission: stick and slip, friction, ripple, power."""
+"""Sections about the transmission: stick and slip, friction, ripple."""
 
 import math
 from typing import NamedTuple
@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.findings.finding import Finding, Section, deviations, shown, times
 from wam_analysis.findings.frequency import frequency_section
+from wam_analysis.findings.power import power_section
 from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals, transmission_signals
-from wam_analysis.measures.efficiency import efficiency
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases
@@ -28,7 +28,8 @@ FAINT = 3.0  # times the median order; smaller ripple is not reported
 SLIGHT = 0.05  # of the dry friction; smaller ripple is not reported either
 UNSURE = 0.25  # of a friction; with a larger standard error it is not identifiable
 NOT_IDENTIFIABLE = "not identifiable"
-LEAST_WORK = 1e-3  # J below which no efficiency is given
+DROWNED = 10.0  # times the torque of the cables; rotors that take more hide every loss
+IMPOSSIBLE = 3.0  # standard errors below zero
 
 
 class MotionFindings(NamedTuple):
@@ -50,17 +51,38 @@ def motion_sections(recording: AnalysedRun) -> MotionFindings:
         why = "no parameters of the arm" if arm is None else "no motor_states with a load"
         sentences = (f"Friction, ripple and power cannot be evaluated: {why} in this bag.",)
         return MotionFindings((stick, Section("friction", "Friction", sentences, (), lacking)), None, {}, {})
-    friction = _friction_of_motors(signals, arm)
     joints = _friction_of_joints(signals, arm)
+    drowned = _drowned(signals, arm)
+    if drowned:
+        about = _friction_section(recording, arm, signals, {}, joints)
+        about = about._replace(sentences=(drowned, *about.sentences))
+        return MotionFindings((stick, about, frequency_section(recording, arm)), None, {}, {})
+    friction = _friction_of_motors(signals, arm)
     ripple = _ripples(signals, arm, friction)
     sections = (
         stick,
         _friction_section(recording, arm, signals, friction, joints),
         _ripple_section(ripple, friction, recording.parameters.effects),
-        _power_section(arm, signals, friction, joints),
+        power_section(arm, signals, friction, joints),
         frequency_section(recording, arm),
     )
     return MotionFindings(sections, signals, friction, ripple)
+
+
+def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
+    """Why the motors' torque tells nothing about losses, '' if it does.
+
+    Motors modelled as velocity sources have a huge inertia: friction would be the difference of two huge torques.
+    """
+    accelerates = np.abs(np.array(arm.motors.inertia) * np.gradient(signals.velocity, signals.time, axis=0))
+    rotors, cables = float(np.max(accelerates)), float(np.max(np.abs(signals.load)))
+    if rotors <= DROWNED * cables:
+        return ""
+    return (
+        "Friction, ripple and efficiency of the motors were not measured: to accelerate the rotors takes up to "
+        f"{shown(rotors, 'N m')}, the cables carry {shown(cables, 'N m')}. The motors of this recording are velocity "
+        "sources, whose torque does not show what is lost."
+    )
 
 
 # stick and slip
@@ -107,7 +129,9 @@ def _stick_sentence(name: str, phases: Phases) -> str:
 def _friction_of_motors(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
     free = signals.torque - signals.load
     return {
-        name: identify_friction(signals.time, signals.velocity[:, i], free[:, i], MOTOR_REST, WINDOW, signals.use)
+        name: _possible(
+            identify_friction(signals.time, signals.velocity[:, i], free[:, i], MOTOR_REST, WINDOW, signals.use)
+        )
         for i, name in enumerate(arm.motors.names)
     }
 
@@ -118,9 +142,20 @@ def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Fri
     if signals.load_from != CABLE or not np.any(np.isfinite(free)):
         return {}
     return {
-        name: identify_friction(signals.time, signals.joint_velocity[:, i], free[:, i], JOINT_REST, WINDOW, signals.use)
+        name: _possible(
+            identify_friction(signals.time, signals.joint_velocity[:, i], free[:, i], JOINT_REST, WINDOW, signals.use)
+        )
         for i, name in enumerate(arm.joints.names)
     }
+
+
+def _possible(found: Friction) -> Friction:
+    """The friction, without its numbers where one is surely below zero: then the torque holds more than friction."""
+    known = ((found.dynamic, found.dynamic_error), (found.viscous, found.viscous_error))
+    if not any(value < -IMPOSSIBLE * error for value, error in known):
+        return found
+    nan = math.nan
+    return found._replace(static=nan, dynamic=nan, viscous=nan, inertia=nan)
 
 
 def _friction_section(
@@ -152,9 +187,10 @@ def _friction_section(
     ]
     still = [name for name in {**friction, **joints} if name not in seen]
     if still:
-        sentences.append(f"Too little motion to identify the friction of {', '.join(still)}.")
+        sentences.append(f"Too little motion, or more than friction in the torque, for that of {', '.join(still)}.")
     lacking = recording.lacking("joint_sensors", "sim/joint_states")
-    return Section("friction", "Friction", tuple(sentences), tuple(findings), lacking)
+    flagged = deviations(tuple(findings))
+    return Section("friction", "Friction", (*sentences, *flagged), tuple(findings), lacking, flagged)
 
 
 def _breakaway(found: Friction) -> str:
@@ -199,7 +235,8 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
         if not identified:
             deviation = f"{NOT_IDENTIFIABLE}: {shown(value)} +-{shown(error)}"
         text = "; ".join(filter(None, (first, deviation, note)))
-        return Finding(f"{name}: {kind} friction", unit, value if identified else math.nan, predicted, text)
+        measured = value if identified else math.nan
+        return Finding(f"{name}: {kind} friction", unit, measured, predicted, text, error if identified else math.nan)
 
     several = found.static_error if found.breakaways > 1 else math.nan
     return [
@@ -269,74 +306,3 @@ def _configured_ripple(effects: Effects | None, shaft: str, order: int) -> float
         )
         if name == shaft and round(cycles * ratio) == order
     )
-
-
-# power
-
-
-def _power_section(
-    arm: Arm, signals: TransmissionSignals, friction: dict[str, Friction], joints: dict[str, Friction]
-) -> Section:
-    inertia, speed = np.array(arm.motors.inertia), signals.velocity
-    acceleration = np.gradient(speed, signals.time, axis=0)
-    motor = np.sum((signals.torque - inertia * acceleration) * speed, axis=1)
-    at_links = signals.strain if np.any(np.isfinite(signals.strain)) else signals.cable_torque
-    joint = np.sum(at_links * signals.joint_velocity, axis=1)
-    known = np.isfinite(joint) & np.isfinite(motor)
-    sentences, findings = [], []
-    if np.any(known):
-        found = efficiency(signals.time[known], motor[known], joint[known])
-        is_measured = not (found.forward > 1.0 or found.back > 1.0)
-        if not is_measured:
-            sentences.append(
-                "The efficiency was not measured: by these signals the transmission gave more work than it took. "
-                "The work that rotors and cables store is larger here than what is lost."
-            )
-        elif found.forward_put > LEAST_WORK:
-            rows = known & (motor > 0.0) & (joint > 0.0)
-            expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
-            expected = max(expected, 0.0)
-            note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
-            findings.append(Finding("efficiency, motors to links", "%", 100.0 * found.forward, 100.0 * expected, note))
-            sentences.append(
-                f"While driving, the motors put {shown(found.forward_put, 'J')} into the transmission; "
-                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %. With the "
-                f"configured friction and creep {100.0 * expected:.0f} % are predicted at the speeds and loads of this "
-                "recording."
-            )
-        if is_measured and found.back_put > LEAST_WORK:
-            findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="backdriven"))
-            sentences.append(f"Backdriven: {100.0 * found.back:.0f} % of {shown(found.back_put, 'J')} came back.")
-    findings += _backdrive(arm, friction, joints)
-    if not sentences:
-        sentences.append("Too little work was done to measure the efficiency.")
-    return Section("power", "Efficiency and backdrivability", tuple(sentences), tuple(findings))
-
-
-def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
-    """Power lost to friction and creep by the configured parameters, (k,), W."""
-    speed, joint = np.abs(signals.velocity), np.abs(np.nan_to_num(signals.joint_velocity))
-    motors, joints = arm.motors, arm.joints
-    loss = speed @ np.array(motors.dynamic_friction) + speed**2 @ np.array(motors.viscous_friction)
-    loss = loss + joint @ np.array(joints.dynamic_friction) + joint**2 @ np.array(joints.viscous_friction)
-    creep = np.array([circuit.loss_per_torque for circuit in arm.circuits])
-    result: Numbers = loss + np.sum(creep * np.abs(signals.load) * np.abs(signals.load * signals.velocity), axis=1)
-    return result
-
-
-def _backdrive(arm: Arm, friction: dict[str, Friction], joints: dict[str, Friction]) -> list[Finding]:
-    """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
-    matrix = np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names)))
-    motor_per_joint = np.abs(np.linalg.inv(matrix))
-    measured = np.array([friction[name].dynamic for name in arm.motors.names])
-    configured = np.array(arm.motors.dynamic_friction)
-    own = np.array([joints[name].dynamic if name in joints else math.nan for name in arm.joints.names])
-    found = []
-    for i, name in enumerate(arm.joints.names):
-        turns = motor_per_joint[:, i]
-        needed = turns > 1e-9
-        by_motors = float(turns[needed] @ measured[needed])
-        note = "dry friction of the joint and of its motors"
-        expected = float(turns @ configured) + arm.joints.dynamic_friction[i]
-        found.append(Finding(f"{name}: backdriving torque", "N m", by_motors + float(own[i]), expected, note))
-    return found

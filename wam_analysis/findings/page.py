@@ -1,54 +1,81 @@
 """An analysis as one self-contained page of HTML."""
 
 import base64
+import hashlib
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from wam_analysis.findings.analysis import Analysis
+from wam_analysis.findings.charts import Chart, charts, data, scripts
 from wam_analysis.findings.finding import Finding, Section, shown
 from wam_analysis.findings.plots import Plot, plots
+from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
 from wam_bag.losses import PARAMETERS
 
 NARROW = 640  # px; up to this width the narrow pictures are shown
 
-# no network access, whatever is in the bag
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+# no network access, whatever is in the bag; only the scripts of this page run
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {}"
 CSS = """
-:root { color-scheme: light; }
+:root {
+  color-scheme: light dark; --ink: #1d2126; --faint: #59636e; --page: #f4f5f7; --sheet: #fff; --line: #e0e3e7;
+  --head: #22303c; --link: #00568c; --bad: #b42318;
+}
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e4e7eb; --faint: #9aa5b1; --page: #14181d; --sheet: #1d232a; --line: #37414c; --head: #0d1116;
+    --link: #7cc4f5; --bad: #ff8a7a; }
+  figure:not(.arm) img { filter: invert(0.88) hue-rotate(180deg); }
+}
 * { box-sizing: border-box; }
-body { margin: 0; background: #f4f5f7; color: #1d2126; font: 16px/1.5 system-ui, "DejaVu Sans", sans-serif; }
+body { margin: 0; background: var(--page); color: var(--ink); font: 16px/1.5 system-ui, "DejaVu Sans", sans-serif; }
 main { max-width: 980px; margin: 0 auto; padding: 0 16px 48px; }
-header { background: #22303c; color: #fff; padding: 20px 16px; }
+header { background: var(--head); color: #fff; padding: 20px 16px; }
 header div { max-width: 948px; margin: 0 auto; }
 h1 { font-size: 1.4rem; margin: 0; overflow-wrap: anywhere; }
 header p { margin: 4px 0 0; color: #c9d3dc; }
 nav { display: flex; flex-wrap: wrap; gap: 6px 14px; margin: 14px 0; }
-nav a { color: #00568c; }
-section { background: #fff; border-radius: 8px; padding: 4px 20px 16px; margin: 16px 0; }
+nav a { color: var(--link); }
+section { background: var(--sheet); border-radius: 8px; padding: 4px 20px 16px; margin: 16px 0; }
+#verdict { border-left: 6px solid var(--link); font-size: 1.06rem; }
 h2 { font-size: 1.15rem; margin: 14px 0 6px; }
 p, li, td, th { overflow-wrap: anywhere; }
 ul { margin: 0; padding-left: 20px; }
 figure { margin: 16px 0 8px; }
 figure img { display: block; width: 100%; height: auto; }
 figure.arm img { max-width: 640px; margin: 0 auto; }
-figcaption { color: #59636e; font-size: 0.875rem; }
-table { width: 100%; border-collapse: collapse; margin: 12px 0 0; font-size: 0.9rem; table-layout: fixed; }
-th { text-align: left; font-weight: 600; border-bottom: 2px solid #d5dae0; }
-td { border-bottom: 1px solid #e6e8eb; vertical-align: top; }
-th, td { padding: 4px 6px 4px 0; }
-th:nth-child(n+2), td.number { text-align: right; width: 24%; font-variant-numeric: tabular-nums; }
-small, .lacking { color: #59636e; }
-summary { cursor: pointer; margin-top: 12px; color: #00568c; }
+figure.chart, .live figure.still { display: none; }
+.live figure.chart { display: block; }
+.u-legend { color: var(--ink); font-size: 0.8rem; }
+figcaption { color: var(--faint); font-size: 0.875rem; }
+.wide { overflow-x: auto; }
+table.numbers { border-collapse: collapse; margin: 12px 0 0; font-size: 0.9rem; }
+.numbers th { text-align: right; vertical-align: bottom; font-weight: 600; border-bottom: 2px solid var(--line); }
+.numbers td { border-bottom: 1px solid var(--line); text-align: right; font-variant-numeric: tabular-nums; }
+.numbers th, .numbers td { padding: 4px 0 4px 14px; max-width: 11em; overflow-wrap: normal; }
+.numbers th:first-child, .numbers td:first-child { text-align: left; padding-left: 0; max-width: 20em; }
+.numbers .predicted { color: var(--faint); font-weight: 400; }
+.numbers .deviates { color: var(--bad); font-weight: 600; }
+small, .lacking { color: var(--faint); }
+summary { cursor: pointer; margin-top: 12px; color: var(--link); }
 pre { white-space: pre-wrap; overflow-wrap: anywhere; font-size: 0.8rem; }
 dl { display: grid; grid-template-columns: minmax(7em, 30%) 1fr; gap: 4px 12px; margin: 0; font-size: 0.9rem; }
-dt { color: #59636e; } dd { margin: 0; overflow-wrap: anywhere; }
+dt { color: var(--faint); } dd { margin: 0; overflow-wrap: anywhere; }
 @media (max-width: 640px) {
   body { font-size: 15px; }
   main { padding: 0 8px 32px; }
   section { padding: 2px 12px 12px; }
-  table { font-size: 0.82rem; }
-  th:nth-child(n+2), td.number { width: 27%; }
+  table.numbers { font-size: 0.82rem; }
   dl { display: block; } dd { margin: 0 0 6px; }
+}
+@media print {
+  :root { --ink: #000; --faint: #444; --page: #fff; --sheet: #fff; --line: #bbb; --head: #fff; --link: #000; }
+  header, header p { color: #000; }
+  nav { display: none; }
+  section, figure, tr { break-inside: avoid; }
+  figure img { filter: none !important; }
+  .live figure.chart { display: none; }
+  .live figure.still { display: block; }
+  .wide { overflow: visible; }
 }
 """
 
@@ -63,39 +90,50 @@ def page(analysis: Analysis) -> str:
     Returns
     -------
     str
-        HTML with its styles and pictures; it has no script and makes no request.
+        HTML with its styles, scripts and pictures; it makes no request.
     """
-    pictures = list(plots(analysis))
+    pictures, drawn = list(plots(analysis)), list(charts(analysis))
     name = analysis.recording.bag.path.name
-    sections = "".join(_section(section, pictures) for section in analysis.sections)
+    sections = "".join(_section(section, pictures, drawn) for section in analysis.sections)
     links = "".join(
         f'<a href="#{key}">{html.escape(title)}</a>'
         for key, title in [*((s.key, s.title) for s in analysis.sections), ("provenance", "Provenance")]
     )
+    library, script, styles = scripts()
+    run = (library, script) if drawn else ()
+    allowed = " ".join(f"'sha256-{_digest(text)}'" for text in run) or "'none'"
     return (
         "<!doctype html>\n"
         '<html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY.format(allowed)}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{html.escape(name)}: analysis</title><style>{CSS}</style></head><body>"
+        f"<title>{html.escape(name)}: analysis</title><style>{styles}{CSS}</style></head><body>"
         f"<header><div><h1>{html.escape(name)}</h1><p>{html.escape(_lead(analysis))}</p></div></header>"
-        f"<main><nav>{links}</nav>{sections}{_provenance(analysis)}{_parameters(analysis)}</main></body></html>\n"
+        f"<main><nav>{links}</nav>{sections}{_provenance(analysis)}{_parameters(analysis)}</main>"
+        f'<script type="application/json" id="charts">{data(drawn)}</script>'
+        f"{''.join(f'<script>{text}</script>' for text in run)}</body></html>\n"
     )
+
+
+def _digest(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
 def _lead(analysis: Analysis) -> str:
     return f"{analysis.recording.summary.namespace or '/'}, {shown(analysis.duration, 's')}, {analysis.recording.mode}"
 
 
-def _section(section: Section, pictures: Iterable[Plot]) -> str:
+def _section(section: Section, pictures: Sequence[Plot], drawn: Sequence[Chart]) -> str:
     sentences = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in section.sentences)
     figures = "".join(_figure(picture) for picture in pictures if picture.section == section.key)
+    figures += "".join(_chart(i, chart) for i, chart in enumerate(drawn) if chart.section == section.key)
     lacking = ""
     if section.lacking:
         lacking = f'<p class="lacking"><small>Not in this bag: {html.escape(", ".join(section.lacking))}.</small></p>'
+    tables = "".join(_table(table) for table in tabulated(section.findings))
     return (
-        f'<section id="{section.key}"><h2>{html.escape(section.title)}</h2><ul>{sentences}</ul>{figures}'
-        f"{_table(section.findings)}{lacking}</section>"
+        f'<section id="{section.key}"><h2>{html.escape(section.title)}</h2><ul>{sentences}</ul>'
+        f"{tables}{_notes(section.findings)}{figures}{lacking}</section>"
     )
 
 
@@ -107,25 +145,40 @@ def _figure(picture: Plot) -> str:
     image = f'<img alt="{text}" src="{wide}">'
     if picture.wide != picture.narrow:
         image = f'<picture><source media="(max-width: {NARROW}px)" srcset="{narrow}">{image}</picture>'
-    kind = ' class="arm"' if picture.kind == "png" else ""
+    kind = ' class="arm"' if picture.kind == "png" else ' class="still"' if picture.has_chart else ""
     return f"<figure{kind}>{image}<figcaption>{text}</figcaption></figure>"
 
 
-def _table(findings: Sequence[Finding]) -> str:
-    if not findings:
-        return ""
-    rows = "".join(
-        f"<tr><td>{html.escape(finding.name)}{_note(finding)}</td>"
-        f'<td class="number">{html.escape(shown(finding.measured, finding.unit))}</td>'
-        f'<td class="number">{html.escape(shown(finding.predicted, finding.unit))}</td></tr>'
-        for finding in findings
+def _chart(number: int, chart: Chart) -> str:
+    caption = f"{html.escape(chart.title)} Drag to zoom, double click to see all."
+    return f'<figure class="chart" data-chart="{number}"><div></div><figcaption>{caption}</figcaption></figure>'
+
+
+def _table(table: Tabulated) -> str:
+    def cells(row: tuple[str, ...], tag: str) -> str:
+        kinds = [
+            " ".join(filter(None, ("predicted" if is_predicted else "", "deviates" if text.endswith(MARK) else "")))
+            for text, is_predicted in zip(row, table.predicted, strict=True)
+        ]
+        return "".join(
+            f"<{tag}{f' class={chr(34)}{kind}{chr(34)}' if kind else ''}>{html.escape(text)}</{tag}>"
+            for text, kind in zip(row, kinds, strict=True)
+        )
+
+    rows = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in table.rows)
+    legend = (
+        f"<p><small>{LEGEND}.</small></p>" if any(cell.endswith(MARK) for row in table.rows for cell in row) else ""
     )
-    head = "".join(f"<th>{title}</th>" for title in ("Quantity", "Measured", "Predicted"))
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    head = f"<thead><tr>{cells(table.columns, 'th')}</tr></thead>"
+    return f'<div class="wide"><table class="numbers">{head}<tbody>{rows}</tbody></table></div>{legend}'
 
 
-def _note(finding: Finding) -> str:
-    return f"<br><small>{html.escape(finding.note)}</small>" if finding.note else ""
+def _notes(findings: Sequence[Finding]) -> str:
+    noted = [one for one in findings if one.note]
+    if not noted:
+        return ""
+    rows = "".join(f"<dt>{html.escape(one.name)}</dt><dd>{html.escape(one.note)}</dd>" for one in noted)
+    return f"<details><summary>Where the numbers come from</summary><dl>{rows}</dl></details>"
 
 
 def _provenance(analysis: Analysis) -> str:

@@ -3,6 +3,7 @@
 import io
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -13,14 +14,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from wam_analysis import arm_picture
-from wam_analysis.colours import COMMANDED, ESTIMATED, MEASURED, TRUE
 from wam_analysis.demo_figure import (
     draw_arm,
     draw_forces,
     draw_positions,
     seconds_at,
 )
+from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, SHAFTS, TRUE
 from wam_analysis.findings.analysis import Analysis
+from wam_analysis.findings.signals import envelope, forces_over_time, moving
 from wam_analysis.measures.loop_timing import latency
 from wam_analysis.recorded import recorded_arm
 from wam_bag.bag import JointColumns, WrenchColumns
@@ -29,8 +31,8 @@ Numbers = NDArray[np.float64]
 
 WIDE, NARROW = 9.6, 4.1  # inches
 MOST = {WIDE: 3000, NARROW: 1200}  # points of a line
+STILL = 1e-5  # rad or rad/s; a smaller range is not blown up
 PNG_DPI = 130
-SHAFTS = (TRUE, ESTIMATED, MEASURED, "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#222222")
 STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
@@ -41,7 +43,7 @@ STYLE: Any = {
     "axes.grid": True,
     "grid.color": "#e6e8eb",
     "legend.frameon": False,
-    "legend.fontsize": 8.5,
+    "legend.fontsize": 9.0,
     "svg.fonttype": "path",
     "svg.hashsalt": "wam",
     "path.simplify": True,
@@ -58,6 +60,7 @@ class Plot(NamedTuple):
     title : caption.
     kind : 'svg+xml' or 'png'.
     wide, narrow : its bytes.
+    has_chart : whether a chart of the page shows the same, which can be zoomed; then it is for print.
     """
 
     section: str
@@ -65,6 +68,7 @@ class Plot(NamedTuple):
     kind: str
     wide: bytes
     narrow: bytes
+    has_chart: bool = False
 
 
 Draw = Callable[[Figure, float], None]
@@ -75,23 +79,21 @@ def plots(analysis: Analysis) -> Iterator[Plot]:
     summary, recording = analysis.recording.summary, analysis.recording
     if summary.moment is not None:
         yield _arm(analysis)
-    if len(summary.traces.stamp):
+    if forces_over_time(recording) is not None:
         title = "Forces and contact position over the whole recording."
         yield _svg("happened", title, lambda figure, width: _story(figure, width, analysis), 4.6, 5.4)
-    joints = [(name, c) for name, c in recording.bag.topics.items() if isinstance(c, JointColumns) and c.position.size]
-    chosen = _motion_topic(recording.namespace, joints)
-    if chosen is not None:
-        title = f"Positions on {chosen[0]}."
-        yield _svg("happened", title, lambda figure, width: _positions(figure, width, chosen[1]), 2.8, 3.2)
-    wrenches = [(n, c) for n, c in recording.bag.topics.items() if isinstance(c, WrenchColumns) and len(c.stamp_ns)]
-    if wrenches and not len(summary.traces.stamp):
-        name, columns = wrenches[0]
-        yield _svg("happened", f"Forces on {name}.", lambda figure, width: _wrench(figure, width, columns), 2.8, 3.2)
+    for name, columns in moving(recording).items():
+        if isinstance(columns, JointColumns):
+            yield from _motion_plots(name, columns)
+        else:
+            draw = partial(_wrench, columns=columns)
+            yield _svg("happened", f"Force on {name}.", draw, 2.8, 3.2)._replace(has_chart=True)
     if any(len(one.time) for one in analysis.held):
         title = "Each commanded force from its start: measured by the force loop, and true."
         rows = sum(len(one.time) > 0 for one in analysis.held[:6])
         wide, narrow = 2.6 * math.ceil(rows / 3), 2.1 * rows
-        yield _svg("force", title, lambda figure, width: _holds(figure, width, analysis), wide, narrow)
+        picture = _svg("force", title, lambda figure, width: _holds(figure, width, analysis), wide, narrow)
+        yield picture._replace(has_chart=True)
     if analysis.motion.signals is not None:
         title = "Friction torque of each motor over its velocity; lines: identified (solid), configured (dashed)."
         n = analysis.motion.signals.torque.shape[1]
@@ -101,6 +103,15 @@ def plots(analysis: Analysis) -> Iterator[Plot]:
         title = "Torque ripple of each motor by the order of its angle."
         yield _svg("ripple", title, lambda figure, width: _ripple(figure, analysis), 2.6, 3.0)
     yield from timing_plots(analysis)
+
+
+def _motion_plots(name: str, columns: JointColumns) -> Iterator[Plot]:
+    n = columns.position.shape[1]
+    draw = partial(_positions, columns=columns)
+    yield _svg("happened", f"Positions on {name}.", draw, 0.8 + 1.3 * n, 0.8 + 1.4 * n)._replace(has_chart=True)
+    if columns.velocity.shape[1] == n:
+        title, rows = f"Velocity over position on {name}; a cycle is a closed curve.", math.ceil(n / 2)
+        yield _svg("stick_slip", title, partial(_phases, columns=columns), 2.8 * rows, 2.6 * n)
 
 
 def _figure(width: float, height: float, draw: Draw) -> Figure:
@@ -147,38 +158,38 @@ def _story(figure: Figure, width: float, analysis: Analysis) -> None:
     draw_positions(below, summary, arm, letter="", most=MOST[width])
 
 
-def _motion_topic(namespace: str, joints: list[tuple[str, JointColumns]]) -> tuple[str, JointColumns] | None:
-    order = [f"{namespace}/{name}" for name in ("joint_sensors", "joint_states", "sim/joint_states", "motor_states")]
-    ranked = sorted(joints, key=lambda item: order.index(item[0]) if item[0] in order else len(order))
-    return ranked[0] if ranked else None
-
-
-def envelope(time: Numbers, value: Numbers, most: int) -> tuple[Numbers, Numbers]:
-    """A line with at most so many points that looks the same: minimum and maximum of each interval.
-
-    Parameters
-    ----------
-    time, value : (n,).
-    most : points, an even number.
-    """
-    n = len(time)
-    if n <= most:
-        return time, value
-    edges = np.linspace(0, n, most // 2 + 1).astype(np.int64)
-    filled = np.where(np.isfinite(value), value, np.nan)
-    low = np.fmin.reduceat(filled, edges[:-1])
-    high = np.fmax.reduceat(filled, edges[:-1])
-    at = time[(edges[:-1] + edges[1:] - 1) // 2]
-    return np.repeat(at, 2), np.column_stack([low, high]).ravel()
-
-
 def _positions(figure: Figure, width: float, columns: JointColumns) -> None:
-    axes = figure.subplots()
+    """Each joint on axes of its own: their ranges differ by orders of magnitude."""
+    rows = figure.subplots(columns.position.shape[1], 1, sharex=True, squeeze=False)[:, 0]
     time = (columns.stamp_ns - columns.stamp_ns[0]) / 1e9
-    for i, name in enumerate(columns.names[: len(SHAFTS)]):
-        axes.plot(*envelope(time, columns.position[:, i], MOST[width]), color=SHAFTS[i], lw=1.2, label=name)
-    axes.set(xlabel="time [s]", ylabel="position [rad]")
-    _legend(axes, width)
+    for i, (axes, name) in enumerate(zip(rows, columns.names, strict=True)):
+        axes.plot(*envelope(time, columns.position[:, i], MOST[width]), color=SHAFTS[i % len(SHAFTS)], lw=1.2)
+        axes.set(ylabel=f"{name} [rad]")
+        _widened(axes)
+    rows[-1].set_xlabel("time [s]")
+    figure.align_ylabels()
+
+
+def _widened(axes: Axes) -> None:
+    """Show a shaft at rest as one, not its rounding errors."""
+    low, high = axes.get_ylim()
+    if high - low < STILL:
+        axes.set_ylim((low + high - STILL) / 2.0, (low + high + STILL) / 2.0)
+
+
+def _phases(figure: Figure, width: float, columns: JointColumns) -> None:
+    """Velocity over position of each joint: a cycle is a closed curve."""
+    n = columns.position.shape[1]
+    across = min(2, n) if width > NARROW else 1
+    grid = figure.subplots(math.ceil(n / across), across, squeeze=False)
+    every = max(1, len(columns.stamp_ns) // MOST[width])
+    for i, (axes, name) in enumerate(zip(grid.flat, columns.names, strict=False)):
+        position, velocity = columns.position[::every, i], columns.velocity[::every, i]
+        axes.plot(position, velocity, color=SHAFTS[i % len(SHAFTS)], lw=0.8)
+        axes.set(xlabel=f"{name} [rad]", ylabel="velocity [rad/s]")
+        _widened(axes)
+    for axes in list(grid.flat)[n:]:
+        axes.set_axis_off()
 
 
 def _wrench(figure: Figure, width: float, columns: WrenchColumns) -> None:

@@ -2,43 +2,83 @@
 
 import json
 import math
+import shutil
 import textwrap
 from typing import Any
 
 from wam_analysis.findings.analysis import Analysis
-from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.table import plain
+from wam_analysis.findings.finding import Finding, Section
+from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
 
-WIDTH = 100
-NAME, COLUMN = 60, 16  # widths in the table: of a name at most, of a number at least
-SCHEMA = 2  # of the JSON; incremented when a key changes its name or meaning
+WIDTH, NARROWEST = 100, 40  # columns of text, at most and at least
+NAME, COLUMN = 0.4, 12  # widths in a table: of a name at most, of all; of a number, columns
+SCHEMA = 3  # of the JSON; incremented when a key changes its name or meaning
 
 
-def text(analysis: Analysis) -> str:
-    """The analysis, section by section: sentences, then measured and predicted numbers."""
+def text(analysis: Analysis, width: int | None = None) -> str:
+    """The analysis, verdict first, then section by section: sentences and a table.
+
+    Parameters
+    ----------
+    width : columns; None takes those of the terminal, at most 100.
+    """
+    wide = shutil.get_terminal_size((WIDTH, 24)).columns if width is None else width
+    wide = min(max(wide, NARROWEST), WIDTH)
     lines: list[str] = []
     for section in analysis.sections:
         lines += ["", section.title, "─" * len(section.title)]
         for sentence in section.sentences:
-            lines += textwrap.wrap(sentence, WIDTH, initial_indent="  ", subsequent_indent="    ")
-        lines += _table(section)
+            lines += _wrapped(sentence, wide)
+        lines += _tables(section, wide)
         if section.lacking:
-            lines += _wrapped(f"not in this bag: {', '.join(section.lacking)}")
+            lines += _wrapped(f"not in this bag: {', '.join(section.lacking)}", wide)
     lines += ["", "Provenance", "──────────"]
-    lines += [line for key, value in analysis.provenance.items() for line in _wrapped(f"{key}: {value}")]
+    lines += [line for key, value in analysis.provenance.items() for line in _wrapped(f"{key}: {value}", wide)]
     return "\n".join(lines).lstrip("\n")
 
 
-def _wrapped(line: str) -> list[str]:
-    return textwrap.wrap(line, WIDTH, initial_indent="  ", subsequent_indent="    ")
+def _wrapped(line: str, wide: int) -> list[str]:
+    return textwrap.wrap(line, wide, initial_indent="  ", subsequent_indent="    ")
 
 
-def _table(section: Section) -> list[str]:
-    """Lines of the table of a section; none without numbers."""
-    if not section.findings:
-        return []
-    rows = [(one.name, shown(one.measured, one.unit), shown(one.predicted, one.unit)) for one in section.findings]
-    return ["", *(f"  {line}" for line in plain([("", "measured", "predicted")], rows, first=NAME, least=COLUMN))]
+def _tables(section: Section, wide: int) -> list[str]:
+    """Lines of the tables of a section; none without numbers."""
+    lines: list[str] = []
+    for table in tabulated(section.findings):
+        for block in _blocks(table, wide):
+            lines += ["", *(f"  {line}".rstrip() for line in block)]
+    if any(MARK in line for line in lines):
+        lines += _wrapped(LEGEND, wide)
+    return lines
+
+
+def _blocks(table: Tabulated, wide: int) -> list[list[str]]:
+    """The table in blocks that fit, each with the names of the rows; a prediction stays with what it predicts."""
+    names = max(COLUMN, min(int(NAME * wide), max(map(len, (table.columns[0], *(row[0] for row in table.rows))))))
+    fits = max(1, (wide - 2 - names) // (COLUMN + 2))
+    groups: list[list[int]] = []
+    for j in range(1, len(table.columns)):
+        with_last = table.predicted[j] or (groups and j + 1 < len(table.columns) and not table.predicted[j + 1])
+        room = bool(groups) and len(groups[-1]) + 1 + (j + 1 < len(table.columns) and table.predicted[j + 1]) <= fits
+        if groups and (room or (table.predicted[j] and with_last)):
+            groups[-1].append(j)
+        else:
+            groups.append([j])
+    return [_block(table, names, group) for group in groups]
+
+
+def _block(table: Tabulated, names: int, columns: list[int]) -> list[str]:
+    lines = []
+    for k, row in enumerate((table.columns, *table.rows)):
+        cells = [textwrap.wrap(row[0], names, subsequent_indent="  ") or [""]]
+        cells += [textwrap.wrap(row[j], COLUMN) or [""] for j in columns]
+        height = max(map(len, cells))
+        pad = (lambda cell, height=height: [""] * (height - len(cell)) + cell) if k == 0 else None
+        cells = [cells[0], *cells[1:]] if pad is None else [pad(cell) for cell in cells]
+        for i in range(height):
+            words = [cell[i] if i < len(cell) else "" for cell in cells]
+            lines.append(words[0].ljust(names) + "".join(f"  {word:>{COLUMN}}" for word in words[1:]))
+    return [line.rstrip() for line in lines]
 
 
 def document(analysis: Analysis) -> dict[str, Any]:
@@ -61,13 +101,9 @@ def document(analysis: Analysis) -> dict[str, Any]:
 
 
 def _finding(finding: Finding) -> dict[str, Any]:
-    return {
-        "name": finding.name,
-        "unit": finding.unit,
-        "measured": finding.measured if math.isfinite(finding.measured) else None,
-        "predicted": finding.predicted if math.isfinite(finding.predicted) else None,
-        "note": finding.note,
-    }
+    numbers = {key: getattr(finding, key) for key in ("measured", "predicted", "error")}
+    known = {key: value if math.isfinite(value) else None for key, value in numbers.items()}
+    return {"name": finding.name, "unit": finding.unit, **known, "deviates": finding.deviates, "note": finding.note}
 
 
 def json_text(analysis: Analysis) -> str:

@@ -18,7 +18,7 @@ TIMED = ("motor_states", "motor_current_command", "joint_states", "force_measure
 
 def timing_section(recording: AnalysedRun) -> Section:
     """Periods, jitter, latency and missed periods, from stamps and reception times."""
-    sentences, findings = [], []
+    sentences, findings, verdict = [], [], []
     real = recording.mode == "realtime"
     timing = recording.parameters.timing
     for name in TIMED:
@@ -31,10 +31,10 @@ def timing_section(recording: AnalysedRun) -> Section:
             expected = timing.period if name.startswith("motor_") else timing.outer_period_ns / 1e9
         findings += [
             Finding(f"{name}: period", "ms", 1e3 * found.period, 1e3 * expected),
-            Finding(f"{name}: missed periods", "", float(found.missed), 0.0),
+            Finding(f"{name}: missed periods", "", float(found.missed)),
         ]
         if found.backwards:
-            findings.append(Finding(f"{name}: stamps that do not increase", "", float(found.backwards), 0.0))
+            findings.append(Finding(f"{name}: stamps that do not increase", "", float(found.backwards)))
         if real:
             findings += [
                 Finding(f"{name}: reception jitter", "ms", 1e3 * found.jitter, note="standard deviation"),
@@ -44,6 +44,7 @@ def timing_section(recording: AnalysedRun) -> Section:
             sentences.append(
                 f"{name}: {found.missed} periods without a message, the longest gap {shown(found.longest_gap, 's')}."
             )
+            verdict.append(sentences[-1])
     states, answers = recording.run.joints("motor_states"), recording.run.joints("motor_current_command")
     if real and states is not None and answers is not None:
         answer = latency(states.stamp_ns, states.log_time_ns, answers.stamp_ns, answers.log_time_ns)
@@ -51,7 +52,7 @@ def timing_section(recording: AnalysedRun) -> Section:
             Finding("latency, state to current at the recorder: median", "us", 1e6 * answer.p50),
             Finding("latency, state to current at the recorder: 99 %", "us", 1e6 * answer.p99),
             Finding("latency, state to current at the recorder: worst", "us", 1e6 * answer.worst),
-            Finding("states without a command", "", float(answer.unanswered), 0.0),
+            Finding("states without a command", "", float(answer.unanswered)),
         ]
         sentences.append(
             f"Latency from state to current command, at the recorder: median {shown(1e6 * answer.p50, 'us')}, "
@@ -64,7 +65,7 @@ def timing_section(recording: AnalysedRun) -> Section:
             Finding("driver: rate", "Hz", loop.rate),
             Finding("driver: latency p50", "us", loop.p50),
             Finding("driver: latency p99", "us", loop.p99),
-            Finding("driver: missed periods", "", float(loop.missed), 0.0, f"of {loop.periods}"),
+            Finding("driver: missed periods", "", float(loop.missed), note=f"of {loop.periods}"),
         ]
     if recording.mode == "lockstep":
         sentences.append(
@@ -72,7 +73,8 @@ def timing_section(recording: AnalysedRun) -> Section:
         )
     if not findings:
         sentences.append("No stamped topic of the loop was recorded.")
-    return Section("timing", "Timing of the loop", tuple(sentences), tuple(findings), recording.lacking(*TIMED[:2]))
+    lacking = recording.lacking(*TIMED[:2])
+    return Section("timing", "Timing of the loop", tuple(sentences), tuple(findings), lacking, tuple(verdict))
 
 
 def provenance(recording: AnalysedRun) -> dict[str, str]:
@@ -95,6 +97,7 @@ def provenance(recording: AnalysedRun) -> dict[str, str]:
         "dropped": "no counts in the bag" if summary.dropped < 0 else str(summary.dropped),
         "lost": " ".join(summary.lost) or "none known",
         "parameters, SHA-256": recording.run.parameters.sha256 or "not in the bag",
+        **({"parameters, notes": "; ".join(recording.run.parameters.notes)} if recording.run.parameters.notes else {}),
         "analysed with": f"wam_stack {here}",
     }
     recorder = {key: value for key, value in metadata.items() if not key.startswith("/") and key != "mode"}

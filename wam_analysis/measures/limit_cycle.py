@@ -14,6 +14,7 @@ Numbers = NDArray[np.float64]
 PHASES = 192  # of a cycle that are resolved, if there are enough samples
 LEAST = 8  # samples for each of them
 FEWEST = 3  # cycles that are needed
+SHORTEST = 2.0  # samples; what repeats faster cannot be seen
 GAP = 2.5  # periods between two samples from which some are missing
 ALIKE = 0.9  # of the highest correlation; the shortest lag that reaches it is the period, not a multiple
 
@@ -67,7 +68,7 @@ def limit_cycle(time: Numbers, value: Numbers) -> LimitCycle:
     flat = value - np.mean(value)
     flat = flat - centre * float(centre @ flat) / float(centre @ centre)
     lag = _period(flat)
-    if math.isnan(lag):
+    if not lag >= SHORTEST:
         return NO_CYCLE
     phase = np.arange(n) / lag % 1.0
     phases = max(min(PHASES, n // LEAST), 2)
@@ -156,7 +157,7 @@ def _period(flat: Numbers) -> float:
         return math.nan
     guess = _top(likeness, int(peaks[likeness[peaks] >= ALIKE * np.max(likeness[peaks])][0]))
     times = 2
-    while times * guess < n / 2.0 - 1.0:
+    while guess >= 1.0 and times * guess < n / 2.0 - 1.0:
         reach = max(2, int(guess / 4.0))
         middle = round(times * guess)
         low, high = max(middle - reach, 1), min(middle + reach + 1, len(likeness) - 1)

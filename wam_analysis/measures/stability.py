@@ -70,9 +70,9 @@ def stability(error: Numbers, tolerance: float) -> Stability:
     if len(late) < FEWEST:
         return Stability(StabilityVerdict.UNDECIDED, math.nan, 0.0, peaks)
     late = late[-max(len(late) // 2 + 1, FEWEST) :]
-    slope, error_of_slope = _trend(np.log(late))
+    slope, error_of_slope = trend(np.log(late))
     sure = abs(slope) / error_of_slope if error_of_slope > 0.0 else math.inf
-    last = _trend(np.log(late[-max(len(late) // 2, FEWEST) :]))[0]
+    last = trend(np.log(late[-max(len(late) // 2, FEWEST) :]))[0]
     if slope > STEADY and sure > 2.0:
         verdict = StabilityVerdict.DIVERGES
     elif abs(last) <= STEADY or sure <= 2.0 or (slope < 0.0 and last > FLATTENED * slope):
@@ -101,8 +101,8 @@ def half_cycle_peaks(error: Numbers, tolerance: float) -> Numbers:
     return result[:-1]
 
 
-def _trend(values: Numbers) -> tuple[float, float]:
-    """Slope per step of a line through the values, and its standard error."""
+def trend(values: Numbers) -> tuple[float, float]:
+    """Slope per step of a line through values, (n,), and its standard error."""
     steps = np.arange(len(values)) - (len(values) - 1) / 2.0
     square = float(steps @ steps)
     slope = float(steps @ values) / square

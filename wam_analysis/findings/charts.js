@@ -1,0 +1,51 @@
+// Draws the charts of the page with uPlot: drag to zoom, double click to see all.
+(function () {
+  "use strict";
+  const all = JSON.parse(document.getElementById("charts").textContent);
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const drawn = [];
+  const short = (value) => (value === null ? "" : String(Number(value.toPrecision(4))));
+  const decade = (value) => (Math.abs(Math.log10(value) % 1) < 1e-9 ? value.toExponential(0) : "");
+  function axis(label, size, logarithmic) {
+    const text = logarithmic ? decade : short;
+    return { values: (plot, values) => values.map((value) => (value === null ? "" : text(value))), label, size, stroke: style("--ink"), grid: { stroke: style("--line"), width: 1 }, ticks: { stroke: style("--line") } };
+  }
+  function range(plot, low, high) {
+    const room = Math.max(0.05 * (high - low), 1e-6);
+    return [low - room, high + room];
+  }
+  function draw(chart, figure) {
+    const place = figure.querySelector("div");
+    const series = chart.series.map((one) => ({
+      label: one.label, width: 1.5, spanGaps: false,
+      stroke: one.colour === "ink" ? style("--ink") : one.colour,
+      dash: one.dashed ? [6, 4] : undefined,
+      points: { show: false },
+    }));
+    const options = {
+      width: place.clientWidth, height: chart.height,
+      series: [{ label: chart.across }, ...series],
+      axes: [axis(chart.across, 46, chart.logarithmic), axis(chart.up, 70, chart.logarithmic)],
+      scales: chart.logarithmic ? { x: { time: false, distr: 3 }, y: { distr: 3 } } : { x: { time: false }, y: { range } },
+      cursor: chart.key ? { sync: { key: chart.key } } : {},
+    };
+    return new uPlot(options, [chart.x, ...chart.series.map((one) => one.y)], place);
+  }
+  function drawAll() {
+    while (drawn.length) drawn.pop().destroy();
+    for (const figure of document.querySelectorAll("figure.chart")) {
+      drawn.push(draw(all[Number(figure.dataset.chart)], figure));
+    }
+  }
+  document.documentElement.classList.add("live");
+  drawAll();
+  dark.addEventListener("change", drawAll);
+  let waiting = 0;
+  window.addEventListener("resize", () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => {
+      for (const one of drawn) one.setSize({ width: one.root.parentNode.clientWidth, height: one.height });
+    }, 100);
+  });
+})();

@@ -1,0 +1,67 @@
+"""Section about the estimated contacts, compared with the true ones."""
+
+import math
+
+import numpy as np
+
+from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED
+from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.measures.runs import runs
+
+
+def contact_section(recording: AnalysedRun) -> Section:
+    """Estimated contacts, compared with the true ones."""
+    summary = recording.summary
+    traces = summary.traces
+    lacking = recording.lacking("contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point")
+    sentences, findings, verdict = [], [], []
+    for touch in summary.touches:
+        if NOT_RECORDED in (touch.link_true, touch.link_estimated):
+            continue
+        missed = touch.link_estimated in ("base", NO_LINK, "")
+        text = f"{touch.step}: contact of {touch.link_true} with {shown(touch.force_true, 'N')}"
+        verdict += [f"{touch.step}: the contact of {touch.link_true} was MISSED."] * missed
+        text += ", missed" if missed else f"; estimated on {touch.link_estimated}"
+        if math.isfinite(touch.force_estimated):
+            text += f" with {shown(touch.force_estimated, 'N')}"
+        if touch.reason:
+            text += f" ({touch.reason})"
+        elif math.isfinite(touch.position_estimated):
+            text += f", position error {100.0 * abs(touch.position_estimated - touch.position_true):.1f} cm"
+        sentences.append(text + ".")
+    true, sensed = traces.true, traces.estimated
+    known = true.is_known & sensed.is_known
+    touching = known & true.acts
+    if np.any(touching):
+        both = touching & sensed.acts & (sensed.frame == true.frame)
+        position = np.abs(sensed.position - true.position)[both]
+        position = position[np.isfinite(position)]
+        force = np.linalg.norm(sensed.force - true.force, axis=1)[both]
+        right = 100.0 * float(np.mean(both[touching]))
+        away = 100.0 * float(np.median(position)) if len(position) else math.nan
+        off = float(np.median(force)) if len(force) else math.nan
+        findings += [
+            Finding("contact on the right link", "%", right),
+            Finding("position error, median", "cm", away),
+            Finding("force error, median", "N", off),
+        ]
+        verdict.append(f"Contact: on the right link {right:.0f} % of the time{_errors(away, off)}.")
+    if np.any(known):
+        false = known & sensed.acts & ~true.acts
+        count = len(runs(false))
+        seconds = float(np.sum(false)) * summary.period
+        findings.append(Finding("false detections", "s", seconds, note=times(count)))
+        if count:
+            sentences.append(f"False detections: {count}, {shown(seconds, 's')} in all.")
+            verdict.insert(0, sentences[-1])
+    elif np.any(sensed.is_known):
+        sentences.append(f"Contact was detected {times(len(runs(sensed.acts)))}; the true contact is not in this bag.")
+    if not sentences:
+        sentences.append("No contact was recorded.")
+    return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(verdict))
+
+
+def _errors(away: float, off: float) -> str:
+    known = [shown(value, unit) for value, unit in ((away, "cm"), (off, "N")) if math.isfinite(value)]
+    return f"; median errors {' and '.join(known)}" if known else ""

@@ -1,0 +1,92 @@
+"""Section about power: efficiency in both directions, and the torque that backdrives each joint."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.transmission_signals import TransmissionSignals
+from wam_analysis.measures.efficiency import efficiency
+from wam_analysis.measures.friction import Friction
+from wam_description.arm import Arm
+
+Numbers = NDArray[np.float64]
+
+LEAST_WORK = 1e-3  # J below which no efficiency is given
+
+
+def power_section(
+    arm: Arm, signals: TransmissionSignals, friction: dict[str, Friction], joints: dict[str, Friction]
+) -> Section:
+    """Efficiency of the transmission, where its losses are larger than the work that it stores."""
+    inertia, speed = np.array(arm.motors.inertia), signals.velocity
+    acceleration = np.gradient(speed, signals.time, axis=0)
+    motor = np.sum((signals.torque - inertia * acceleration) * speed, axis=1)
+    at_links = signals.strain if np.any(np.isfinite(signals.strain)) else signals.cable_torque
+    joint = np.sum(at_links * signals.joint_velocity, axis=1)
+    known = np.isfinite(joint) & np.isfinite(motor)
+    sentences, findings = [], []
+    if np.any(known):
+        found = efficiency(signals.time[known], motor[known], joint[known])
+        lost = found.forward_put - found.forward_got + found.back_put - found.back_got
+        mixed = known & (motor * joint < 0.0)
+        stored = float(np.sum(np.abs(motor[mixed]))) * float(np.median(np.diff(signals.time)))
+        is_measured = not (found.forward > 1.0 or found.back > 1.0 or stored > lost)
+        if not is_measured:
+            sentences.append(
+                "The efficiency was not measured: the work that rotors and cables store and return is larger here than "
+                "what is lost."
+            )
+        elif found.forward_put > LEAST_WORK:
+            rows = known & (motor > 0.0) & (joint > 0.0)
+            expected = 1.0 - float(np.sum(_losses(arm, signals)[rows])) / float(np.sum(motor[rows]))
+            expected = max(expected, 0.0)
+            note = "friction and cables (6.14) as configured, at the speeds and loads of this recording"
+            findings.append(Finding("efficiency, motors to links", "%", 100.0 * found.forward, 100.0 * expected, note))
+            sentences.append(
+                f"While driving, the motors put {shown(found.forward_put, 'J')} into the transmission; "
+                f"{shown(found.forward_got, 'J')} reached the links: {100.0 * found.forward:.0f} %. With the "
+                f"configured friction and creep {100.0 * expected:.0f} % are predicted at the speeds and loads of this "
+                "recording."
+            )
+        if is_measured and found.back_put > LEAST_WORK:
+            findings.append(Finding("efficiency, links to motors", "%", 100.0 * found.back, note="backdriven"))
+            sentences.append(f"Backdriven: {100.0 * found.back:.0f} % of {shown(found.back_put, 'J')} came back.")
+    findings += _backdrive(arm, friction, joints)
+    if not sentences:
+        sentences.append("Too little work was done to measure the efficiency.")
+    verdict = tuple(
+        f"{one.name[0].upper()}{one.name[1:]}: {shown(one.measured, '%')}." for one in findings if one.unit == "%"
+    )
+    return Section("power", "Efficiency and backdrivability", tuple(sentences), tuple(findings), (), verdict)
+
+
+def _losses(arm: Arm, signals: TransmissionSignals) -> Numbers:
+    """Power lost to friction and creep by the configured parameters, (k,), W."""
+    speed, joint = np.abs(signals.velocity), np.abs(np.nan_to_num(signals.joint_velocity))
+    motors, joints = arm.motors, arm.joints
+    loss = speed @ np.array(motors.dynamic_friction) + speed**2 @ np.array(motors.viscous_friction)
+    loss = loss + joint @ np.array(joints.dynamic_friction) + joint**2 @ np.array(joints.viscous_friction)
+    creep = np.array([circuit.loss_per_torque for circuit in arm.circuits])
+    result: Numbers = loss + np.sum(creep * np.abs(signals.load) * np.abs(signals.load * signals.velocity), axis=1)
+    return result
+
+
+def _backdrive(arm: Arm, friction: dict[str, Friction], joints: dict[str, Friction]) -> list[Finding]:
+    """Torque that backdrives each joint alone, against the dry friction of the joint and of its motors."""
+    matrix = np.reshape(arm.joint_from_motor, (len(arm.joints.names), len(arm.motors.names)))
+    motor_per_joint = np.abs(np.linalg.inv(matrix))
+    measured = np.array([friction[name].dynamic for name in arm.motors.names])
+    configured = np.array(arm.motors.dynamic_friction)
+    own = np.array([joints[name].dynamic if name in joints else math.nan for name in arm.joints.names])
+    found = []
+    for i, name in enumerate(arm.joints.names):
+        turns = motor_per_joint[:, i]
+        needed = turns > 1e-9
+        by_motors = float(turns[needed] @ measured[needed])
+        note = "dry friction of the joint and of its motors"
+        expected = float(turns @ configured) + arm.joints.dynamic_friction[i]
+        torque = by_motors + float(own[i])
+        found.append(Finding(f"{name}: backdriving torque", "N m", torque, expected, note))
+    return found

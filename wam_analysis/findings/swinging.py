@@ -1,0 +1,136 @@
+"""Cycles of motors and joints: under a force that was not recorded, and in the bags of other robots."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.findings.analysed_run import AnalysedRun, Hold
+from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.measures.limit_cycle import limit_cycle
+from wam_analysis.measures.runs import noise
+from wam_analysis.measures.stability import StabilityVerdict
+from wam_analysis.measures.swings import Swings, swings
+from wam_bag.bag import JointColumns, WrenchColumns
+
+Numbers = NDArray[np.float64]
+
+LATE = 0.7  # of a hold, at its end: its range is that of the motion without the approach
+LEAST = 0.05  # of that range: a smaller change is no swing
+LOUD = 8.0  # standard deviations of the noise: likewise
+STILL = 1e-4  # rad; a shaft that moves less does not swing
+SURE = 0.8  # confidence from which a cycle is reported
+
+
+class Swinging(NamedTuple):
+    """A shaft that swings during a hold; `topic` is where it was seen."""
+
+    name: str
+    topic: str
+    swings: Swings
+
+
+def swinging(recording: AnalysedRun, hold: Hold) -> Swinging | None:
+    """The motor, or else the joint, whose swings tell most about a hold; None if none was recorded."""
+    found = []
+    for topic in ("motor_states", "joint_sensors", "joint_states"):
+        columns = recording.run.joints(topic)
+        if columns is None or not columns.position.shape[1]:
+            continue
+        for i, name in enumerate(columns.names):
+            one = _swings(columns, i, hold)
+            if one is not None:
+                found.append(Swinging(name, topic, one))
+        if found:
+            break
+    order = (StabilityVerdict.DIVERGES, StabilityVerdict.CYCLES, StabilityVerdict.SETTLES, StabilityVerdict.UNDECIDED)
+    return min(found, key=lambda one: (order.index(one.swings.verdict), -one.swings.number), default=None)
+
+
+def _swings(columns: JointColumns, i: int, hold: Hold) -> Swings | None:
+    a, b = (int(row) for row in np.searchsorted(columns.stamp_ns, [hold.begin, hold.end]))
+    value = columns.position[a:b, i]
+    if len(value) < 20 or not np.all(np.isfinite(value)):
+        return None
+    extent = float(np.ptp(value[int((1.0 - LATE) * len(value)) :]))
+    if extent < STILL:
+        return None
+    return swings((columns.stamp_ns[a:b] - hold.begin) / 1e9, value, max(LEAST * extent, LOUD * noise(value)))
+
+
+def swinging_words(name: str, found: Swinging) -> tuple[str, str]:
+    """A sentence on a hold, and its verdict ('' for none)."""
+    one, where = found.swings, f"{found.name} (the force was not recorded)"
+    size = f"{shown(one.peak_to_peak, 'rad')} peak to peak, period {shown(one.period, 's')}"
+    if one.verdict is StabilityVerdict.CYCLES:
+        text = f"{name}: limit cycle, seen on {where}: {size}."
+        return text, text
+    if one.verdict is StabilityVerdict.DIVERGES:
+        text = f"{name}: DIVERGES, seen on {where}: {shown(100.0 * (one.growth - 1.0))} % per half cycle, last {size}."
+        return text, text
+    settled = one.verdict is StabilityVerdict.SETTLES
+    text = (
+        f"{name}: {where} {'ceases to swing' if settled else 'swings too seldom to decide'}; no limit cycle detected."
+    )
+    return text, text
+
+
+def swinging_findings(name: str, found: Swinging) -> list[Finding]:
+    """Size, period and growth of the swings of a hold."""
+    one = found.swings
+    if one.verdict not in (StabilityVerdict.CYCLES, StabilityVerdict.DIVERGES):
+        return []
+    return [
+        Finding(f"{name}: swing of {found.name}, peak to peak", "rad", one.peak_to_peak),
+        Finding(f"{name}: period", "s", one.period),
+        Finding(f"{name}: growth per half cycle", "", one.growth, note=f"{one.verdict}; {one.number} swings"),
+    ]
+
+
+def cycles_of_others(topics: dict[str, JointColumns | WrenchColumns]) -> Section:
+    """What repeats in the joints and forces of another robot, whatever it was commanded."""
+    sentences, findings = [], []
+    for topic, columns in topics.items():
+        for name, unit, value in _signals(topic, columns):
+            found = limit_cycle(columns.stamp_ns / 1e9, value)
+            if not found.confidence >= SURE:
+                continue
+            findings += [
+                Finding(f"{name}: cycle, peak to peak", unit, found.peak_to_peak),
+                Finding(f"{name}: frequency", "Hz", 1.0 / found.period),
+                Finding(f"{name}: confidence", "", found.confidence),
+            ]
+            sentences.append(
+                f"{name} repeats at {shown(1.0 / found.period, 'Hz')}, {shown(found.peak_to_peak, unit)} peak to peak "
+                f"(confidence {found.confidence:.2f}); whether it was commanded to is not in this bag."
+            )
+    told = tuple(sentences) or ("Nothing in this recording repeats three times.",)
+    return Section("stability", "Cycles", told, tuple(findings), (), tuple(sentences))
+
+
+def _signals(topic: str, columns: JointColumns | WrenchColumns) -> list[tuple[str, str, Numbers]]:
+    """Name, unit and values of what may cycle: positions, and each force along which it varies most."""
+    if isinstance(columns, WrenchColumns):
+        force = columns.force
+        if len(force) < 20 or not np.all(np.isfinite(force)) or not np.any(np.ptp(force, axis=0) > 0.0):
+            return []
+        way = np.linalg.eigh(np.cov(force.T))[1][:, -1]
+        return [(topic, "N", force @ way)]
+    return [
+        (name, "rad", columns.position[:, i])
+        for i, name in enumerate(columns.names)
+        if columns.position.shape[1] and np.all(np.isfinite(columns.position[:, i])) and _moves(columns.position[:, i])
+    ]
+
+
+def _moves(value: Numbers) -> bool:
+    return bool(np.ptp(value) > max(STILL, LOUD * noise(value))) if len(value) > 20 else False
+
+
+def at_the_contact(found: Swinging, motors: tuple[str, ...], motor_per_metre: Numbers) -> float:
+    """Swing of a motor as a motion of the contact along the force, m; NaN for a joint."""
+    if found.name not in motors:
+        return math.nan
+    ratio = abs(float(motor_per_metre[motors.index(found.name)]))
+    return found.swings.peak_to_peak / ratio if ratio > 0.0 else math.nan

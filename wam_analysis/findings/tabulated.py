@@ -1,0 +1,66 @@
+"""The numbers of a section as tables: subjects by quantities, and a list of the rest."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wam_analysis.findings.finding import Finding, shown
+
+MARK = " !"  # after a number more than three standard errors from its prediction
+LEGEND = "! more than three standard errors from its prediction"
+
+
+class Tabulated(NamedTuple):
+    """A table of text.
+
+    Attributes
+    ----------
+    columns : titles; the first is that of the rows.
+    predicted : whether each column, the first included, holds predictions for the one before.
+    rows : cells, as many as columns; '' where nothing belongs, '-' where nothing was measured.
+    """
+
+    columns: tuple[str, ...]
+    predicted: tuple[bool, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def tabulated(findings: tuple[Finding, ...]) -> tuple[Tabulated, ...]:
+    """Tables of some numbers: at most one of those with a subject, and one of those without.
+
+    What was neither measured nor predicted for any subject is left out; a column of predictions is there only if there
+    is one.  The longer axis runs down.
+    """
+    known = [one for one in findings if np.isfinite(one.measured) or not np.isnan(one.predicted)]
+    having = [one for one in known if one.subject]
+    alone = [one for one in known if not one.subject]
+    return tuple(_table(part) for part in (having, alone) if part)
+
+
+def _table(findings: list[Finding]) -> Tabulated:
+    subjects = list(dict.fromkeys(one.subject for one in findings))
+    quantities = list(dict.fromkeys((one.quantity, one.unit) for one in findings))
+    cells = {(one.subject, (one.quantity, one.unit)): one for one in findings}
+    downwards = len(subjects) <= len(quantities)
+    titles = [_titled(*quantity) for quantity in quantities]
+    names, heads = (titles, subjects) if downwards else (subjects, titles)
+    heads = [head or "measured" for head in heads]
+    columns, predicted = ["quantity" if downwards else ""], [False]
+    rows: list[list[str]] = [[name] for name in names]
+    grid = [[cells.get((subject, quantity)) for quantity in quantities] for subject in subjects]
+    columned = grid if downwards else [list(column) for column in zip(*grid, strict=True)]
+    for head, found in zip(heads, columned, strict=True):
+        columns.append(head)
+        predicted.append(False)
+        for row, one in zip(rows, found, strict=True):
+            row.append("" if one is None else shown(one.measured) + MARK * one.deviates)
+        if any(one is not None and not np.isnan(one.predicted) for one in found):
+            columns.append("predicted")
+            predicted.append(True)
+            for row, one in zip(rows, found, strict=True):
+                row.append("" if one is None or np.isnan(one.predicted) else shown(one.predicted))
+    return Tabulated(tuple(columns), tuple(predicted), tuple(tuple(row) for row in rows))
+
+
+def _titled(quantity: str, unit: str) -> str:
+    return f"{quantity} [{unit}]" if unit else quantity

@@ -1,0 +1,102 @@
+"""Swings of a signal from one turning point to the next: the few, slow cycles that no autocorrelation finds."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.measures.stability import StabilityVerdict, trend
+
+Numbers = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+FEWEST = 3  # swings that a verdict needs
+ALIKE = 0.05  # of their mean: swings that differ by less are those of one cycle
+SURE = 3.0  # standard errors of a trend
+QUIET = 1.5  # longest of the last swings; after so long without another one the motion has ended
+
+
+class Swings(NamedTuple):
+    """The last swings of a signal and their trend.
+
+    Attributes
+    ----------
+    verdict : of the last swings: of one size, growing, shrinking, or undecided.
+    peak_to_peak : mean size of the last swings, in the unit of the signal; NaN if there are too few.
+    period : of the last two of them, s; NaN likewise.
+    growth : factor from one swing to the next; NaN likewise.
+    number : of swings in all.
+    """
+
+    verdict: StabilityVerdict
+    peak_to_peak: float
+    period: float
+    growth: float
+    number: int
+
+
+def swings(time: Numbers, value: Numbers, least: float) -> Swings:
+    """Evaluate the swings of a signal.
+
+    Parameters
+    ----------
+    time : (n,), s.
+    value : (n,), without NaN.
+    least : a smaller change is no swing; above the noise.
+
+    Raises
+    ------
+    ValueError
+        if `least` is not above zero.
+    """
+    if not least > 0.0:
+        raise ValueError(f"least is {least!r}; it must be above zero, above the noise of the signal")
+    rows = turning_points(value, least)
+    sizes, lengths = np.abs(np.diff(value[rows])), np.diff(time[rows])
+    if len(sizes) < FEWEST:
+        return Swings(StabilityVerdict.UNDECIDED, math.nan, math.nan, math.nan, len(sizes))
+    late = sizes[-max(len(sizes) // 2, FEWEST) :]
+    slope, error = trend(np.log(late))
+    ended = float(time[-1] - time[rows[-1]]) > QUIET * float(np.max(lengths[-FEWEST:]))
+    changes = abs(slope) * (len(late) - 1) > ALIKE and abs(slope) > SURE * error
+    if ended or (changes and slope < 0.0):
+        verdict = StabilityVerdict.SETTLES
+    elif changes:
+        verdict = StabilityVerdict.DIVERGES
+    elif float(np.ptp(late)) <= 2.0 * ALIKE * float(np.mean(late)):
+        verdict = StabilityVerdict.CYCLES
+    else:
+        verdict = StabilityVerdict.UNDECIDED
+    return Swings(verdict, float(np.mean(late)), float(time[rows[-1]] - time[rows[-3]]), math.exp(slope), len(sizes))
+
+
+def turning_points(value: Numbers, least: float) -> Rows:
+    """Rows at which a signal turns by more than `least`, (k,); its first and last samples are none.
+
+    Parameters
+    ----------
+    value : (n,).
+    least : a return by less is no turn.
+    """
+    found: list[int] = []
+    low = high = row = 0
+    way = 0
+    samples = value.tolist()
+    for k, sample in enumerate(samples):
+        if way <= 0 and sample < samples[low]:
+            low = k
+        if way >= 0 and sample > samples[high]:
+            high = k
+        row = high if way > 0 else low
+        if way > 0 and sample < samples[row] - least:
+            found.append(row)
+            way, low = -1, k
+        elif way < 0 and sample > samples[row] + least:
+            found.append(row)
+            way, high = 1, k
+        elif way == 0 and sample > samples[low] + least:
+            way, high = 1, k
+        elif way == 0 and sample < samples[high] - least:
+            way, low = -1, k
+    return np.array(found, dtype=np.int64)
