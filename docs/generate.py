@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -24,22 +24,36 @@ from wam_control.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
+from wam_description.driver_contract import REQUIREMENTS
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, fields
 from wam_description.topics import TOPICS
+from wam_experiments import design_choices
 from wam_experiments.contact_benchmark import resting_push
+from wam_experiments.figures import backdrivability
 from wam_experiments.figures.catalogue import FIGURES, file_of, numbers
 from wam_experiments.figures.catalogue import table as figures_table
-from wam_experiments.force_benchmark import elbow, elbow_table
+from wam_experiments.force_benchmark import usual_tasks
+from wam_experiments.force_benchmark.elbow import elbow, elbow_table
 from wam_experiments.plant.figure import figure
 from wam_experiments.scorecard import report as scorecard
+from wam_experiments.tasks.pictures import save as save_task
+from wam_experiments.thesis import claims
+from wam_experiments.thesis.definition import load, tasks
+from wam_experiments.thesis.evaluation import evaluate
+from wam_experiments.thesis.rows import markdown as rows_of_a_result
 from wam_sim.batch import processes
 from wam_sim.pieces import default_folder
 from wam_theory.equations import EQUATIONS, Equation
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "docs"))
+import moving_picture  # noqa: E402
+
 CONFIGURATION = ROOT / "config" / "wam.yaml"
+SAMPLES = ROOT / "bags" / "sample"
+CLAIMS = ROOT / "docs" / "thesis.yaml"
 WRITES_PICTURES = __name__ == "__main__"
 CITED = re.compile(r"\((\d\.\d+)(?:\.[ab])?\)")
 BLOCK = re.compile(r"(<!-- generated: (?P<name>[^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -95,7 +109,7 @@ def parameter_rows(cls: type, given: Mapping[str, Any]) -> Iterator[list[str]]:
     """One row for each parameter of a class."""
     for field in fields(cls):
         kind = f"list of {field.kind.__name__}" if field.is_array else field.kind.__name__
-        value = number(given[field.name])
+        value = "as in arm" if field.derived and field.name not in given else number(given[field.name])
         live = "yes" if field.live else ""
         yield [f"`{field.name}`", kind, field.unit, field.allowed, live, field.doc, f"`{value}`" if value else "empty"]
 
@@ -239,6 +253,7 @@ def blocks() -> dict[str, Callable[[], str]]:
     return {
         "topics": lambda: topics(configuration),
         "parameters": lambda: parameters(configuration),
+        "driver contract": driver_contract,
         "constants of the arm, printed": lambda: constants(ARM_PRINTED),
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),
         "constants of the testbed": lambda: constants(TESTBED),
@@ -247,12 +262,47 @@ def blocks() -> dict[str, Callable[[], str]]:
         "dither": lambda: dither(configuration),
         "refusals": refusals,
         "elbow": lambda: f"\n{(ROOT / 'docs' / 'elbow.txt').read_text(encoding='utf-8')}",
+        "force tasks": lambda: f"\n{(ROOT / 'docs' / 'force-tasks.txt').read_text(encoding='utf-8')}",
         "guard": lambda: f"```\n{(ROOT / 'docs' / 'guard.txt').read_text(encoding='utf-8')}```\n",
         "figures": figures,
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
+        "backdrivability": lambda: backdrivability.table(backdrivability.backdrivability()),
+        "stiffness rule": lambda: design_choices.stiffness_table(configuration),
+        "friction or stiffness": design_choices.friction_table,
+        **{f"task {name}": partial(task_of, name) for name in tasks()},
+        **{f"claims, {title}": partial(claims.table, rows) for title, rows in claims.load(CLAIMS).items()},
+        "verdict of the demonstration": verdict,
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
+
+
+def verdict() -> str:
+    """The verdict of the demonstration, as `wam demo` prints it."""
+    _, head, rest = (ROOT / "docs" / "demo.txt").read_text(encoding="utf-8").partition("Result,")
+    return "\n```text\n" + f"{head}{rest}".partition("\n\n")[0].rstrip() + "\n```\n"
+
+
+def task_of(name: str) -> str:
+    """The numbers of a whole-arm task, from its sample bag."""
+    result = evaluate(load(name), SAMPLES / name)
+    return f"{rows_of_a_result(result.rows)}\n![{load(name).title}](tasks/{name}.png)\n"
+
+
+def draw_tasks() -> None:
+    """The pictures of the whole-arm tasks, from their sample bags."""
+    folder = ROOT / "docs" / "tasks"
+    folder.mkdir(exist_ok=True)
+    for name in tasks():
+        task = load(name)
+        save_task(task, SAMPLES / name, evaluate(task, SAMPLES / name), folder / f"{name}.png")
+        print(f"docs/tasks/{name}.png", flush=True)
+
+
+def driver_contract() -> str:
+    """The rows that `wam conform` tests."""
+    rows = [[f"`{key}`", row.text, row.advice] for key, row in REQUIREMENTS.items()]
+    return markdown(["row", "a driver", "if it does not"], rows)
 
 
 @cache
@@ -334,7 +384,13 @@ def measure_guard() -> None:
 def measure_elbow() -> None:
     """Press with a nearly straight elbow and keep the table."""
     table = elbow_table(elbow(Configuration.load(CONFIGURATION)))
-    (ROOT / "docs" / "elbow.txt").write_text(table + "\n", encoding="utf-8")
+    (ROOT / "docs" / "elbow.txt").write_text(table, encoding="utf-8")
+
+
+def measure_force_tasks() -> None:
+    """Do the force tasks in simulation and keep their table."""
+    table = usual_tasks.table(list(usual_tasks.perform_all(Configuration.load(CONFIGURATION))))
+    (ROOT / "docs" / "force-tasks.txt").write_text(table + "\n", encoding="utf-8")
 
 
 def filled(text: str) -> str:
@@ -369,28 +425,59 @@ def draw_demonstration() -> None:
         done = subprocess.run([*command, "--config", str(file)], stdout=subprocess.PIPE, text=True, check=False)
         if done.returncode:
             raise SystemExit("the demonstration failed, see above; docs/demo.* are unchanged")
-        report = done.stdout.partition("\nbag ")[0].rstrip()
+        report = done.stdout[done.stdout.index("Demonstration of") :].partition("\nbag ")[0].rstrip()
         (ROOT / "docs" / "demo.txt").write_text(report + "\n", encoding="utf-8")
         shutil.copyfile(Path(folder) / "demo" / "demo.png", ROOT / "docs" / "demo.png")
+        moving_picture.save(Path(folder) / "demo", ROOT / "docs" / "demo.webp")
+    print("docs/demo.png\ndocs/demo.txt\ndocs/demo.webp", flush=True)
+
+
+def draw_and_run_examples() -> None:
+    """Draw the pictures of the concepts, run the notebooks and the sweep."""
+    notebooks = sorted(str(path) for path in (ROOT / "docs" / "notebooks").glob("*.ipynb"))
+    for command in (
+        ["docs/concept_pictures.py"],
+        ["docs/notebook.py", *notebooks],
+        ["examples/sweep.py", "--picture", "docs/sweep.png"],
+    ):
+        subprocess.run([sys.executable, *command], cwd=ROOT, check=True)
+
+
+def draw_push() -> None:
+    """The picture of the contact estimator's page."""
+    resting_push.save(ROOT / "docs" / "estimator.png", Configuration.load(CONFIGURATION))
+    print("docs/estimator.png", flush=True)
+
+
+DRAWN = {
+    "push": draw_push,
+    "demonstration": draw_demonstration,
+    "tasks": draw_tasks,
+    "examples": draw_and_run_examples,
+}
 
 
 def main() -> None:
     """Validate the guard, write the pages, then the pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", choices=DRAWN, default="", help="nothing but these pictures, and what goes with them")
     parser.add_argument(
         "--pages", action="store_true", help="pages only, without demonstration and validation of the guard"
     )
     given = parser.parse_args()
+    if given.only:
+        DRAWN[given.only]()
+        return
     if not given.pages:
         measure_guard()
         measure_elbow()
+        measure_force_tasks()
     for path, text in pages().items():
         path.write_text(text, encoding="utf-8")
         print(path.relative_to(ROOT))
     if not given.pages:
-        resting_push.save(ROOT / "docs" / "estimator.png", Configuration.load(CONFIGURATION))
-        draw_demonstration()
-        print("docs/estimator.png\ndocs/demo.png\ndocs/demo.txt")
+        for draw in DRAWN.values():
+            draw()
 
 
 if __name__ == "__main__":

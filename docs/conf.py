@@ -1,0 +1,107 @@
+"""Settings of Sphinx: the documentation site, built from these pages and the docstrings without a network.
+
+Every page reads the same in the repository: links point to files.  Pages that are elsewhere in the repository have a
+page here with one link, which the site replaces by their text.
+"""
+
+import re
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path[:0] = [str(HERE), str(ROOT)]
+
+from notebook import NotebookParser  # noqa: E402
+
+OUTSIDE = {
+    "contributing": "CONTRIBUTING.md",
+    "changelog": "CHANGELOG.md",
+    "samples": "bags/README.md",
+    "speed": "benchmarks/README.md",
+}
+PACKAGES = sorted(path.parent.name for path in ROOT.glob("wam_*/__init__.py"))
+LINK = re.compile(r"\]\((?P<path>[^)#:\s]+)(?P<anchor>#[^)]*)?\)")
+# of a toctree: pages that other work brings appear by themselves
+GLOB = re.compile(r"^([\w/*-]*\*[\w/*-]*)\n", re.MULTILINE)
+
+project = "wam_stack"
+author = "wam_stack maintainers"
+copyright = "wam_stack maintainers, Apache-2.0"  # noqa: A001
+html_title = "wam_stack"
+html_theme = "furo"
+html_show_sphinx = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+
+extensions = ["myst_parser", "sphinx.ext.apidoc", "sphinx.ext.autodoc", "numpydoc"]
+source_suffix = {".rst": "restructuredtext", ".md": "markdown", ".ipynb": "notebook"}
+exclude_patterns = ["_build"]
+nitpicky = True
+# types of numpy, ROS and MuJoCo in signatures: their documentation is not on this machine
+nitpick_ignore_regex = [("py:.*", ".*")]
+
+myst_heading_anchors = 3
+myst_links_external_new_tab = False
+
+# the tests build the site without the API reference: sphinx -t no_api
+has_api = not tags.has("no_api")  # type: ignore[name-defined]  # noqa: F821
+exclude_patterns += [] if has_api else ["api/*"]
+apidoc_modules = [
+    {"path": f"../{package}", "destination": f"api/{package}", "separate_modules": False, "max_depth": 3}
+    for package in PACKAGES
+    if has_api
+]
+autodoc_default_options = {"members": True, "show-inheritance": True, "member-order": "bysource"}
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+# a mock has no `|`, so what is installed is imported
+OPTIONAL = ("rclpy", "rerun", "viser", "trimesh", "distributed", "websockets")
+autodoc_mock_imports = [name for name in OPTIONAL if find_spec(name) is None]
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+
+def text_of(app: Sphinx, docname: str, source: list[str]) -> None:
+    """The text of a page that is elsewhere, and links as the site needs them."""
+    outside = OUTSIDE.get(docname)
+    page = ROOT / outside if outside else HERE / f"{docname}.md"
+    if not page.is_file():
+        return
+    text = page.read_text(encoding="utf-8") if outside else source[0]
+    text = GLOB.sub(lambda found: found[0] if is_there(found[1]) else "", text)
+    source[0] = LINK.sub(lambda found: f"]({target(page.parent, found['path'])}{found['anchor'] or ''})", text)
+
+
+def is_there(pattern: str) -> bool:
+    """Whether a pattern of a toctree matches a page of this build."""
+    return any(HERE.glob(f"{pattern}.*")) and (has_api or not pattern.startswith("api/"))
+
+
+def target(folder: Path, path: str) -> str:
+    """A link of a page in this folder, as a link of the site: to a page, to a file, or to the list of samples."""
+    file = (folder / path).resolve()
+    named = file.relative_to(ROOT).as_posix() if file.is_relative_to(ROOT) else path
+    for docname, outside in OUTSIDE.items():
+        if named == outside or (ROOT / outside).parent == file:
+            return f"/{docname}.md"
+    if file.is_dir():
+        return "/samples.md"
+    return f"/{file.relative_to(HERE).as_posix()}" if file.is_relative_to(HERE) else f"/{Path('..') / named}"
+
+
+def plain_docstring(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Show the table of contents of a package as it is written, and names that end in an underscore as names."""
+    if what == "module" and name in PACKAGES and lines and not any(line.startswith("===") for line in lines):
+        lines[1:] = ["", "::", "", *(f"    {line}" for line in lines[1:])]
+
+
+def setup(app: Sphinx) -> None:
+    """Connect the above."""
+    app.add_source_parser(NotebookParser)
+    app.connect("source-read", text_of)
+    app.connect("autodoc-process-docstring", plain_docstring, priority=400)

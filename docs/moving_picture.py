@@ -1,0 +1,116 @@
+"""Draws docs/demo.webp: the demonstration as a moving picture, the arm above its forces over time.
+
+    python docs/moving_picture.py bags/first docs/demo.webp
+
+Needs neither a display nor a browser.  `make docs` draws it from the recording that docs/demo.txt reports.
+"""
+
+import argparse
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from wam_analysis import arm_picture
+from wam_analysis.demo_figure import ESTIMATED, METRES_PER_NEWTON, STYLE, TRUE, draw_forces, seconds_at
+from wam_analysis.demo_summary import DemoSummary, summary_of
+from wam_analysis.demo_traces import TOPICS_READ, ForceSignal
+from wam_analysis.recorded import RecordedArm, recorded_arm
+from wam_bag.bag import JointColumns, read
+from wam_description.signals import Contact
+from wam_sim.recording import recorded_run
+
+SIZE, DPI = (6.4, 6.4), 110
+FRAMES_PER_SECOND, SPEED = 8, 1.5
+LARGEST = 1_000_000  # bytes
+QUALITIES = (70, 55, 40, 25)
+
+
+def frames(summary: DemoSummary, recorded: RecordedArm, joints: JointColumns) -> list[Image.Image]:
+    """One picture for each instant shown."""
+    begin, end = summary.steps[0].begin, summary.steps[-1].end
+    stamps = np.arange(begin, end, round(1e9 * SPEED / FRAMES_PER_SECOND))
+    order = [joints.names.index(name) for name in recorded.arm.joints.names]
+    poses = [joints.position[row_at(joints.stamp_ns, stamp)][order].tolist() for stamp in stamps]
+    with mpl.rc_context({**STYLE, "font.size": 11.0}):
+        figure = Figure(figsize=SIZE, dpi=DPI)
+        FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(2, 1, height_ratios=(1.7, 1.0), left=0.1, right=0.98, bottom=0.08, top=0.95)
+        scene, forces = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
+        draw_forces(forces, summary, letter="", room=0)
+        forces.tick_params(labelbottom=True)
+        forces.set_xlabel("time [s]")
+        now = forces.axvline(0.0, color="#222222", linewidth=1.0, zorder=9)
+        box = scene.get_window_extent()
+        views = [
+            arm_picture.side_view(recorded.arm, q, recorded.obstacles, float(box.width / box.height)) for q in poses
+        ]
+        view = max(views, key=lambda view: view.width)  # does not move
+        return [
+            frame(figure, scene, now, summary, recorded, q, view, int(stamp))
+            for stamp, q in zip(stamps, poses, strict=True)
+        ]
+
+
+def frame(figure, scene, now, summary, recorded, q, view, stamp) -> Image.Image:  # type: ignore[no-untyped-def]
+    """The picture of one instant."""
+    scene.clear()
+    scene.set_axis_off()
+    scene.set(xlim=(-view.width / 2.0, view.width / 2.0), ylim=(-view.height / 2.0, view.height / 2.0))
+    scene.set_aspect("equal")
+    arm_picture.draw(scene, recorded.arm, q, recorded.obstacles, view)
+    row = row_at(summary.traces.stamp, stamp)
+    for signal, colour, width in ((summary.traces.true, TRUE, 5.0), (summary.traces.estimated, ESTIMATED, 2.0)):
+        contact = contact_at(signal, row)
+        if contact.cover in recorded.arm.covers.names and np.isfinite(contact.place):
+            point, force = arm_picture.contact_on_surface(recorded.arm, q, contact)
+            start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
+            arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0}
+            scene.annotate("", end, start, arrowprops=arrow, zorder=30)
+    step = next((step.name for step in summary.steps if step.begin <= stamp < step.end), "")
+    scene.text(0.02, 0.98, step, transform=scene.transAxes, va="top", fontsize=14)
+    now.set_xdata([seconds_at(summary, stamp)] * 2)
+    figure.canvas.draw()
+    return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
+
+
+def row_at(stamps: np.ndarray, stamp: int) -> int:
+    """Row of the last message at or before a stamp."""
+    return max(int(np.searchsorted(stamps, stamp, side="right")) - 1, 0)
+
+
+def contact_at(signal: ForceSignal, row: int) -> Contact:
+    """The contact at a row, none where no force acts."""
+    x, y, z = signal.force[row].tolist()
+    return Contact(str(signal.frame[row]) if signal.acts[row] else "", float(signal.position[row]), (x, y, z))
+
+
+def save(bag: Path, file: Path) -> None:
+    """Draw a recording into an animated WebP file, as good as its size allows."""
+    run = recorded_run(read(bag, TOPICS_READ, may_lack=True))
+    joints = run.joints("sim/joint_states")
+    assert joints is not None, f"{bag} has no sim/joint_states"
+    first, *others = frames(summary_of(run), recorded_arm(run.parameters), joints)
+    for quality in QUALITIES:
+        duration = round(1000 / FRAMES_PER_SECOND)
+        first.save(file, save_all=True, append_images=others, duration=duration, loop=0, quality=quality, method=4)
+        if file.stat().st_size < LARGEST:
+            return
+    raise SystemExit(f"{file} has {file.stat().st_size} bytes, more than {LARGEST}")
+
+
+def main() -> None:
+    """Draw a recording."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("bag", type=Path)
+    parser.add_argument("picture", type=Path)
+    given = parser.parse_args()
+    save(given.bag, given.picture)
+    print(f"{given.picture}: {given.picture.stat().st_size} bytes")
+
+
+if __name__ == "__main__":
+    main()
