@@ -154,7 +154,7 @@ def main() -> None:
             ours, bare = [one[i] for one in stack], [one[i] for one in relay]
             ratio = ratios(ours, bare)
             micro = [Spread(*(1e6 * value for value in spread(part))) for part in (ours, bare)]
-            rows.append([f"{way}, {name}", *(f"{part.median:.0f}" for part in micro), f"{ratio:.2f}"])
+            rows.append([f"{way}, {name}", *(f"{part.median:.0f}" for part in micro), f"{ratio:#.3g}"])
             measured[f"{way}, {name}"] = {"ratio": ratio, "stack_us": micro[0], "relay_us": micro[1]}
     print(machine())
     print(table(["state to current at 1 kHz", "stack [us]", "relay [us]", "ratio (middle half)"], rows))
