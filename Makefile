@@ -27,7 +27,7 @@ export ROS_LOG_DIR ?= $(CURDIR)/.cache/ros
 export MPLCONFIGDIR ?= $(CURDIR)/.cache/matplotlib
 
 .DEFAULT_GOAL := help
-.PHONY: help demo install check test bench soak docs constraints clean
+.PHONY: help demo install dependencies check test bench soak docs site constraints clean
 .DELETE_ON_ERROR:
 # pip must not run twice at once in one .venv
 .NOTPARALLEL:
@@ -42,6 +42,8 @@ demo: $(INSTALLED)  ## run the demonstration: start all nodes, press on a foam b
 	@$(VENV)/bin/wam demo $(ARGS)
 
 install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .venv/bin/wam --help
+
+dependencies: $(STAMPS)/test  # for the container: everything but the package itself
 
 check: PYTEST_ARGS = -m "not ros and not slow"
 check: $(STAMPS)/test  ## lint, types and fast tests without ROS nodes, in under a minute; ARGS="-k plant" goes to pytest
@@ -65,12 +67,22 @@ bench: $(STAMPS)/test $(INSTALLED)  ## run the benchmarks; they print ratios of 
 soak: $(INSTALLED)  ## run the nodes for SOAK_SECONDS (600): memory, lost messages; the figures go into docs/reliability.md
 	@$(VENV)/bin/wam evaluate soak --seconds $(SOAK_SECONDS) --write docs/reliability.md $(ARGS)
 
-docs: $(STAMPS)/test $(INSTALLED)  ## regenerate the generated pages of docs/
+docs: $(STAMPS)/docs $(INSTALLED)  ## regenerate the pages of docs/, build the site docs/_build/html; ARGS="--pages" for text only
 	@$(PY) docs/generate.py $(ARGS)
+	@$(SITE)
+
+site: $(STAMPS)/docs $(INSTALLED)  ## build the site docs/_build/html from the pages as they are
+	@$(SITE)
+
+define SITE
+rm -rf docs/api docs/_build/html; \
+$(PY) -P -m sphinx -n -q -j 2 -d docs/_build/doctrees docs docs/_build/html && \
+echo "site: docs/_build/html/index.html"
+endef
 
 constraints: $(STAMPS)/venv  ## pin the newest compatible versions in constraints.txt; then make clean test
 	@mkdir -p .cache
-	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[ros,live,test,view]'
+	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[docs,ros,live,test,view]'
 	@$(TIDY)
 	@$(PY) -c 'import json, pathlib, re; file = pathlib.Path("constraints.txt"); \
 	head = [line for line in file.read_text().splitlines() if line.startswith("#")]; \
@@ -102,6 +114,13 @@ $(STAMPS)/test: $(STAMPS)/ros
 	@echo "Installing the tools of the tests"
 	@$(TIDY)
 	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[ros,live,test]'
+	@$(TIDY)
+	@touch $@
+
+$(STAMPS)/docs: $(STAMPS)/test
+	@echo "Installing what builds the site"
+	@$(TIDY)
+	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[docs,ros,live,test]'
 	@$(TIDY)
 	@touch $@
 

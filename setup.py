@@ -13,7 +13,7 @@ HERE = Path(__file__).resolve().parent
 NODES = run_path(str(HERE / "wam_description" / "nodes.py"))["NODES"]
 PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 
-CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets")
+CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets", "config/tasks")
 
 package = ElementTree.parse(HERE / "package.xml").getroot()
 name = package.findtext("name")
@@ -36,7 +36,7 @@ setup(
     maintainer=package.findtext("maintainer"),
     maintainer_email=package.find("maintainer").get("email"),
     packages=find_packages(include=["wam_*"]),
-    package_data={"": ["py.typed"], "wam_ros": ["this_machine.xml"]},
+    package_data={"": ["py.typed"], "wam_ros": ["this_machine.xml"], "wam_analysis.findings": ["charts.js", "uplot/*"]},
     python_requires=">=3.11",
     install_requires=[
         "lz4",
@@ -51,6 +51,8 @@ setup(
     extras_require={
         # maps and benchmarks on many machines: `wam map --dask ADDRESS`
         "dask": ["distributed"],
+        # the documentation site: `make docs`
+        "docs": ["furo", "myst-parser", "numpydoc", "sphinx>=8.2"],
         # the live page in the browser: `wam live`, `wam view`; without an upper limit pip takes 0.2, which has no plots
         "live": ["viser>=1.1,<1.2"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone

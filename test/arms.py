@@ -105,6 +105,7 @@ def one_joint(ratio: float = 14.0, cable: float = 8.33) -> Arm:
         name="one",
         joint_from_motor=(1.0 / ratio,),
         tool=(LEVER, 0.0, 0.0),
+        payload=0.0,
         gravity=(0.0, 0.0, 0.0),
         joint_sensors=True,
     )

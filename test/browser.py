@@ -24,7 +24,7 @@ LOOK = """<!doctype html><body style="margin:0">
 window.addEventListener("load", () => {
   const frame = document.querySelector("iframe"), page = frame.contentDocument, own = frame.contentWindow;
   const room = page.documentElement.clientWidth;
-  const all = [...page.body.querySelectorAll("*")];
+  const all = [...page.body.querySelectorAll("*")].filter(e => !e.closest(".wide"));  // which scrolls by itself
   document.getElementById("seen").textContent = JSON.stringify({
     width: own.innerWidth,
     room: room,
@@ -32,6 +32,7 @@ window.addEventListener("load", () => {
     height: page.documentElement.scrollHeight,
     overflow: all.filter(e => e.getBoundingClientRect().right > room + 0.5).map(e => e.tagName),
     pictures: [...page.images].map(image => image.complete && image.naturalWidth > 0),
+    charts: page.querySelectorAll("figure.chart canvas").length,
     requests: own.performance.getEntriesByType("resource").map(r => r.name).filter(n => !n.startsWith("data:")),
   });
 });

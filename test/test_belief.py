@@ -158,6 +158,62 @@ def test_the_node_that_has_stopped_is_named(lost: list[str], present: list[str],
     assert Interface(WAM.shared).silent(lost, present) == silent
 
 
+CHAIN: dict[str, list[str]] = {
+    "velocity_loop": ["motor_effort_command", "motor_velocity_command"],
+    "transform": ["joint_effort_command", "joint_velocity_command"],
+    "gravity": [],
+    "force_loop": [],
+    "contact_estimator": [],
+}
+
+
+@pytest.mark.parametrize(
+    ("awaited", "found"),
+    [
+        (CHAIN, {"force_loop": ["joint_effort_command", "joint_velocity_command"]}),
+        ({**CHAIN, "velocity_loop": []}, {"velocity_loop": ["motor_current_command"]}),
+        (
+            {**CHAIN, "velocity_loop": ["motor_effort_command"], "transform": ["gravity_effort"]},
+            {"gravity": ["gravity_effort"]},
+        ),
+        ({**CHAIN, "force_loop": ["contact/hypotheses"]}, {"contact_estimator": ["contact/hypotheses"]}),
+    ],
+)  # fmt: skip
+def test_the_node_that_lacks_nothing_and_did_not_answer_is_named(
+    awaited: dict[str, list[str]], found: dict[str, list[str]]
+) -> None:
+    assert Interface(WAM.shared).unanswered(["motor_current_command"], awaited) == found
+
+
+def test_a_session_that_only_a_status_announces_forgets_nothing() -> None:
+    synchroniser = Synchroniser(dataclasses.replace(REALTIME, mode="lockstep"), "state", {"input": FEEDBACK})
+    synchroniser.put("state", 6 * MS, "waiting")
+    assert synchroniser.awaited(6 * MS) == ["input"]
+    synchroniser.follow(MS)  # anybody can send that
+    (inputs,) = synchroniser.put("input", 6 * MS, "its input")
+    assert (inputs["state"], inputs["input"]) == ("waiting", "its input")
+    assert synchroniser.awaited(6 * MS) == []
+    assert synchroniser.awaited(11 * MS) == ["state"]
+
+
+def test_a_session_that_a_state_confirms_begins_with_it_and_with_what_came_before_it() -> None:
+    synchroniser = Synchroniser(dataclasses.replace(REALTIME, mode="lockstep"), "state", {"input": FEEDBACK})
+    synchroniser.put("state", 6 * MS, "of the driver before")
+    synchroniser.follow(MS)
+    assert list(synchroniser.put("input", MS, "early")) == []
+    (inputs,) = synchroniser.put("state", MS, "first")
+    assert (inputs["state"], inputs["input"]) == ("first", "early")
+
+
+def test_a_driver_sees_that_another_one_has_begun_a_session() -> None:
+    session = Session(["gravity"])
+    session.begin()
+    session.hear(NodeStatus(Level.OK, "ready", "gravity", session=999))
+    assert session.is_overtaken
+    session.begin()
+    assert (session.number, session.is_overtaken) == (1000, False)
+
+
 def test_every_input_of_the_stack_says_how_old_it_may_be_and_what_its_absence_means() -> None:
     for name in NODES:
         for reaction in declared(name).reactions:

@@ -202,3 +202,22 @@ def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: 
     path.write_text(text)
     with pytest.raises(ParameterError, match=message):
         Configuration.load(path)
+
+
+def test_a_file_that_is_nested_without_end_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "deep.yaml").write_text("{" * 3_000)
+    with pytest.raises(ParameterError, match=r"deep.yaml is not YAML: its brackets or blocks are nested hundreds of"):
+        Configuration.load(tmp_path / "deep.yaml")
+
+
+def test_files_that_build_on_each_other_without_end_are_refused_in_one_line(tmp_path: Path) -> None:
+    for k in range(100):
+        (tmp_path / f"{k}.yaml").write_text(f"base: {k + 1}.yaml\n")
+    with pytest.raises(ParameterError, match=r"0.yaml: more than 20 files build on each other by 'base'; put some"):
+        Configuration.load(tmp_path / "0.yaml")
+
+
+def test_a_configuration_without_nodes_is_refused() -> None:
+    empty = Configuration.load(packaged("wam")).with_values({"nodes": []})
+    with pytest.raises(ParameterError, match="parameter 'nodes' is empty; list the nodes to start, for example"):
+        empty.shared  # noqa: B018

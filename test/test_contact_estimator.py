@@ -75,22 +75,22 @@ def at_rest(cover: str, x: float, force: tuple[float, float, float]) -> ContactE
 @pytest.mark.parametrize("phi", [0.0, 60.0, 90.0, 180.0, -90.0])
 def test_joint_sensors_feel_a_light_push_at_rest(size: float, phi: float) -> None:
     force = (0.0, size * math.cos(math.radians(phi)), size * math.sin(math.radians(phi)))
-    felt = at_rest("outer_link", 0.28, force)
-    assert felt.in_contact
-    assert felt.link == "outer_link"
-    assert felt.place == pytest.approx(0.28, abs=0.03)
-    assert abs(felt.place - 0.28) < 2 * felt.position_sd
-    assert np.linalg.norm(np.subtract(felt.force, force)) < 0.1 * size
-    assert felt.reason == ""
+    estimate = at_rest("outer_link", 0.28, force)
+    assert estimate.in_contact
+    assert estimate.link == "outer_link"
+    assert estimate.place == pytest.approx(0.28, abs=0.03)
+    assert abs(estimate.place - 0.28) < 2 * estimate.position_sd
+    assert np.linalg.norm(np.subtract(estimate.force, force)) < 0.1 * size
+    assert estimate.reason == ""
 
 
 def test_joint_sensors_feel_the_moment_of_a_push_on_the_inner_link() -> None:
-    felt = at_rest("inner_link", 0.3, (0.0, 0.0, 8.0))
-    assert felt.link == "inner_link"
-    assert math.isnan(felt.place)
-    assert "the shoulder measures only the moment" in felt.reason
-    assert felt.moment[1] == pytest.approx(-2.4, rel=0.05)
-    assert np.linalg.norm(felt.force) <= 8.0
+    estimate = at_rest("inner_link", 0.3, (0.0, 0.0, 8.0))
+    assert estimate.link == "inner_link"
+    assert math.isnan(estimate.place)
+    assert "the shoulder measures only the moment" in estimate.reason
+    assert estimate.moment[1] == pytest.approx(-2.4, rel=0.05)
+    assert np.linalg.norm(estimate.force) <= 8.0
 
 
 class Move(NamedTuple):

@@ -249,6 +249,13 @@ def test_good_run_has_a_good_verdict_in_narrow_lines():
     assert all(len(line) <= 100 for line in text(summary).splitlines())
 
 
+def test_verdict_comes_before_the_tables():
+    lines = text(Recording().summary()).splitlines()
+    result = lines.index("Result, worst case in brackets")
+    assert lines[result + 1] == "  force within 10 %: YES (5.0 %)"
+    assert result < next(i for i, line in enumerate(lines) if line.startswith("Force along")) < len(lines) - 5
+
+
 def test_each_fault_turns_its_own_verdict():
     force, link, position = Recording(), Recording(), Recording()
     force.set(force.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)

@@ -93,9 +93,12 @@ def test_the_console_says_the_state_and_what_to_call_next(hand: Hand, capfd: pyt
 
 
 def test_the_console_names_the_nodes_that_are_missing_and_the_arm_that_is_called() -> None:
-    assert guidance("braked", "", ["gravity"], "/wam", False) == "braked; not connected yet: gravity"
-    assert guidance("braked", "", [], "/left", False).endswith(
+    assert guidance("braked", "", ["gravity"], [], "/wam", False) == "braked; not connected yet: gravity"
+    assert guidance("braked", "", [], [], "/left", False).endswith(
         "ros2 service call /left/driver/enable std_srvs/srv/SetBool '{data: true}' "
         "(or: wam call enable --namespace left)"
     )
-    assert guidance("braked", "", [], "/wam", True) == "braked: the brakes are on"
+    assert guidance("braked", "fault", [], ["gravity"], "/wam", False) == (
+        "braked; enable is refused until the fault is over that is reported by gravity"
+    )
+    assert guidance("braked", "", [], [], "/wam", True) == "braked: the brakes are on"

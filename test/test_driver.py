@@ -545,7 +545,7 @@ ARRAYS = [(prefix, field) for prefix, field in EVERY if field.is_array]
 @pytest.mark.parametrize(("prefix", "field"), ARRAYS, ids=[field.name for _, field in ARRAYS])
 def test_wrong_number_of_values_is_refused_with_a_name(prefix: str, field: Field) -> None:
     key, value = prefix + field.name, list(present(prefix, field))
-    runs_over = field.name.endswith((".names", ".shafts", ".joints", ".stage_motors"))
+    runs_over = field.name.endswith((".names", ".shafts", ".joints", ".stage_motors", ".obstacles"))
     extra = "another" if field.name.endswith(".names") else value[0]
     for wrong in (value[:-1], [*value, extra]):
         with pytest.raises(ParameterError) as refusal:
@@ -601,3 +601,48 @@ def test_added_friction_on_the_wrong_number_of_joints_is_refused() -> None:
     hardware = driver()
     with pytest.raises(ParameterError, match=r"'effects\.added_coulomb_friction' has 1 values; 4 names need 4"):
         hardware.set_added_friction([0.1])
+
+
+def stopped_at_speed(q: list[float], qd: list[float], stop: Callable[[Driver], Any], **parameters: float) -> Driver:
+    """An enabled arm that moves at qd, (4,), rad/s, and is stopped; after 0.1 s."""
+    hardware = enabled(FAST_JOINTS | {"start": tuple(q)}, **parameters)
+    hardware.plant.data.qvel[:] = [*np.linalg.inv(np.reshape(WAM.joint_from_motor, (4, 4))) @ qd, *qd]
+    stop(hardware)
+    for _ in range(100):
+        hardware.advance(0.0)
+    return hardware
+
+
+@pytest.mark.parametrize(
+    ("stop", "before"), [(Driver.estop, "emergency stop; then "), (Driver.disable, ""), (_faulty, "another; then ")]
+)
+def test_cable_that_breaks_under_the_brakes_is_named_once_after_the_fault(
+    stop: Callable[[Driver], Any], before: str
+) -> None:
+    """Joint 2 at 3.5 of its 4 rad/s, stopped in one step: 870 to 930 N, of which nobody was told."""
+    hardware = stopped_at_speed([0.0, -0.6, 0.0, 0.5], [0.0, 3.5, 0.0, 0.0], stop, brake_torque=1000.0)
+    fault = hardware.safety.fault
+    assert fault.startswith(before + "cable tension of motor2 ")
+    assert fault.endswith(" N is above its limit 756.198 under the brakes; check the cable")
+    hardware.reset_fault()
+    for _ in range(20):
+        hardware.advance(0.0)
+    assert hardware.safety.mode is Mode.BRAKED
+
+
+@pytest.mark.parametrize(
+    ("q", "qd"),
+    [
+        ([0.0, -0.6, 0.0, 0.5], [0.0, 4.0, 0.0, 0.0]),
+        ([0.07, 2.03, -1.79, 2.15], [-4.0, 0.0, 6.0, -6.0]),
+        ([-2.08, 1.44, 0.92, 1.53], [2.6, -2.6, 3.9, 3.9]),
+        ([2.73, 1.01, 0.21, -0.41], [4.0, -2.0, -6.0, 6.0]),
+    ],
+)
+def test_brakes_stop_an_arm_at_its_speed_limits_within_a_tenth_of_a_radian_and_break_no_cable(
+    q: list[float], qd: list[float]
+) -> None:
+    hardware = stopped_at_speed(q, qd, Driver.estop)
+    assert hardware.safety.fault == "emergency stop"
+    assert max(map(abs, hardware.plant.thetad)) < 1e-3
+    assert np.abs(np.array(hardware.plant.q) - q).max() < 0.1

@@ -76,9 +76,9 @@ def test_an_arm_that_hangs_from_a_ceiling_has_its_base_turned_and_gravity_pulls_
         (WAM, {"driver:world.obstacles.damping": [20000.0]}, "too long for obstacle 'foam_box' on"),
         (WAM, {"driver:world.obstacles.hardening": [1e6]}, "too long for obstacle 'foam_box' on"),
         (WAM, {"driver:world.pushers.force": [5.0], "driver:world.pushers.stiffness": [1e8]}, "pusher 'hand' on outer"),
-        (WAM, {"arm.motors.inertia": [4e-6] * 4}, "too long for cables, rotors and springs"),
-        (WAM, {"arm.cables.damping": [0.5] * 4}, "too long for cables, rotors and springs"),
-        (TESTBED, {"driver:world.springs.stiffness": [1e8]}, "too long for cables, rotors and springs"),
+        (WAM, {"arm.motors.inertia": [4e-6] * 4}, "too long for cables, rotors, springs and hinges"),
+        (WAM, {"arm.cables.damping": [0.5] * 4}, "too long for cables, rotors, springs and hinges"),
+        (TESTBED, {"driver:world.springs.stiffness": [1e8]}, "too long for cables, rotors, springs and hinges"),
     ],
 )
 def test_a_step_that_does_not_fit_is_refused_and_the_one_it_names_is_taken(
@@ -107,6 +107,21 @@ def test_a_push_beyond_the_limit_is_refused_by_name_and_the_last_one_remains() -
             hardware.push("outer_link", force, torque)
     (load,) = hardware.plant.loads()
     assert load.force == (0.0, 5.0, 0.0)
+
+
+def test_a_push_that_nobody_repeats_ends_after_the_age_of_a_command() -> None:
+    hardware = driver()
+    periods = round(WAM.shared.ages.command / WAM.shared.timing.period)
+    hardware.push("outer_link", (0.0, 5.0, 0.0), (0.0, 0.0, 1.0))
+    for _ in range(periods):
+        hardware.advance(0.0)
+    hardware.push("outer_link", (0.0, 6.0, 0.0), (0.0, 0.0, 1.0))
+    for _ in range(periods):
+        hardware.advance(0.0)
+        assert hardware.plant.loads()
+    for _ in range(2):
+        hardware.advance(0.0)
+    assert hardware.plant.loads() == []
 
 
 @pytest.mark.parametrize("force", [1e12, 1e300, math.nan])

@@ -15,7 +15,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, build, fields, values
 from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, big_endian, broken, leaves
-from wam_experiments.faults.page import report, with_section
+from wam_experiments.faults.page import faults_section, report, with_section
 from wam_experiments.faults.parameter_faults import UNKNOWN_CODES, parameter_set
 from wam_experiments.faults.trials import MOST_ESCAPES, FaultKind, FaultTrial, KindResult, played
 from wam_ros.messages import joint_state
@@ -119,7 +119,7 @@ def result(*escapes: str) -> KindResult:
 def test_the_report_counts_and_says_how_to_repeat_an_escape() -> None:
     text = report([result("the arm moved")])
     assert "11 messages" in text
-    assert "wam evaluate faults --only messages --seed 1 --first 3 --count 1" in text
+    assert "wam evaluate faults --only messages --count 1 --seed 1 --first 3" in text
     assert "42" in text
     assert "--only" not in report([result()])
 
@@ -142,6 +142,16 @@ def test_a_section_of_the_page_is_replaced_and_the_others_stay(tmp_path: Path) -
     (tmp_path / "other.md").write_text("by hand")
     with pytest.raises(ValueError, match="has no line '<!-- written: soak -->'"):
         with_section(tmp_path / "other.md", "soak", "x")
+
+
+def test_kinds_that_were_not_played_keep_their_rows() -> None:
+    first = faults_section([result()], "a", "")
+    others = faults_section([result()._replace(kind="bags", unit="bags")], "b", first)
+    again = faults_section([result("the arm moved")], "c", others)
+    assert [line.split("|")[1:4] for line in again.splitlines()[4:]] == [
+        [" messages ", " 11 messages ", " 1 "],
+        [" bags ", " 11 bags ", " 0 "],
+    ]
 
 
 # what is watched, on the nodes

@@ -31,7 +31,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
-from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, Wrench
+from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, ObjectState, Wrench
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
 
@@ -40,6 +40,7 @@ from geometry_msgs.msg import WrenchStamped  # noqa: E402
 
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
+from wam_live.object_meshes import ObjectMeshes  # noqa: E402
 from wam_live.panel import POINTS, Controls, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, LinkPush, Scene, band_push  # noqa: E402
@@ -512,3 +513,16 @@ def until(holds: Callable[[], Any]) -> None:
 
 def test_frames_of_a_push_are_covers() -> None:
     assert RELEASE.cover == BASE
+
+
+def test_objects_of_the_world_are_drawn_where_the_simulator_has_them(server: Any) -> None:
+    section = CONFIGURATION.sections["driver"]
+    world = build_part(World, {**section, "world.doors.mass": (2.0,), "world.bodies.mass": (1.0,)}, "world.")
+    objects = ObjectMeshes(server, world)
+    half = math.sqrt(0.5)
+    block = ObjectState._make((0, 0.5, 0.1, 0.2, 0, 0, half, half, *[0.0] * 13))
+    objects.show([block])
+    assert objects.frames[0].position == pytest.approx((0.5, 0.1, 0.2))
+    assert turned(objects.frames[0].wxyz, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+    panel = server.scene.get_handle_by_name("/world/door/mesh")
+    assert panel.position == pytest.approx((0.3, 0.0, 0.0))  # half its width from the hinge

@@ -114,7 +114,7 @@ def test_lockstep_over_topics_equals_the_loop_without_ros(
     record_composed(configured, domain_id)
     run = play_directly(configured, script)
     bag = read(tmp_path / "composed")
-    assert len(run.rows) == 25
+    assert len(run.rows) == 26
     assert len(run.rows["motor_states"]) == 801
     assert differences(run.rows, bag) == []
 

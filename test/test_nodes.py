@@ -276,7 +276,7 @@ def test_two_publishers_of_the_command_are_a_fault_that_says_what_to_do(live: Ha
     live.ask("reset_fault")
     assert "which one node alone may" in live.ask("enable", True).message
     other.destroy_publisher(second)
-    live.ros.wait(lambda: live.node._ports.publisher_count("motor_current_command") == 1)
+    live.ros.wait(lambda: live.node._ports._subscriptions["motor_current_command"].get_publisher_count() == 1)
     live.ros.wait(lambda: not live.node._ports.problem)
     live.wait_periods(5)
     live.enable()
@@ -415,7 +415,7 @@ def test_lockstep_time_out_names_what_is_missing_and_lockstep_goes_on_with_the_n
     hand.is_answering = False
     ros.wait(lambda: hand.driver.safety.mode is Mode.FAULT, what="the time-out")
     text = f"lockstep: no motor_current_command for the state of {hand.last + MS} ns within 0.3 s"
-    assert hand.driver.safety.fault == f"{text}; check that velocity_loop runs"
+    assert hand.driver.safety.fault == f"{text}; check that velocity_loop runs, then reset_fault"
     assert hand.driver.currents == [0.0] * 4
     unanswered = hand.driver.stamp
     ros.wait(lambda: hand.driver.stamp > unanswered + 3 * MS, what="time that creeps")

@@ -126,6 +126,45 @@ def test_a_node_that_is_none_is_refused_by_name(entry: str, text: str, configure
         declared(entry)
 
 
+class Raising(Echo):
+    def __init__(self, shared: Shared, own: Nothing) -> None:
+        raise KeyError("stiff\nness")
+
+
+def test_a_controller_whose_constructor_raises_is_named_with_its_line(
+    configured: Configuration, tmp_path: Path
+) -> None:
+    with pytest.raises(ParameterError) as refusal:
+        Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"echo": Raising})
+    text = str(refusal.value)
+    assert text.startswith(f"node 'echo' cannot be made: {__name__}:Raising raised KeyError: ")
+    assert f", at {__file__}:" in text
+    assert text.endswith("; correct its __init__")
+    assert "\n" not in text
+
+
+def test_a_module_that_raises_at_its_import_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "broken_module.py").write_text("gain = 1 +\n")
+    with pytest.raises(ParameterError, match=r"node 'broken_module:Any' cannot be imported: SyntaxError: .*; correct"):
+        declared("broken_module:Any")
+
+
+def test_the_example_holds_the_last_posture_where_one_is_beyond_the_stops(configured: Configuration) -> None:
+    node: Any = declared("impedance:Impedance").node
+    loop = node(configured.shared, configured.node("impedance", node.parameters))
+    joints = State([0.0, -1.2, 0.0, 0.9], [0.0] * 4, [])
+
+    def effort(stamp: int, posture: list[float]) -> Any:
+        taken = {"joint_states": (stamp, joints), "joint_posture_command": (stamp, State(posture, [], []))}
+        return loop.step(Inputs(stamp, 0.005, taken))["joint_effort_command"]
+
+    good = effort(5_000_000, [0.0, -1.3, 0.0, 0.9])
+    assert loop.refusals == {}
+    assert effort(10_000_000, [0.0, 9.0, 0.0, 0.9]) == good
+    assert "joint2 is to be at 9 rad; allowed: " in loop.refusals["joint_posture_command"]
+
+
 def test_a_topic_that_is_in_no_table_is_refused(configured: Configuration) -> None:
     class Lost(Echo):
         name, topics = "lost", ()

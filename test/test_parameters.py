@@ -18,7 +18,7 @@ from wam_description.arm import Servo, Shared
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import declared
 from wam_description.nodes import NODES
-from wam_description.parameters import ParameterError, build, fields, parameter, require, values
+from wam_description.parameters import ParameterError, build, copy_of, fields, parameter, require, values
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, declaration, reaction
 from wam_ros.node import AdaptedNode, make_node
@@ -95,6 +95,19 @@ def test_a_set_with_something_wrong_is_refused_by_name(change: dict[str, Any], t
         build(Example, flat)
 
 
+@dataclass(frozen=True)
+class Derived:
+    gain: float = parameter("gain", low=0.0, high=2.0)
+    copy: float = parameter("copy", low=0.0, high=2.0, derived=copy_of("gain"))
+
+
+def test_a_derived_parameter_follows_another_one_unless_it_is_given() -> None:
+    assert build(Derived, {"gain": 1.5}) == Derived(1.5, 1.5)
+    assert build(Derived, {"gain": 1.5, "copy": 0.5}) == Derived(1.5, 0.5)
+    with pytest.raises(ParameterError, match="missing parameter 'gain'; missing parameter 'copy'"):
+        build(Derived, {})
+
+
 @pytest.mark.parametrize("node", ["", *NODES])
 def test_every_number_has_a_finite_range(node: str) -> None:
     numbers = [field for field in fields(own_class(node) if node else Shared) if field.kind in (int, float)]
@@ -112,7 +125,9 @@ def test_every_section_of_every_configuration_builds_the_class_of_its_node(path:
     configuration = Configuration.load(path)
     shared = configuration.sections["/**"]
     assert build(Shared, shared) == configuration.shared
-    assert set(values(configuration.shared)) == set(shared), "nothing is left over"
+    derived = {field.name for field in fields(Shared) if field.derived}
+    assert set(values(configuration.shared)) == set(shared) | derived, "nothing is left over"
+    assert not derived & set(shared), "they have their home elsewhere"
     sections = set(configuration.sections) - {"/**"}
     assert sections <= set(NODES), "every section is that of a node"
     assert set(configuration.shared.nodes) <= sections, "every node of the bring-up has one"
@@ -199,7 +214,10 @@ def test_live_parameters_change_as_a_set_over_ros(ros: Any) -> None:
         ({"force_gain": [0.02], "posture_gain": -1.0}, "posture_gain"),
         ({"force_gain": [0.02], "posture_gain": "much"}, "Wrong parameter type"),
         ({"force_gain": [0.02], "timing.mode": "lockstep"}, "timing.mode"),
-        ({"force_gain": [0.02], "force_gian": 0.02}, "undeclared parameter"),
+        (
+            {"force_gain": [0.02], "force_gian": 0.02},
+            "unknown parameter 'force_gian'; did you mean 'force_gain'? allowed, as they can change while node",
+        ),
         ({"force_gain": [0.5]}, "times the largest linearly stable one"),
         ({"force_gain": [0.02], "guard.contact_stiffness": 0.5}, "guard.contact_stiffness"),
     ],

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Callable
 
+import mujoco
 import numpy as np
 import pytest
 from arms import (
@@ -673,6 +674,22 @@ def test_stop_gives_back_less_than_it_takes() -> None:
 def test_energy_of_the_frictionless_arm_stays() -> None:
     found = energies(changed(frictionless(WAM), joints=WIDE), 1, 1.0, 1e-4)
     assert np.ptp(found) < 0.02
+
+
+def test_energy_of_the_frictionless_arm_grows_no_faster_than_stated() -> None:
+    """docs/plant.md: at the step of config/wam.yaml, up to 0.3 W in fast motion."""
+    plant = released(changed(frictionless(WAM), joints=WIDE), step=STEP)
+    plant.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    qd = np.array([-0.9, 1.8, -1.4, 1.8])
+    plant.data.qvel[:] = [*(R @ qd), *qd]
+    means = []
+    for _ in range(3):  # before it meets a stop
+        total = 0.0
+        for _ in range(round(1.0 / STEP)):
+            plant.step([0.0] * 4)
+            total += plant.data.energy.sum() * STEP
+        means.append(total)
+    assert abs(np.polyfit(np.arange(3.0), means, 1)[0]) < 0.33
 
 
 def test_power_that_goes_in_at_the_motors_comes_out_at_the_joints() -> None:

@@ -5,11 +5,23 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 import pytest
-from arms import CONFIGURATION, LEVER, LINK_INERTIA, NOWHERE, WAM, changed, frictionless, ideal_plant, one_joint
+from arms import (
+    CONFIGURATION,
+    LEVER,
+    LINK_INERTIA,
+    NOWHERE,
+    WAM,
+    changed,
+    frictionless,
+    ideal_mjcf,
+    ideal_plant,
+    one_joint,
+)
 from contact_truth import cover_frame, frame, joint_torques, motor_from_joint, torques
 
 from wam_description.arm import Arm
@@ -801,3 +813,49 @@ def test_rod_taken_off_lets_a_stuck_joint_go() -> None:
     for _ in range(10):
         turn(plant, 1.5)
     assert plant.q[0] > 1e-6
+
+
+def with_riding_rotors(turn: str) -> mujoco.MjModel:
+    """The arm with rotors 2 and 3 on link 1, where their axes have this rotation, roll pitch yaw."""
+    root = ElementTree.fromstring(ideal_mjcf(WAM, 5e-4, NOWHERE))
+    world = root.find("worldbody")
+    assert world is not None
+    (link1,) = (body for body in world.iter("body") if body.get("name") == "link1")
+    for name in ("motor2_rotor", "motor3_rotor"):
+        (rotor,) = (body for body in world.findall("body") if body.get("name") == name)
+        world.remove(rotor)
+        rotor.set("pos", "0 0 0")
+        rotor.set("euler", turn)
+        link1.append(rotor)
+    return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+
+
+def motion(model: mujoco.MjModel, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Inertia and bias of motors, then joints, by name; q and qd in that order."""
+    data, inertia = mujoco.MjData(model), np.zeros((8, 8))
+    order = [model.joint(name).dofadr[0] for name in (*WAM.motors.names, *WAM.joints.names)]
+    data.qpos[order], data.qvel[order] = q, qd
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, inertia)
+    return inertia[np.ix_(order, order)], data.qfrc_bias[order]
+
+
+def test_rotors_that_ride_on_joint_1_change_nothing_but_its_inertia() -> None:
+    """Their axes are parallel to that of joint 2, as the cables of the differential need, and square to joint 1's.
+
+    Along the axis of joint 1 they would couple it with both motors by J, which is how much is left out at most.
+    """
+    random = np.random.default_rng(2)
+    fixed = mujoco.MjModel.from_xml_string(ideal_mjcf(WAM, 5e-4, NOWHERE))
+    q, qd = random.uniform(-1.0, 1.0, 8), random.uniform(-1.0, 1.0, 8) * ([200.0] * 4 + [4.0] * 4)
+    inertia, bias = motion(fixed, q, qd)
+    rotor = WAM.motors.inertia[1]
+    riding_inertia, riding_bias = motion(with_riding_rotors("1.5707963267948966 0 0"), q, qd)
+    added = riding_inertia - inertia
+    assert added[4, 4] == pytest.approx(2.0 * rotor, rel=1e-6)
+    added[4, 4] = 0.0
+    assert np.abs(added).max() < 1e-12
+    assert riding_bias == pytest.approx(bias, abs=1e-9)
+    along, _ = motion(with_riding_rotors("0 0 0"), q, qd)
+    assert along[1, 4] == pytest.approx(rotor)
+    assert 2.0 * rotor * 30.4 / inertia[4, 4] < 0.02

@@ -18,7 +18,7 @@ from wam_description.world import NO_SPRINGS, Pushers, World
 from wam_driver.plant import Plant
 
 STEP = 5e-4
-AS_CONFIGURED = ModelMismatch((1.0,) * 4, (1.0,) * 4, (1.0,) * 4, (1.0,) * 4, 0.0)
+AS_CONFIGURED = ModelMismatch((1.0,) * 4, (1.0,) * 4, (1.0,) * 4, (1.0,) * 4, 0.0, (1.0,) * 4)
 L3 = 0.5588
 
 
@@ -145,7 +145,7 @@ def test_an_arm_without_departure_is_the_configured_one() -> None:
 
 def test_model_mismatch_is_in_the_compiled_plant() -> None:
     mismatch = ModelMismatch(
-        (1.1, 1.0, 0.9, 1.0), (1.2, 1.0, 1.0, 1.0), (1.0, 0.8, 1.0, 1.0), (1.0, 1.0, 1.0, 1.5), 0.0
+        (1.1, 1.0, 0.9, 1.0), (1.2, 1.0, 1.0, 1.0), (1.0, 0.8, 1.0, 1.0), (1.0, 1.0, 1.0, 1.5), 0.0, (1.0,) * 4
     )
     arm = true_arm(WAM, mismatch)
     before, after = (mujoco.MjModel.from_xml_string(ideal_mjcf(a, STEP, NOWHERE)) for a in (WAM, arm))

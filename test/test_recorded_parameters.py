@@ -111,9 +111,13 @@ def test_everything_with_a_value_from_before_may_be_missing_in_a_recording() -> 
     }
     assert "friction.law" in young
     found = read({node: {k: v for k, v in values.items() if k not in young} for node, values in NODES.items()})
-    own = {field.name: young[field.name] for field in fields(DriverParameters) if field.name in young}
+    before = {name: value(SECTIONS["/**"]) if callable(value) else value for name, value in young.items()}
+    own = {field.name: before[field.name] for field in fields(DriverParameters) if field.name in young}
     assert found.part("driver", DriverParameters) == build(DriverParameters, {**SECTIONS["driver"], **own})
-    assert all(any(name in note for note in found.notes) for name in young)
+    derived = {field.name for field in fields(Shared) if field.derived}
+    noted = {name for name in young if any(name in note for note in found.notes)}
+    assert noted == set(young) - derived
+    assert found.shared.model_arm == found.shared.arm, "a recording from before the model was its own had that of arm"
 
 
 def test_a_parameter_that_moved_to_another_node_is_found_where_it_was() -> None:

@@ -386,7 +386,8 @@ def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> No
     for number in (2, 3):
         machine.receive(row.name, b"\0\1\0\0\1", 1, 1, number)
     machine.finish()
-    assert "No space left" in machine.failure
+    stopped = f"recording into {tmp_path / 'bag'} has stopped: the disk is full (No space left on device)"
+    assert machine.failure.startswith(stopped)
     assert "free some space" in machine.failure
     assert machine.lost_at_disk == 2
     assert bag.closed

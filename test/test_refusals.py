@@ -77,6 +77,16 @@ def test_what_cannot_be_written_is_said_before_the_work(
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
 
 
+@pytest.mark.parametrize("command", ["demo --no-live", "record"])
+def test_a_bag_that_exists_is_named_before_the_work(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bags" / "here").mkdir(parents=True)
+    said = refused(capfd, *command.split(), "--name", "here")
+    assert "bag bags/here exists already; give another name as --name, or move it away" in said
+
+
 def test_a_directory_without_permission_is_named_with_the_option(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -95,7 +95,7 @@ def test_a_lockstep_recording_replays_bit_for_bit(bag: Path, node: str) -> None:
     done = replay(bag, node)
     assert done.mode == "lockstep"
     assert [topic for topic in done.topics if not topic.is_same] == []
-    counts = {topic.compared for topic in done.topics}
+    counts = {topic.compared for topic in done.topics if topic.topic != "task_axes"}  # no task in it
     assert counts <= {501, 101, 11}  # inner, outer, display rate
     assert counts
     assert done.is_same

@@ -13,6 +13,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_experiments.scorecard import measures, report
 from wam_theory.requisites import Measures, Requisite, scorecard
+from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 
 POSE = (0.0, -math.pi / 4, 0.0, 0.0)  # (A.2)
 LB = 4.4482216152605
@@ -110,6 +111,30 @@ def test_push_that_moves_no_joint_is_the_least_over_joints_and_the_greatest_over
     assert arm.least_force == pytest.approx(max(held), abs=0.03)
     dynamic_range = row(scorecard(arm), "steady force over force masked")
     assert dynamic_range.value == pytest.approx(arm.steady_force / max(held), rel=0.01)
+
+
+def test_stiction_cycle_at_the_tip_is_that_of_the_exact_force_loop(configuration: Configuration, arm: Measures) -> None:
+    """Joint by joint, and as a slow loop with a lightly damped link that goes on until its cycle repeats."""
+    of = configuration.shared.arm
+    body = RigidBody(of)
+    rotation, jacobian = body.cover_pose(POSE, "outer_link").rotation, body.tool_jacobian(POSE)
+    largest = 0.0
+    for angle in np.linspace(0.0, math.pi, 19):
+        levers = np.abs((math.cos(angle) * rotation[:, 1] + math.sin(angle) * rotation[:, 2]) @ jacobian)
+        for i in np.flatnonzero(levers > 0.02):
+            cable, contact = arm.transmission_stiffness[i], 4000.0 * levers[i] ** 2
+            damping = 0.01 * 2.0 * math.sqrt((cable + contact) * arm.link_inertia[i])
+            drop = (of.joints.dynamic_friction[i], of.joints.static_friction[i])
+            node = FrictionNode(arm.link_inertia[i], damping, cable, contact, *drop)
+            gain = 0.02 * math.sqrt((cable + contact) / arm.link_inertia[i]) * (cable + contact) / (cable * contact)
+            found = assess(node, IntegralLoop(gain), 2.0 * node.static_friction, tolerance=1e-4)
+            assert found.verdict is Verdict.LIMIT_CYCLE
+            largest = max(largest, found.peak_to_peak / levers[i])
+    assert arm.cycle_force == pytest.approx(largest, rel=0.06)  # (5.8) is the limit of a slow undamped loop
+    with_feedback = row(scorecard(arm), "force feedback")
+    assert with_feedback.value == pytest.approx(arm.steady_force / arm.cycle_force)
+    without = row(scorecard(replace(arm, cycle_force=0.0)), "force feedback")
+    assert without.value == math.inf
 
 
 @pytest.mark.parametrize(

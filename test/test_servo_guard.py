@@ -171,6 +171,23 @@ def test_the_velocity_loop_takes_no_gain_that_would_oscillate() -> None:
         )
 
 
+@pytest.mark.parametrize("configuration", [WAM, TESTBED], ids=["wam", "testbed"])
+@pytest.mark.parametrize(("proportional", "integral"), [(0.0, 0.0), (0.0, 50.0), (1e-6, 1.0)])
+def test_gains_that_hold_nothing_are_refused_with_the_least_that_is_allowed(
+    configuration: Configuration, proportional: float, integral: float
+) -> None:
+    guard, n = guard_of(configuration), len(configuration.shared.arm.motors.names)
+    with pytest.raises(
+        ParameterError, match=r"cannot hold the arm: motor1 at .* rad/s.* allowed: at least \["
+    ) as refusal:
+        guard.require_stable(Servo((proportional,) * n, (integral,) * n))
+    named = str(refusal.value).rpartition("at least [")[2].rstrip("]")
+    least = tuple(float(each) for each in named.split(", "))
+    guard.require_stable(Servo(least, (0.0,) * n))
+    with pytest.raises(ParameterError, match="cannot hold the arm"):
+        guard.require_stable(Servo(tuple(0.98 * each for each in least), (0.0,) * n))
+
+
 def test_gains_are_taken_where_the_guard_is_off() -> None:
     off = WAM.with_values({"velocity_loop:guard.mode": "off"})
     guard_of(off).require_stable(scaled(off.shared.servo, 100.0))

@@ -16,6 +16,7 @@ from wam_analysis.measures.ripple import ripple_spectrum
 from wam_analysis.measures.runs import runs, without_short
 from wam_analysis.measures.stability import StabilityVerdict, half_cycle_peaks, stability
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 
 MS = 1_000_000
@@ -474,3 +475,36 @@ def test_force_accuracy_is_bias_and_ripple_and_gives_the_dynamic_range():
     assert found.smallest == near(0.3)
     assert dynamic_range(60.0, "motor1", [found]).ratio == near(200.0)
     assert math.isnan(dynamic_range(60.0, "motor1", []).ratio)
+
+
+# swings
+
+
+@pytest.mark.parametrize(
+    ("factor", "verdict"),
+    [(1.0, StabilityVerdict.CYCLES), (1.08, StabilityVerdict.DIVERGES), (0.92, StabilityVerdict.SETTLES)],
+)
+def test_four_swings_tell_whether_a_motion_cycles(factor, verdict):
+    time = np.arange(0.0, 5.6, 0.001)
+    value = factor**time * np.sin(math.pi * (time + 0.3))  # a half cycle each second
+    value += 1e-3 * np.random.default_rng(2).standard_normal(len(time))
+    found = swings(time, value, 0.05)
+    assert found.verdict is verdict
+    assert found.growth == pytest.approx(factor, rel=0.02)
+    assert found.period == pytest.approx(2.0, rel=0.02)
+
+
+def test_a_motion_that_has_ended_and_one_that_never_turned_do_not_cycle():
+    time = np.arange(0.0, 12.0, 0.001)
+    value = np.sin(math.pi * np.minimum(time, 4.5))
+    assert swings(time, value, 0.05).verdict is StabilityVerdict.SETTLES
+    assert swings(time[:3000], value[:3000], 0.05).verdict is StabilityVerdict.UNDECIDED
+    assert swings(time, time, 0.05).number == 0
+
+
+def test_a_signal_that_hardly_turns_negative_in_its_correlation_ends_the_search():
+    """The first negative correlation at lag 0 or 1 once made the refinement run forever."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        found = limit_cycle(np.arange(200) / 1e3, 1e-15 * rng.integers(-1, 2, 200).astype(float))
+        assert found.confidence < 0.8

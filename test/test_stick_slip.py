@@ -303,6 +303,15 @@ def test_domain_one_takes_every_step_and_domain_three_none() -> None:
     assert largest_stable_step(unit_node(), IntegralLoop(2.20)) == 0.0
 
 
+def test_a_size_that_has_not_converged_is_no_limit_cycle() -> None:
+    node = FrictionNode(1.0, 1.5012051, 2.1646104, 43.5124522, 1.0, 1.0)
+    loop = IntegralLoop(0.2164, 0.56938673, sample_period=0.7614, delay_samples=4)
+    early, late, later = (assess(node, loop, 5.0, max_events=count) for count in (300, 1500, 3000))
+    assert early.verdict is Verdict.UNDECIDED
+    assert late.verdict is later.verdict is Verdict.LIMIT_CYCLE
+    assert late.peak_to_peak == pytest.approx(later.peak_to_peak, rel=0.02)
+
+
 def test_early_verdicts_are_those_of_long_runs() -> None:
     rng = np.random.default_rng(11)
     seen = set()

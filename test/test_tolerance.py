@@ -29,7 +29,7 @@ from wam_ros.header import header
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type
 from wam_ros.node import make_node
 from wam_ros.qos import qos
-from wam_ros.tolerance import TolerantNode
+from wam_ros.tolerance import HELD, TolerantNode
 
 WAM = Configuration.load(packaged("wam"))
 SEED = 20261120
@@ -201,15 +201,36 @@ def test_a_step_that_raises_is_reported_by_the_node_and_brakes_the_arm(ros: Any,
     nodes = ["driver", "gravity"]
     driver = make(ros, tmp_path, "driver", nodes)
     gravity = make(ros, tmp_path, "gravity", nodes)
-    gravity.node._body = None  # a defect of the node
+    body, gravity.node._body = gravity.node._body, None  # a defect of the node
     sender = ros.node("sender").create_publisher(JointState, "joint_states", 10)
     ros.wait(lambda: sender.get_subscription_count() == 1)
     names = list(WAM.shared.arm.joints.names)
     state = JointState(header=header(5_000_000), name=names, position=[0.0] * 4, velocity=[0.0] * 4, effort=[0.0] * 4)
     sender.publish(state)
     ros.wait(lambda: "gravity: unexpected AttributeError" in driver.driver.safety.fault, what="a fault by name")
+    gravity._exception_time = -HELD  # long ago, and no step since
+    gravity._look_for_end()
+    assert "unexpected AttributeError" in gravity._ports.problem, "it has not worked since"
+    request(ros, Trigger, "driver/reset_fault")
+    assert "gravity: unexpected AttributeError" in request(ros, SetBool, "driver/enable", data=True).message
+    gravity.node._body = body
+    state.header = header(10_000_000)
+    sender.publish(state)
     ros.wait(lambda: not any(driver._ports.faults.values()), what="the node is well again")
-    assert gravity._ports.counts["steps"] == 1
+    assert gravity._ports.counts["steps"] == 2
+
+
+def test_a_step_that_takes_long_is_reported_by_the_name_of_its_node(
+    ros: Any, tmp_path: Path, capfd: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wam_ros.node.SLOW_STEP", -1.0)  # every step is slow
+    gravity = make(ros, tmp_path, "gravity", ["gravity"])
+    sender = ros.node("sender").create_publisher(JointState, "joint_states", 10)
+    ros.wait(lambda: sender.get_subscription_count() == 1)
+    for stamp in (5_000_000, 10_000_000):
+        sender.publish(JointState(header=header(stamp), name=list(WAM.shared.arm.joints.names), position=[0.0] * 4))
+    ros.wait(lambda: gravity._ports.counts["steps"] == 2)
+    assert capfd.readouterr().err.count("node gravity: a step took 0.0 s; the other nodes wait for it") == 1
 
 
 def test_a_directory_that_cannot_be_written_is_a_warning_and_no_end(ros: Any, tmp_path: Path) -> None:
@@ -231,6 +252,19 @@ def test_refusals_are_bounded_in_length_and_number(ros: Any, tmp_path: Path, cap
     assert 1 <= len(lines) <= 3
     assert sum(map(len, lines)) < 3000
     assert gravity._ports.refusals["joint_states"] == 500
+
+
+def test_what_is_refused_on_many_topics_in_the_same_way_is_reported_once(ros: Any, tmp_path: Path, capfd: Any) -> None:
+    loop = make(ros, tmp_path, "force_loop", ["force_loop"])
+    capfd.readouterr()
+    for topic in ("joint_states", "force_command", "joint_posture_command"):
+        for _ in range(10):
+            loop._ports.refuse(topic, "stamp 1 ns is ahead", "out of time")
+    (line,) = (line for line in capfd.readouterr().err.splitlines() if "refused" in line)
+    assert "joint_states: refused: stamp 1 ns is ahead" in line
+    loop._ports._logged.clear()  # a second later
+    loop._ports.refuse("force_command", "stamp 2 ns is ahead", "out of time")
+    assert "(30 more were refused before)" in capfd.readouterr().err
 
 
 def test_control_characters_are_shown_and_not_sent() -> None:
