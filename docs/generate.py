@@ -271,10 +271,20 @@ def blocks() -> dict[str, Callable[[], str]]:
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
         "friction or stiffness": design_choices.friction_table,
         **{f"task {name}": partial(task_of, name) for name in tasks()},
-        **{f"claims, {title}": partial(claims.table, rows) for title, rows in claims.load(CLAIMS).items()},
+        **{f"claims, {title}": partial(claims_of, rows) for title, rows in claims.load(CLAIMS).items()},
         "verdict of the demonstration": verdict,
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
+
+
+def claims_of(rows: tuple[claims.Claim, ...]) -> str:
+    """Claims of a chapter, with the distances that figures, effects and experiments have now."""
+    measured = {
+        "figure": claims.distances_in(figures()),
+        "effect": claims.distances_in(plant_study()),
+        "experiment": claims.deviations_in((ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")),
+    }
+    return claims.table(rows, measured)
 
 
 def verdict() -> str:

@@ -13,12 +13,14 @@ from wam_experiments.figures import (
     cables,
     friction_claims,
     links,
+    reducer,
     responses,
     stability,
 )
 from wam_experiments.figures import force_control_drawings as force_control
 from wam_experiments.figures import friction_claim_drawings as in_words
 from wam_experiments.figures import transmission_drawings as transmission
+from wam_experiments.figures.panels import distances, draw_panels
 from wam_experiments.figures.series import Series
 from wam_sim import batch
 
@@ -83,6 +85,12 @@ FIGURES: dict[str, ThesisFigure] = {
         backdrivability.backdrivability,
         backdrivability_drawing.draw,
         _no_plant,
+    ),
+    "4.5": ThesisFigure(
+        "Where the reducer is, and the torque that bandwidth by feedback costs.",
+        reducer.reducer,
+        draw_panels,
+        distances,
     ),
     "4.9": ThesisFigure(
         "Open-loop force bandwidth versus contact stiffness.",
