@@ -16,6 +16,7 @@ from wam_experiments.figures import (
     reducer,
     responses,
     stability,
+    transmissions,
 )
 from wam_experiments.figures import force_control_drawings as force_control
 from wam_experiments.figures import friction_claim_drawings as in_words
@@ -77,6 +78,12 @@ def _kept_contact_distance(numbers: friction_claims.KeptContact) -> dict[str, fl
 
 
 FIGURES: dict[str, ThesisFigure] = {
+    "1.1": ThesisFigure(
+        "Various types of transmissions: cables, shaft and gears, direct drive.",
+        transmissions.transmissions,
+        draw_panels,
+        distances,
+    ),
     "3.1": ThesisFigure(
         "Effect of aspect ratio on available contact length.", links.grasp, transmission.draw_grasp, _no_plant
     ),
