@@ -31,7 +31,7 @@ from wam_description.parameters import ParameterError, fields
 from wam_description.topics import TOPICS
 from wam_experiments import design_choices
 from wam_experiments.contact_benchmark import resting_push
-from wam_experiments.figures import backdrivability
+from wam_experiments.figures import backdrivability, open_loop, transmissions
 from wam_experiments.figures.catalogue import FIGURES, file_of, numbers
 from wam_experiments.figures.catalogue import table as figures_table
 from wam_experiments.force_benchmark import usual_tasks
@@ -237,10 +237,16 @@ def plant_study() -> str:
 
 
 @cache
+def found_figures() -> dict[str, Any]:
+    """Numbers of every figure."""
+    with processes() as executor:
+        return numbers(list(FIGURES), executor, default_folder())
+
+
+@cache
 def figures() -> str:
     """Distances of the plant from the lines of the thesis's figures; also draws the figures."""
-    with processes() as executor:
-        found = numbers(list(FIGURES), executor, default_folder())
+    found = found_figures()
     if WRITES_PICTURES:
         for name, values in found.items():
             FIGURES[name].draw(values, file_of(name, ROOT / "docs" / "figures"))
@@ -267,6 +273,8 @@ def blocks() -> dict[str, Callable[[], str]]:
         "figures": figures,
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
+        "transmissions": transmissions.table,
+        "open-loop accuracy": lambda: open_loop.table(found_figures()["2.1.1"]),
         "backdrivability": lambda: backdrivability.table(backdrivability.backdrivability()),
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
         "friction or stiffness": design_choices.friction_table,

@@ -13,6 +13,7 @@ from wam_experiments.figures import (
     cables,
     friction_claims,
     links,
+    open_loop,
     reducer,
     responses,
     stability,
@@ -83,6 +84,12 @@ FIGURES: dict[str, ThesisFigure] = {
         transmissions.transmissions,
         draw_panels,
         distances,
+    ),
+    "2.1.1": ThesisFigure(
+        "Error of the force without feedback over the workspace of the arm.",
+        open_loop.open_loop,
+        draw_panels,
+        _no_plant,
     ),
     "3.1": ThesisFigure(
         "Effect of aspect ratio on available contact length.", links.grasp, transmission.draw_grasp, _no_plant
