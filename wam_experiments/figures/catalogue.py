@@ -12,6 +12,7 @@ from wam_experiments.figures import (
     bandwidth,
     cables,
     friction_claims,
+    inner_loops,
     links,
     open_loop,
     reducer,
@@ -90,6 +91,9 @@ FIGURES: dict[str, ThesisFigure] = {
         open_loop.open_loop,
         draw_panels,
         _no_plant,
+    ),
+    "2.1.2": ThesisFigure(
+        "Inner loops on torque, and on velocity or position.", inner_loops.inner_loops, draw_panels, distances
     ),
     "3.1": ThesisFigure(
         "Effect of aspect ratio on available contact length.", links.grasp, transmission.draw_grasp, _no_plant
