@@ -31,7 +31,7 @@ from wam_description.parameters import ParameterError, fields
 from wam_description.topics import TOPICS
 from wam_experiments import design_choices
 from wam_experiments.contact_benchmark import resting_push
-from wam_experiments.figures import backdrivability
+from wam_experiments.figures import backdrivability, open_loop, transmissions
 from wam_experiments.figures.catalogue import FIGURES, file_of, numbers
 from wam_experiments.figures.catalogue import table as figures_table
 from wam_experiments.force_benchmark import usual_tasks
@@ -237,10 +237,16 @@ def plant_study() -> str:
 
 
 @cache
+def found_figures() -> dict[str, Any]:
+    """Numbers of every figure."""
+    with processes() as executor:
+        return numbers(list(FIGURES), executor, default_folder())
+
+
+@cache
 def figures() -> str:
     """Distances of the plant from the lines of the thesis's figures; also draws the figures."""
-    with processes() as executor:
-        found = numbers(list(FIGURES), executor, default_folder())
+    found = found_figures()
     if WRITES_PICTURES:
         for name, values in found.items():
             FIGURES[name].draw(values, file_of(name, ROOT / "docs" / "figures"))
@@ -267,14 +273,26 @@ def blocks() -> dict[str, Callable[[], str]]:
         "figures": figures,
         "equations": equations,
         "scorecard": lambda: scorecard(configuration),
+        "transmissions": transmissions.table,
+        "open-loop accuracy": lambda: open_loop.table(found_figures()["2.1.1"]),
         "backdrivability": lambda: backdrivability.table(backdrivability.backdrivability()),
         "stiffness rule": lambda: design_choices.stiffness_table(configuration),
         "friction or stiffness": design_choices.friction_table,
         **{f"task {name}": partial(task_of, name) for name in tasks()},
-        **{f"claims, {title}": partial(claims.table, rows) for title, rows in claims.load(CLAIMS).items()},
+        **{f"claims, {title}": partial(claims_of, rows) for title, rows in claims.load(CLAIMS).items()},
         "verdict of the demonstration": verdict,
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
+
+
+def claims_of(rows: tuple[claims.Claim, ...]) -> str:
+    """Claims of a chapter, with the distances that figures, effects and experiments have now."""
+    measured = {
+        "figure": claims.distances_in(figures()),
+        "effect": claims.distances_in(plant_study()),
+        "experiment": claims.deviations_in((ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")),
+    }
+    return claims.table(rows, measured)
 
 
 def verdict() -> str:

@@ -200,3 +200,13 @@ def test_share_at_the_crossover_falls_from_one_to_0_62_at_the_matched_ratio() ->
 def test_a_refusal_names_the_value(call: Callable[[], object], names: str) -> None:
     with pytest.raises(ValueError, match=names):
         call()
+
+
+def test_torque_of_a_force_is_that_of_the_two_masses_driven_at_one_frequency() -> None:
+    jm, jl, ktr, n, kc = *TESTBED.values(), 1464.0
+    stiffness = np.array([[ktr, -n * ktr], [-n * ktr, n * n * ktr + kc]])
+    for omega in (0.0, 20.0, 60.0, 300.0):
+        angle = np.linalg.solve(stiffness - omega**2 * np.diag([jm, jl]), [1.0, 0.0])[1]
+        found = resonance.torque_amplification(1j * omega, **TESTBED, contact_stiffness=kc)
+        assert float(found) == pytest.approx(n / abs(kc * angle), rel=1e-9)
+    assert float(resonance.torque_amplification(0.0, **TESTBED, contact_stiffness=kc)) == pytest.approx(1.0)

@@ -16,6 +16,7 @@ from wam_experiments.plant.levels import LEVELS
     ("name", "most"),
     [
         ("slack", 1e-6),
+        ("backlash", 1e-6),
         ("creep", 1e-3),  # (6.19) 0.1 %: the damper of the circuit carries a little of the load while it creeps
         ("efficiency", 1e-3),  # (6.15) 0.1 %: creep is first order in the strain
         ("ripple", 1e-6),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wam_experiments.thesis.claims import Claim, load, unresolved
+from wam_experiments.thesis.claims import Claim, deviations_in, distances_in, load, near_of, unresolved
 
 ROOT = Path(__file__).resolve().parents[1]
 CLAIMS = [claim for rows in load(ROOT / "docs" / "thesis.yaml").values() for claim in rows]
@@ -100,3 +100,21 @@ def test_references_are_separated_by_semicolons(tmp_path: Path) -> None:
     file = tmp_path / "claims.yaml"
     file.write_text("Chapter:\n- [5.2, text, docs/a.md; figure 5.8, 1 %, why]\n", encoding="utf-8")
     assert load(file)["Chapter"] == (Claim("5.2", "text", ("docs/a.md", "figure 5.8"), "1 %", "why"),)
+
+
+def test_every_distance_that_a_row_gives_is_that_of_something_it_shows() -> None:
+    figures = distances_in((ROOT / "docs" / "figures.md").read_text(encoding="utf-8"))
+    effects = distances_in((ROOT / "docs" / "plant.md").read_text(encoding="utf-8"))
+    experiments = deviations_in((ROOT / "docs" / "experiments.md").read_text(encoding="utf-8"))
+    measured = {"figure": figures, "effect": effects, "experiment": experiments}
+    assert sum(near_of(claim, measured) != claim.near for claim in CLAIMS) > 20
+
+
+def test_the_greatest_distance_counts() -> None:
+    claim = Claim("5.2", "text", ("figure a", "figure b", "effect a"), "{figure} and {effect}", "")
+    figures = distances_in("| a | x | 0.1 % |\n| a | y | 2 % |\n| b | z | below 0.5 % |\n| c | z | 9 % |")
+    assert near_of(claim, {"figure": figures, "effect": {"a": "3 %"}}) == "2 % and 3 %"
+    page = "<!-- experiment: e -->\n| q | 1 | 2 | N | -0.30 % | 2 % | |\n| r | 1 | 2 | N | +9 % |  | |\n<!-- end -->"
+    assert deviations_in(page) == {"e": "0.30 %"}
+    with pytest.raises(ValueError, match="no experiment that it shows"):
+        near_of(claim._replace(near="{experiment}"), {"experiment": {}})

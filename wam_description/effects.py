@@ -31,6 +31,14 @@ class Effects:
 
     ripples: Ripples
     creep: bool = parameter("true if cables creep on their pulleys, (6.19), which is also their loss, (6.15)")
+    backlash: tuple[float, ...] = parameter(
+        "play of each circuit at its motor, one for all or one each; above 0 it is a gear or shaft without pretension "
+        "(2.2), which slack does not concern",
+        "rad",
+        low=0.0,
+        high=10.0,
+        before=(0.0,),
+    )
     slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
     tension_friction: tuple[float, ...] = parameter(
         "friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
@@ -46,12 +54,17 @@ class Effects:
         live=True,
     )
 
+    def play(self, motor: int) -> float:
+        """Backlash of the circuit of this motor, rad."""
+        return self.backlash[motor if len(self.backlash) > 1 else 0]
+
 
 def no_effects(arm: Arm) -> Effects:
     """An ideal transmission: elastic, and nothing else."""
     return Effects(
         ripples=Ripples((), (), (), (), ()),
         creep=False,
+        backlash=(0.0,),
         slack=False,
         tension_friction=(0.0,) * len(arm.motors.names),
         added_coulomb_friction=(0.0,) * len(arm.joints.names),

@@ -34,7 +34,7 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     step : simulation step, s.
     world : obstacles, free bodies and doors, each paired with every cover; free bodies also with each other, with
         obstacles and doors; springs at joints; pushers, each paired with its cover.
-    effects : slack, torque ripple of motors and pulleys.
+    effects : slack, backlash, torque ripple of motors and pulleys.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     for pair in contact_pairs(arm, world):
         _add_pair(contact, pair)
     tendons = _add(root, "tendon")
-    _add_cables(tendons, arm, effects.slack)
+    _add_cables(tendons, arm, effects)
     _add_springs(tendons, world.springs)
     _add_actuators(root, arm, effects.ripples)
     ElementTree.indent(root)
@@ -86,6 +86,8 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
         shafts = (*motors, *joints)
         require(name in shafts, f"effects.ripples.shafts names '{name}'; motors and joints: {', '.join(shafts)}")
     lengths("effects", motors, {"tension_friction": effects.tension_friction})
+    if len(effects.backlash) != 1:
+        lengths("effects", motors, {"backlash": effects.backlash})
     lengths("effects", joints, {"added_coulomb_friction": effects.added_coulomb_friction})
 
 
@@ -252,18 +254,23 @@ def _add_pair(contact: ElementTree.Element, pair: ContactPair) -> None:
     )
 
 
-def _add_cables(tendons: ElementTree.Element, arm: Arm, slack: bool) -> None:
-    """Two strands per circuit, each with half the stiffness, pretensioned, unable to push."""
+def _add_cables(tendons: ElementTree.Element, arm: Arm, effects: Effects) -> None:
+    """Two strands per circuit, each with half the stiffness, pretensioned, unable to push.
+
+    With backlash they are the two flanks of a tooth, each with the whole stiffness.
+    """
     size = len(arm.motors.names)
     motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(size, size))
     for i, (motor, circuit) in enumerate(zip(arm.motors.names, arm.circuits, strict=True)):
-        stretch = circuit.slack_stretch if slack else NEVER_SLACK
+        stretch, share = circuit.slack_stretch if effects.slack else NEVER_SLACK, 0.5
+        if play := effects.play(i):
+            stretch, share = -0.5 * play, 1.0
         for strand, springlength in (("tight", (-FAR, -stretch)), ("loose", (stretch, FAR))):
             tendon = _add(
                 tendons,
                 "fixed",
                 name=f"{motor}_{strand}",
-                stiffness=repr(circuit.stiffness / 2.0),
+                stiffness=repr(circuit.stiffness * share),
                 damping=repr(circuit.damping / 2.0),
                 springlength=_numbers(springlength),
                 springyield=repr(NEVER_YIELDS),

@@ -75,7 +75,7 @@ class Plant:
         self._n = n
         self._brakes = [brake_torque] * n
         self._start = arm.joints.start
-        self._slack = effects.slack
+        self._slack, self._play = effects.slack, [effects.play(i) for i in range(n)]
         self._arm = arm
         self._motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(n, n))
         self._circuits = CableCircuits(self.data, arm, effects, step)
@@ -116,8 +116,8 @@ class Plant:
         load = data.qfrc_bias[joints] - data.qfrc_spring[joints]
         torque = np.linalg.solve(self._motor_from_joint.T, load)
         self._theta[:] = self._motor_from_joint @ self._q + [
-            _stretch(tau, circuit, self._slack)
-            for tau, circuit in zip(torque.tolist(), self._arm.circuits, strict=True)
+            _stretch(tau, circuit, self._slack, play)
+            for tau, circuit, play in zip(torque.tolist(), self._arm.circuits, self._play, strict=True)
         ]
         self._begin()
 
@@ -309,9 +309,11 @@ def _unheard(_: str) -> None:
     """In place of MuJoCo's own report of a warning, which writes a file; `Plant.trouble` tells of it."""
 
 
-def _stretch(torque: float, circuit: Circuit, slack: bool) -> float:
+def _stretch(torque: float, circuit: Circuit, slack: bool, play: float) -> float:
     """Stretch at which a circuit gives a torque, rad."""
     stretch = torque / circuit.stiffness
+    if play:
+        return stretch + math.copysign(0.5 * play, torque) if torque else 0.0
     limit = circuit.slack_stretch
     if slack and abs(stretch) > limit:
         stretch += math.copysign(abs(stretch) - limit, stretch)

@@ -139,6 +139,29 @@ def force_resonances(
     return Resonances(np.sqrt(2.0 * c / (b + root)), np.sqrt((b + root) / 2.0))
 
 
+def torque_amplification(
+    s: ArrayLike,
+    motor_inertia: ArrayLike,
+    link_inertia: ArrayLike,
+    transmission_stiffness: ArrayLike,
+    contact_stiffness: ArrayLike,
+    ratio: ArrayLike,
+) -> Array:
+    """Motor torque for a contact force over that at rest: N over the magnitude of (4.3), the cost of 4.1.1.
+
+    Below 1 near the two resonances, above the upper one it grows with the fourth power of the frequency.  No
+    feedback can do with less.  Not in print.
+
+    Parameters
+    ----------
+    s : complex frequency, rad/s.
+    motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio : as in `force_resonances`.
+    """
+    (n,) = above_zero(ratio=ratio)
+    transfer = force_transfer(s, motor_inertia, link_inertia, transmission_stiffness, contact_stiffness, ratio)
+    return np.asarray(n / np.abs(transfer))
+
+
 def soft_contact_bandwidth(
     motor_inertia: ArrayLike, link_inertia: ArrayLike, contact_stiffness: ArrayLike, ratio: ArrayLike
 ) -> Array:

@@ -255,3 +255,23 @@ def deadband_against_stiction(peak_to_peak: ArrayLike) -> Array:
     """
     (size,) = zero_or_more(peak_to_peak=peak_to_peak)
     return size / 2.0
+
+
+def play(desired: ArrayLike, friction: ArrayLike) -> Array:
+    """Contact force of open-loop force control along a path of F_des, N: friction as a deadband (5.2).
+
+    |F_c - F_des| stays within the friction, and F_c changes only where it would not.  From rest F_c is zero up to
+    F_des = friction, which is the deadband of 5.2; on the way back F_c is kept over twice the friction.  A contact
+    that cannot pull; slow motion.
+
+    Parameters
+    ----------
+    desired : (n,), F_des along the path, N, from rest at zero.
+    friction : Coulomb friction in the units of F_des, zero or more; a number.
+    """
+    (wanted,) = finite(desired=desired)
+    (most,) = zero_or_more(friction=friction)
+    force, found = 0.0, np.empty_like(wanted)
+    for i, value in enumerate(wanted.tolist()):
+        force = found[i] = max(min(max(force, value - float(most)), value + float(most)), 0.0)
+    return found

@@ -12,13 +12,18 @@ from wam_experiments.figures import (
     bandwidth,
     cables,
     friction_claims,
+    inner_loops,
     links,
+    open_loop,
+    reducer,
     responses,
     stability,
+    transmissions,
 )
 from wam_experiments.figures import force_control_drawings as force_control
 from wam_experiments.figures import friction_claim_drawings as in_words
 from wam_experiments.figures import transmission_drawings as transmission
+from wam_experiments.figures.panels import distances, draw_panels
 from wam_experiments.figures.series import Series
 from wam_sim import batch
 
@@ -75,6 +80,21 @@ def _kept_contact_distance(numbers: friction_claims.KeptContact) -> dict[str, fl
 
 
 FIGURES: dict[str, ThesisFigure] = {
+    "1.1": ThesisFigure(
+        "Various types of transmissions: cables, shaft and gears, direct drive.",
+        transmissions.transmissions,
+        draw_panels,
+        distances,
+    ),
+    "2.1.1": ThesisFigure(
+        "Error of the force without feedback over the workspace of the arm.",
+        open_loop.open_loop,
+        draw_panels,
+        _no_plant,
+    ),
+    "2.1.2": ThesisFigure(
+        "Inner loops on torque, and on velocity or position.", inner_loops.inner_loops, draw_panels, distances
+    ),
     "3.1": ThesisFigure(
         "Effect of aspect ratio on available contact length.", links.grasp, transmission.draw_grasp, _no_plant
     ),
@@ -83,6 +103,12 @@ FIGURES: dict[str, ThesisFigure] = {
         backdrivability.backdrivability,
         backdrivability_drawing.draw,
         _no_plant,
+    ),
+    "4.5": ThesisFigure(
+        "Where the reducer is, and the torque that bandwidth by feedback costs.",
+        reducer.reducer,
+        draw_panels,
+        distances,
     ),
     "4.9": ThesisFigure(
         "Open-loop force bandwidth versus contact stiffness.",

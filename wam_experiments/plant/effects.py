@@ -26,7 +26,7 @@ from wam_experiments.plant.ideal_testbed import (
     one_step_map,
     released_plant,
 )
-from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, stage_loss
+from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, play_torque, stage_loss
 from wam_theory.resonance import force_resonances
 from wam_theory.stick_slip import IntegralLoop, simulate
 
@@ -72,6 +72,19 @@ def slack() -> PlantCurve:
         torques.append(plant.circuit_torque[0])
     theory = circuit_torque(stretch, circuit.stiffness, circuit.pretension, circuit.radius)
     return PlantCurve(stretch, np.array(torques), theory)
+
+
+def backlash(play: float = 0.04) -> PlantCurve:
+    """Torque of a circuit with backlash over its stretch, rad and N m."""
+    arm = ideal_testbed()
+    plant = released_plant(arm, backlash=(play,))
+    stretch = np.linspace(-2.5, 2.5, 101) * play
+    torques = []
+    for value in stretch:
+        plant.data.qpos[:] = (value, 0.0)
+        mujoco.mj_forward(plant.model, plant.data)
+        torques.append(plant.circuit_torque[0])
+    return PlantCurve(stretch, np.array(torques), play_torque(stretch, arm.circuits[0].stiffness, play))
 
 
 def creep_out_and_back(torque: float = 40.0, speed: float = 1.0, seconds: float = 10.0) -> PlantCurve:
@@ -250,6 +263,7 @@ def impact() -> PlantCurve:
 
 STUDIES: dict[str, Callable[[], PlantCurve]] = {
     "slack": slack,
+    "backlash": backlash,
     "creep": creep_out_and_back,
     "efficiency": efficiency_under_load,
     "ripple": ripple,

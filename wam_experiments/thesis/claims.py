@@ -12,6 +12,8 @@ from wam_analysis.table import markdown
 from wam_experiments.figures.catalogue import FIGURES
 from wam_experiments.plant.effects import STUDIES
 
+PLACE = re.compile(r"\{(figure|effect|experiment)\}")
+
 
 class Claim(NamedTuple):
     """One claim of the thesis.
@@ -21,7 +23,8 @@ class Claim(NamedTuple):
     section : of the thesis.
     text : what is claimed.
     shown : references, see `unresolved`; none if nothing shows it.
-    near : how near, in words or a number.
+    near : how near, in words; `{figure}`, `{effect}` or `{experiment}` stands for the greatest distance that was
+        measured for those that `shown` names, see `near_of`.
     missing : what is not shown, and why; empty if nothing is missing.
     """
 
@@ -93,10 +96,61 @@ def _importable(name: str) -> bool:
         return False
 
 
-def table(claims: tuple[Claim, ...]) -> str:
-    """Claims as Markdown."""
+def near_of(claim: Claim, measured: Mapping[str, Mapping[str, str]]) -> str:
+    """How near, with the measured distances in their places.
+
+    Parameters
+    ----------
+    claim : of the page.
+    measured : of each kind, figure, effect and experiment, the greatest distance of each name, as "0.3 %".
+
+    Raises
+    ------
+    ValueError
+        if nothing of the kind is shown, or it has no distance.
+    """
+
+    def worst(kind: re.Match[str]) -> str:
+        names = [name for found, _, name in (one.partition(" ") for one in claim.shown) if found == kind[1]]
+        texts = [measured[kind[1]][name] for name in names if name in measured[kind[1]]]
+        if not texts:
+            raise ValueError(f"{claim.section}, '{claim.text}': no {kind[1]} that it shows has a distance")
+        return max(texts, key=percent)
+
+    return PLACE.sub(worst, claim.near)
+
+
+def percent(text: str) -> float:
+    """The number of a distance, as 0.3 of "0.3 %" or "below 0.3 %"."""
+    return abs(float(text.split()[-2]))
+
+
+def distances_in(table_text: str) -> dict[str, str]:
+    """Greatest distance of each name in a Markdown table, names in its first column and distances in its last."""
+    found: dict[str, str] = {}
+    for line in table_text.splitlines():
+        cells = [cell.strip() for cell in line.strip("| ").split("|")]
+        if cells[-1].endswith("%"):
+            found[cells[0]] = max(found.get(cells[0], cells[-1]), cells[-1], key=percent)
+    return found
+
+
+def deviations_in(page: str) -> dict[str, str]:
+    """Greatest deviation with a bound of each experiment on docs/experiments.md."""
+    found = {}
+    for name, block in re.findall(r"<!-- experiment: (\S+) -->\n(.*?)<!-- end -->", page, re.DOTALL):
+        rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in block.splitlines()]
+        bounded = [row[4].lstrip("+-") for row in rows if len(row) > 5 and row[4].endswith("%") and row[5].endswith("%")]
+        if bounded:
+            found[name] = max(bounded, key=percent)
+    return found
+
+
+def table(claims: tuple[Claim, ...], measured: Mapping[str, Mapping[str, str]]) -> str:
+    """Claims as Markdown, with the distances that were measured, see `near_of`."""
     head = ("section", "claimed", "shown by", "how near", "not shown, because")
-    return markdown(head, [(c.section, c.text, "; ".join(map(_cell, c.shown)), c.near, c.missing) for c in claims])
+    rows = [(c.section, c.text, "; ".join(map(_cell, c.shown)), near_of(c, measured), c.missing) for c in claims]
+    return markdown(head, rows)
 
 
 def _cell(reference: str) -> str:

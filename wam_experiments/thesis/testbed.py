@@ -24,10 +24,12 @@ from wam_experiments.thesis.one_link import (
 )
 from wam_experiments.thesis.recording import Recording, Step
 from wam_experiments.thesis.rows import Comparison, Curve, Panel, Result
+from wam_experiments.thesis.step_response import errors_at_rest, exact_ratio
 from wam_theory.stick_slip import Verdict, simulate
 
 TRANSIENT = 0.4  # s after a step, before the growing mode dominates
 WITHIN = 0.02
+SMALL = 0.3  # N, a step at the margin with the rod
 CYCLE = 0.05  # of a cycle with a long transient
 PLAIN = 2  # steps of a run, up to which the last one is drawn with its prediction
 ROUNDING = 1e-9  # s
@@ -48,6 +50,41 @@ def section_5_6(runs: Mapping[str, Recording]) -> Result:
         _panel(runs, ("delayed_with_rod_at_0.8", "delayed_with_rod_at_0.9"), "one sample of delay, with rod"),
     ]
     return Result(rows, panels)
+
+
+def as_told(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `testbed-5.6-as-told`: verdict on every step and push, and the margin with the rod."""
+    rows = [row for name, run in runs.items() for row in verdicts(run, name.replace("_", " "))]
+    below, above = (_ratio_at_rest(runs[f"rod_{side}_the_new_margin"]) for side in ("below", "above"))
+    link, gains = below[0], [one.loop.gain for one, _ in (below, above)]
+    gain = gains[0] + (gains[1] - gains[0]) * (1.0 - below[1]) / (above[1] - below[1])
+    expected = friction_margin(link, SMALL)
+    rows += [
+        Comparison(
+            "marginal gain with the rod", link.tip_gain(expected), link.tip_gain(gain), "m/s/N", WITHIN, "integrator"
+        ),
+        Comparison("over that without", expected / link.margin.gain, gain / link.margin.gain, "", WITHIN, "5.6"),
+    ]
+    panels = [_panel(runs, (name,), name.replace("_", " ")) for name in runs]
+    return Result(rows, panels)
+
+
+def _ratio_at_rest(run: Recording) -> tuple[OneLink, float]:
+    """The loop of the last step, and the median ratio of the errors at successive standstills in it, Psi."""
+    step = run.steps[-1]
+    link = one_link(run, set_until(run, step))
+    errors = np.abs(errors_at_rest(response(run, link, step), desired_force(run, step.begin)))
+    return link, float(np.median(errors[1:] / errors[:-1]))
+
+
+def friction_margin(link: OneLink, step: float) -> float:
+    """G_I at the joint at which the errors of a small step, N, neither grow nor shrink with friction, within 0.1 %."""
+    low, high = link.margin.gain, 10.0 * link.margin.gain
+    while high > 1.001 * low:
+        middle = math.sqrt(low * high)
+        grows = abs(exact_ratio(link._replace(loop=replace(link.loop, gain=middle)), step)) > 1.0
+        low, high = (low, middle) if grows else (middle, high)
+    return low
 
 
 def large_step(runs: Mapping[str, Recording]) -> Result:

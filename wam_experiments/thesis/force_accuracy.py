@@ -1,0 +1,66 @@
+"""Accuracy of the contact force without feedback, 5.2, and with a sensor that is calibrated wrong, 2.2."""
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_experiments.thesis.one_link import OneLink, desired_force, one_link, response
+from wam_experiments.thesis.recording import Recording
+from wam_experiments.thesis.rows import Comparison, Curve, Numbers, Panel, Result
+from wam_theory.stiction import play
+
+WITHIN = 0.02
+LATE = 0.5  # s at the end of a step, over which a settled force is averaged
+LEAST = 0.02  # N; the force from which contact counts
+
+
+def accuracy(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `force-accuracy`."""
+    rows, panel = open_loop(runs["open_loop"])
+    curves = []
+    for name, run in runs.items():
+        if name != "open_loop":
+            link = one_link(run)
+            shown = response(run, link)
+            rows.append(_calibration(name.replace("_", " "), run, link, shown.force[shown.time > shown.time[-1] - LATE]))
+            curves.append(Curve("measured", name.replace("_", " "), shown.time, shown.force))
+    return Result(rows, [panel, Panel("with feedback, 20 N commanded", "time [s]", "force [N]", curves)])
+
+
+def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
+    """F_c over F_des, without feedback: friction is a deadband, and keeps the force on the way back."""
+    link = one_link(run)
+    friction = link.node.dynamic_friction / link.lever
+    desired, force = _fed_forward(run, link)
+    expected = play(desired, friction)
+    begin = float(desired[np.argmax(force > LEAST)])
+    rows = [Comparison("deadband, F_des at which F_c begins", friction, begin - LEAST, "N", WITHIN, "5.2")]
+    for step, after in pairwise([*run.steps, None]):
+        last = len(force) - 1 if after is None else int(np.searchsorted(_times(run), after.begin)) - 1
+        label = f"F_c at {desired[last]:.0f} N, {step.name}"
+        rows.append(Comparison(label, float(expected[last]), float(force[last]), "N", WITHIN, "5.2"))
+    worst = float(np.abs(force - expected).max() / expected.max())
+    rows.append(Comparison("largest difference", 0.0, worst, "of F_c", WITHIN, "5.2", True))
+    each = slice(None, None, 40)
+    curves = [Curve("measured", "measured", desired[each], force[each]), Curve("predicted", "", desired, expected)]
+    return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
+
+
+def _times(run: Recording) -> Numbers:
+    return run.joints("joint_sensors").time
+
+
+def _fed_forward(run: Recording, link: OneLink) -> tuple[Numbers, Numbers]:
+    """F_des from the torque of the motor, and F_c, N, at the times of the sensors."""
+    motors, shown = run.joints("motor_states"), response(run, link)
+    torque = -np.interp(shown.time, motors.time, motors.effort[:, 0])
+    return torque * link.ratio / link.lever, shown.force
+
+
+def _calibration(name: str, run: Recording, link: OneLink, force: Numbers) -> Comparison:
+    """Settled force of a loop that knows another stiffness of its spring: F_des k/k_known."""
+    known = run.node("force_loop", ForceLoopParameters).spring_stiffness[0]
+    expected = desired_force(run, run.steps[0].begin) * link.node.contact_stiffness / known
+    return Comparison(f"settled force, {name}", expected, float(force.mean()), "N", WITHIN, "2.2")
