@@ -63,12 +63,13 @@ class MoveGenerator:
         return result
 
     def _speed_ratio(self, here: np.ndarray, way: np.ndarray, seconds: float) -> float:
-        """Greatest speed of elbow or tip, over the allowed one."""
-        worst, outer = 0.0, self._arm.covers.names[-1]
+        """Greatest speed of elbow, wrist or tip, over the allowed one."""
+        worst = 0.0
         for s in np.linspace(0.1, 0.9, 9):
             q = here + way * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
             qd = way * 30.0 * s * s * (1.0 - s) ** 2 / seconds
-            elbow = self._body.point_jacobian(q, outer, (0.0, 0.0, 0.0)) @ qd
+            for velocity in self._body.start_velocities(q, qd).values():
+                worst = max(worst, float(np.linalg.norm(velocity)) / ELBOW_SPEED)
             tip = self._body.tool_jacobian(q) @ qd
-            worst = max(worst, float(np.linalg.norm(elbow)) / ELBOW_SPEED, float(np.linalg.norm(tip)) / TIP_SPEED)
+            worst = max(worst, float(np.linalg.norm(tip)) / TIP_SPEED)
         return worst
