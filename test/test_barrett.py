@@ -38,7 +38,7 @@ WRISTED = """
 .07548270 .00014836 .00007252 -.00335185 .00003911 .00003877 .00007614 .00000019 0 0
 """
 PEAK = (77.3, 160.6, 95.6, 29.4, 11.6, 11.6, 2.7)  # N m, of the joints
-ARMS = {"barrett-wam4": (SHOULDER, BODIES + BLANK)}
+ARMS = {"barrett-wam4": (SHOULDER, BODIES + BLANK), "barrett-wam7": (SHOULDER + WRIST, BODIES + WRISTED)}
 
 
 def motors_of(q: Sequence[float]) -> list[float]:
@@ -53,7 +53,7 @@ def written_urdf(name: str) -> str:
     """Link i turns with joint i; its mass is on a body that is fixed to it behind d, a and alpha."""
     rows, bodies = ARMS[name]
     parts, before, at = ['<link name="base"/>'], "base", '<origin xyz="0 0 0"/>'
-    for i, ((alpha, a, d), line) in enumerate(zip(rows, bodies.strip().splitlines(), strict=True), start=1):
+    for i, ((alpha, a, d), line) in enumerate(zip(rows, filter(None, bodies.splitlines()), strict=True), start=1):
         mass, x, y, z, xx, yy, zz, xy, xz, yz = line.split()
         inertia = f'ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="{xy}" ixz="{xz}" iyz="{yz}"'
         parts.append(
