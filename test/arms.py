@@ -100,7 +100,7 @@ def one_joint(ratio: float = 14.0, cable: float = 8.33) -> Arm:
         joints=Joints(
             ("joint1",), (0.0,), (0.0,), (0.0,), (-3.0,), (3.0,), (0.0,), (0.05,), (0.0,), (0.0,), (0.0,), (9.0,)
         ),
-        links=Links(("link1",), (1.0,), (0.0, 0.0, 0.0), (0.3, 0.3, LINK_INERTIA - 0.05)),
+        links=Links(("link1",), (1.0,), (0.0, 0.0, 0.0), (0.3, 0.3, LINK_INERTIA - 0.05), (0.0,) * 3),
         covers=Covers(("tube",), ("link1",), (0.0,) * 3, (0.0,) * 3, (LEVER,), (0.0,) * 3, (LEVER, 0.0, 0.0), (0.02,)),
         name="one",
         joint_from_motor=(1.0 / ratio,),

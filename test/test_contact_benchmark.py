@@ -240,7 +240,7 @@ def synthetic(error: float, latency: float, right: float, group: str = "moving")
     for i in range(100):
         good = i < 100 * right
         contact = EvaluatedContact(
-            group, "push", 0.0, "outer_link", 0.2, 5.0, True, True, latency, True, 0.99, good,
+            group, "push", 0.0, "outer_link", 0.2, 5.0, True, True, latency, True, 0.99, good, "",
             error if good else math.inf, 0.015 if good else NAN, 0.5, i % 10 != 0, 0.1, 1.0, 5.0,
         )  # fmt: skip
         rest = torque_errors(story([0.0] * 100, {}, error=0.2))

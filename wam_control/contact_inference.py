@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 NEAR = math.cos(math.radians(20.0))  # how close to an ambiguous pose or direction that is given as the reason
-SMALL = 1e-9  # m, lever arms that are zero apart from rounding
+
+SHOULDER_JOINTS = 3  # of the arms whose elbow the reasons name
 
 MOMENT_ONLY = "measures only the moment: the contact position is unknown, the force is a lower bound"
 BENT = "elbow at 90 deg and force in plane: contact position and force cannot be separated"
@@ -107,6 +108,22 @@ class _Cover(NamedTuple):
     is_moment_only: bool
 
 
+class _Elbow(NamedTuple):
+    """Indices of the covers at both sides of an elbow."""
+
+    inner: int
+    outer: int
+
+
+def _elbow(covers: Sequence[_Cover]) -> _Elbow | None:
+    """The elbow behind a shoulder of three axes, None where the arm has none."""
+    for i, outer in enumerate(covers[1:], start=1):
+        inner = covers[i - 1]
+        if inner.is_moment_only and inner.joints == SHOULDER_JOINTS == outer.joints - 1:
+            return _Elbow(i - 1, i)
+    return None
+
+
 def detection_statistic(torques: Sequence[float], precision: Array) -> float:
     """r^T S^-1 r of external torques r, (n,), N m, with the inverse of their covariance S, (n, n)."""
     r = np.array(torques)
@@ -116,8 +133,8 @@ def detection_statistic(torques: Sequence[float], precision: Array) -> float:
 class ContactInference:
     """One hypothesis per cover, by the probability of contact positions along it.
 
-    Any joints, links and covers will do; reasons name poses of the WAM if the arm has its geometry:
-    four joints, an inner cover from shoulder to elbow, an outer one from the elbow on.
+    Any joints, links and covers will do.  Where three joints meet in a shoulder, with a cover from there to the next
+    joint, the elbow, and a cover from that on, reasons name poses of these two.
     """
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
@@ -135,11 +152,7 @@ class ContactInference:
             friction=parameters.friction,
             positions=parameters.positions,
         )
-        self._is_wam = (
-            len(arm.joints.names) == 4
-            and [cover.joints for cover in self._covers] == [3, 4]
-            and self._covers[0].is_moment_only
-        )
+        self._elbow = _elbow(covers)
 
     def infer(self, q: Sequence[float], torques: Sequence[float], precision: Array) -> tuple[Hypothesis, ...]:
         """Explain external torques by one contact.
@@ -203,15 +216,21 @@ class ContactInference:
     def _in_words(self, reason: str, cover: _Cover) -> str:
         if reason != MOMENT_ONLY:
             return reason
-        joint = "the shoulder" if self._is_wam else "the only joint" if cover.joints == 1 else "the pivot"
+        joint = (
+            "the shoulder"
+            if cover.joints == SHOULDER_JOINTS
+            else "the only joint"
+            if cover.joints == 1
+            else "the pivot"
+        )
         return f"{joint} {reason}"
 
     def _why_unknown(self, q: Sequence[float], cover: _Cover, fit: Fit) -> str:
         if cover.is_moment_only:
             return MOMENT_ONLY
-        if not self._is_wam:
+        if self._elbow is None or cover is not self._covers[self._elbow.outer]:
             return WEAK
-        in_plane, straight, bent = self._elbow(q, cover, fit)
+        in_plane, straight, bent = self._at_elbow(q, self._elbow, fit)
         if in_plane > NEAR and bent > NEAR:
             return BENT
         if in_plane < math.sqrt(1.0 - NEAR**2) and straight > NEAR:
@@ -222,19 +241,21 @@ class ContactInference:
 
     def _ambiguity(self, q: Sequence[float], fits: list[Fit]) -> str:
         """Why the link is not identified."""
-        if not self._is_wam:
+        likely = sorted(range(len(fits)), key=lambda i: -fits[i].probability)[:2]
+        if self._elbow is None or set(likely) != set(self._elbow):
             return LINKS
-        outer, fit = self._covers[1], fits[1]
-        in_plane, straight, _ = self._elbow(q, outer, fit)
+        outer, fit = self._covers[self._elbow.outer], fits[self._elbow.outer]
+        in_plane, straight, _ = self._at_elbow(q, self._elbow, fit)
         if straight > NEAR and in_plane < math.sqrt(1.0 - NEAR**2):
             return STRAIGHT_LINK
         if fit.place - outer.start[0] < 2.0 * fit.position_sd:
             return ELBOW
         return LINKS
 
-    def _elbow(self, q: Sequence[float], cover: _Cover, fit: Fit) -> tuple[float, float, float]:
+    def _at_elbow(self, q: Sequence[float], elbow: _Elbow, fit: Fit) -> tuple[float, float, float]:
         """How much, 0..1, the force lies in the plane of the links, the elbow is straight, the elbow is at 90 deg."""
-        inner = self._body.cover_pose(q, self._covers[0].name).rotation[:, 0]
+        cover = self._covers[elbow.outer]
+        inner = self._body.cover_pose(q, self._covers[elbow.inner].name).rotation[:, 0]
         outer = self._body.cover_pose(q, cover.name).rotation[:, 0]
         cosine = min(1.0, abs(float(inner @ outer)))
         vector = cover.across @ np.array(fit.force)
@@ -274,7 +295,7 @@ def _cover(arm: Arm, body: RigidBody, i: int) -> _Cover:
         directions=across.tolist(),
         hinge=_hinge(body, name, joints),
         joints=joints,
-        is_moment_only=_is_moment_only(arm, body, name, origin),
+        is_moment_only=not body.moves(name, origin),  # only the product of x and force is measured then
     )
 
 
@@ -290,9 +311,3 @@ def _wrenches(origin: Array, slope: Array, axis: Array, across: Array) -> Array:
 def _hinge(body: RigidBody, name: str, joints: int) -> Array:
     """Axis of the joint that carries the cover, in the cover's frame."""
     return body.cover_jacobian([0.0] * len(body.arm.joints.names), name)[3:, joints - 1]
-
-
-def _is_moment_only(arm: Arm, body: RigidBody, name: str, origin: Array) -> bool:
-    """Whether all joint axes meet the tube's axis at x = 0: only the product of x and force is measured then."""
-    poses = ([0.3 * (i + 1) * sign for i in range(len(arm.joints.names))] for sign in (1.0, -1.0))
-    return all(float(np.abs(body.point_jacobian(q, name, origin)).max()) < SMALL for q in poses)

@@ -334,9 +334,8 @@ class _Load:
     def __init__(self, arm: Arm, payload: tuple[float, ...]) -> None:
         n = len(arm.links.names)
         centre = (*arm.links.centre[:-3], *arm.tool)
-        links = dataclasses.replace(
-            arm.links, mass=(NO_MASS,) * (n - 1) + (1.0,), centre=centre, inertia=(0.0,) * (3 * n)
-        )
+        masses, none = (NO_MASS,) * (n - 1) + (1.0,), (0.0,) * (3 * n)
+        links = dataclasses.replace(arm.links, mass=masses, centre=centre, inertia=none, product=none)
         self._body = RigidBody(dataclasses.replace(arm, links=links, payload=0.0))
         low, high = payload
         # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass

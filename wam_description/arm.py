@@ -5,16 +5,22 @@ arrays are flattened row by row because ROS parameters cannot be nested.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
 from wam_description.parameters import lengths, one_each, parameter, require
 from wam_description.units import STANDARD_GRAVITY
+
+
+def _no_products(others: Mapping[str, Any]) -> tuple[float, ...]:
+    return (0.0,) * (3 * len(others["arm.links.names"]))
 
 
 def _distinct(group: str, names: tuple[str, ...]) -> None:
@@ -108,13 +114,35 @@ class Links:
         "centre of mass in the link's frame, x y z of each link", "m", low=-3.0, high=3.0
     )
     inertia: tuple[float, ...] = parameter(
-        "principal inertia about the centre of mass, x y z", "kg m^2", low=0.0, high=100.0
+        "moments of inertia about the centre of mass, along the axes of the link's frame, xx yy zz",
+        "kg m^2",
+        low=0.0,
+        high=100.0,
+    )
+    product: tuple[float, ...] = parameter(
+        "the other elements xy xz yz of the same inertia tensor; where they are not given, the axes are principal",
+        "kg m^2",
+        low=-100.0,
+        high=100.0,
+        derived=_no_products,
     )
 
     def __post_init__(self) -> None:
         _distinct("arm.links", self.names)
         lengths("arm.links", self.names, {"mass": self.mass})
-        lengths("arm.links", self.names, {"centre": self.centre, "inertia": self.inertia}, width=3)
+        spatial = {"centre": self.centre, "inertia": self.inertia, "product": self.product}
+        lengths("arm.links", self.names, spatial, width=3)
+        for i, name in enumerate(self.names):
+            least = float(np.linalg.eigvalsh(self.tensor(i))[0])
+            require(
+                least >= 0.0,
+                f"{name}: arm.links.inertia and product give a principal inertia of {least:.3g} kg m^2, below 0",
+            )
+
+    def tensor(self, i: int) -> NDArray[np.float64]:
+        """Inertia tensor of link i, counted from 0, about its centre of mass in its frame, (3, 3), kg m^2."""
+        (xx, yy, zz), (xy, xz, yz) = (values[3 * i : 3 * i + 3] for values in (self.inertia, self.product))
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 @dataclass(frozen=True)
@@ -237,26 +265,20 @@ class Arm:
 
     @cached_property
     def carried(self) -> Links:
-        """The links with the payload, a point mass at the tool: what the motors carry, in every model of the arm.
-
-        Raises
-        ------
-        ParameterError
-            if the payload would turn the principal axes of the last link.
-        """
+        """The links with the payload, a point mass at the tool: what the motors carry, in every model of the arm."""
         links, payload = self.links, self.payload
         if not payload:
             return links
-        centre, inertia = np.reshape(links.centre, (-1, 3)).copy(), np.reshape(links.inertia, (-1, 3)).copy()
-        lever, mass = np.array(self.tool) - centre[-1], links.mass[-1]
-        require(
-            int(np.count_nonzero(lever)) <= 1,
-            f"the payload is {payload:g} kg, but the tool is not on an axis of the last link's inertia; set it to 0",
+        centre, inertia, product = (
+            np.reshape(values, (-1, 3)).copy() for values in (links.centre, links.inertia, links.product)
         )
+        lever, mass = np.array(self.tool) - centre[-1], links.mass[-1]
         fraction = payload / (mass + payload)
         inertia[-1] += mass * fraction * (lever @ lever - lever * lever)
+        product[-1] -= mass * fraction * lever[[0, 0, 1]] * lever[[1, 2, 2]]
         centre[-1] += fraction * lever
-        moved = {"centre": tuple(centre.ravel().tolist()), "inertia": tuple(inertia.ravel().tolist())}
+        shown = {"centre": centre, "inertia": inertia, "product": product}
+        moved = {name: tuple(values.ravel().tolist()) for name, values in shown.items()}
         return replace(links, mass=(*links.mass[:-1], mass + payload), **moved)
 
     @cached_property

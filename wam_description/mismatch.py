@@ -69,8 +69,11 @@ def _with_friction(shafts: Shafts, factors: Sequence[float]) -> Shafts:
 def _scaled_links(arm: Arm, mismatch: ModelMismatch) -> Links:
     links = arm.links
     mass = np.multiply(links.mass, mismatch.mass)
-    inertia = np.reshape(links.inertia, (-1, 3)) * np.array(mismatch.mass)[:, None]
-    return dataclasses.replace(links, mass=_row(mass), inertia=_row(inertia))
+    inertia, product = (
+        _row(np.reshape(values, (-1, 3)) * np.array(mismatch.mass)[:, None])
+        for values in (links.inertia, links.product)
+    )
+    return dataclasses.replace(links, mass=_row(mass), inertia=inertia, product=product)
 
 
 def _row(values: np.ndarray) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from wam_description.arm import Arm
+from wam_description.arm import Arm, Links
 from wam_description.contact_pairs import ContactPair, contact_pairs
 from wam_description.effects import Effects, Ripples
 from wam_description.mjcf_objects import add_bodies, add_doors, require_names
@@ -161,7 +161,7 @@ def _add_links(world: ElementTree.Element, arm: Arm) -> None:
             "inertial",
             pos=_triple(links.centre, i),
             mass=repr(links.mass[i]),
-            diaginertia=_triple(links.inertia, i),
+            **_inertia(links, i),
         )
         _add(
             parent,
@@ -176,6 +176,13 @@ def _add_links(world: ElementTree.Element, arm: Arm) -> None:
             if covers.links[j] == name:
                 _add_cover(parent, arm, j, cover)
     _add(parent, "site", name="tool", pos=_numbers(arm.tool))
+
+
+def _inertia(links: Links, i: int) -> dict[str, str]:
+    moments, products = _triple(links.inertia, i), _triple(links.product, i)
+    if any(links.product[3 * i : 3 * i + 3]):
+        return {"fullinertia": f"{moments} {products}"}
+    return {"diaginertia": moments}
 
 
 def _add_cover(body: ElementTree.Element, arm: Arm, i: int, name: str) -> None:

@@ -5,9 +5,9 @@ their covariance.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,11 @@ from wam_description.parameters import copy_of, lengths, one_each, parameter, re
 
 FROM_ARM: Final = "arm"  # source of a model that was not identified
 UNKNOWN: Final = "none"  # in place of the names of identified parameters, where there are none
+
+
+def _products(others: Mapping[str, Any]) -> tuple[float, ...]:
+    """Those of the arm, none where it does not give them."""
+    return tuple(others.get("arm.links.product", (0.0,) * (3 * len(others["arm.links.names"]))))
 
 
 @dataclass(frozen=True)
@@ -31,11 +36,18 @@ class LinkModel:
         derived=copy_of("arm.links.centre"),
     )
     inertia: tuple[float, ...] = parameter(
-        "principal inertia about the centre of mass, x y z",
+        "moments of inertia about the centre of mass, along the axes of the link's frame, xx yy zz",
         "kg m^2",
         low=0.0,
         high=100.0,
         derived=copy_of("arm.links.inertia"),
+    )
+    product: tuple[float, ...] = parameter(
+        "the other elements xy xz yz of the same inertia tensor",
+        "kg m^2",
+        low=-100.0,
+        high=100.0,
+        derived=_products,
     )
 
 
@@ -157,7 +169,9 @@ class ArmModel:
         n = len(self.motors.inertia)
         size = ("",) * n
         lengths("model.links", size, {"mass": self.links.mass})
-        lengths("model.links", size, {"centre": self.links.centre, "inertia": self.links.inertia}, width=3)
+        links = self.links
+        spatial = {"centre": links.centre, "inertia": links.inertia, "product": links.product}
+        lengths("model.links", size, spatial, width=3)
         lengths("model.motors", size, dataclasses.asdict(self.motors))
         lengths("model.joints", size, dataclasses.asdict(self.joints))
         pairs = {

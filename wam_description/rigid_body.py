@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from wam_description.arm import Arm
 
 Array = NDArray[np.float64]
+SMALL = 1e-9  # m, lever arms that are zero apart from rounding
 
 
 class Pose(NamedTuple):
@@ -50,6 +51,7 @@ class RigidBody:
         self._tool = self._model.getFrameId("tool")
         self._frame = {name: self._model.getFrameId(name) for name in self.covers}
         self._joint = {name: self._model.frames[frame].parentJoint for name, frame in self._frame.items()}
+        self._moving = tuple(name for name in self.covers if self.moves(name, (0.0, 0.0, 0.0)))
 
     def cover_pose(self, q: ArrayLike, cover: str) -> Pose:
         """Frame of a cover in base coordinates."""
@@ -83,6 +85,16 @@ class RigidBody:
         result: Array = jacobians[:3] - pin.skew(point) @ jacobians[3:]
         result[:, self._joint[cover] :] = 0.0
         return result
+
+    def moves(self, cover: str, p: ArrayLike) -> bool:
+        """Whether some joint moves the point p, (3,), m, of a cover, given in its frame."""
+        n = self._model.nv
+        poses = ([0.3 * (i + 1) * sign for i in range(n)] for sign in (1.0, -1.0))
+        return any(float(np.abs(self.point_jacobian(q, cover, p)).max()) >= SMALL for q in poses)
+
+    def start_velocities(self, q: ArrayLike, qd: ArrayLike) -> dict[str, Array]:
+        """Velocity, (3,), m/s, of the origin of every cover whose origin moves: of the elbow, and of a wrist."""
+        return {name: self.point_jacobian(q, name, (0.0, 0.0, 0.0)) @ _vector(qd) for name in self._moving}
 
     def cover_jacobian(self, q: ArrayLike, cover: str) -> Array:
         """Motion of a cover per joint velocity, in the cover's frame.
@@ -186,12 +198,11 @@ def _model(arm: Arm, mass_scale: Sequence[float]) -> pin.Model:
     model.gravity.linear = np.array(arm.gravity)
     links = arm.carried
     centres = np.reshape(links.centre, (-1, 3))
-    inertias = np.reshape(links.inertia, (-1, 3))
     joint = 0
     for i, name in enumerate(arm.joints.names):
         joint = model.addJoint(joint, pin.JointModelRZ(), joint_placement(arm, i), name)
         mass = links.mass[i] * mass_scale[i]
-        inertia = pin.Inertia(mass, centres[i], np.diag(inertias[i] * mass_scale[i]))
+        inertia = pin.Inertia(mass, centres[i], links.tensor(i) * mass_scale[i])
         model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
     _add_frame(model, "tool", joint, pin.SE3(np.eye(3), np.array(arm.tool)))
     for i, name in enumerate(arm.covers.names):

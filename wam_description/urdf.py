@@ -44,8 +44,9 @@ def _add_link(robot: Element, arm: Arm, i: int) -> None:
     inertial = SubElement(link, "inertial")
     inertial.append(_origin(_triple(arm.carried.centre, i), (0.0, 0.0, 0.0)))
     SubElement(inertial, "mass", value=_numbers([arm.carried.mass[i]]))
-    xx, yy, zz = (_numbers([value]) for value in _triple(arm.carried.inertia, i))
-    SubElement(inertial, "inertia", ixx=xx, ixy="0", ixz="0", iyy=yy, iyz="0", izz=zz)
+    tensor = arm.carried.tensor(i).tolist()
+    elements = ((a, b) for a in range(3) for b in range(a, 3))
+    SubElement(inertial, "inertia", {f"i{'xyz'[a]}{'xyz'[b]}": _numbers([tensor[a][b]]) for a, b in elements})
     for cover, carrier in enumerate(arm.covers.links):
         if carrier == arm.links.names[i]:
             _add_tube(link, arm, cover)

@@ -42,7 +42,7 @@ class DriverParameters:
         before=1e3,
     )
     elbow_speed_limit: float = parameter(
-        "speed of the last joint's origin above which there is a fault", "m/s", low=0.0, high=100.0
+        "speed of the start of a cover, as the elbow, above which there is a fault", "m/s", low=0.0, high=100.0
     )
     tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0, high=100.0)
     disturbance_force_limit: float = parameter(

@@ -94,9 +94,9 @@ class LimitWatch:
 
     def _speeds(self, q: list[float], qd: list[float]) -> Iterator[WatchedLimit]:
         joints = self._arm.joints
-        elbow = self._body.point_jacobian(q, self._arm.covers.names[-1], (0.0, 0.0, 0.0)) @ qd
         tip = self._body.tool_jacobian(q) @ qd
-        yield WatchedLimit("speed of the elbow", math.hypot(*elbow), self._elbow_speed_limit, "m/s")
+        for cover, velocity in self._body.start_velocities(q, qd).items():
+            yield WatchedLimit(f"speed of the start of {cover}", math.hypot(*velocity), self._elbow_speed_limit, "m/s")
         yield WatchedLimit("speed of the tip", math.hypot(*tip), self._tip_speed_limit, "m/s")
         for name, speed, limit in zip(joints.names, qd, joints.speed_limit, strict=True):
             yield WatchedLimit(f"speed of {name}", abs(speed), limit, "rad/s")

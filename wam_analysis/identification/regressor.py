@@ -3,6 +3,7 @@
 The friction of a window is the mean over its states, each with the direction, speed and load of its own.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -119,24 +120,26 @@ class Regressor:
 
     def _inertial(self, values: Array) -> tuple[list[int], Array, Array]:
         """Where the parameters of the links are, and the ten of each link as jacobian @ parameters + constant."""
-        unknowns, n = self._unknowns, len(self._shared.arm.links.names)
+        unknowns, links = self._unknowns, self._shared.arm.links
+        n = len(links.names)
         groups = ["mass", *(f"moment_{axis}" for axis in AXES), *(f"inertia_{axis}" for axis in AXES)]
         at = np.array([unknowns.places(f"links.{group}") for group in groups])  # (7, n)
         jacobian, constant = np.zeros((10 * n, 7 * n)), np.zeros(10 * n)
         for i in range(n):
-            ten, slope = about_origin(values[at[:, i]])
+            ten, slope = about_origin(values[at[:, i]], links.product[3 * i : 3 * i + 3])
             rows, own = slice(10 * i, 10 * i + 10), np.arange(7) * n + i
             jacobian[rows, own] = slope
             constant[rows] = ten - slope @ values[at[:, i]]
         return at.ravel().tolist(), jacobian, constant
 
 
-def about_origin(link: Array) -> tuple[Array, Array]:
+def about_origin(link: Array, product: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
     """The ten parameters of a link about its frame's origin, (10,), and their slopes, (10, 7).
 
     Parameters
     ----------
-    link : (7,), mass, kg; mass times centre, kg m; principal inertia about the centre, kg m^2.
+    link : (7,), mass, kg; mass times centre, kg m; moments of inertia about the centre, kg m^2.
+    product : elements xy, xz, yz of that inertia, kg m^2, which are not estimated.
     """
     mass, moment, inertia = float(link[0]), link[1:4], link[4:]
     ten, slope = np.zeros(10), np.zeros((10, 7))
@@ -149,8 +152,8 @@ def about_origin(link: Array) -> tuple[Array, Array]:
         slope[place, 0], slope[place, 4 + i] = -square / mass**2, 1.0
         for axis in others:
             slope[place, 1 + axis] = 2.0 * moment[axis] / mass
-    for place, a, b in PRODUCTS:
-        ten[place] = -moment[a] * moment[b] / mass
+    for (place, a, b), own in zip(PRODUCTS, product, strict=True):
+        ten[place] = own - moment[a] * moment[b] / mass
         slope[place, 0] = moment[a] * moment[b] / mass**2
         slope[place, 1 + a], slope[place, 1 + b] = -moment[b] / mass, -moment[a] / mass
     return ten, slope

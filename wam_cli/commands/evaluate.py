@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from wam_cli.commands import (
+    BASE_CONFIGURATION,
     at_least,
     batch_of,
     configuration_of,
@@ -114,7 +115,8 @@ def _write(
     defaults = f"--contacts {given.contacts} --resting {given.resting} --free {given.free:g}"
     seeds = " ".join(map(str, given.seed))
     sensors = " --joint-sensors" * given.joint_sensors
-    command = f"wam evaluate contact --seed {seeds} {defaults}{sensors} --mode {given.mode} --write {file}"
+    of = "" if given.config == BASE_CONFIGURATION else f"--config {given.config} "
+    command = f"wam evaluate contact {of}--seed {seeds} {defaults}{sensors} --mode {given.mode} --write {file}"
     compute = section(times(configuration, scenario))
     text = page(result, arm, command, compute, f"{picture.parent.name}/{picture.name}")
     file.write_text(text, encoding="utf-8")

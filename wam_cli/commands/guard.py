@@ -1,12 +1,15 @@
-"""`wam guard`: the stability guard validated by Monte Carlo simulation, or a force loop of your own assessed."""
+"""`wam guard`: the guard validated by Monte Carlo simulation; or the force loop of an arm, or your own, assessed."""
 
 import argparse
 import math
 import sys
 from pathlib import Path
 
-from wam_cli.commands import at_least, writable_file
+from wam_cli.commands import at_least, configuration_of, take_configuration, writable_file
+from wam_control.force_loop import ForceLoop
+from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.loop_design import loop_design
+from wam_description.configuration import Configuration
 from wam_experiments.stability.guard_validation import Trial, exact_trials, table, testbed_trials
 from wam_experiments.stability.map_picture import draw
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
@@ -26,6 +29,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sets", type=int, default=200, help="random sets for the exact integrator; default: 200")
     parser.add_argument("--testbed", type=int, default=40, help="random sets for the testbed in MuJoCo; default: 40")
     parser.add_argument("--seed", type=int, default=1, help="seed of the random sets; default: 1")
+    take_configuration(parser)
+    parser.set_defaults(config="")
     own = parser.add_argument_group("a force loop of your own", "all but the last six are needed; consistent units")
     for name, text in PLANT.items():
         own.add_argument(f"--{name}", type=float, help=text)
@@ -38,7 +43,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the two tables, 1 where a set was accepted that diverges; or assess a loop, 1 where it is not safe."""
+    """Print the two tables, 1 where a set was accepted that diverges; or assess a loop, 1 where it is not safe.
+
+    With a configuration, its force loop is assessed as at its start.
+    """
+    if given.config:
+        return _assess_configuration(configuration_of(given))
     missing = [name for name in PLANT if getattr(given, name) is None]
     if len(missing) < len(PLANT):
         if missing:
@@ -59,6 +69,14 @@ def run(given: argparse.Namespace) -> int:
         sys.stderr.write("\n")
         print(f"{name}\n{found.text()}\n")
     return int(bad > 0)
+
+
+def _assess_configuration(configuration: Configuration) -> int:
+    shared, parameters = configuration.shared, configuration.node("force_loop", ForceLoopParameters)
+    report = ForceLoop(shared.model_arm, shared.servo, parameters, shared.timing).report
+    width = max(map(len, report.facts))
+    print("\n".join([report.message, *(f"  {name:{width}}  {value}" for name, value in report.facts.items())]))
+    return int(report.is_warning)
 
 
 def _assess(given: argparse.Namespace) -> int:

@@ -37,6 +37,7 @@ class EvaluatedContact(NamedTuple):
     detected : whether the estimator reported a contact.
     link_probability : of the most probable link, NaN if not detected.
     right_link : whether that link is the true one.
+    link : that link, '' if not detected.
     error : m, signed, of the position; inf without a position, on the wrong link or if not detected.
     position_sd : m, reported standard deviation, NaN without one.
     credibility : posterior probability of everything more probable than the truth; 0.9 bounds the 90 % set; 1 if not
@@ -59,6 +60,7 @@ class EvaluatedContact(NamedTuple):
     detected: bool
     link_probability: float
     right_link: bool
+    link: str
     error: float
     position_sd: float
     credibility: float
@@ -143,6 +145,7 @@ def _evaluate(
         detected=now.in_contact,
         link_probability=named.probability if named else math.nan,
         right_link=right,
+        link=named.cover if named else "",
         error=error,
         position_sd=position_sd,
         credibility=level,

@@ -12,10 +12,11 @@ from wam_experiments.contact_benchmark.contacts import EvaluatedContact
 from wam_experiments.contact_benchmark.scenarios import KINDS
 from wam_experiments.contact_benchmark.score import (
     IN_MOTION,
-    TORQUE_REQUIRED,
+    TORQUE_LIMITS,
     ScenarioScore,
     contacts_of,
     on_outer_link,
+    outer_links,
 )
 from wam_experiments.figures.style import panels
 
@@ -33,7 +34,7 @@ def figure(scores: Sequence[ScenarioScore], arm: Arm, file: Path) -> None:
         _standard_deviations(flat[1], found)
         _reliability(flat[2], contacts_of(scores), found)
         _torques(flat[3], scores, arm)
-        _latency(flat[4], on_outer_link(scores, arm, force=5.0))
+        _latency(flat[4], on_outer_link(scores, arm, force=5.0), outer_links(arm))
         _links(flat[5], contacts_of(scores), arm)
 
 
@@ -108,19 +109,20 @@ def _torques(axes: Axes, scores: Sequence[ScenarioScore], arm: Arm) -> None:
             axes.bar(
                 np.arange(len(names)) + 0.2 * (k - 1.5), np.sqrt(squares / count), 0.18, color=COLOURS[k], label=label
             )
-    for i, limit in enumerate(TORQUE_REQUIRED):
+    required, _ = TORQUE_LIMITS.get(arm.name, ((), ()))
+    for i, limit in enumerate(required):
         axes.plot([i - 0.4, i + 0.4], [limit, limit], color="black", lw=2)
     axes.set(title="external torque, rms error; bars: required in motion or dithered", ylabel="[N m]")
     axes.set_xticks(range(len(names)), names)
     axes.legend(frameon=False, fontsize=8)
 
 
-def _latency(axes: Axes, found: Sequence[EvaluatedContact]) -> None:
+def _latency(axes: Axes, found: Sequence[EvaluatedContact], links: str) -> None:
     times = sorted(1e3 * contact.latency for contact in found if not math.isnan(contact.latency))
     axes.step(times, (np.arange(len(times)) + 1.0) / max(len(times), 1), color=COLOURS[0], where="post")
     axes.plot(60.0, 0.95, "_", color="black", ms=14, mew=2)
     axes.set(
-        title="detection latency, 5 N on the outer link; mark: required",
+        title=f"detection latency, 5 N on the {links}; mark: required",
         xlabel="time [ms]",
         ylabel="share of contacts",
         xlim=(0, 120),
@@ -133,7 +135,7 @@ def _links(axes: Axes, every: Sequence[EvaluatedContact], arm: Arm) -> None:
     counts = np.zeros((len(names), len(names) + 1))
     for contact in every:
         true = names.index(contact.cover)
-        named = len(names) if not contact.detected else true if contact.right_link else 1 - true
+        named = names.index(contact.link) if contact.link else len(names)
         counts[true, named] += 1
     axes.imshow(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0), cmap="Blues", vmin=0.0, vmax=1.0)
     for (i, j), count in np.ndenumerate(counts):

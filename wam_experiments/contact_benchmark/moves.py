@@ -12,8 +12,9 @@ SLOWEST, FASTEST = 0.4, 2.5  # rad/s, peak of the fastest joint
 SHORTEST, LONGEST = 0.7, 1.1  # s
 ELBOW_SPEED, TIP_SPEED = 1.9, 3.2  # m/s, well below the driver's limits
 PEAK = 1.875  # greatest speed of a minimum-jerk path over its mean speed
-RANGE = (1.5, 1.8, 1.5, 1.2)  # rad, each way from the middle
-MIDDLE = (0.0, 0.0, 0.0, 0.5)  # rad
+# rad, middle of the poses of each joint and range each way from it, by arm
+POSES = {"wam": ((0.0, 0.0, 0.0, 0.5), (1.5, 1.8, 1.5, 1.2))}
+SHARE = 0.6  # of the range of a joint, about its middle, of any other arm
 RETURN_PROBABILITY = 0.3  # of a move back to the start of the last one
 
 
@@ -28,11 +29,11 @@ class MoveGenerator:
     """Random poses and moves of one arm."""
 
     def __init__(self, arm: Arm) -> None:
-        self._arm, self._body = arm, RigidBody(arm)
-        joints = len(arm.joints.names)
-        middle, span = np.array(MIDDLE[:joints]), np.array(RANGE[:joints])
-        self._low = np.maximum(middle - span, np.array(arm.joints.lower) + 0.1)
-        self._high = np.minimum(middle + span, np.array(arm.joints.upper) - 0.1)
+        self._body = RigidBody(arm)
+        lower, upper = np.array(arm.joints.lower), np.array(arm.joints.upper)
+        middle, span = map(np.array, POSES.get(arm.name, (0.5 * (lower + upper), 0.5 * SHARE * (upper - lower))))
+        self._low = np.maximum(middle - span, lower + 0.1)
+        self._high = np.minimum(middle + span, upper - 0.1)
 
     def pose(self, random: np.random.Generator) -> tuple[float, ...]:
         """A pose within the range, rad."""
@@ -63,12 +64,13 @@ class MoveGenerator:
         return result
 
     def _speed_ratio(self, here: np.ndarray, way: np.ndarray, seconds: float) -> float:
-        """Greatest speed of elbow or tip, over the allowed one."""
-        worst, outer = 0.0, self._arm.covers.names[-1]
+        """Greatest speed of elbow, wrist or tip, over the allowed one."""
+        worst = 0.0
         for s in np.linspace(0.1, 0.9, 9):
             q = here + way * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
             qd = way * 30.0 * s * s * (1.0 - s) ** 2 / seconds
-            elbow = self._body.point_jacobian(q, outer, (0.0, 0.0, 0.0)) @ qd
+            for velocity in self._body.start_velocities(q, qd).values():
+                worst = max(worst, float(np.linalg.norm(velocity)) / ELBOW_SPEED)
             tip = self._body.tool_jacobian(q) @ qd
-            worst = max(worst, float(np.linalg.norm(elbow)) / ELBOW_SPEED, float(np.linalg.norm(tip)) / TIP_SPEED)
+            worst = max(worst, float(np.linalg.norm(tip)) / TIP_SPEED)
         return worst

@@ -136,7 +136,7 @@ def page(result: BenchmarkResult, arm: Arm, command: str, times: str, picture: s
     """
     total = result.total
     parts = [
-        PREFACE.format(command=command),
+        PREFACE.format(command=command, arm="" if arm.name == "wam" else f", {arm.name}"),
         extent(total),
         "",
         f"![Errors, calibration, latency and link identification]({picture})",
@@ -154,7 +154,7 @@ def page(result: BenchmarkResult, arm: Arm, command: str, times: str, picture: s
     return "\n".join(parts)
 
 
-PREFACE = f"""# Benchmark of contact estimation
+PREFACE = f"""# Benchmark of contact estimation{{arm}}
 
 Written by `{{command}}`; nothing here is written by hand.
 

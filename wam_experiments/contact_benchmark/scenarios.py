@@ -30,6 +30,7 @@ WEAKEST, STRONGEST = 1.0, 20.0  # N
 ROUGH = 0.8  # the greatest coefficient of friction, of every fifth pusher
 MARGIN = 0.02  # m at the ends of a link without contacts
 DITHER_CYCLE = 0.04  # s: 25 Hz
+BEYOND_FIRST = 0.7  # of the contacts are not on the first cover
 FOAM_SHARE = 0.15  # of the scenarios in motion
 KINDS = ("push", "sphere", "flat", "foam")
 AWAY = Foam((5.0, 5.0, 5.0), (0.0, 0.0, 0.0), 0.01)  # out of reach
@@ -173,7 +174,8 @@ class ScenarioGenerator:
             push = self._push(contact, now) if contact.kind == "push" else None
             steps.append(ScenarioStep(f"rest {number + 1}", 0.6 + REST_HOLD + 0.2, push=push))
             now += steps[-1].seconds
-        values = self._values(random, start, planned) | dict(dither or {})
+        still = dict.fromkeys(dither_values(self._configuration), 0)
+        values = self._values(random, start, planned) | (still if dither is None else dict(dither))
         group = "rest" if dither is None else "dither"
         return BenchmarkScenario(f"seed {self._seed} {group} {i}", group, values, tuple(steps), tuple(planned))
 
@@ -198,7 +200,7 @@ class ScenarioGenerator:
 
     def _contact(self, random: np.random.Generator, begin: float, end: float) -> PlannedContact:
         covers = self._arm.covers
-        cover = int(random.random() < 0.7) if len(covers.names) > 1 else 0
+        cover = _drawn_cover(random.random(), len(covers.names)) if len(covers.names) > 1 else 0
         kind = str(random.choice(("push", "sphere", "flat"), p=(0.4, 0.3, 0.3)))
         level = float(random.choice((*LEVELS, 0.0), p=(0.35, 0.25, 0.2, 0.2)))
         force = level * float(random.uniform(0.95, 1.05)) if level else float(random.uniform(WEAKEST, STRONGEST))
@@ -229,6 +231,11 @@ class ScenarioGenerator:
             **_mismatch(random, self._arm),
             **_pushers(random, [contact for contact in planned if contact.kind in ("sphere", "flat")]),
         }
+
+
+def _drawn_cover(share: float, covers: int) -> int:
+    """Index of the cover in contact for a number from 0 to 1: those behind the first one have `BEYOND_FIRST` of all."""
+    return 1 + int(share / BEYOND_FIRST * (covers - 1)) if share < BEYOND_FIRST else 0
 
 
 def _opening() -> list[ScenarioStep]:

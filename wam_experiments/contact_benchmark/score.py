@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NamedTuple
 
 from wam_description.arm import Arm
+from wam_description.rigid_body import RigidBody
 from wam_experiments.contact_benchmark.contacts import EvaluatedContact, evaluate_contacts
 from wam_experiments.contact_benchmark.free_motion import (
     ContactFreeTime,
@@ -24,7 +26,8 @@ NEAR = 0.2  # of a force: 5 N are 4 to 6 N
 SMALL_SD = 0.02  # m
 HIGH_PROBABILITY = 0.95
 IN_MOTION = ("moving", "free")
-TORQUE_REQUIRED, TORQUE_TARGET = (0.25, 0.35, 0.15, 0.12), (0.10, 0.15, 0.06, 0.05)  # N m by joint, moving or dithered
+# N m by joint, moving or dithered, by arm: required, target
+TORQUE_LIMITS = {"wam": ((0.25, 0.35, 0.15, 0.12), (0.10, 0.15, 0.06, 0.05))}
 DITHERED = "at rest, dithered"
 
 
@@ -91,12 +94,26 @@ def contacts_of(scores: Sequence[ScenarioScore], group: str = "moving") -> list[
     return [contact for contact in every if group != "moving" or (contact.moving and contact.began_moving)]
 
 
+@cache
+def outer_covers(arm: Arm) -> tuple[str, ...]:
+    """The covers along which a position can be measured: not all joint axes meet at their start."""
+    body, covers = RigidBody(arm), arm.covers
+    return (
+        tuple(name for name in covers.names if body.moves(name, (0.0, *covers.aside(name, 0.0)))) or covers.names[-1:]
+    )
+
+
+def outer_links(arm: Arm) -> str:
+    """These in words."""
+    return " or ".join(outer_covers(arm)).replace("_", " ")
+
+
 def on_outer_link(
     scores: Sequence[ScenarioScore], arm: Arm, group: str = "moving", force: float = 0.0
 ) -> list[EvaluatedContact]:
-    """The same on the last link, near a force if one is given, N."""
-    last = arm.covers.names[-1]
-    found = [contact for contact in contacts_of(scores, group) if contact.cover == last]
+    """The same on the covers along which a position can be measured, near a force if one is given, N."""
+    outer = outer_covers(arm)
+    found = [contact for contact in contacts_of(scores, group) if contact.cover in outer]
     return [contact for contact in found if force == 0.0 or abs(contact.force - force) <= NEAR * force]
 
 
@@ -181,8 +198,8 @@ def _coverage(
 
 def _on_inner_link(scores: Sequence[ScenarioScore], arm: Arm) -> list[EvaluatedContact]:
     """Contacts whose inner link is identified."""
-    last = arm.covers.names[-1]
-    return [contact for contact in contacts_of(scores) if contact.cover != last and contact.right_link]
+    outer = outer_covers(arm)
+    return [contact for contact in contacts_of(scores) if contact.cover not in outer and contact.right_link]
 
 
 def _moment(arm: Arm) -> Callable[..., Interval]:
@@ -228,25 +245,30 @@ def _torque_z(scores: Sequence[ScenarioScore]) -> Interval:
     return rms([sum(part.moving_z) for part in parts], [joints * part.moving_count for part in parts])
 
 
+def _up_to(limit: float) -> Bound:
+    return ANY if math.isinf(limit) else (0.0, limit)
+
+
 def required_metrics(arm: Arm) -> list[Metric]:
     """The metrics with required or target values."""
-    last = arm.covers.names[-1]
-    torques = zip(arm.joints.names, TORQUE_REQUIRED, TORQUE_TARGET, strict=True)
+    outer, links = outer_covers(arm), outer_links(arm)
+    unlimited = (math.inf,) * len(arm.joints.names)
+    torques = zip(arm.joints.names, *TORQUE_LIMITS.get(arm.name, (unlimited, unlimited)), strict=True)
     states = (("in motion", IN_MOTION, "moving"), (DITHERED, ("dither",), "still"))
     joints = list(enumerate(torques))
     metrics = [
         Metric(
-            f"external torque {when}, rms, {name}", "N m", 1.0, (0.0, must), (0.0, aim), _torque_rms(i, groups, state)
+            f"external torque {when}, rms, {name}", "N m", 1.0, _up_to(must), _up_to(aim), _torque_rms(i, groups, state)
         )
         for when, groups, state in states
         for i, (name, must, aim) in joints
     ]
     metrics.append(Metric("false alarms in free motion with stops", "", 1.0, (0.0, 0.0), (0.0, 0.0), _alarms(True)))
     for seconds, must, aim in ((0.06, (0.95, 1.0), ANY), (0.03, ANY, (0.99, 1.0))):
-        name = f"5 N on the outer link detected within {1e3 * seconds:.0f} ms"
+        name = f"5 N on the {links} detected within {1e3 * seconds:.0f} ms"
         metrics.append(percentage(name, _detected_within(arm, seconds), must, aim))
     for force, must_cm, aim_cm in ((5.0, 3.0, 2.0), (10.0, 2.0, 1.0), (20.0, 1.3, 0.8)):
-        name = f"position on the outer link at {force:.0f} N, median error"
+        name = f"position on the {links} at {force:.0f} N, median error"
         metrics.append(position_error(name, _position(arm, force), (0.0, must_cm / 100.0), (0.0, aim_cm / 100.0)))
     small_sd = "position with a reported sd below 2 cm"
     rough_and_strong = _coverage(lambda contact: contact.friction >= ROUGH - 1e-9 and abs(contact.force - 20.0) <= 8.0)
@@ -261,12 +283,13 @@ def required_metrics(arm: Arm) -> list[Metric]:
         ),
         percentage("90 % set contains the truth", _coverage(), (0.85, 0.97)),
         percentage("90 % set contains the truth at 20 N, mu 0.8", rough_and_strong, ANY, (0.85, 0.97)),
-        percentage("90 % set contains the truth, outer link", _coverage(lambda contact: contact.cover == last)),
+        percentage(f"90 % set contains the truth, {links}", _coverage(lambda contact: contact.cover in outer)),
     ]
 
 
 def further_metrics(arm: Arm) -> list[Metric]:
     """The metrics without required or target values."""
+    links = outer_links(arm)
     metrics = [
         percentage("link identified with a probability above 0.95", _share_of_high_probability),
         percentage("inner link: relative error of the moment, median", _moment(arm)),
@@ -281,10 +304,10 @@ def further_metrics(arm: Arm) -> list[Metric]:
             metrics.append(Metric(f"external torque {when}, rms, {name}", "N m", 1.0, ANY, ANY, of))
     for group, when in (("rest", "at rest"), ("dither", DITHERED)):
         for force in LEVELS:
-            name = f"{force:.0f} N on the outer link"
+            name = f"{force:.0f} N on the {links}"
             metrics.append(percentage(f"{name} detected {when}", _detected(arm, group, force)))
             metrics.append(position_error(f"position, {name} {when}, median error", _position(arm, force, group)))
         metrics.append(percentage(f"90 % set contains the truth {when}", _coverage(group=group)))
     return metrics + [
-        position_error(f"position on the outer link, {kind}, median error", _position(arm, kind=kind)) for kind in KINDS
+        position_error(f"position on the {links}, {kind}, median error", _position(arm, kind=kind)) for kind in KINDS
     ]

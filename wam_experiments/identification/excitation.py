@@ -143,8 +143,8 @@ class _Space:
     def _allows(self, q: Array, qd: Array) -> bool:
         covers = self._arm.covers
         tip = np.linalg.norm(self._body.tool_jacobian(q) @ qd)
-        elbow = np.linalg.norm(self._body.point_jacobian(q, covers.names[-1], np.zeros(3)) @ qd)
-        if tip > self._tip or elbow > self._elbow:
+        starts = self._body.start_velocities(q, qd).values()
+        if tip > self._tip or any(np.linalg.norm(velocity) > self._elbow for velocity in starts):
             return False
         for i, name in enumerate(covers.names):
             start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (covers.start, covers.end))
