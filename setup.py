@@ -49,6 +49,8 @@ setup(
         "zstandard",
     ],
     extras_require={
+        # Tab in the shell: `wam completion bash`
+        "completion": ["argcomplete"],
         # maps and benchmarks on many machines: `wam map --dask ADDRESS`
         "dask": ["distributed"],
         # the documentation site: `make docs`

@@ -60,10 +60,10 @@ def configuration_of(given: argparse.Namespace) -> Configuration:
     name: str = given.config
     loaded = Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
     values = getattr(given, "values", [])
-    return loaded.with_values(dict(map(_value, values))) if values else loaded
+    return loaded.with_values(dict(map(configured_value, values))) if values else loaded
 
 
-def _value(text: str) -> tuple[str, Any]:
+def configured_value(text: str) -> tuple[str, Any]:
     """Parameter and value of an option --set; a whole number is what the parameter's class makes of it.
 
     Raises
