@@ -15,6 +15,7 @@ Messages:
 
 - `columns`: the columns of each message type. `point_clouds`: points of PointCloud2 as a table.
 - `message_groups`: messages of equal layout decoded together. `cdr`: layouts, and messages decoded one by one.
+- `cdr_encoder`: messages serialized without ROS, whose definitions for that are in `messages.json`.
 - `message_layout`: exact length and stamp of a serialized message, for the recorder.
 - `message_text`: fields of a type from its definition. `definitions`: definitions as ROS installs them.
 

@@ -12,7 +12,7 @@ import yaml
 
 from wam_description import yaml_text
 from wam_description.arm import Shared
-from wam_description.parameters import ParameterError, build, fields, flatten
+from wam_description.parameters import ParameterError, build, fields, flatten, nested
 
 T = TypeVar("T")
 SHARED = "/**"
@@ -244,17 +244,6 @@ def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[s
 
 def _text(sections: Mapping[str, Mapping[str, Any]]) -> str:
     tree = {
-        (name if name == SHARED else f"{SHARED}/{name}"): {PARAMETERS: _nested(flat)} for name, flat in sections.items()
+        (name if name == SHARED else f"{SHARED}/{name}"): {PARAMETERS: nested(flat)} for name, flat in sections.items()
     }
     return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
-
-
-def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    tree: dict[str, Any] = {}
-    for name, value in flat.items():
-        *groups, leaf = name.split(".")
-        branch = tree
-        for group in groups:
-            branch = branch.setdefault(group, {})
-        branch[leaf] = value
-    return tree

@@ -2,7 +2,7 @@
 
 import importlib
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
@@ -82,7 +82,12 @@ class CalledStack:
             where it does not answer.
         """
         asked = RemoteParameters(self.node, [node])
-        self._wait(lambda: (asked.ask(), not asked.missing)[1], f"no node '{node}' answers")
+
+        def is_answered() -> bool:
+            asked.ask()
+            return not asked.missing
+
+        self._wait(is_answered, f"no node '{node}' answers")
         return asked.found[node]
 
     def messages(self, topic: str) -> Iterator[Any]:
@@ -123,7 +128,7 @@ class CalledStack:
         finally:
             self.node.destroy_subscription(subscription)
 
-    def _wait(self, condition: Any, failure: str) -> None:
+    def _wait(self, condition: Callable[[], Any], failure: str) -> None:
         end = time.monotonic() + PATIENCE
         while not condition():
             if time.monotonic() > end:
