@@ -65,6 +65,11 @@ class Configuration(NamedTuple):
         base = cls.load(_base(path, tree.pop(BASE), _above), (*_above, path.resolve()))
         return base._overlaid(path, _sections(path, tree, whole=False))
 
+    def __repr__(self) -> str:
+        """Path and sections, not every value."""
+        changed = "" if self.path.is_file() and self.path.read_text(encoding="utf-8") == self.text else ", changed"
+        return f"Configuration({str(self.path)!r}, sections {', '.join(self.sections)}{changed})"
+
     @property
     def sha256(self) -> str:
         """Checksum of `text`, hexadecimal."""

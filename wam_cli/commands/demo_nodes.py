@@ -21,14 +21,14 @@ WITHOUT_ROS = (
 )
 
 
-class Played(NamedTuple):
+class PlayedDemo(NamedTuple):
     """How it ended: why it failed, if it did, and whether somebody stopped it."""
 
     failures: list[str]
     stopped: bool
 
 
-def play(configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace) -> Played:
+def play(configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace) -> PlayedDemo:
     """Play the scenario of a configuration and record it into a bag.
 
     Raises
@@ -44,7 +44,7 @@ def play(configuration: Configuration, steps: list[ScenarioStep], bag: Path, giv
     return _with_nodes(configuration, given)
 
 
-def _simulated(configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace) -> Played:
+def _simulated(configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace) -> PlayedDemo:
     if runs_apart(configuration, given) or given.live:
         option = "--live" if given.live else "--processes" if given.processes else "--realtime"
         raise ValueError(f"{option} needs ROS; pip install 'wam_stack[ros,live]', or leave it out")
@@ -53,14 +53,14 @@ def _simulated(configuration: Configuration, steps: list[ScenarioStep], bag: Pat
     failure = record(configuration, steps, bag, tell=_told, is_stopped=lambda: stop.is_set)
     if failure:
         print(f"error: {failure}", file=sys.stderr, flush=True)
-    return Played([failure] if failure else [], stop.is_set)
+    return PlayedDemo([failure] if failure else [], stop.is_set)
 
 
 def _told(seconds: float, step: str) -> None:
     print(f"{seconds:5.1f} s  {step}", flush=True)
 
 
-def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Played:
+def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> PlayedDemo:
     from wam_cli.commands.live import page_beside
     from wam_cli.commands.up import import_nodes
     from wam_ros.bring_up import start
@@ -89,4 +89,4 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
         for failure in failures:  # before the others end and print what follows from it
             print(f"error: {failure}; all others are stopped now", file=sys.stderr, flush=True)
         close_page()
-    return Played([*failures, *([stack.bag_failure] if stack.bag_failure else [])], stop.is_set)
+    return PlayedDemo([*failures, *([stack.bag_failure] if stack.bag_failure else [])], stop.is_set)
