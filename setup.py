@@ -36,7 +36,12 @@ setup(
     maintainer=package.findtext("maintainer"),
     maintainer_email=package.find("maintainer").get("email"),
     packages=find_packages(include=["wam_*"]),
-    package_data={"": ["py.typed"], "wam_ros": ["this_machine.xml"], "wam_analysis.findings": ["charts.js", "uplot/*"]},
+    package_data={
+        "": ["py.typed"],
+        "wam_bag": ["messages.json"],
+        "wam_ros": ["this_machine.xml"],
+        "wam_analysis.findings": ["charts.js", "uplot/*"],
+    },
     python_requires=">=3.11",
     install_requires=[
         "lz4",
@@ -49,6 +54,8 @@ setup(
         "zstandard",
     ],
     extras_require={
+        # Tab in the shell: `wam completion bash`
+        "completion": ["argcomplete"],
         # maps and benchmarks on many machines: `wam map --dask ADDRESS`
         "dask": ["distributed"],
         # the documentation site: `make docs`

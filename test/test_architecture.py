@@ -32,7 +32,8 @@ ARROWS = {
 # package -> all that it may import of others; the rest take what they need
 DEPENDENCIES = {
     "wam_theory": {"numpy"},
-    "wam_bag": {"numpy", "mcap", "lz4", "zstandard", "yaml", "ament_index_python"},  # the last where there is ROS
+    # ament_index_python where there is ROS, pandas where somebody asks for a DataFrame
+    "wam_bag": {"numpy", "mcap", "lz4", "zstandard", "yaml", "ament_index_python", "pandas"},
 }
 KNOW_ROS = ("wam_ros", "wam_cli", "wam_live")
 WITHOUT_CLOCK = ("wam_theory", "wam_description", "wam_driver", "wam_control")

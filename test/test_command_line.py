@@ -1,13 +1,19 @@
 """The command line: what it says to words it does not know, and how one number is changed."""
 
 import importlib
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from wam_bag.bag import read
+from wam_bag.bag import BagError, JointColumns, read
 from wam_cli.main import ALIASES, COMMANDS, EXTRAS, main
+from wam_description.configuration import Configuration, packaged
+from wam_sim.recording import recorded_run
 
 ROOT = Path(__file__).parents[1]
 
@@ -102,6 +108,79 @@ def test_the_extras_are_those_of_the_package() -> None:
     assert all(f'"{extra}": [' in declared for extra in EXTRAS)
 
 
-def test_a_bag_prints_what_it_holds_and_not_its_arrays() -> None:
-    bag = read(ROOT / "bags" / "sample" / "creep")
-    assert repr(bag).endswith("creep', 4 topics, 6284 messages)")
+def test_what_is_printed_at_a_prompt_is_one_line() -> None:
+    bag = read(ROOT / "bags" / "sample" / "wam-touch")
+    assert repr(bag).endswith("wam-touch', 32 topics, 17194 messages)")
+    assert repr(bag.topics["/wam/joint_states"]) == "JointColumns(461 messages: joint1, joint2, joint3, joint4)"
+    run, configuration = recorded_run(bag), Configuration.load(packaged("wam"))
+    assert "changed" in repr(configuration.with_values({"timing.mode": "realtime"}))
+    assert "changed" not in repr(configuration)
+    shown = [bag, run, run.parameters, configuration, *bag.topics.values()]
+    assert max(len(repr(one)) for one in shown) < 300
+
+
+def test_a_topic_becomes_series_of_equal_length() -> None:
+    bag = read(ROOT / "bags" / "sample" / "wam-touch")
+    joints = bag.series("joint_states")
+    assert list(joints)[:3] == ["time", "position.joint1", "position.joint2"]
+    columns = bag.topics["/wam/joint_states"]
+    assert isinstance(columns, JointColumns)
+    np.testing.assert_array_equal(joints["position.joint4"], columns.position[:, 3])
+    assert joints["time"][1] - joints["time"][0] == pytest.approx(0.005)
+    for topic in bag.topics:
+        assert len({len(values) for values in bag.series(topic).values()}) == 1, topic
+    assert bag.series("sim/contact/wrench")["force.y"].max() == pytest.approx(12.0)
+    with pytest.raises(BagError, match="no topics are named 'joint_state'; choose one of"):
+        bag.series("joint_state")
+
+
+def test_without_pandas_a_data_frame_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    bag = read(ROOT / "bags" / "sample" / "wam-touch", ["joint_states"])
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ModuleNotFoundError, match="pip install pandas"):
+        bag.to_pandas("joint_states")
+
+
+def test_with_pandas_a_topic_is_a_data_frame() -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = read(ROOT / "bags" / "sample" / "wam-touch").to_pandas("joint_states")
+    assert isinstance(frame, pandas.DataFrame)
+    assert (frame.index.name, len(frame)) == ("time", 461)
+
+
+# completion
+
+
+def completed(line: str, folder: Path) -> list[str]:
+    """The words that a shell would offer."""
+    answer = folder / "answer"
+    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line, "COMP_POINT": str(len(line))}
+    subprocess.run(
+        [sys.executable, "-P", "-m", "wam_cli.program"],
+        env={**os.environ, **asked, "_ARGCOMPLETE_STDOUT_FILENAME": str(answer)},
+        check=False,
+    )
+    return answer.read_text().split()
+
+
+def test_commands_options_and_requests_are_completed(tmp_path: Path) -> None:
+    pytest.importorskip("argcomplete")
+    assert completed("wam ana", tmp_path) == ["analyse"]
+    assert completed("wam demo --no", tmp_path) == ["--no-live"]
+    assert {"reset", "resume", "reset_fault"} == set(completed("wam call re", tmp_path))
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_each_shell_has_its_script(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("argcomplete")
+    code, out, err = said(capsys, "completion", shell)
+    assert (code, err) == (0, "")
+    assert "wam" in out
+    assert "_ARGCOMPLETE" in out
+
+
+def test_the_help_fits_a_narrow_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    for words in [[], *([name] for name in COMMANDS)]:
+        out = said(capsys, *words, "--help")[1]
+        assert max(map(len, out.splitlines())) <= 60, words

@@ -13,6 +13,8 @@ import yaml
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, parameter
 
+WAM = Configuration.load(packaged("wam"))
+
 
 @dataclass(frozen=True)
 class Loop:
@@ -54,7 +56,7 @@ def test_replaced_values_leave_the_original_alone(file: Path) -> None:
 
 
 def test_text_of_a_changed_configuration_gives_the_same_values(file: Path, tmp_path: Path) -> None:
-    changed = Configuration.load(file).with_values({"loop:gain": 1e-7, "arm.tool": (0.1, 0.0, 1 / 3)})
+    changed = Configuration.load(file).with_values({"loop:gain": 1e-7, "arm.tool": (0.5, 0.0, 1 / 3)})
     (tmp_path / "again.yaml").write_text(changed.text)
     again = Configuration.load(tmp_path / "again.yaml")
     assert again.sections == changed.sections
@@ -221,3 +223,27 @@ def test_a_configuration_without_nodes_is_refused() -> None:
     empty = Configuration.load(packaged("wam")).with_values({"nodes": []})
     with pytest.raises(ParameterError, match="parameter 'nodes' is empty; list the nodes to start, for example"):
         empty.shared  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"arm.tool": [0.3, 0.0, 0.0]}, "by arm.covers.length it ends at (0.4064, 0, 0) m"),
+        ({"arm.covers.length": [0.5588, 0.5]}, "but arm.tool is at (0.4064, 0, 0) m"),
+        ({"arm.covers.length": [0.6, 0.4064]}, "but joint4 is at (0, 0, 0) m"),
+        ({"arm.covers.end": [0.5588, 0.0, 0.0, 0.5, 0.0, 0.0]}, "the tube ends at 0.5 m, arm.covers.end"),
+        ({"arm.joints.offset": [0.0, 0.0, 0.7, 0.0]}, "by arm.joints.offset of joint3, at (0, 0, -0.7)"),
+    ],
+)
+def test_a_link_whose_numbers_do_not_meet_is_refused_with_the_others_to_change(
+    values: dict[str, list[float]], message: str
+) -> None:
+    with pytest.raises(ParameterError) as refused:
+        _ = WAM.with_values(values).shared
+    assert message in str(refused.value)
+    assert "a longer " in str(refused.value)
+
+
+def test_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() -> None:
+    longer = {"arm.covers.length": [0.5588, 0.5], "arm.covers.end": [0.5588, 0.0, 0.04064, 0.5, 0.0, 0.0]}
+    assert WAM.with_values({**longer, "arm.tool": [0.6, 0.0, 0.0]}).shared.arm.covers.length == (0.5588, 0.5)

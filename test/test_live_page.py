@@ -26,7 +26,8 @@ from test_lockstep import STEPS, configuration, record_composed
 
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
-from wam_cli.commands.live import page_beside, take_page
+from wam_cli.commands import take_page
+from wam_cli.commands.live import page_beside
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf

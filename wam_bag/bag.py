@@ -35,6 +35,7 @@ from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_file import McapFile
 from wam_bag.message_groups import Times
 from wam_bag.message_search import NEVER, log_times, messages
+from wam_bag.series import Series, series
 
 __all__ = [
     "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns", "Raw",
@@ -60,6 +61,41 @@ class Bag(NamedTuple):
         """Path and counts, not every array."""
         messages = sum(len(columns.log_time_ns) for columns in self.topics.values())
         return f"Bag({str(self.path)!r}, {len(self.topics)} topics, {messages} messages)"
+
+    def series(self, topic: str) -> Series:
+        """A topic as named series of equal length, see `wam_bag.series.series`.
+
+        Parameters
+        ----------
+        topic : its name; one without a leading '/' is looked for in every namespace, the outermost first.
+
+        Raises
+        ------
+        BagError
+            if the bag has no such topic, or several.
+        """
+        named = [name for name in self.topics if is_selected(name, [topic])]
+        found = [name for name in named if name.count("/") == min(name.count("/") for name in named)]
+        if len(found) != 1:
+            listed = ", ".join(found or sorted(self.topics)) or "none"
+            raise BagError(f"{self.path}: {len(found) or 'no'} topics are named '{topic}'; choose one of {listed}")
+        return series(self.topics[found[0]])
+
+    def to_pandas(self, topic: str) -> Any:
+        """A topic as a DataFrame with the time, s, as its index; arguments and errors as those of `series`.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            if pandas is not installed.
+        """
+        try:
+            import pandas
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError(
+                "a DataFrame needs pandas: pip install pandas; Bag.series has the same as arrays", name="pandas"
+            ) from error
+        return pandas.DataFrame(self.series(topic)).set_index("time")
 
     @property
     def first_ns(self) -> int:

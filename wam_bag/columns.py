@@ -21,6 +21,10 @@ from wam_bag.point_clouds import table_columns, tables
 Texts = NDArray[np.object_]
 
 
+def _listed(frames: Texts) -> str:
+    return ", ".join(sorted(map(str, set(frames))))
+
+
 class JointColumns(NamedTuple):
     """sensor_msgs/JointState, k messages of n joints, matched by name.
 
@@ -36,6 +40,9 @@ class JointColumns(NamedTuple):
     velocity: Numbers
     effort: Numbers
 
+    def __repr__(self) -> str:
+        return f"JointColumns({len(self.log_time_ns)} messages: {', '.join(self.names)})"
+
 
 class WrenchColumns(NamedTuple):
     """geometry_msgs/WrenchStamped, k messages: force (k, 3) N, torque (k, 3) N m."""
@@ -46,6 +53,9 @@ class WrenchColumns(NamedTuple):
     force: Numbers
     torque: Numbers
 
+    def __repr__(self) -> str:
+        return f"WrenchColumns({len(self.log_time_ns)} messages: {_listed(self.frames)})"
+
 
 class PointColumns(NamedTuple):
     """geometry_msgs/PointStamped, k messages: point (k, 3) m."""
@@ -54,6 +64,9 @@ class PointColumns(NamedTuple):
     stamp_ns: Times
     frames: Texts
     point: Numbers
+
+    def __repr__(self) -> str:
+        return f"PointColumns({len(self.log_time_ns)} messages: {_listed(self.frames)})"
 
 
 class TableColumns(NamedTuple):
@@ -69,6 +82,9 @@ class TableColumns(NamedTuple):
     message: Index
     columns: dict[str, NDArray[Any]]
 
+    def __repr__(self) -> str:
+        return f"TableColumns({len(self.log_time_ns)} messages: {', '.join(self.columns)})"
+
     @property
     def row_stamp_ns(self) -> Times:
         """Stamp of the message of each row, ns, (p,)."""
@@ -81,6 +97,9 @@ class BoolColumns(NamedTuple):
     log_time_ns: Times
     data: NDArray[np.bool_]
 
+    def __repr__(self) -> str:
+        return f"BoolColumns({len(self.log_time_ns)} messages)"
+
 
 class ClockColumns(NamedTuple):
     """rosgraph_msgs/Clock, k messages."""
@@ -88,12 +107,18 @@ class ClockColumns(NamedTuple):
     log_time_ns: Times
     stamp_ns: Times
 
+    def __repr__(self) -> str:
+        return f"ClockColumns({len(self.log_time_ns)} messages)"
+
 
 class Messages(NamedTuple):
     """Messages of any other type; fields are attributes, arrays of numbers numpy arrays."""
 
     log_time_ns: Times
     messages: Sequence[Any]
+
+    def __repr__(self) -> str:
+        return f"Messages({len(self.log_time_ns)} messages)"
 
     def column(self, path: str) -> NDArray[Any]:
         """One field of every message, for example 'header.stamp.sec'; shape (k,), or (k, n) of equal arrays."""

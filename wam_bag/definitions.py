@@ -1,14 +1,15 @@
 """Message definitions as ROS installs them: text, fields and hash of a type.
 
 Found below ``share/<package>/msg`` through the ament index or, if that is not set (wheels from PyPI), next to
-the Python package of the messages.
+the Python package of the messages.  Where there is no ROS, `messages.json` has those that a simulation records; it is
+a copy of what ROS Jazzy installs, common_interfaces (Apache-2.0).
 """
 
 import importlib.util
 import json
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from wam_bag.message_text import SEPARATOR, Fields, fields
 
@@ -28,7 +29,10 @@ class Definition(NamedTuple):
 @cache
 def definition(name: str) -> Definition:
     """The definition of ``package/msg/Type``."""
-    text = _file(name, ".msg").read_text(encoding="utf-8")
+    if (copy := _copy(name)) is not None:
+        text = "\n".join(copy["text"]) + "\n"
+    else:
+        text = _file(name, ".msg").read_text(encoding="utf-8")
     return Definition(name, text, fields(text, name.partition("/")[0]))
 
 
@@ -48,11 +52,28 @@ def schema(name: str) -> bytes:
 @cache
 def type_hash(name: str) -> str:
     """The RIHS01 hash of a type, as ROS computed it."""
+    if (copy := _copy(name)) is not None:
+        return str(copy["hash"])
     path = _file(name, ".json")
     for entry in json.loads(path.read_text(encoding="utf-8"))["type_hashes"]:
         if entry["type_name"] == name:
             return str(entry["hash_string"])
     raise DefinitionError(f"{path} has no hash of {name}; reinstall its package")
+
+
+@cache
+def _copies() -> dict[str, Any]:
+    copies: dict[str, Any] = json.loads(Path(__file__).with_name("messages.json").read_text(encoding="utf-8"))
+    return copies
+
+
+def _copy(name: str) -> Any:
+    """The entry of a type in `messages.json`, None where ROS has its definition, or there is no entry."""
+    try:
+        _file(name, ".msg")
+    except DefinitionError:
+        return _copies().get(name)
+    return None
 
 
 def _file(name: str, suffix: str) -> Path:

@@ -19,7 +19,7 @@ COMMANDS = {
     "demo": "run the demonstration or a whole-arm task, record it and print its report",
     "up": "start the nodes and run them until Ctrl-C",
     "node": "start one node, with ROS arguments if needed",
-    "call": "call a service of a running stack: enable, disable, estop, reset_fault, reset, tare",
+    "call": "one request to a running stack: enable, disable, pause, get, set, echo, push and others",
     "record": "record every topic of a running stack until Ctrl-C",
     "bag": "print the contents of a bag, or repair a broken bag",
     "report": "print the demo report again",
@@ -39,8 +39,10 @@ COMMANDS = {
     "conform": "test a driver, the simulated one or yours, against the contract of drivers",
     "evaluate": "seeded benchmarks: contact, robustness, force, faults, identify, soak",
     "model": "print the arm's model as URDF or MJCF",
+    "completion": "print what makes a shell complete commands and options: bash, zsh or fish",
 }
 
+COMPLETING = "_ARGCOMPLETE"  # set by a shell that asks how a line may go on
 ALIASES = {"analyze": "analyse"}
 # the extras of setup.py, and the modules that come with them
 EXTRAS = {
@@ -51,11 +53,14 @@ EXTRAS = {
     "live": ("viser",),
     "view": ("rerun",),
     "dask": ("distributed", "dask"),
+    "completion": ("argcomplete",),
 }  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; exits with 0 on success."""
+    if COMPLETING in os.environ:
+        _complete()
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words and words[0] in ALIASES:
         words[0] = ALIASES[words[0]]
@@ -86,6 +91,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for number, handler in before.items():
             signal.signal(number, handler)
     sys.exit(code or 0)
+
+
+def _complete() -> None:
+    """Answer a shell that asks how a line may go on, and end."""
+    import argcomplete
+
+    line = os.environ.get("COMP_LINE", "")
+    argcomplete.autocomplete(_parser(_command(line.split()[1:])))
 
 
 class _Printable:

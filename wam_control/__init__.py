@@ -26,7 +26,8 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``guard_supervision``             - the guard's part: admits a parameter set, scales its gains
 ``force_loop_parameters``         - its parameters
 ``stability_guard``               domain, margin and largest saturation of a parameter set on the arm
-``guard_watch``, ``guard_report`` the guard while the arm moves; its report
+``guard_watch``                   the guard while the arm moves
+``guard_report``                  - its report
 ``sampled_loop``                  arm, velocity loop and force loop as one linear map from sample to sample
 ``friction_trial``                the same map with saturation and friction, for an arm of one joint
 ``friction_verdict``              domain, stable error and limit cycle of one friction node, chapter 5

@@ -18,6 +18,8 @@ from wam_description.model import ArmModel
 from wam_description.parameters import lengths, one_each, parameter, require
 from wam_description.units import STANDARD_GRAVITY
 
+TOLERANCE = 1e-3  # m, by which numbers that describe the same point may differ
+
 
 def _no_products(others: Mapping[str, Any]) -> tuple[float, ...]:
     return (0.0,) * (3 * len(others["arm.links.names"]))
@@ -183,6 +185,16 @@ class Covers:
         return start[1] + fraction * (end[1] - start[1]), start[2] + fraction * (end[2] - start[2])
 
 
+def _turned_x(rotation: Sequence[float]) -> tuple[float, float, float]:
+    """The x axis of a frame that is turned by roll, pitch and yaw, rad."""
+    _, pitch, yaw = rotation
+    return math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)
+
+
+def _point(point: Sequence[float]) -> str:
+    return f"({', '.join(f'{round(value, 4) + 0.0:g}' for value in point)})"
+
+
 @dataclass(frozen=True)
 class Arm:
     """The arm: mechanics, names and sensors."""
@@ -224,8 +236,47 @@ class Arm:
             require(len(vector) == 3, f"parameter 'arm.{name}' has {len(vector)} values; it needs x y z")
         for link in self.covers.links:
             require(link in self.links.names, f"arm.covers.links names '{link}'; links: {', '.join(self.links.names)}")
-
         self._require_plausible()
+        self._require_joined()
+
+    def _require_joined(self) -> None:
+        """Refuse covers that do not end where the kinematics have the next joint, or the tool."""
+        covers, joints, links = self.covers, self.joints, self.links.names
+        for k, name in enumerate(covers.names):
+            three = slice(3 * k, 3 * k + 3)
+            x = _turned_x(covers.rotation[three])
+            ends = [start + covers.length[k] * along for start, along in zip(covers.origin[three], x, strict=True)]
+            link = links.index(covers.links[k])
+            coupled = f"; a longer {name} changes arm.covers.length and end, {{}}, and arm.links.mass, centre, inertia"
+            if link + 1 < len(links):
+                twist, offset = joints.twist[link + 1], joints.offset[link + 1]
+                joint = (joints.length[link + 1], -math.sin(twist) * offset, math.cos(twist) * offset)
+                here = f"arm.joints.offset and length of {joints.names[link + 1]}, arm.covers.origin"
+                where = f"{joints.names[link + 1]} is at {_point(joint)} m"
+                apart = math.dist(ends, joint)
+            else:
+                here, where = "arm.tool", f"arm.tool is at {_point(self.tool)} m"
+                beyond = [end - tool for end, tool in zip(ends, self.tool, strict=True)]
+                apart = max(0.0, sum(a * b for a, b in zip(beyond, x, strict=True)))  # a tool may be beyond the link
+            require(
+                apart <= TOLERANCE,
+                f"{name}: by arm.covers.length it ends at {_point(ends)} m in the frame of {links[link]}, but {where}"
+                + coupled.format(here),
+            )
+            before = (-joints.length[link], 0.0, -joints.offset[link])  # the joint before, in this link's frame
+            origin = covers.origin[three]
+            require(
+                min(math.hypot(*origin), math.dist(origin, before)) <= TOLERANCE,
+                f"{name}: arm.covers.origin is {_point(origin)} m; its link begins at (0, 0, 0) or, by "
+                f"arm.joints.offset of {joints.names[link]}, at {_point(before)}"
+                + coupled.format("arm.covers.origin, arm.joints.offset"),
+            )
+            far = max(covers.start[3 * k], covers.end[3 * k])
+            require(
+                far <= covers.length[k] + TOLERANCE,
+                f"{name}: the tube ends at {far:g} m, arm.covers.end, but arm.covers.length is {covers.length[k]:g} m"
+                + coupled.format(here),
+            )
 
     def _require_plausible(self) -> None:
         """Refuse links that this arm cannot have, such as values in other units."""

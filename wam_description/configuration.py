@@ -12,7 +12,7 @@ import yaml
 
 from wam_description import yaml_text
 from wam_description.arm import Shared
-from wam_description.parameters import ParameterError, build, fields, flatten
+from wam_description.parameters import ParameterError, build, fields, flatten, nested
 
 T = TypeVar("T")
 SHARED = "/**"
@@ -64,6 +64,11 @@ class Configuration(NamedTuple):
             return cls(path, text, _sections(path, tree))
         base = cls.load(_base(path, tree.pop(BASE), _above), (*_above, path.resolve()))
         return base._overlaid(path, _sections(path, tree, whole=False))
+
+    def __repr__(self) -> str:
+        """Path and sections, not every value."""
+        changed = "" if self.path.is_file() and self.path.read_text(encoding="utf-8") == self.text else ", changed"
+        return f"Configuration({str(self.path)!r}, sections {', '.join(self.sections)}{changed})"
 
     @property
     def sha256(self) -> str:
@@ -244,17 +249,6 @@ def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[s
 
 def _text(sections: Mapping[str, Mapping[str, Any]]) -> str:
     tree = {
-        (name if name == SHARED else f"{SHARED}/{name}"): {PARAMETERS: _nested(flat)} for name, flat in sections.items()
+        (name if name == SHARED else f"{SHARED}/{name}"): {PARAMETERS: nested(flat)} for name, flat in sections.items()
     }
     return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
-
-
-def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    tree: dict[str, Any] = {}
-    for name, value in flat.items():
-        *groups, leaf = name.split(".")
-        branch = tree
-        for group in groups:
-            branch = branch.setdefault(group, {})
-        branch[leaf] = value
-    return tree

@@ -119,6 +119,18 @@ def flatten(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """A flat mapping with dotted names as a nested one; the inverse of `flatten`."""
+    tree: dict[str, Any] = {}
+    for name, value in flat.items():
+        *groups, leaf = name.split(".")
+        branch = tree
+        for group in groups:
+            branch = branch.setdefault(group, {})
+        branch[leaf] = value
+    return tree
+
+
 def values(instance: Any, prefix: str = "") -> dict[str, Value]:
     """The flat ``{dotted name: value}`` of a parameter object; the inverse of `build`."""
     flat: dict[str, Value] = {}

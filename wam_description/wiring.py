@@ -22,8 +22,8 @@ owns : name of a group of shared parameters that are live at this node, taken by
 follows : a `Followed` group of shared parameters of another node; changes come to ``retune(group)``, too.
 take_status(status) : called with the `NodeStatus` that any other node reports; it may return outputs.
 services : by name, the method that answers a std_srvs/Trigger at ``~/name`` with an `Answer`.
-requests : list of `Call` and `SetParameters`, filled by steps; they are made, in order, before the outputs of the
-    step are published.  If one is refused, the outputs are those of ``refused(message)``, none without it.
+requests : list of `Call` and `SetParameters`, filled by steps; made in order before the step's outputs are published.
+refused(message) : outputs in place of the step's where one of them is refused; none without it.
 refusals : by topic, why the present input is not used; reported once for each message.
 needs : of the inputs with absent='brake' those that the node relies on as it is tuned now; all where it has none.
 diagnostics() : further values for /diagnostics, by name, as text or numbers.

@@ -1,44 +1,136 @@
-"""One question to a service of a running stack, for shells without the `ros2` command."""
+"""A running stack as a shell sees it, without the `ros2` command: requests, parameters, messages."""
 
+import importlib
+import time
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import NamedTuple
+from types import TracebackType
+from typing import Any, Final, NamedTuple, Self
 
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from wam_ros.requests import answer_of, switch_request
+from wam_description.topics import BY_NAME
+from wam_description.wiring import Call, SetParameters
+from wam_ros.qos import qos
+from wam_ros.remote_parameters import RemoteParameters
+from wam_ros.requests import answer_of, refusal_of, service_request
 from wam_ros.run import Connection
 
-PATIENCE = 10.0  # s
-ATTEMPTS = 20
+PATIENCE: Final = 10.0  # s
+ATTEMPTS: Final = 20
+SET_ATTEMPTS: Final = 3  # the guard of the force loop takes its time over new gains
+WAITING: Final = 100  # messages that may wait for a slow terminal
+START: Final = "start the stack with 'wam up'"
 
 
 class Reply(NamedTuple):
-    """The answer of the service."""
+    """The answer to a request."""
 
     success: bool
     message: str
 
 
-def call(service: str, switch: bool | None) -> Reply:
-    """Ask a service and wait for its answer.
+class NoAnswerError(OSError):
+    """A node, service or topic that is not there; the text says what to do."""
+
+
+class CalledStack:
+    """The nodes of one arm; leaving the context leaves the network.
 
     Parameters
     ----------
-    service : full name, for example '/wam/driver/enable'.
-    switch : value of a SetBool; None for a Trigger.
+    namespace : of the arm.
+
+    Attributes
+    ----------
+    node : that asks, in the namespace of the arm.
     """
-    connection = Connection()
-    try:
-        node = Node("wam_call", context=connection.context)
-        connection.add(node)
-        kind, request = switch_request(switch)
-        client = node.create_client(kind, service)
+
+    def __init__(self, namespace: str) -> None:
+        self._connection = Connection()
+        self.node = Node("wam_call", context=self._connection.context, namespace=namespace)
+        self._connection.add(self.node)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
+        self._connection.close()
+
+    def request(self, request: Call | SetParameters) -> Reply:
+        """Ask a node and wait for its answer."""
+        service, kind, message = service_request(request)
+        client = self.node.create_client(kind, service)
+        name = client.srv_name
         if not client.wait_for_service(PATIENCE):
-            return Reply(False, f"no service {service} within {PATIENCE:g} s; start the stack with 'wam up'")
-        wait = partial(connection.executor.spin_until_future_complete, timeout_sec=PATIENCE / ATTEMPTS)
-        answer = answer_of(client, request, ATTEMPTS, wait)
+            return Reply(False, f"no service {name} within {PATIENCE:g} s; {START}")
+        attempts = SET_ATTEMPTS if isinstance(request, SetParameters) else ATTEMPTS
+        wait = partial(self._connection.executor.spin_until_future_complete, timeout_sec=PATIENCE / attempts)
+        answer = answer_of(client, message, attempts, wait)
         if answer is None:
-            return Reply(False, f"no answer from {service} within {PATIENCE:g} s")
-        return Reply(bool(answer.success), str(answer.message))
-    finally:
-        connection.close()
+            return Reply(False, f"no answer from {name} within {PATIENCE:g} s")
+        refusal = refusal_of(request, answer)
+        return Reply(not refusal, refusal or getattr(answer, "message", ""))
+
+    def parameters(self, node: str) -> dict[str, Any]:
+        """Every parameter of a node by its dotted name.
+
+        Raises
+        ------
+        NoAnswerError
+            where it does not answer.
+        """
+        asked = RemoteParameters(self.node, [node])
+
+        def is_answered() -> bool:
+            asked.ask()
+            return not asked.missing
+
+        self._wait(is_answered, f"no node '{node}' answers")
+        return asked.found[node]
+
+    def messages(self, topic: str) -> Iterator[Any]:
+        """Messages of a topic as they come, without end; a run is not delayed by it.
+
+        Parameters
+        ----------
+        topic : name in the namespace of the arm, or a full one.
+
+        Raises
+        ------
+        NoAnswerError
+            where there is no such topic.
+        """
+        name = self.node.resolve_topic_name(topic)
+
+        def kinds() -> list[str]:
+            return dict(self.node.get_topic_names_and_types()).get(name, [])
+
+        self._wait(kinds, f"no topic {name}")
+        package, _, kind = kinds()[0].split("/")
+        row = BY_NAME.get(topic)
+        profile = QoSProfile(depth=WAITING, reliability=ReliabilityPolicy.BEST_EFFORT)
+        if row is not None and row.latched:
+            profile = qos(row)
+            profile.depth = WAITING  # many nodes may have one each
+        elif row is None:
+            profile.durability = DurabilityPolicy.VOLATILE
+        taken: list[Any] = []
+        subscription = self.node.create_subscription(
+            getattr(importlib.import_module(f"{package}.msg"), kind), name, taken.append, profile
+        )
+        try:
+            while True:
+                self._connection.executor.spin_once(timeout_sec=0.1)
+                yield from taken
+                taken.clear()
+        finally:
+            self.node.destroy_subscription(subscription)
+
+    def _wait(self, condition: Callable[[], Any], failure: str) -> None:
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            if time.monotonic() > end:
+                raise NoAnswerError(f"{failure} within {PATIENCE:g} s; {START}")
+            self._connection.executor.spin_once(timeout_sec=0.05)

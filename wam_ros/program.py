@@ -25,6 +25,18 @@ def ignore_signals() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
+class Stop:
+    """Set by SIGINT and SIGTERM; the context stays alive, so that nodes can say goodbye."""
+
+    def __init__(self) -> None:
+        self.is_set = False
+        for number in SIGNALS:
+            signal.signal(number, self._take)
+
+    def _take(self, number: int, frame: object) -> None:
+        self.is_set = True
+
+
 def main() -> None:
     """Run the node that the name of this program, or its first argument, names."""
     end_at_once_on_signals()

@@ -18,6 +18,7 @@ from wam_description.parameters import ParameterError, parameter, values
 from wam_description.signals import Level, NodeStatus
 from wam_description.status import diagnosed_name
 from wam_description.topics import BY_NAME, Topic
+from wam_description.yaml_text import parameter_text
 from wam_ros.messages import diagnostic_status, message_type, read_status
 from wam_ros.network import require_name
 from wam_ros.parameters import declare
@@ -25,7 +26,7 @@ from wam_ros.ports import DIAGNOSTICS, ENDED, NODE, PUBLISHED, READY, topic_name
 from wam_ros.qos import DEPTH, qos
 from wam_ros.recorder import Recorder, summary
 from wam_ros.recorder_interface import RecorderInterface
-from wam_ros.remote_parameters import RemoteParameters, as_yaml
+from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.tolerance import TolerantNode
 
 EVERY = "*"
@@ -210,7 +211,7 @@ class RecorderNode(TolerantNode):
         found = self.parameters_of_nodes.found
         parameters = {self.resolve_service_name(node): given for node, given in found.items()}
         parameters[self.get_fully_qualified_name()] = self._own_parameters
-        text = as_yaml(parameters)
+        text = parameter_text(parameters)
         if text != self._attached and self.recorder.attach("parameters.yaml", "application/yaml", text.encode()):
             self._attached = text
 

@@ -1,11 +1,10 @@
 """The parameters of other nodes, read over the standard services."""
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import partial
 from typing import Any, Final
 
-import yaml
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
@@ -61,27 +60,3 @@ class RemoteParameters:
             self.found[name] = dict(zip(names, values, strict=True))
         except (RuntimeError, ValueError):
             return  # no answer of a node of ours; the next request follows
-
-
-def as_yaml(parameters: Mapping[str, Mapping[str, Any]]) -> str:
-    """Parameters as a ROS parameter file.
-
-    Parameters
-    ----------
-    parameters : values by dotted name, by full node name.
-    """
-    tree = {node: {"ros__parameters": _nested(values)} for node, values in sorted(parameters.items())}
-    return str(yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110))
-
-
-def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    tree: dict[str, Any] = {}
-    for name, value in sorted(values.items()):
-        if value is None:
-            continue
-        *groups, leaf = name.split(".")
-        branch = tree
-        for group in groups:
-            branch = branch.setdefault(group, {})
-        branch[leaf] = value if isinstance(value, (bool, int, float, str)) else list(value)
-    return tree

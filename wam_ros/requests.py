@@ -52,9 +52,11 @@ def answer_of(client: Any, message: Any, attempts: int, wait: Callable[[Any], ob
     attempts : how often it is sent.
     wait : called with the future of each attempt, spins until it is done or the patience with this attempt is over.
     """
+    futures: list[Any] = []
     for _ in range(attempts):
-        future = client.call_async(message)
-        wait(future)
-        if future.done():
-            return future.result()
+        futures.append(client.call_async(message))
+        wait(futures[-1])
+        for future in futures:  # an earlier one may be answered meanwhile
+            if future.done():
+                return future.result()
     return None

@@ -24,6 +24,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from wam_description.parameters import ParameterError
 from wam_ros.network import limit_to_this_machine
+from wam_ros.program import Stop
 
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
@@ -72,18 +73,6 @@ def end_of_delivery(context: Context) -> float:
     There is one deadline for all of them: a listener that is frozen would hold up each node in turn.
     """
     return _ENDS.get(context, time.monotonic() + LONGEST_DELIVERY)
-
-
-class Stop:
-    """Set by SIGINT and SIGTERM; the context stays alive, so that nodes can say goodbye."""
-
-    def __init__(self) -> None:
-        self.is_set = False
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._take)
-
-    def _take(self, number: int, frame: object) -> None:
-        self.is_set = True
 
 
 def spin(executor: Any, until: Callable[[], bool], end: Callable[[], object] = lambda: None) -> None:

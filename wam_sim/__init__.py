@@ -2,6 +2,7 @@
 
 - simulation: the nodes of a configuration around the simulated arm, in lockstep
 - bus: the topics of a simulation, and what was published on them
+- simulated_bag: a simulation recorded as the recorder node records the nodes
 - recording, recorded_parameters: a recorded run, its steps, faults and parameters, read from a bag
 - replay: recorded inputs through a node again, its outputs compared with the recorded ones
 - batch: one function over many inputs on any executor; pieces: its finished results on disk

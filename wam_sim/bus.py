@@ -48,8 +48,10 @@ class Bus:
     def connect(self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]]) -> None:
         """Connect the reactions of a node; when several take one topic, all work before the first publishes."""
         outlets = _Outlets(declaration)
-        for name in (*declaration.outputs, *EVERY_NODE):
+        for name in declaration.outputs:
             outlets[name] = self._routes.setdefault(name, _Route(None, [], []))
+        for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
+            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(None, [], []))
         for topic, found in feeds.items():
             reactions = [(feed.synchroniser.inlet(topic), mask(feed.arrays), feed.work) for feed in found]
             if len(reactions) > 1:
@@ -78,6 +80,11 @@ class Bus:
                 self._rows.setdefault(name, []).extend(map(TopicValue._make, new))
                 new.clear()
         return self._rows
+
+
+def of_node(node: str, topic: str) -> str:
+    """The name under which the bus has what a node publishes on a topic of `EVERY_NODE`."""
+    return f"{node}: {topic}" if topic in EVERY_NODE else topic
 
 
 class _Route(NamedTuple):

@@ -40,6 +40,9 @@ class RecordedParameters(NamedTuple):
     problem: str
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"RecordedParameters({self.source!r}, nodes {', '.join(self.nodes) or 'none'})"
+
     def node(self, name: str) -> Values:
         """The flat values of a node.
 

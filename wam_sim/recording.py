@@ -59,6 +59,9 @@ class RecordedRun(NamedTuple):
     faults: tuple[RecordedFault, ...]
     mode: str
 
+    def __repr__(self) -> str:
+        return f"RecordedRun({self.bag!r}, {self.namespace!r}, {len(self.steps)} steps, {self.outcome!r}, {self.mode})"
+
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""
         columns = self.bag.topics.get(f"{self.namespace}/{topic}")

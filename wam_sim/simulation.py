@@ -18,7 +18,7 @@ from wam_description.signals import BASE, Level, NodeStatus, Point, State, Wrenc
 from wam_description.synchroniser import Inputs, Synchroniser
 from wam_description.wiring import Call, Declaration, Outputs, SetParameters
 from wam_driver.driver import Driver, DriverParameters
-from wam_sim.bus import Bus, Rows
+from wam_sim.bus import Bus, Rows, of_node
 
 
 class Simulation:
@@ -113,6 +113,18 @@ class Simulation:
         found: ContactEstimate = self.nodes["contact_estimator"].estimate
         return found
 
+    @property
+    def driver_status(self) -> NodeStatus:
+        """What the driver reports of itself."""
+        safety = self.driver.safety
+        level = Level.ERROR if safety.fault else Level.OK
+        message = f"{safety.mode.value}: {safety.fault}".removesuffix(": ")
+        return NodeStatus(level, message, "driver", mode=safety.mode.value, fault=safety.fault)
+
+    def listen(self, topic: str, take: Callable[[int, Any], None], node: str = "") -> None:
+        """Call a function with stamp, ns, and value of each message of a topic; of one that all publish, of a node."""
+        self._bus.listen(of_node(node, topic), take)
+
     def play(self) -> str:
         """Play the scenario to its end; returns why it failed, '' where it did not."""
         while not self.step():
@@ -202,10 +214,8 @@ class Simulation:
         if safety.fault == self._fault:
             return
         self._fault = safety.fault
-        level = Level.ERROR if safety.fault else Level.OK
-        message = f"{safety.mode.value}: {safety.fault}".removesuffix(": ")
-        status = NodeStatus(level, message, "driver", mode=safety.mode.value, fault=safety.fault)
-        for node in self.nodes.values():
+        status = self.driver_status
+        for node_name, node in self.nodes.items():
             if hasattr(node, "take_status"):
                 for name, output in (node.take_status(status) or {}).items():
-                    self._bus.publish(name, status.stamp, output)
+                    self._bus.publish(of_node(node_name, name), status.stamp, output)

@@ -51,6 +51,9 @@ class Analysis(NamedTuple):
     provenance: dict[str, str]
     sections: tuple[Section, ...]
 
+    def __repr__(self) -> str:
+        return f"Analysis({self.recording.run.bag!r}, {self.duration:.1f} s, {len(self.sections)} sections)"
+
 
 def analyse(path: str | Path, progress: Progress) -> Analysis:
     """Read a bag and analyse it.

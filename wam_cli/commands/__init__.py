@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from wam_description.configuration import Configuration, packaged
+from wam_live.page import PORT
 from wam_sim.batch import executor
 from wam_sim.pieces import default_folder
 from wam_sim.progress import Progress
@@ -60,10 +61,10 @@ def configuration_of(given: argparse.Namespace) -> Configuration:
     name: str = given.config
     loaded = Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
     values = getattr(given, "values", [])
-    return loaded.with_values(dict(map(_value, values))) if values else loaded
+    return loaded.with_values(dict(map(configured_value, values))) if values else loaded
 
 
-def _value(text: str) -> tuple[str, Any]:
+def configured_value(text: str) -> tuple[str, Any]:
     """Parameter and value of an option --set; a whole number is what the parameter's class makes of it.
 
     Raises
@@ -80,6 +81,61 @@ def _value(text: str) -> tuple[str, Any]:
         raise ValueError(
             f"--set {name.strip()}: '{value}' is no value of YAML: {str(error).partition(chr(10))[0]}"
         ) from error
+
+
+def take_time(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options that say how time passes."""
+    parser.add_argument("--processes", action="store_true", help="a process for each node; default: all in one process")
+    parser.add_argument(
+        "--realtime",
+        action="store_true",
+        help="do not wait for commands, as a real driver; a process for each node; default: timing.mode, lockstep",
+    )
+    parser.add_argument(
+        "--real-time-factor",
+        type=float,
+        metavar="FACTOR",
+        help="speed of lockstep: 1 as the wall clock, 0 as fast as it can; default: timing.real_time_factor",
+    )
+    parser.add_argument("--lockstep", action="store_true", help=argparse.SUPPRESS)  # what factor 0 was called before
+
+
+def timed(configuration: Configuration, given: argparse.Namespace) -> Configuration:
+    """The configuration with what the options say about time.
+
+    Raises
+    ------
+    ValueError
+        where options exclude each other.
+    """
+    mode = "realtime" if given.realtime else "lockstep" if given.lockstep else getattr(given, "mode", None)
+    factor = 0.0 if given.lockstep else given.real_time_factor
+    values = {"timing.mode": mode, "timing.real_time_factor": factor}
+    timed = configuration.with_values({name: value for name, value in values.items() if value is not None})
+    if factor is not None and timed.shared.timing.mode == "realtime":
+        raise ValueError("--real-time-factor is for lockstep; leave out --realtime")
+    return timed
+
+
+def runs_apart(configuration: Configuration, given: argparse.Namespace) -> bool:
+    """Whether each node gets a process of its own."""
+    return given.processes or configuration.shared.timing.mode == "realtime"
+
+
+def take_port(parser: argparse.ArgumentParser) -> None:
+    """Give a command the option --port."""
+    parser.add_argument("--port", type=int, default=PORT, help="of the page on this machine; default: %(default)s")
+
+
+def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
+    """Give a command the options --live and --no-live; None: a page where that is possible."""
+    parser.add_argument(
+        "--live",
+        action=argparse.BooleanOptionalAction,
+        default=default,
+        help="show the arm in the browser; default: " + ("no" if default is False else "where that is possible"),
+    )
+    take_port(parser)
 
 
 class BatchOptions(NamedTuple):

@@ -1,30 +1,165 @@
-"""`wam call`: one service of a running stack, called."""
+"""`wam call`: one request to a running stack: a service, a parameter, a topic, a push."""
 
 import argparse
+import difflib
+import math
 import sys
+from collections.abc import Mapping, Sequence
+from itertools import islice
+from typing import Any, Final
 
-from wam_cli.commands import namespace
-from wam_ros.call import call
+import yaml
 
-REQUESTS = {  # node, service, and the value where it is a switch
-    "enable": ("driver", "enable", True),
-    "disable": ("driver", "enable", False),
-    "estop": ("driver", "estop", None),
-    "reset_fault": ("driver", "reset_fault", None),
-    "reset": ("driver", "reset", None),
-    "tare": ("force_loop", "tare", None),
+from wam_cli.commands import configured_value, namespace
+from wam_description.arm import Shared
+from wam_description.parameters import build_part
+from wam_description.signals import BASE, Wrench
+from wam_description.topics import BY_NAME, TABLE
+from wam_description.wiring import Call, SetParameters
+from wam_live.hold import HeldTopic
+from wam_ros.call import CalledStack, Reply
+from wam_ros.header import stamp_of
+from wam_ros.messages import read_table
+
+SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
+    "enable": ("release the brakes", (Call("driver", "enable", True),)),
+    "disable": ("put on the brakes", (Call("driver", "enable", False),)),
+    "estop": ("stop at once and latch a fault", (Call("driver", "estop"),)),
+    "reset_fault": ("forget the latched fault", (Call("driver", "reset_fault"),)),
+    "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
+    "tare": ("count the present external torques as payload", (Call("force_loop", "tare"),)),
+    "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
+    "step": ("pause, and let one period pass", (Call("driver", "pause", True), Call("driver", "step"))),
+    "resume": ("let the time go on", (Call("driver", "pause", False),)),
 }
+ZERO: Final = (0.0, 0.0, 0.0)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("request", choices=tuple(REQUESTS))
+    where = argparse.ArgumentParser(add_help=False)
+    where.add_argument(
+        "--namespace", type=namespace, default=argparse.SUPPRESS, help="namespace of the stack; default: wam"
+    )
     parser.add_argument("--namespace", type=namespace, default="wam", help="namespace of the stack; default: wam")
+    requests = parser.add_subparsers(dest="request", required=True, metavar="REQUEST")
+    for name, (text, _) in SERVICES.items():
+        requests.add_parser(name, parents=[where], help=text, description=f"{text[0].upper()}{text[1:]}.")
+    found = requests.add_parser("get", parents=[where], help="print parameters of a node")
+    found.add_argument("name", metavar="NODE[:PARAMETER]", help="force_loop, or force_loop:force_gain")
+    new = requests.add_parser("set", parents=[where], help="change a live parameter, or be refused with the reason")
+    new.add_argument("value", metavar="NODE:PARAMETER=VALUE", help="for example force_loop:force_gain=0.01")
+    heard = requests.add_parser("echo", parents=[where], help="print messages of a topic")
+    heard.add_argument("topic", help="as in docs/topics.md, for example force_measured")
+    heard.add_argument("--count", type=int, metavar="N", help="end after so many; default: Ctrl-C")
+    push = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
+    push.add_argument("cover", help="link that is pushed, for example outer_link")
+    push.add_argument("force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), help="N, in the frame of the link")
+    push.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")
+    push.add_argument("--seconds", type=float, default=1.0, help="of the arm's time; default: %(default)g")
 
 
 def run(given: argparse.Namespace) -> int:
-    """Call the service and print its answer."""
-    node, service, switch = REQUESTS[given.request]
-    answer = call(f"/{given.namespace}/{node}/{service}", switch)
-    print(answer.message, file=sys.stdout if answer.success else sys.stderr)
-    return 0 if answer.success else 1
+    """Make the request and print its answer."""
+    others = {"get": _get, "set": _set, "echo": _echo, "push": _push}
+    with CalledStack(given.namespace) as stack:
+        if given.request in others:
+            return others[given.request](given, stack)
+        return _told(list(map(stack.request, SERVICES[given.request][1])))
+
+
+def _told(replies: Sequence[Reply]) -> int:
+    """Print the last answer, or the first refusal."""
+    reply = next((reply for reply in replies if not reply.success), replies[-1])
+    print(reply.message, file=sys.stdout if reply.success else sys.stderr)
+    return 0 if reply.success else 1
+
+
+def _get(given: argparse.Namespace, stack: CalledStack) -> int:
+    node, _, name = given.name.partition(":")
+    values = stack.parameters(node)
+    wanted = {key: value for key, value in values.items() if not name or key == name or key.startswith(f"{name}.")}
+    if not wanted:
+        raise ValueError(_unknown(node, name, values))
+    for key, value in sorted(wanted.items()):
+        print(value if key == name else f"{node}:{key}={value}")
+    return 0
+
+
+def _set(given: argparse.Namespace, stack: CalledStack) -> int:
+    key, value = configured_value(given.value)
+    node, _, name = key.partition(":")
+    values = stack.parameters(node)
+    if name not in values:
+        raise ValueError(_unknown(node, name, values))
+    like = values[name]
+    if hasattr(like, "__len__") and not isinstance(like, str):
+        value = [value] * len(like) if not isinstance(value, list) else value
+        value = [_like(one, like[0]) if len(like) else one for one in value]
+    reply = stack.request(SetParameters(node, {name: _like(value, like)}))
+    return _told([reply._replace(message=reply.message or f"{node}:{name}={value}")])
+
+
+def _like(value: Any, like: Any) -> Any:
+    """A whole number where a parameter has none is one with a point."""
+    return float(value) if isinstance(like, float) and type(value) is int else value
+
+
+def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
+    near = difflib.get_close_matches(name, values, n=1)
+    return f"node '{node}' has no parameter '{name}'" + (
+        f"; did you mean '{near[0]}'?" if near else f"; 'wam call get {node}' lists them"
+    )
+
+
+def _echo(given: argparse.Namespace, stack: CalledStack) -> int:
+    for message in islice(stack.messages(given.topic), given.count):
+        print(yaml.safe_dump(plain(message, given.topic), sort_keys=False, default_flow_style=None), end="---\n")
+        sys.stdout.flush()
+    return 0
+
+
+def plain(message: Any, topic: str = "") -> Any:
+    """A message as mappings, lists and numbers; a table of the stack as its rows."""
+    row = BY_NAME.get(topic)
+    if row is not None and row.type == TABLE:
+        table = read_table(message, row.columns, [message.header.frame_id, *[""] * 100])
+        return {
+            "stamp": stamp_of(message),
+            "rows": [dict(zip(row.columns, found, strict=True)) for found in table.rows],
+        }
+    if hasattr(message, "get_fields_and_field_types"):
+        return {name: plain(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    if isinstance(message, bytes) or hasattr(message, "tolist"):
+        return list(message)
+    return [plain(item) for item in message] if isinstance(message, list) else message
+
+
+def _push(given: argparse.Namespace, stack: CalledStack) -> int:
+    shared = build_part(Shared, stack.parameters("driver"))
+    covers = shared.arm.covers
+    if given.cover not in covers.names:
+        raise ValueError(f"no link '{given.cover}'; push one of {', '.join(covers.names)}")
+    i = 3 * covers.names.index(given.cover)
+    low, high = covers.start[i], covers.end[i]
+    at = 0.5 * (low + high) if given.at is None else given.at
+    if not low <= at <= high:
+        raise ValueError(f"--at is {at:g} m; {given.cover} is from {low:g} to {high:g} m")
+    x, y, z = given.force
+    push = Wrench(given.cover, (x, y, z), (0.0, -at * z, at * y))
+    hold = HeldTopic(stack.node, "sim/disturbance", shared)
+    begin = stamp = 0
+    try:
+        for message in stack.messages("joint_states"):
+            stamp = stamp_of(message)
+            begin = begin or stamp
+            if stamp - begin > given.seconds * 1e9:
+                break
+            if refusal := hold.send(stamp, push):
+                raise ValueError(f"not pushed: {refusal}")
+    finally:
+        if hold.is_on:
+            hold.send(stamp, Wrench(BASE, ZERO, ZERO))
+            hold.end()
+    print(f"pushed {given.cover} with {math.hypot(x, y, z):g} N at {at:.2f} m for {(stamp - begin) / 1e9:.2f} s")
+    return 0

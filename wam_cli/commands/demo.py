@@ -2,27 +2,26 @@
 
 import argparse
 import math
-import os
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 from wam_bag.errors import BagError
-from wam_cli.commands import configuration_of, new_bag, take_configuration, writable_directory
-from wam_cli.commands.live import page_beside, take_page
-from wam_cli.commands.up import import_nodes, runs_apart, take_time, timed
+from wam_cli.commands import (
+    configuration_of,
+    new_bag,
+    take_configuration,
+    take_page,
+    take_time,
+    timed,
+    writable_directory,
+)
+from wam_cli.commands.demo_nodes import play
+from wam_control.scenario import ScenarioStep, script_file
 from wam_control.scenario import load as steps_of
-from wam_control.scenario import script_file
 from wam_description.configuration import Configuration
 from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
-from wam_ros.bring_up import start
-from wam_ros.network import move_to_free_domain
 from wam_ros.program import end_at_once_on_signals
-from wam_ros.run import NAMESPACE, Stop
-
-PLAIN_LOG = "[{severity}] [{name}]: {message}"  # of ROS, without the wall clock
-LONGEST_START = 120.0  # s, until all nodes are connected, on a machine that is busy
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,33 +53,9 @@ def run(given: argparse.Namespace) -> int:
     if task:
         base = with_run(base, task.runs[0]._replace(name=name), directory)
     configuration = base.with_values({"nodes": [*base.shared.nodes, "scenario", "recorder"], "recorder:name": name})
-    tell_task(configuration, bag, task.name if task else "")
-    os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
-    end_at_once_on_signals()
-    import_nodes(configuration, given)
-    stop = Stop()
-    if moved := move_to_free_domain(NAMESPACE):
-        print(moved, flush=True)
-    late = time.monotonic() + LONGEST_START
-    with (
-        page_beside(given, NAMESPACE) as close_page,
-        start(configuration, runs_apart(configuration, given), lambda: stop.is_set) as stack,
-    ):
-        driver: Any = getattr(stack, "nodes", {}).get("driver")
-
-        def is_over(ended: dict[str, int]) -> bool:
-            return stop.is_set or bool(ended) or (time.monotonic() > late and bool(getattr(driver, "awaited", "")))
-
-        ended = stack.wait(is_over)
-        failures = stack.failures
-        if not ended and not stop.is_set:
-            failures = [f"not ready within {LONGEST_START:g} s: {driver.awaited}"]
-        for failure in failures:  # before the others end and print what follows from it
-            print(f"error: {failure}; all others are stopped now", file=sys.stderr, flush=True)
-        close_page()
-    if stack.bag_failure:
-        failures = [*failures, stack.bag_failure]
-    if stop.is_set:
+    steps = tell_task(configuration, bag, task.name if task else "")
+    failures, stopped = play(configuration, steps, bag, given)
+    if stopped:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130
     end_at_once_on_signals()  # the bag is closed
@@ -95,8 +70,13 @@ def run(given: argparse.Namespace) -> int:
     return 0
 
 
-def tell_task(configuration: Configuration, bag: Path, task: str = "") -> None:
+def tell_task(configuration: Configuration, bag: Path, task: str = "") -> list[ScenarioStep]:
     """Print what is about to happen, and refuse a task that cannot be played before anything is started.
+
+    Returns
+    -------
+    list
+        its steps.
 
     Raises
     ------
@@ -115,6 +95,7 @@ def tell_task(configuration: Configuration, bag: Path, task: str = "") -> None:
     if presses:
         print(f"  the force loop presses with {', '.join(f'{newtons:g}' for newtons in presses)} N")
     print(f"  every topic is recorded in {bag}", flush=True)
+    return list(steps)
 
 
 def _report(bag: Path, failed: bool, task: Experiment | None) -> bool:

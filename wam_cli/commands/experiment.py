@@ -13,7 +13,7 @@ from wam_experiments.thesis.figure import draw
 from wam_experiments.thesis.page import write
 from wam_experiments.thesis.rows import Result
 from wam_ros.bring_up import Composition
-from wam_ros.run import Stop
+from wam_ros.program import Stop
 
 PICTURE = "result.png"
 SHOWN_EVERY = 0.2  # s

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from wam_cli.commands import namespace
-from wam_live.page import PORT, NoPageError, needing_viser, obstacle
-from wam_ros.program import end_at_once_on_signals
-from wam_ros.run import NAMESPACE, PARENT, Stop, die_with_parent
+from wam_cli.commands import namespace, take_port
+from wam_live.page import NoPageError, needing_viser, obstacle
+from wam_ros.program import Stop, end_at_once_on_signals
+from wam_ros.run import NAMESPACE, PARENT, die_with_parent
 
 PATIENCE: Final = 1.0  # s, in which a page ends by itself
 
@@ -21,22 +21,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--namespace", type=namespace, default=NAMESPACE, help="of the stack; default: %(default)s")
     take_port(parser)
     parser.epilog = "Needs viser: pip install 'wam_stack[live]'.  The page is reachable from this machine alone."
-
-
-def take_port(parser: argparse.ArgumentParser) -> None:
-    """Give a command the option --port."""
-    parser.add_argument("--port", type=int, default=PORT, help="of the page on this machine; default: %(default)s")
-
-
-def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:
-    """Give a command the options --live and --no-live; None: a page where that is possible."""
-    parser.add_argument(
-        "--live",
-        action=argparse.BooleanOptionalAction,
-        default=default,
-        help="show the arm in the browser; default: " + ("no" if default is False else "where that is possible"),
-    )
-    take_port(parser)
 
 
 @contextmanager

@@ -16,7 +16,7 @@ TAKES_ROS_ARGUMENTS = True
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command; the rest of the line is ROS's."""
     parser.add_argument("name", help="driver, transform, velocity_loop, gravity, force_loop, contact_estimator, ...")
-    parser.usage = "wam node [-h] [--config CONFIG] name [ROS argument ...]"
+    parser.usage = "wam node [--config CONFIG] NAME [ROS ARGUMENT ...]"
     parser.epilog = "ROS arguments are for example: -p timing.mode:=lockstep -r __ns:=/left"
     take_configuration(parser)
 

@@ -1,16 +1,24 @@
-"""`wam up`: the nodes, until Ctrl-C; and the options of time, which `wam demo` has, too."""
+"""`wam up`: the nodes, until Ctrl-C."""
 
 import argparse
 import sys
 
-from wam_cli.commands import configuration_of, namespace, take_configuration
-from wam_cli.commands.live import page_beside, take_page
+from wam_cli.commands import (
+    configuration_of,
+    namespace,
+    runs_apart,
+    take_configuration,
+    take_page,
+    take_time,
+    timed,
+)
+from wam_cli.commands.live import page_beside
 from wam_control.scenario import load, script_file
 from wam_description.configuration import Configuration
 from wam_ros.bring_up import start
 from wam_ros.node import node_factory
-from wam_ros.program import end_at_once_on_signals
-from wam_ros.run import NAMESPACE, Stop, die_with_parent
+from wam_ros.program import Stop, end_at_once_on_signals
+from wam_ros.run import NAMESPACE, die_with_parent
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,45 +32,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     take_page(parser, default=False)
     take_configuration(parser)
-
-
-def take_time(parser: argparse.ArgumentParser) -> None:
-    """Give a command the options that say how time passes."""
-    parser.add_argument("--processes", action="store_true", help="a process for each node; default: all in one process")
-    parser.add_argument(
-        "--realtime",
-        action="store_true",
-        help="do not wait for commands, as a real driver; a process for each node; default: timing.mode, lockstep",
-    )
-    parser.add_argument(
-        "--real-time-factor",
-        type=float,
-        metavar="FACTOR",
-        help="speed of lockstep: 1 as the wall clock, 0 as fast as it can; default: timing.real_time_factor",
-    )
-    parser.add_argument("--lockstep", action="store_true", help=argparse.SUPPRESS)  # what factor 0 was called before
-
-
-def timed(configuration: Configuration, given: argparse.Namespace) -> Configuration:
-    """The configuration with what the options say about time.
-
-    Raises
-    ------
-    ValueError
-        where options exclude each other.
-    """
-    mode = "realtime" if given.realtime else "lockstep" if given.lockstep else getattr(given, "mode", None)
-    factor = 0.0 if given.lockstep else given.real_time_factor
-    values = {"timing.mode": mode, "timing.real_time_factor": factor}
-    timed = configuration.with_values({name: value for name, value in values.items() if value is not None})
-    if factor is not None and timed.shared.timing.mode == "realtime":
-        raise ValueError("--real-time-factor is for lockstep; leave out --realtime")
-    return timed
-
-
-def runs_apart(configuration: Configuration, given: argparse.Namespace) -> bool:
-    """Whether each node gets a process of its own."""
-    return given.processes or configuration.shared.timing.mode == "realtime"
 
 
 def import_nodes(configuration: Configuration, given: argparse.Namespace) -> None:

@@ -6,10 +6,9 @@ from pathlib import Path
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.rerun_view import load_rerun, view, viewer
 from wam_bag.bag import read
-from wam_cli.commands import writable_file
-from wam_cli.commands.live import take_port
+from wam_cli.commands import take_port, writable_file
 from wam_live.page import needing_viser
-from wam_ros.run import Stop
+from wam_ros.program import Stop
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,0 +1,178 @@
+"""A simulation recorded into a bag, as the recorder node does it in lockstep, without ROS."""
+
+import struct
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from wam_bag.bag_writer import BagWriter
+from wam_bag.cdr_encoder import encoded
+from wam_bag.losses import PARAMETERS as ATTACHMENT
+from wam_bag.losses import RECORDING
+from wam_bag.metadata import INFINITE
+from wam_control.scenario import ScenarioStep
+from wam_description.arm import Shared
+from wam_description.configuration import SHARED, Configuration
+from wam_description.interface import Interface
+from wam_description.signals import NodeStatus
+from wam_description.status import pairs
+from wam_description.topics import JOINT_STATE, POINT, STATUS, TABLE, WRENCH, Topic
+from wam_description.urdf import urdf
+from wam_description.yaml_text import parameter_text
+from wam_sim.simulation import Simulation
+
+DESCRIPTION: Final = "robot_description"
+DOUBLE: Final = 8  # FLOAT64 of a PointField
+DEPTH: Final = 1000
+Values = Callable[[int, Any], Sequence[Any]]
+
+
+def record(
+    configuration: Configuration,
+    steps: Sequence[ScenarioStep],
+    path: Path,
+    namespace: str = "wam",
+    tell: Callable[[float, str], None] = lambda seconds, step: None,
+    is_stopped: Callable[[], bool] = lambda: False,
+) -> str:
+    """Play a scenario in this process and record it.
+
+    Not recorded are what only viewers use and what tells of the network: markers, diagnostics, the clock.
+
+    Parameters
+    ----------
+    configuration : of the nodes.
+    steps : the scenario.
+    path : of the bag, a new directory.
+    namespace : of the recorded topics.
+    tell : called with the arm's time, s, and the name of each step that begins.
+    is_stopped : ends the recording once it is true.
+
+    Returns
+    -------
+    str
+        why the scenario failed, '' where it did not.
+
+    Raises
+    ------
+    RecordingError
+        if the bag cannot be written.
+    """
+    simulation = Simulation(configuration, steps)
+    shared = configuration.shared
+    with BagWriter(path) as bag:
+        recording = _Recording(bag, simulation, shared, namespace)
+        simulation.listen(STATUS, lambda _, status: tell(status.stamp / 1e9, status.message), "scenario")
+        bag.attach(ATTACHMENT, "application/yaml", _parameters(configuration, namespace).encode())
+        recording.watch_driver()
+        while not is_stopped() and not simulation.step():
+            recording.watch_driver()
+        recording.watch_driver()
+        bag.metadata(RECORDING, recording.counts())
+    failure: str = simulation.scenario.failure
+    return failure
+
+
+class _Recording:
+    """Writes what a simulation publishes."""
+
+    def __init__(self, bag: BagWriter, simulation: Simulation, shared: Shared, namespace: str) -> None:
+        self._bag, self._simulation, self._arm, self._namespace = bag, simulation, shared.arm, namespace
+        self._counts: Counter[tuple[str, str]] = Counter()
+        self._driver: NodeStatus | None = None
+        interface = Interface(shared)
+        for topic in interface.topics.values():
+            values = _values_of(topic, shared)
+            if values is not None and (senders := interface.publishers(topic.name)):
+                bag.add_topic(self._full(topic.name), topic.type, _qos(topic))
+                if topic.name != DESCRIPTION:
+                    simulation.listen(topic.name, self._writer(topic, values, senders[0]))
+        self._status = interface.topics[STATUS]
+        bag.add_topic(self._full(STATUS), self._status.type, _qos(self._status))
+        for node in simulation.nodes:
+            simulation.listen(STATUS, self._status_writer(node), node)
+        self._write(DESCRIPTION, interface.topics[DESCRIPTION].type, 0, [urdf(shared.arm)], "driver")
+
+    def watch_driver(self) -> None:
+        """Record the driver's status where it has changed."""
+        status = self._simulation.driver_status
+        if status != self._driver:
+            self._driver = status
+            self._write_status(status._replace(stamp=self._simulation.driver.stamp), "driver")
+
+    def counts(self) -> dict[str, str]:
+        """The record of what is in the bag: everything."""
+        found = {"mode": "lockstep"}
+        for (topic, node), count in self._counts.items():
+            found |= {f"{topic} {node} received": str(count), f"{topic} {node} dropped": "0"}
+            found[f"{topic} {node} missed"] = "0"
+        return found
+
+    def _full(self, topic: str) -> str:
+        return topic if topic.startswith("/") else f"/{self._namespace}/{topic}"
+
+    def _writer(self, topic: Topic, values: Values, sender: str) -> Callable[[int, Any], None]:
+        return lambda stamp, value: self._write(topic.name, topic.type, stamp, values(stamp, value), sender)
+
+    def _status_writer(self, node: str) -> Callable[[int, Any], None]:
+        return lambda _, status: self._write_status(status, node)
+
+    def _write_status(self, status: NodeStatus, node: str) -> None:
+        status = status._replace(node=node, connected=True, session=1)
+        facts = pairs(status)
+        fields = [status.level, node, status.message, self._arm.name, facts]
+        self._write(STATUS, self._status.type, self._simulation.driver.stamp, fields, node)
+
+    def _write(self, topic: str, kind: str, stamp: int, fields: Sequence[Any], sender: str) -> None:
+        name = self._full(topic)
+        self._counts[name, sender] += 1
+        self._bag.write(name, encoded(kind, fields), stamp, stamp, self._counts[name, sender])
+
+
+def _parameters(configuration: Configuration, namespace: str) -> str:
+    own = {name: flat for name, flat in configuration.sections.items() if name in configuration.shared.nodes}
+    shared = configuration.sections[SHARED]
+    return parameter_text({f"/{namespace}/{name}": {**shared, **flat} for name, flat in own.items()})
+
+
+def _qos(topic: Topic) -> Mapping[str, Any]:
+    """The policies that the ROS nodes offer."""
+    return {
+        "history": "keep_last",
+        "depth": 1 if topic.latched else DEPTH,
+        "reliability": "reliable",
+        "durability": "transient_local" if topic.latched else "volatile",
+        "deadline": dict(INFINITE),
+        "lifespan": dict(INFINITE),
+        "liveliness": "automatic",
+        "liveliness_lease_duration": dict(INFINITE),
+        "avoid_ros_namespace_conventions": False,
+    }
+
+
+def _values_of(topic: Topic, shared: Shared) -> Values | None:
+    """The fields of a message of a topic, None of a type that is not recorded here."""
+    names = shared.arm.motors.names if topic.side == "motors" else shared.arm.joints.names
+    columns = topic.columns
+    fields = [(name, DOUBLE * i, DOUBLE, 1) for i, name in enumerate(columns)]
+
+    def table(stamp: int, value: Any) -> Sequence[Any]:
+        rows = value.rows
+        data = b"".join(struct.pack(f"<{len(row)}d", *row) for row in rows)
+        step = DOUBLE * len(columns)
+        return _header(stamp, value.frame), 1, len(rows), fields, False, step, step * len(rows), data, False
+
+    by_type: dict[str, Values] = {
+        JOINT_STATE: lambda stamp, value: (_header(stamp), names, value.position, value.velocity, value.effort),
+        WRENCH: lambda stamp, value: (_header(stamp, value.frame), (value.force, value.torque)),
+        POINT: lambda stamp, value: (_header(stamp, value.frame), value.position),
+        TABLE: table,
+        "std_msgs/msg/Bool": lambda stamp, value: [bool(value)],
+        "std_msgs/msg/String": lambda stamp, value: [value],
+    }
+    return by_type.get(topic.type)
+
+
+def _header(stamp: int, frame: str = "") -> tuple[tuple[int, int], str]:
+    return divmod(stamp, 1_000_000_000), frame
