@@ -87,7 +87,7 @@ def predicted_limit(configuration: Configuration, held: bool, delay: int, by_dif
     shared = configuration.shared
     guard = ServoGuard(shared.arm, shared.timing, replace(GUARD, velocity_by_difference=by_difference))
     (mechanism,) = (m for m in guard._mechanisms if held == ("held" in m.what) and "joints at 0" not in m.what)
-    scale = largest_scale(lambda scale: guard._is_stable(mechanism, shared.servo, scale, scale, delay), 100.0)
+    scale = largest_scale(lambda scale: is_stable(guard._period(mechanism, shared.servo, scale, scale, delay)), 100.0)
     return scaled(shared.servo, scale)
 
 
@@ -186,6 +186,16 @@ def test_gains_that_hold_nothing_are_refused_with_the_least_that_is_allowed(
     guard.require_stable(Servo(least, (0.0,) * n))
     with pytest.raises(ParameterError, match="cannot hold the arm"):
         guard.require_stable(Servo(tuple(0.98 * each for each in least), (0.0,) * n))
+
+
+@pytest.mark.parametrize(("proportional", "integral"), [(9e-4, 1.0), (1e-3, 50.0)])
+def test_a_large_integral_gain_on_gains_that_hardly_brake_is_refused(proportional: float, integral: float) -> None:
+    """The integral of the velocity is a spring: with little damping the arm swings on it for long."""
+    guard = guard_of(WAM)
+    with pytest.raises(ParameterError, match=r"hardly decays.*allowed: servo.integral_gain up to \[") as refusal:
+        guard.require_stable(Servo((proportional,) * 4, (integral,) * 4))
+    named = str(refusal.value).rpartition("integral_gain up to [")[2].partition("]")[0]
+    guard.require_stable(Servo((proportional,) * 4, tuple(float(each) for each in named.split(", "))))
 
 
 def test_gains_are_taken_where_the_guard_is_off() -> None:

@@ -307,6 +307,16 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     assert warned.report.facts["gain factor"] == "1"
 
 
+@pytest.mark.parametrize("schedule", ["off", "position"])
+def test_gains_without_any_margin_are_followed_where_the_guard_only_warns(schedule: str) -> None:
+    own = guarded(bench(force_gain=(5.0,), schedule=schedule), mode="warn")
+    loop = bench_loop(own)
+    assert loop.assessment is not None
+    assert loop.assessment.scale == 0.0
+    assert follow(loop, own.guard.posture, force=(0.0, 1.0, 0.0)) == 0.0
+    assert loop.report.facts["gain factor"] == "1"
+
+
 def loop_task(loop: ForceLoop) -> GuardedTask:
     from wam_control.force_loop_parameters import force_law, task_of
 

@@ -39,9 +39,11 @@ class Watch:
 
     def __init__(self, guard: StabilityGuard, task: GuardedTask, found: GuardAssessment, is_scheduled: bool) -> None:
         self._guard, self._task, self._is_scheduled = guard, task, is_scheduled
-        self._tuned = found.scale
+        demanded = 1.0 / guard.parameters.stability_fraction
+        # gains without any margin are only taken where the guard warns: there is none to keep
+        self._tuned = found.scale or demanded
         # in domain II the margin is less than the fraction demands, and may stay so
-        self._needed = min(found.scale, 1.0 / guard.parameters.stability_fraction)
+        self._needed = min(self._tuned, demanded)
         self._judged: list[GuardedContact] = []
         self._pending: list[GuardedContact] = []
         self._work: Iterator[float] | None = None

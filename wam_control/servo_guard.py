@@ -18,10 +18,12 @@ from wam_control.stability_guard import rounded_down, rounded_up
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import ParameterError, lengths, parameter, require
 from wam_description.transmission_map import TransmissionMap
-from wam_theory.velocity_servo import is_stable, largest_scale, locked_rotors, servo_period
+from wam_theory.velocity_servo import is_stable, largest_scale, least_damping, locked_rotors, servo_period
 
 Array = NDArray[np.float64]
 LARGEST = 1e3  # factor on the gains up to which a margin is searched
+DAMPING = 0.03  # least damping ratio of a slow mode: what the integral gain alone holds swings on its spring
+SLOW = 0.6  # rad per period, up to which a mode is slow
 DEAD = 0.02  # of the peak torque: a smaller one may be lost in the deadband of an amplifier, not in brakes
 
 
@@ -107,7 +109,7 @@ class ServoGuard:
         """Largest factor on all gains, up to `LARGEST`, that is stable with currents on time."""
 
         def is_stable_at(scale: float) -> bool:
-            return all(self._is_stable(mechanism, servo, scale, scale, 0) for mechanism in self._mechanisms)
+            return all(is_stable(self._period(each, servo, scale, scale, 0)) for each in self._mechanisms)
 
         return largest_scale(is_stable_at, LARGEST)
 
@@ -136,24 +138,28 @@ class ServoGuard:
         fraction = self._parameters.stability_fraction
         late = self._parameters.extra_delay if self._timing.mode == "realtime" else 0
         for mechanism in self._mechanisms:
+            found = least_damping(self._period(mechanism, servo, proportional, integral, 0), SLOW)
+            if found < DAMPING:
+                return (
+                    f"an oscillation hardly decays with {mechanism.what}, its damping ratio is {found:.2g} "
+                    f"(at least {DAMPING:g})"
+                )
             for scale, delay in sorted({(1.0, 0), (1.0 / fraction, 0), (1.0, late)}):
-                if not self._is_stable(mechanism, servo, scale * proportional, scale * integral, delay):
+                if not is_stable(self._period(mechanism, servo, scale * proportional, scale * integral, delay)):
                     when = f"{delay} periods late" if delay else "on time"
                     share = f", of which velocity_loop:guard.stability_fraction, {fraction:g}, is accepted"
                     return f"an oscillation grows with {mechanism.what}, currents {when}{share if scale > 1.0 else ''}"
         return ""
 
-    def _is_stable(self, mechanism: Mechanism, servo: Servo, proportional: float, integral: float, delay: int) -> bool:
-        return is_stable(
-            servo_period(
-                mechanism.rate,
-                mechanism.inlet,
-                [proportional * gain for gain in servo.proportional_gain],
-                [integral * gain for gain in servo.integral_gain],
-                self._timing.period,
-                delay,
-                self._parameters.velocity_by_difference,
-            )
+    def _period(self, mechanism: Mechanism, servo: Servo, proportional: float, integral: float, delay: int) -> Array:
+        return servo_period(
+            mechanism.rate,
+            mechanism.inlet,
+            [proportional * gain for gain in servo.proportional_gain],
+            [integral * gain for gain in servo.integral_gain],
+            self._timing.period,
+            delay,
+            self._parameters.velocity_by_difference,
         )
 
     @cached_property

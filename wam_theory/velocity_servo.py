@@ -16,6 +16,7 @@ from wam_theory.zero_order_hold import zero_order_hold
 
 Array = NDArray[np.float64]
 ON_THE_CIRCLE = 1e-7  # growth of a mode in one period that counts as none
+MEMORY = 1e-9  # of a mode after a period, below which it is none
 STEP = 0.8  # from one scale that is tried to the next
 SMALLEST = 1e-15  # scale at which a search ends
 
@@ -80,6 +81,20 @@ def is_stable(period_map: Array) -> bool:
     period_map : (m, m), state after a period from the state before it.
     """
     return bool(np.abs(np.linalg.eigvals(period_map)).max() <= 1.0 + ON_THE_CIRCLE)
+
+
+def least_damping(period_map: Array, slow: float) -> float:
+    """Smallest damping ratio of the modes slower than `slow`, rad per period; 1 where there is none.
+
+    Parameters
+    ----------
+    period_map : (m, m), state after a period from the state before it.
+    """
+    values = np.linalg.eigvals(period_map).astype(np.complex128)
+    rates = np.log(values[np.abs(values) > MEMORY])
+    size = np.abs(rates)
+    used = (np.abs(rates.imag) > 0.0) & (size < slow)
+    return float(min(-rates.real[used] / size[used], default=1.0))
 
 
 def largest_scale(is_stable_at: Callable[[float], bool], top: float) -> float:
