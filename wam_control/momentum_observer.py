@@ -155,7 +155,7 @@ class MomentumObserver:
         if not (0.0 < dt < math.inf):
             return False
         position, velocity, effort = state
-        finite = all(map(math.isfinite, (*position, *velocity, *effort)))
+        finite = math.isfinite(sum(position) + sum(velocity) + sum(effort))
         if not len(position) == len(velocity) == len(effort) == n or not finite:
             self._gap += dt
             return False
@@ -180,8 +180,9 @@ class MomentumObserver:
 
     def _update(self, sample: "_Torques", dt: float) -> bool:
         body, (q, qd, tau, friction, sliding, resting) = self._body, sample
-        momentum = ((body.mass_matrix(q) + self._carried) @ np.array(qd)).tolist()
-        bias = (body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)).tolist()
+        at, speed = np.array(q), np.array(qd)
+        momentum = (body.mass_matrix(at) + self._carried).dot(speed).tolist()
+        bias = (body.coriolis_transpose_times_velocity(at, speed) - body.gravity_torque(at)).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)]
         before, span = self._momentum, dt + self._gap
         keep = math.exp(-span / self._parameters.time_constant)

@@ -118,6 +118,13 @@ class RigidBody:
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         return _columns(pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, aligned))[:3]
 
+    def elbow_and_tip_velocity(self, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
+        """Velocities of the origins of the last cover and of the tool, (3,) each, m/s, in base coordinates."""
+        pin.forwardKinematics(self._model, self._data, _vector(q), _vector(qd))
+        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        elbow = pin.getFrameVelocity(self._model, self._data, self._frame[self.covers[-1]], aligned)
+        return elbow.linear, pin.getFrameVelocity(self._model, self._data, self._tool, aligned).linear
+
     def hand_jacobian(self, q: ArrayLike) -> Array:
         """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in frame 5 (A.7 corrected)."""
         local = pin.ReferenceFrame.LOCAL
@@ -134,7 +141,8 @@ class RigidBody:
     def coriolis_transpose_times_velocity(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """C(q, qd)^T qd, (n,), N m, with dM/dt = C + C^T: the term of a momentum observer."""
         velocity = _vector(qd)
-        return pin.computeCoriolisMatrix(self._model, self._data, _vector(q), velocity).T @ velocity
+        # dot: of two small arrays three times as fast as @, the same bits
+        return velocity.dot(pin.computeCoriolisMatrix(self._model, self._data, _vector(q), velocity))
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Joint torques, (n,), N m, that give the links the acceleration qdd, (n,), rad/s^2."""

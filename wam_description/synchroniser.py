@@ -127,6 +127,8 @@ class Synchroniser:
             for spec in {spec[:2]: spec for spec in waited.values()}.values()
         ]
         self._is_alone = not inputs  # a trigger is all there is to a step
+        self._outer_period, self._outer_phase = timing.outer_period_ns, timing.period_ns % timing.outer_period_ns
+        self._lacks: tuple[dict[int, Any], int, int] | None = None  # see `_taken`
         self._triggers: deque[tuple[int, Any]] = deque()
         self._announced: int | None = None  # first state of a session that none of its states has confirmed yet, ns
         self._early: deque[tuple[str, int, Any]] = deque(maxlen=MOST_EARLY)
@@ -144,6 +146,7 @@ class Synchroniser:
         self._announced = None
         self._last = self._last_done = self._suspect = 0
         self._triggers.clear()
+        self._lacks = None
         for kept in self._kept.values():
             kept.clear()
         for newest in self._newest.values():
@@ -170,8 +173,8 @@ class Synchroniser:
     def accepts(self, topic: str, stamp: int) -> bool:
         """Whether a message of this stamp can be part of a step; if not, it need not be decoded."""
         if topic == self._trigger:
-            return not self._thinned or self._timing.is_outer(stamp)
-        return not self._outer or topic in self._newest or self._timing.is_outer(stamp)
+            return not self._thinned or stamp % self._outer_period == self._outer_phase
+        return not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase
 
     def put(self, topic: str, stamp: int, value: Any) -> Sequence[Inputs]:
         """Take an input; returns the inputs of each step that is now complete, in the order of their stamps.
@@ -183,7 +186,7 @@ class Synchroniser:
         """
         last = self._last
         if topic == self._trigger:
-            if self._thinned and not self._timing.is_outer(stamp):
+            if self._thinned and stamp % self._outer_period != self._outer_phase:
                 return ()
             if (
                 not last < stamp <= last + self._longest_jump
@@ -192,22 +195,30 @@ class Synchroniser:
             ):
                 return ()
             self._last, self._suspect = stamp, 0
+            if self._is_alone:
+                return (self._step(stamp, {topic: (stamp, value)}),)
             self._triggers.append((stamp, value))
-        elif not self._outer or topic in self._newest or self._timing.is_outer(stamp):
+        elif not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase:
             if self._announced is not None:
                 self._early.append((topic, stamp, value))
             self._keep(topic, stamp, value)
         if not self._triggers:
             return ()
-        if self._is_alone:
-            self._triggers.clear()
-            return (self._step(stamp, {topic: (stamp, value)}),)
+        if self._lacks is not None:
+            kept, cause, earliest = self._lacks
+            if cause not in kept and (stamp <= earliest or topic == self._trigger):
+                return ()  # nothing that the first step waits for, or shows that it waits in vain
+        return self._complete()
+
+    def _complete(self) -> list[Inputs]:
+        """The inputs of each step that is complete, in the order of their stamps."""
         complete: list[Inputs] = []
         while self._triggers:
             taken = self._taken(self._triggers[0][0])
             if taken is None and not self._has_missed(self._triggers[0][0]):
                 break
             stamp, value = self._triggers.popleft()
+            self._lacks = None
             if taken is not None:
                 taken[self._trigger] = (stamp, value)
                 complete.append(self._step(stamp, taken))
@@ -310,11 +321,16 @@ class Synchroniser:
         cause = stamp - group.delay_ns
         if cause <= 0:
             return 0
-        cause = self._timing.outer_stamp(cause) if group.outer else cause
+        if group.outer:
+            cause -= (cause - self._outer_phase) % self._outer_period
         return cause if cause >= self._begin else 0
 
     def _taken(self, stamp: int) -> dict[str, tuple[int, Any] | None] | None:
-        """The inputs of a step, None where it still waits for one; older ones are forgotten."""
+        """The inputs of a step, None where it still waits for one; older ones are forgotten.
+
+        Where it waits, `_lacks` is where that input will be, its stamp, and the earliest stamp of all inputs of the
+        step: no message that is not later can show that an input was missed.
+        """
         taken: dict[str, tuple[int, Any] | None] = {}
         for topic, newest in self._newest.items():
             taken[topic] = newest.taken(stamp)
@@ -324,6 +340,7 @@ class Synchroniser:
                 if cause in kept:
                     taken[topic] = (cause, kept[cause])
                 elif cause:
+                    self._lacks = kept, cause, min(self._cause(one, stamp) for one in self._groups)
                     return None
         for group in self._groups:
             for topic, kept in group.members:

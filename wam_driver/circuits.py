@@ -82,11 +82,10 @@ class CableCircuits:
             )
         ]
 
-    @property
-    def tensions(self) -> list[tuple[float, float]]:
-        """Tension of the tight and of the loose strand of each first stage, N, at the start of the last step."""
+    def tensions(self, pulls: Sequence[float]) -> list[tuple[float, float]]:
+        """Tension of the tight and of the loose strand of each first stage, N, at elastic torques, N m, (n,)."""
         result = []
-        for circuit, pull in zip(self._circuits, self._pull.tolist(), strict=True):
+        for circuit, pull in zip(self._circuits, pulls, strict=True):
             difference = abs(pull) / circuit.radius
             if self._may_slacken and difference > 2.0 * circuit.pretension:
                 result.append((difference, 0.0))

@@ -110,9 +110,7 @@ class Driver:
         self._command = self._zero
         self._command_tick = self._tick
         self.currents = self._zero
-        self._tightest = (
-            self._zero
-        )  # N, of each cable since the last check of the limits, so that no short peak is missed
+        self._pull = self._zero  # N m, largest of each cable since its last check, so that no short peak is missed
         self.warnings = []
 
     @property
@@ -172,8 +170,7 @@ class Driver:
         if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
             plant = self.plant
             self.recent.append(DriverSample(self.stamp, plant.theta, plant.thetad, self._command, self.currents))
-        tight = [tension for tension, _ in self.plant.tensions]
-        self._tightest = [max(pair) for pair in zip(self._tightest, tight, strict=True)]
+        self._pull = list(map(max, self._pull, self.plant.cable_pull))
         if self.is_outer:
             if enabled:
                 self._watch_limits()
@@ -182,9 +179,10 @@ class Driver:
 
     def _watch_limits(self) -> None:
         """Trip on the first quantity above its limit; warn of those near it."""
-        watched = list(self._watch.watched(self.plant.theta, self.plant.thetad, self.currents, self._tightest))
-        self._tightest = self._zero
-        self.warnings = [limit.warning for limit in watched if limit.is_near]
+        tensions = self.plant.tight_tensions(self._pull)
+        self._pull = self._zero
+        watched = self._watch.watched(self.plant.theta, self.plant.thetad, self.currents, tensions)
+        self.warnings = [limit.warning for limit in watched]
         self.warnings += [
             f"{name} is hot: {heat:.0%} of its thermal (I2t) limit"
             for name, heat in zip(self._arm.motors.names, self.amplifier.heat, strict=True)
@@ -196,8 +194,9 @@ class Driver:
 
     def _watch_braking(self) -> None:
         """Name the first cable that breaks under the brakes."""
-        broken = next(filter(None, (limit.excess for limit in self._watch.tensions(self._tightest))), "")
-        self._tightest = self._zero
+        tensions = self.plant.tight_tensions(self._pull)
+        self._pull = self._zero
+        broken = next(filter(None, (limit.excess for limit in self._watch.tensions(tensions))), "")
         if broken:
             self.safety.damage(f"{broken} under the brakes; check the cable")
 

@@ -1,7 +1,7 @@
 """What the driver watches: each quantity, its limit, and the warning near it."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from wam_description.arm import Arm
@@ -13,17 +13,12 @@ LEEWAY = 0.05  # rad, by which an arm that was enabled beyond a stop may go on b
 
 
 class WatchedLimit(NamedTuple):
-    """A quantity that is a fault above its limit and a warning near it."""
+    """A quantity near its limit, which is a warning, or above it, which is a fault."""
 
     quantity: str
     value: float
     limit: float
     unit: str
-
-    @property
-    def is_near(self) -> bool:
-        """Whether it is worth a warning."""
-        return self.value > WARNING * self.limit
 
     @property
     def warning(self) -> str:
@@ -54,7 +49,6 @@ class LimitWatch:
 
     def __init__(self, arm: Arm, elbow_speed_limit: float, tip_speed_limit: float) -> None:
         self._arm = arm
-        self._elbow_speed_limit, self._tip_speed_limit = elbow_speed_limit, tip_speed_limit
         self._map = TransmissionMap.of(arm)
         self._body = RigidBody(arm)
         motors, joints = arm.motors, arm.joints
@@ -62,6 +56,19 @@ class LimitWatch:
         self._middle = [0.5 * (low + high) for low, high in zip(joints.lower, joints.upper, strict=True)]
         self._half = [0.5 * (high - low) for low, high in zip(joints.lower, joints.upper, strict=True)]
         self._travel = self._half
+        zero = [0.0] * len(joints.names)
+        self._starts = list(self._body.start_velocities(zero, zero))
+        self._speeds = [*[elbow_speed_limit] * len(self._starts), tip_speed_limit, *joints.speed_limit]
+        self._strengths = [circuit.breaking_strength for circuit in arm.circuits]
+        self._of_cables = [(f"cable tension of {name}", "N") for name in motors.names]
+        self._quantities = [
+            *((f"speed of the start of {cover}", "m/s") for cover in self._starts),
+            ("speed of the tip", "m/s"),
+            *((f"speed of {name}", "rad/s") for name in joints.names),
+            *((f"travel of {name} from the middle of its range", "rad") for name in joints.names),
+            *((f"current of {name}", "A") for name in motors.names),
+            *self._of_cables,
+        ]
 
     def begin(self, theta: Sequence[float]) -> None:
         """The brakes are released at the motor angles theta, (n,), rad: an arm beyond a stop may come back."""
@@ -71,8 +78,8 @@ class LimitWatch:
 
     def watched(
         self, theta: Sequence[float], thetad: Sequence[float], currents: Sequence[float], tensions: Sequence[float]
-    ) -> Iterator[WatchedLimit]:
-        """Every quantity with its limit.
+    ) -> list[WatchedLimit]:
+        """The quantities that are near their limits or above them.
 
         Parameters
         ----------
@@ -81,26 +88,28 @@ class LimitWatch:
         tensions : largest of each cable since the last check, N, (n,).
         """
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        yield from self._speeds(q, qd)
-        yield from self._travels(q)
-        for name, current, limit in zip(self._arm.motors.names, currents, self._peak, strict=True):
-            yield WatchedLimit(f"current of {name}", abs(current), limit, "A")
-        yield from self.tensions(tensions)
+        starts = self._body.start_velocities(q, qd)
+        values = [
+            *(math.hypot(*starts[cover]) for cover in self._starts),
+            math.hypot(*(self._body.tool_jacobian(q) @ qd)),
+            *map(abs, qd),
+            *[abs(angle - middle) for angle, middle in zip(q, self._middle, strict=True)],
+            *map(abs, currents),
+            *tensions,
+        ]
+        return _near(self._quantities, values, [*self._speeds, *self._travel, *self._peak, *self._strengths])
 
-    def tensions(self, tensions: Sequence[float]) -> Iterator[WatchedLimit]:
-        """Tension of each cable with its breaking strength, also while the brakes stop the arm; (n,), N."""
-        for name, tension, circuit in zip(self._arm.motors.names, tensions, self._arm.circuits, strict=True):
-            yield WatchedLimit(f"cable tension of {name}", tension, circuit.breaking_strength, "N")
+    def tensions(self, tensions: Sequence[float]) -> list[WatchedLimit]:
+        """The cables whose tension, (n,), N, is near their breaking strength, also while the brakes stop the arm."""
+        return _near(self._of_cables, tensions, self._strengths)
 
-    def _speeds(self, q: list[float], qd: list[float]) -> Iterator[WatchedLimit]:
-        joints = self._arm.joints
-        tip = self._body.tool_jacobian(q) @ qd
-        for cover, velocity in self._body.start_velocities(q, qd).items():
-            yield WatchedLimit(f"speed of the start of {cover}", math.hypot(*velocity), self._elbow_speed_limit, "m/s")
-        yield WatchedLimit("speed of the tip", math.hypot(*tip), self._tip_speed_limit, "m/s")
-        for name, speed, limit in zip(joints.names, qd, joints.speed_limit, strict=True):
-            yield WatchedLimit(f"speed of {name}", abs(speed), limit, "rad/s")
 
-    def _travels(self, q: list[float]) -> Iterator[WatchedLimit]:
-        for name, angle, middle, limit in zip(self._arm.joints.names, q, self._middle, self._travel, strict=True):
-            yield WatchedLimit(f"travel of {name} from the middle of its range", abs(angle - middle), limit, "rad")
+def _near(
+    quantities: Sequence[tuple[str, str]], values: Sequence[float], limits: Sequence[float]
+) -> list[WatchedLimit]:
+    """Of quantities, each with its unit, those that are near their limits."""
+    return [
+        WatchedLimit(quantity, value, limit, unit)
+        for (quantity, unit), value, limit in zip(quantities, values, limits, strict=True)
+        if not value <= WARNING * limit  # what is not a number is above every limit
+    ]

@@ -95,8 +95,9 @@ class Plant:
             data.qpos[joints],
             data.qvel[joints],
         )
-        self._qdd, self._joint_damping = data.qacc[joints], model.dof_damping[joints]
-        self._armature = model.dof_armature[joints]
+        self._qdd = data.qacc[joints]
+        self._joint_damping, self._armature = model.dof_damping[joints].tolist(), model.dof_armature[joints].tolist()
+        self._constraint = data.qfrc_constraint[: 2 * n]
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
         self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
@@ -240,7 +241,11 @@ class Plant:
     def _friction_torque(self) -> list[float]:
         """Dry friction on rotors, then on joints, N m, (2 n,), in the last step."""
         data = self.data
-        torque = self._friction.elastic.copy() or [0.0] * (2 * self._n)
+        elastic = self._friction.elastic
+        if data.nefc == data.nf:  # no other constraint, so that MuJoCo's sum of all is that of dry friction
+            dry_friction: list[float] = self._constraint.tolist()
+            return [a + b for a, b in zip(elastic, dry_friction, strict=True)] if elastic else dry_friction
+        torque = elastic.copy() or [0.0] * (2 * self._n)
         dry = slice(data.ne, data.ne + data.nf)
         for dof, friction in zip(data.efc_id[dry].tolist(), data.efc_force[dry].tolist(), strict=True):
             if dof < len(torque):  # not the hinge of a door
@@ -275,12 +280,21 @@ class Plant:
     @property
     def tensions(self) -> list[tuple[float, float]]:
         """Tension of the tight and of the loose strand of each first stage, N, at the start of the last step."""
-        return self._circuits.tensions
+        return self._circuits.tensions(self._circuits.elastic_torque)
+
+    @property
+    def cable_pull(self) -> list[float]:
+        """Size of the elastic torque of each cable circuit, N m, (n,), at the start of the last step."""
+        return list(map(abs, self._circuits.elastic_torque))
+
+    def tight_tensions(self, pulls: Sequence[float]) -> list[float]:
+        """Tension of the tight strand of each first stage, N, (n,), which grows with the `cable_pull`, N m, (n,)."""
+        return [tight for tight, _ in self._circuits.tensions(pulls)]
 
     @property
     def cable_torque(self) -> list[float]:
         """Torque of the cables on the joints, N m, (n,), at the start of the last step."""
-        torque: list[float] = (self.circuit_torque @ self._motor_from_joint).tolist()
+        torque: list[float] = np.array(self.circuit_torque).dot(self._motor_from_joint).tolist()
         return torque
 
     @property
@@ -291,10 +305,12 @@ class Plant:
         root of the link reads it: M qdd + c(q, qd) + g - tau_ext of the links alone.
         """
         n = self._n
-        viscous = self._joint_damping * self._velocity[n:]
-        torque = self.circuit_torque @ self._motor_from_joint - viscous - self._armature * self._qdd
-        result: list[float] = (torque + self._friction_torque()[n:]).tolist()
-        return result
+        acceleration, velocity, dry = self._qdd.tolist(), self._velocity[n:], self._friction_torque()[n:]
+        each = zip(self._joint_damping, velocity, self._armature, acceleration, dry, strict=True)
+        return [
+            torque - damping * speed - armature * qdd + friction
+            for torque, (damping, speed, armature, qdd, friction) in zip(self.cable_torque, each, strict=True)
+        ]
 
     def loads(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""

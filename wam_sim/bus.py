@@ -19,9 +19,7 @@ class TopicValue(NamedTuple):
 
 
 Rows = dict[str, list[TopicValue]]
-
-
-Row = tuple[int, tuple[float, ...], str]  # a TopicValue; plain tuples of numbers cost the garbage collector nothing
+Row = tuple[int, tuple[float, ...], str]  # a TopicValue
 
 
 class Bus:
@@ -33,7 +31,8 @@ class Bus:
     """
 
     def __init__(self, topics: Mapping[str, Topic]) -> None:
-        self._routes = {name: _Route(_FLAT.get(topic.type), [], []) for name, topic in topics.items()}
+        flat = {name: _FLAT.get(topic.type) for name, topic in topics.items()}
+        self._routes = {name: _Route(_Log(write) if write else None, []) for name, write in flat.items()}
         self._rows: Rows = {}
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
@@ -49,9 +48,9 @@ class Bus:
         """Connect the reactions of a node; when several take one topic, all work before the first publishes."""
         outlets = _Outlets(declaration)
         for name in declaration.outputs:
-            outlets[name] = self._routes.setdefault(name, _Route(None, [], []))
+            outlets[name] = self._routes.setdefault(name, _Route(None, []))
         for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
-            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(None, [], []))
+            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(None, []))
         for topic, found in feeds.items():
             reactions = [(feed.synchroniser.inlet(topic), mask(feed.arrays), feed.work) for feed in found]
             if len(reactions) > 1:
@@ -64,9 +63,9 @@ class Bus:
         self._deliver(self._routes[topic], stamp, value)
 
     def _deliver(self, route: "_Route", stamp: int, value: Any) -> None:
-        flat, new, takers = route
-        if flat:
-            new.append(flat(stamp, value))
+        log, takers = route
+        if log is not None:
+            log.add(stamp, value)
         for inlet, masked, work, outlets in takers:
             for inputs in inlet(stamp, masked(value) if masked else value):
                 for name, output in work(inputs).items():
@@ -75,10 +74,9 @@ class Bus:
     @property
     def rows(self) -> Rows:
         """What was published on each topic of numbers so far; a JointState as position, velocity and effort."""
-        for name, (_, new, _) in self._routes.items():
-            if new:
-                self._rows.setdefault(name, []).extend(map(TopicValue._make, new))
-                new.clear()
+        for name, (log, _) in self._routes.items():
+            if log is not None and (new := log.take()):
+                self._rows.setdefault(name, []).extend(new)
         return self._rows
 
 
@@ -87,11 +85,47 @@ def of_node(node: str, topic: str) -> str:
     return f"{node}: {topic}" if topic in EVERY_NODE else topic
 
 
-class _Route(NamedTuple):
-    """One topic: how its numbers are kept, those that are not yet in `rows`, and who takes it."""
+class _Log:
+    """The numbers of a topic, one after the other: a tuple for each message would keep the garbage collector busy.
 
-    flat: Callable[[int, Any], Row] | None
-    new: list[Row]
+    Parameters
+    ----------
+    flat : a value as time, numbers and frame.
+    """
+
+    __slots__ = ("_ends", "_flat", "_frames", "_numbers", "_stamps")
+
+    def __init__(self, flat: Callable[[int, Any], Row]) -> None:
+        self._flat = flat
+        self._clear()
+
+    def _clear(self) -> None:
+        self._stamps: list[int] = []
+        self._frames: list[str] = []
+        self._numbers: list[float] = []
+        self._ends: list[int] = []  # of the numbers of each message
+
+    def add(self, stamp: int, value: Any) -> None:
+        """Keep the numbers of one message."""
+        _, numbers, frame = self._flat(stamp, value)
+        self._stamps.append(stamp)
+        self._frames.append(frame)
+        self._numbers += numbers
+        self._ends.append(len(self._numbers))
+
+    def take(self) -> list[TopicValue]:
+        """The messages since the last call."""
+        numbers, begins = tuple(self._numbers), [0, *self._ends]
+        each = zip(self._stamps, begins, self._ends, self._frames, strict=False)
+        rows = [TopicValue(stamp, numbers[begin:end], frame) for stamp, begin, end, frame in each]
+        self._clear()
+        return rows
+
+
+class _Route(NamedTuple):
+    """One topic: its numbers, where it carries any, and who takes it."""
+
+    log: _Log | None
     takers: list["_Taker"]
 
 
