@@ -1,4 +1,4 @@
-"""Numbers of figure 2.1.1: error of the force without feedback over the workspace, and what feed-forward saves (7.2.2)."""
+"""Numbers of figure 2.1.1: error of the force without feedback over the workspace, and with feed-forward (7.2.2)."""
 
 from dataclasses import replace
 
@@ -130,7 +130,10 @@ def open_loop() -> Panels:
             arm = OpenLoopArm(quiet)
             lines.append((f"worst, {100 * share:g} % of that force", _sorted(arm, pushes, share, True)))
         panels.append(_panel(title, lines))
-    both = [(f"{100 * known:g} % fed forward", _sorted(OpenLoopArm(False, known), pushes, 0.1, False)) for known in (0.0, KNOWN)]
+    both = [
+        (f"{100 * known:g} % fed forward", _sorted(OpenLoopArm(False, known), pushes, 0.1, False))
+        for known in (0.0, KNOWN)
+    ]
     return (*panels, _panel("c) feed-forward, 10 % of that force", both))
 
 
