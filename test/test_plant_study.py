@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from wam_analysis.measures.limit_cycle import mean_cycle
-from wam_experiments.plant.effects import STUDIES, actuator_cycle_with_backlash, resonances, stiction_cycle, torque_controlled
+from wam_experiments.plant.effects import (
+    STUDIES,
+    actuator_cycle_with_backlash,
+    resonances,
+    stiction_cycle,
+    torque_controlled,
+)
 from wam_experiments.plant.figure import RATIOS, figure
 from wam_experiments.plant.levels import LEVELS
 

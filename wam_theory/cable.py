@@ -71,7 +71,7 @@ def circuit_torque(stretch: ArrayLike, stiffness: ArrayLike, pretension: ArrayLi
 
 
 def play_torque(stretch: ArrayLike, stiffness: ArrayLike, backlash: ArrayLike) -> Array:
-    """Torque of a geared shaft with backlash at its motor, N m: k (|x| - play/2) beyond half the play (2.2).
+    """Torque of a geared shaft with backlash at its motor, N m: k (|x| - play/2) beyond half the play, section 2.2.
 
     Parameters
     ----------

@@ -283,8 +283,7 @@ def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
     """
     friction, play = 6.0, np.array([0.0, 2.5e-3, 5e-3, 1e-2])
     found = [
-        force_step(desired, 1464.28, 4.3e-2, 18.7, (friction, friction), 4.0, backlash=value)
-        for value in play.tolist()
+        force_step(desired, 1464.28, 4.3e-2, 18.7, (friction, friction), 4.0, backlash=value) for value in play.tolist()
     ]
     travel = np.array([np.ptp(response.motor[response.time > 0.15]) for response in found])
     crossed = play if desired < friction else 0.0 * play
