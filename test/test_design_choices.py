@@ -11,10 +11,12 @@ from wam_experiments.design_choices import (
     GAMMA,
     STEP,
     Choice,
+    differential_radius,
     friction_or_stiffness,
     half_friction,
     stiffness_rule,
     twice_stiffness,
+    twisted_circuit,
 )
 from wam_experiments.scorecard import measures
 from wam_theory.linear_loop import routh_gain
@@ -106,3 +108,29 @@ def test_twice_the_stiffness_costs_margin_and_less_friction_does_not(choices: di
     ratio = choices["margin of the gain (5.15)"]
     assert margin(twice_stiffness()) / margin(BASE) == pytest.approx(ratio.twice_stiffness, rel=1e-4)
     assert ratio.half_friction == 1.0 > ratio.twice_stiffness
+
+
+def test_third_stage_leaves_96_percent_from_a_radius_of_an_inch_and_a_half_on() -> None:
+    """In the units of the thesis: 43 in-lb times 30.4 at each pulley of the differential, E A 51 500 lb."""
+    configuration = Configuration.load(packaged("wam"))
+    inches = differential_radius(configuration) / 0.0254
+    assert inches == pytest.approx(43.0 * 30.4 / 51_500.0 / (1.0 - 0.96 / measures(configuration).efficiency), rel=1e-3)
+    assert 1.2 < inches < 2.0
+
+
+def test_twist_of_the_circuit_of_joint_4_costs_little_torque_on_joint_3() -> None:
+    """By the length of a helix and the slope of the energy of both strands."""
+    configuration = Configuration.load(packaged("wam"))
+    arm, twisted = configuration.shared.arm, twisted_circuit(configuration)
+    assert math.degrees(twisted.twist) == pytest.approx(180.0)
+    ea, length, radius, t0 = 42258.1, 22 * 0.0254, 0.375 * 0.0254, arm.cables.pretension[3]
+
+    def energy(phi: float) -> float:
+        longer = math.sqrt(length**2 + (radius * phi) ** 2) - length
+        return 2.0 * (t0 * longer + 0.5 * ea / length * longer**2)
+
+    slope = (energy(twisted.twist + 1e-4) - energy(twisted.twist - 1e-4)) / 2e-4
+    assert twisted.torque == pytest.approx(slope, rel=1e-5)
+    assert 0.2 < twisted.change / t0 < 0.25
+    friction = 0.01 * 2.0 * 15.2 * 43.0 * 0.1129848  # 1 % of the peak torque of joint 3
+    assert twisted.torque < 0.25 * friction

@@ -217,3 +217,16 @@ def test_arguments_broadcast() -> None:
 def test_a_refusal_names_the_value(call: Callable[[], object], names: str) -> None:
     with pytest.raises(ValueError, match=names):
         call()
+
+
+@pytest.mark.parametrize("viscosity", [30.0, 300.0])
+def test_viscous_cable_loses_on_each_pulley_what_a_slipping_one_loses(viscosity: float) -> None:
+    """6.2.5: an element that enters with T1 stretches under T2 after it has left; stepped in time, any viscosity."""
+    loose, tight, ea, speed = 100.0, 500.0, 42_258.0, 0.3
+    strain, heat, dt = loose / ea, 0.0, 2e-3 * viscosity / ea
+    for _ in range(6000):
+        rate = (tight - ea * strain) / viscosity
+        heat += viscosity * rate**2 * dt
+        strain += rate * dt
+    shaft_power = (tight - loose) * speed  # heat is per length of cable, of which `speed` passes in a second
+    assert heat * speed == pytest.approx(float(te.pulley_loss(shaft_power, tight - loose, ea)), rel=5e-3)

@@ -31,7 +31,10 @@ def test_dynamics_between_motor_and_sensor_limit_the_torque_loop_and_not_the_vel
     """The margin is where a sampled root crosses the unit circle; an undamped cable leaves the torque loop none."""
     torque, velocity = LOOPS
     soft, stiff = damped_testbed(0.5), damped_testbed(2.0)
-    ratios = [largest_gain(period_map(stiff), loop.gain(stiff)) / largest_gain(period_map(soft), loop.gain(soft)) for loop in (torque, velocity)]
+    ratios = [
+        largest_gain(period_map(stiff), loop.gain(stiff)) / largest_gain(period_map(soft), loop.gain(soft))
+        for loop in (torque, velocity)
+    ]
     assert ratios[0] < 0.3
     assert ratios[1] == pytest.approx(1.0, abs=0.05)
     arm = damped_testbed()
@@ -44,7 +47,7 @@ def test_dynamics_between_motor_and_sensor_limit_the_torque_loop_and_not_the_vel
 
 
 def test_torque_loop_of_a_rotor_on_a_held_cable_by_hand() -> None:
-    """u = -g k theta on J theta'' + d theta' + k theta: the half period of the hold takes g k T/2 of the damping d."""
+    """U = -g k theta on J theta'' + d theta' + k theta: the half period of the hold takes g k T/2 of the damping d."""
     arm = damped_testbed()
     (circuit,), rotor = arm.circuits, arm.motors.inertia[0]
     drag = circuit.damping + arm.motors.viscous_friction[0]

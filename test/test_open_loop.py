@@ -1,8 +1,12 @@
 """Force without feedback: the play of friction, and errors over the workspace within what statics allows."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from wam_description.configuration import Configuration, packaged
+from wam_driver.driver import DriverParameters
 from wam_experiments.figures.open_loop import KNOWN, OpenLoopArm
 from wam_theory.stiction import play
 
@@ -40,3 +44,13 @@ def test_feed_forward_of_friction_and_cogging_halves_the_error() -> None:
     pushes = plain.pushes()[:12]
     before, after = (np.median([abs(arm.error(q, 0.1 * f)) for q, f in pushes]) for arm in (plain, known))
     assert after < 0.65 * before
+
+
+def test_arm_with_cogging_has_the_measured_breakaway_torque_of_its_motors() -> None:
+    """Its friction, that by tension and its cogging are together the friction of config/wam.yaml."""
+    measured = Configuration.load(packaged("wam")).shared.arm.motors.static_friction
+    parts = Configuration.load(Path(__file__).resolve().parents[1] / "examples" / "cogging.yaml")
+    arm, effects = parts.shared.arm, parts.node("driver", DriverParameters).effects
+    tension = 2.0 * np.multiply(effects.tension_friction, arm.cables.pretension)
+    together = arm.motors.static_friction + tension + np.array(effects.ripples.amplitude[:4])
+    np.testing.assert_allclose(together, measured, rtol=0.01)

@@ -508,7 +508,7 @@ EVERYTHING = Effects(
     ripples=Ripples(("motor1", "motor4", "joint2"), (1.0, 0.26, 5.5), (0.02, 0.1, 0.1), (24, 1, 1), (0.0, 0.5, 1.0)),
     creep=True,
     slack=True,
-    backlash=(0.0,),
+    backlash=(0.0, 0.0, 0.0, 0.02),
     tension_friction=(1e-5,) * 4,
     added_coulomb_friction=(0.05,) * 4,
 )

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from wam_analysis.measures.limit_cycle import mean_cycle
-from wam_experiments.plant.effects import STUDIES, resonances, stiction_cycle
+from wam_experiments.plant.effects import (
+    STUDIES,
+    actuator_cycle_with_backlash,
+    resonances,
+    stiction_cycle,
+    torque_controlled,
+)
 from wam_experiments.plant.figure import RATIOS, figure
 from wam_experiments.plant.levels import LEVELS
 
@@ -19,9 +25,12 @@ from wam_experiments.plant.levels import LEVELS
         ("backlash", 1e-6),
         ("creep", 1e-3),  # (6.19) 0.1 %: the damper of the circuit carries a little of the load while it creeps
         ("efficiency", 1e-3),  # (6.15) 0.1 %: creep is first order in the strain
+        ("torque control", 1e-2),  # (6.22) is first order in the strain
+        ("pretension", 1e-3),
         ("ripple", 1e-6),
         ("linear surface", 2e-3),  # k_c 0.2 %: the tip accelerates, which takes 0.1 % of the force
         ("hardening surface", 2e-3),
+        ("backlash in the loop", 1e-2),
         ("impact", 5e-3),  # (3.1) 0.5 %
         ("actuator cycle", 1e-2),  # (5.20) 1 %, at every moment of 6 s
     ],
@@ -66,3 +75,18 @@ def test_figure_is_drawn_and_its_table_names_every_effect(tmp_path: Path) -> Non
 )
 def test_level_is_as_near_to_theory_as_promised(name: str, most: float) -> None:
     assert LEVELS[name]().error < most
+
+
+def test_loss_under_torque_control_is_creep_and_no_friction_of_the_torque() -> None:
+    """6.4.4 calls it friction: the joint has all of the torque in both directions, and the motor turns further."""
+    for speed in (0.5, -0.5):
+        torque, loss = torque_controlled(4.0, speed)
+        assert torque == pytest.approx(14.0 * 4.0, rel=1e-6)
+        by_hand = 4.0**2 / (9.525e-3 * 42258.1) + 4.0**2 * 3.74166 / (9.525e-3 * 158116.0)
+        assert loss == pytest.approx(by_hand, rel=0.01)
+
+
+@pytest.mark.slow
+def test_play_is_without_effect_while_a_force_above_the_friction_keeps_the_flank_loaded() -> None:
+    travel = actuator_cycle_with_backlash(20.0).plant
+    assert travel == pytest.approx(travel[0], rel=0.01)

@@ -56,8 +56,9 @@ def test_the_samples_are_small() -> None:
     )
 
 
-def test_every_experiment_and_task_has_a_sample_and_it_is_what_is_declared() -> None:
-    assert [entry["name"] for entry in INDEX] == sorted([*names(), *tasks()])
+def test_every_sample_that_an_experiment_or_task_declares_is_there_and_what_is_declared() -> None:
+    declared = [name for name in [*names(), *tasks()] if load(name).sample is not None]
+    assert [entry["name"] for entry in INDEX] == sorted(declared)
     for entry in INDEX:
         sample = load(entry["name"]).sample
         assert sample is not None

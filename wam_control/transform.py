@@ -1,22 +1,65 @@
 """The transform between motor space and joint space, (A.5), as the joint side uses it."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from wam_description.arm import Arm
+from wam_description.parameters import parameter
 from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
 
 
-class Transform:
-    """Motor states to joint states, joint commands to motor commands."""
+@dataclass(frozen=True)
+class TransformParameters:
+    """What the transform knows of the cables."""
+
+    creep_correction: bool = parameter(
+        "true if joint angles are corrected by the creep of the cables, (6.19), of the torques that the motors report",
+        before=False,
+    )
+
+
+class CreepEstimate:
+    """Creep of each circuit at its motor, rad, along the motor's travel: the integral of loss tau |d theta|, (6.19).
+
+    Section 6.4.3; friction and acceleration of the rotors count as load, elastic stretch is not in it.  It starts at
+    zero, so joint angles are right where the motors were referenced.
+    """
 
     def __init__(self, arm: Arm) -> None:
+        self._loss = [circuit.loss_per_torque for circuit in arm.circuits]
+        self._before: list[float] = []
+        self.creep = [0.0] * len(self._loss)
+
+    def step(self, theta: Sequence[float], tau: Sequence[float]) -> list[float]:
+        """Creep after the motors have turned to these angles (n,), rad, with these torques (n,), N m."""
+        for i, (angle, before) in enumerate(zip(theta, self._before or theta, strict=True)):
+            self.creep[i] += self._loss[i] * abs(angle - before) * tau[i]
+        self._before = list(theta)
+        return self.creep
+
+
+class Transform:
+    """Motor states to joint states, joint commands to motor commands.
+
+    Parameters
+    ----------
+    arm : the arm as the controllers know it.
+    creep_correction : as in `TransformParameters`.
+    """
+
+    def __init__(self, arm: Arm, creep_correction: bool = False) -> None:
         self._map = TransmissionMap.of(arm)
+        self._creep = CreepEstimate(arm) if creep_correction else None
 
     def joint_state(self, motors: State) -> State:
-        """Joint angles, velocities and torques (n,) that belong to those of the motors, cables taken as rigid."""
+        """Joint angles, velocities and torques (n,) that belong to those of the motors, cables not stretched."""
+        angles: Sequence[float] = motors.position
+        if self._creep is not None:
+            creep = self._creep.step(angles, motors.effort)
+            angles = [angle - crept for angle, crept in zip(angles, creep, strict=True)]
         return State(
-            self._map.joint_positions(motors.position),
+            self._map.joint_positions(angles),
             self._map.joint_velocities(motors.velocity),
             self._map.joint_torques(motors.effort),
         )

@@ -1,8 +1,7 @@
 """Node `transform`: motor space to joint space and back."""
 
-from wam_control.transform import Transform
+from wam_control.transform import Transform, TransformParameters
 from wam_description.arm import Shared
-from wam_description.parameters import Nothing
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
@@ -11,10 +10,10 @@ from wam_description.wiring import Input, Outputs, reaction
 class TransformNode:
     """Converts each message as it comes; the stamp stays that of the state that caused it."""
 
-    name, parameters = "transform", Nothing
+    name, parameters = "transform", TransformParameters
 
-    def __init__(self, shared: Shared, own: Nothing) -> None:
-        self._transform = Transform(shared.arm)
+    def __init__(self, shared: Shared, own: TransformParameters) -> None:
+        self._transform = Transform(shared.arm, own.creep_correction)
         self._no_effort = State([], [], [0.0] * len(shared.arm.joints.names))
 
     @reaction(Input("motor_states"), outputs=("joint_states",), thinned=True)

@@ -258,7 +258,7 @@ def deadband_against_stiction(peak_to_peak: ArrayLike) -> Array:
 
 
 def play(desired: ArrayLike, friction: ArrayLike) -> Array:
-    """Contact force of open-loop force control along a path of F_des, N: friction as a deadband (5.2).
+    """Contact force of open-loop force control along a path of F_des, N: friction as a deadband, section 5.2.
 
     |F_c - F_des| stays within the friction, and F_c changes only where it would not.  From rest F_c is zero up to
     F_des = friction, which is the deadband of 5.2; on the way back F_c is kept over twice the friction.  A contact

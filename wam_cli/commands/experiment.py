@@ -46,7 +46,8 @@ def run(given: argparse.Namespace) -> int:
     if given.write:
         writable_file("--write", Path(given.write))
     results: dict[str, tuple[Experiment, Result, Path]] = {}
-    for experiment in map(load, names() if given.all else [given.experiment]):
+    chosen = names() if given.all else [given.experiment]
+    for number, experiment in enumerate(map(load, chosen), 1):
         if given.evaluate:
             directory = Path(given.evaluate) / experiment.name if given.all else Path(given.evaluate)
             picture = Path(given.directory) / f"{experiment.name}.png"
@@ -54,7 +55,7 @@ def run(given: argparse.Namespace) -> int:
             name = given.name or f"{experiment.name}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
             directory = Path(given.directory) / (f"{name}/{experiment.name}" if given.all and given.name else name)
             picture = directory / PICTURE
-            if not _record(experiment, directory):
+            if not _record(experiment, directory, f"{number}/{len(chosen)} " if given.all else ""):
                 return 130
         result = evaluate(experiment, directory)
         picture.parent.mkdir(parents=True, exist_ok=True)
@@ -66,11 +67,11 @@ def run(given: argparse.Namespace) -> int:
     return 0 if all(result.agrees for _, result, _ in results.values()) else 1
 
 
-def _record(experiment: Experiment, directory: Path) -> bool:
+def _record(experiment: Experiment, directory: Path, place: str) -> bool:
     """Record every run; False where it was interrupted."""
     stop = Stop()
     for i, each in enumerate(experiment.runs):
-        play(experiment, each, directory, f"{experiment.name} {i + 1}/{len(experiment.runs)} {each.name}", stop)
+        play(experiment, each, directory, f"{place}{experiment.name} {i + 1}/{len(experiment.runs)} {each.name}", stop)
         if stop.is_set:
             print(f"stopped; what was recorded until then is in {directory}")
             return False

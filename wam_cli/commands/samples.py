@@ -27,7 +27,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Check or record; 0 if every sample is as the index lists it."""
     directory = Path(given.directory)
-    chosen = [load(name) for name in given.name or [*names(), *tasks()]]
+    every = [load(name) for name in given.name or [*names(), *tasks()]]
+    chosen = [experiment for experiment in every if given.name or experiment.sample is not None]
     if given.make and not _make(chosen, directory):
         return 130
     entries = read_index(directory)

@@ -1,4 +1,4 @@
-"""Numbers of figure 2.1.2: what an inner loop on torque, or on velocity or position, leaves of a disturbance at the motor.
+"""Numbers of figure 2.1.2: what an inner loop on torque, velocity or position leaves of a disturbance at the motor.
 
 Every loop is sampled at 1 kHz.  A velocity loop with an integral is a position loop whose reference is the integral
 of the commanded velocity, so that both are one curve.

@@ -1,5 +1,6 @@
-"""Numbers of figure 2.1.1: error of the force without feedback over the workspace, and what feed-forward saves (7.2.2)."""
+"""Numbers of figure 2.1.1: error of the force without feedback over the workspace, and with feed-forward (7.2.2)."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,7 @@ RIPPLE, FRICTION, DEADBAND = 0.02, 0.01, 0.005  # of the torque; of the continuo
 CONTACT = 2000.0  # N/m at the tip, in every direction
 COGGING, CYCLES = 0.5, 24  # part of the motor's friction that is cogging, assumed; 8 poles, 3 phases
 KNOWN = 0.9  # of friction and cogging, that is fed forward
+SHARES = 1.0, 0.1  # of the largest steady force
 POSES, SEED = 60, 11
 STEP, RISE, REST = 5e-4, 0.6, 0.3  # s
 SINGULAR = 0.15  # m, least singular value of the tip's Jacobian of a pose that counts
@@ -124,25 +126,26 @@ def open_loop() -> Panels:
     """Distribution of the error over poses and directions, with the worst by statics; and with feed-forward."""
     pushes = OpenLoopArm(True).pushes()
     panels = []
-    for title, quiet in (("a) motors of 2.1.1 alone", True), ("b) the arm of 7.2.2", False)):
+    for title, arm in (("a) motors of 2.1.1 alone", OpenLoopArm(True)), ("b) the arm of 7.2.2", OpenLoopArm(False))):
         lines = []
-        for share in (1.0, 0.1):
-            arm = OpenLoopArm(quiet)
-            lines.append((f"worst, {100 * share:g} % of that force", _sorted(arm, pushes, share, True)))
+        for share in SHARES:
+            bounds, errors = (_sorted(of, pushes, share) for of in (arm.bound, arm.error))
+            lines.append((f"worst, {100 * share:g} % of that force", Series(bounds, _parts(), errors, _parts())))
         panels.append(_panel(title, lines))
-    both = [(f"{100 * known:g} % fed forward", _sorted(OpenLoopArm(False, known), pushes, 0.1, False)) for known in (0.0, KNOWN)]
+    plain, known = lines[-1][1].plant_x, _sorted(OpenLoopArm(False, KNOWN).error, pushes, SHARES[-1])
+    both = [("0 % fed forward", line_only(plain, _parts())), ("90 % fed forward", line_only(known, _parts()))]
     return (*panels, _panel("c) feed-forward, 10 % of that force", both))
 
 
-def _sorted(arm: OpenLoopArm, pushes: Pushes, share: float, bounded: bool) -> Series:
-    """Part of the poses below each error, percent of the largest steady force; the line is the bound or the error."""
-    fraction = (np.arange(len(pushes)) + 0.5) / len(pushes)
-    largest = [float(np.linalg.norm(force)) for _, force in pushes]
-    errors = np.sort([100.0 * abs(arm.error(q, share * f)) / n for (q, f), n in zip(pushes, largest, strict=True)])
-    if not bounded:
-        return line_only(errors, fraction)
-    bounds = np.sort([100.0 * arm.bound(q, share * f) / n for (q, f), n in zip(pushes, largest, strict=True)])
-    return Series(bounds, fraction, errors, fraction)
+def _parts() -> Numbers:
+    parts: Numbers = (np.arange(POSES) + 0.5) / POSES
+    return parts
+
+
+def _sorted(of: Callable[[tuple[float, ...], Numbers], float], pushes: Pushes, share: float) -> Numbers:
+    """Errors or bounds of a share of each force, percent of the largest steady force, the least first."""
+    found: Numbers = np.sort([100.0 * abs(of(q, share * force)) / np.linalg.norm(force) for q, force in pushes])
+    return found
 
 
 def _panel(title: str, lines: list[tuple[str, Series]]) -> ThesisPanel:

@@ -29,6 +29,7 @@ from wam_experiments.plant.ideal_testbed import (
 from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, play_torque, stage_loss
 from wam_theory.resonance import force_resonances
 from wam_theory.stick_slip import IntegralLoop, simulate
+from wam_theory.tension_element import coulomb_like_torque
 
 Numbers = NDArray[np.float64]
 
@@ -152,6 +153,38 @@ def efficiency_under_load() -> PlantCurve:
     return PlantCurve(torques, np.array(efficiencies), np.array(theory))
 
 
+def torque_controlled(torque: float, speed: float) -> tuple[float, float]:
+    """Torque of the cables on a link that turns at a speed, and power lost over the speed of the motor, N m.
+
+    Parameters
+    ----------
+    torque : of the motor, N m, against the link's motion for a positive speed.
+    speed : of the link, rad/s, which its inertia keeps.
+    """
+    arm = ideal_testbed(damping=0.02)
+    arm = replace(arm, joints=replace(arm.joints, armature=(IMMOVABLE,)))
+    plant = released_plant(arm, creep=True)
+    plant.data.qpos[0] = torque / arm.circuits[0].stiffness
+    plant.data.qvel[:] = (14.0 * speed, speed)
+    for _ in range(round(0.3 / STEP)):
+        plant.step([torque])
+    theta, q, count = plant.theta[0], plant.q[0], round(0.5 / STEP)
+    for _ in range(count):
+        plant.step([torque])
+    travel = plant.theta[0] - theta
+    return plant.cable_torque[0], torque * (travel - 14.0 * (plant.q[0] - q)) / abs(travel)
+
+
+def coulomb_like() -> PlantCurve:
+    """Loss under torque control as a friction torque at the motor, over its torque, N m: (6.22) of all pulleys."""
+    torques = np.linspace(1.0, 6.0, 6)
+    found = [torque_controlled(torque, 0.5)[1] for torque in torques.tolist()]
+    cables = ideal_testbed().cables
+    stages = list(zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, strict=True))
+    theory = sum(2.0 * coulomb_like_torque(n * torques, r, ea) / n for n, r, ea in stages)
+    return PlantCurve(torques, np.array(found), np.asarray(theory))
+
+
 def ripple(eccentricity: float = 2.54e-4) -> PlantCurve:
     """Torque of an eccentric pulley at a third of the motor's speed, over the motor's angle, rad."""
     arm = ideal_testbed(rotor=IMMOVABLE)
@@ -239,6 +272,24 @@ def actuator_cycle() -> PlantCurve:
     return step_response((6.0, 6.0), damping=18.7, gain=4.3e-2, seconds=6.0).motor
 
 
+def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
+    """Actuator cycle, peak to peak, over the play, both at the joint, rad: 2 F/k_tr of (5.20) and the play (2.2).
+
+    A desired force below the friction, so that the gear changes its flank; above it the play is without effect.
+
+    Parameters
+    ----------
+    desired : F_des, N m.
+    """
+    friction, play = 6.0, np.array([0.0, 2.5e-3, 5e-3, 1e-2])
+    found = [
+        force_step(desired, 1464.28, 4.3e-2, 18.7, (friction, friction), 4.0, backlash=value) for value in play.tolist()
+    ]
+    travel = np.array([np.ptp(response.motor[response.time > 0.15]) for response in found])
+    crossed = play if desired < friction else 0.0 * play
+    return PlantCurve(play, travel, 2.0 * friction / found[0].node.transmission_stiffness + crossed)
+
+
 def impact() -> PlantCurve:
     """Greatest force of a link that runs into a spring at 0.5 rad/s, over its stiffness at the tip, N/m; (3.1).
 
@@ -261,15 +312,48 @@ def impact() -> PlantCurve:
     return PlantCurve(stiffness, np.array(found), 0.5 * np.sqrt(inertia * stiffness))
 
 
+def pretension(coefficient: float = 1e-4) -> PlantCurve:
+    """Breakaway torque of the motor over the pretension, N m over N: what active pretension would lower, (6.5)."""
+    arm = ideal_testbed(friction=(50.0, 50.0))  # the link does not move
+    tension = np.linspace(0.2, 1.0, 5) * arm.cables.pretension[0]
+    found = []
+    for value in tension.tolist():
+        less = replace(arm, cables=replace(arm.cables, pretension=(value,)))
+        plant = released_plant(less, tension_friction=(coefficient,))
+        found.append(breakaway(plant, False, 0.9 * coefficient * 2.0 * value))
+    return PlantCurve(tension, np.array(found), coefficient * 2.0 * tension)
+
+
+def breakaway(plant: Plant, at_joint: bool, start: float) -> float:
+    """Torque, N m, at which a shaft at rest starts to turn, increased by 1e-5 of itself in each step.
+
+    Parameters
+    ----------
+    plant : at rest.
+    at_joint : whether the joint is pushed, otherwise the motor gives the torque.
+    start : torque at the start, N m.
+    """
+    torque = start
+    while abs(plant.qd[0] if at_joint else plant.thetad[0]) < 1e-5:
+        torque *= 1.00001
+        if at_joint:
+            plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
+        plant.step([0.0 if at_joint else torque])
+    return torque
+
+
 STUDIES: dict[str, Callable[[], PlantCurve]] = {
     "slack": slack,
     "backlash": backlash,
     "creep": creep_out_and_back,
     "efficiency": efficiency_under_load,
+    "torque control": coulomb_like,
+    "pretension": pretension,
     "ripple": ripple,
     "linear surface": lambda: surface(0.0),
     "hardening surface": lambda: surface(50.0),
     "impact": impact,
     "actuator cycle": actuator_cycle,
+    "backlash in the loop": actuator_cycle_with_backlash,
     "stiction cycle": stiction_cycle,
 }

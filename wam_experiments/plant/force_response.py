@@ -43,11 +43,12 @@ def loop_arm(damping: float, friction: tuple[float, float]) -> Arm:
     return replace(arm, joints=replace(arm.joints, viscous_friction=(damping,)))
 
 
-def loop_plant(arm: Arm, stiffness: float, unilateral: bool = False, step: float = STEP) -> Plant:
-    """Its plant against a spring, N m/rad; a unilateral one pushes at angles below zero."""
-    return released_plant(
-        arm, World(NOTHING, Springs(("joint1",), (stiffness,), (1.0,), (0.0,), (not unilateral,))), step
-    )
+def loop_plant(
+    arm: Arm, stiffness: float, unilateral: bool = False, step: float = STEP, backlash: float = 0.0
+) -> Plant:
+    """Its plant against a spring, N m/rad; a unilateral one pushes at angles below zero; backlash at the joint, rad."""
+    spring = Springs(("joint1",), (stiffness,), (1.0,), (0.0,), (not unilateral,))
+    return released_plant(arm, World(NOTHING, spring), step, backlash=(RATIO * backlash,))
 
 
 def loop_node(arm: Arm, stiffness: float, unilateral: bool = False) -> FrictionNode:
@@ -74,6 +75,7 @@ def force_step(
     unilateral: bool = False,
     proportional: bool = False,
     step: float = STEP,
+    backlash: float = 0.0,
 ) -> PlantResponse:
     """Response of the testbed to a step of the desired force, the loop closed in every step.
 
@@ -88,9 +90,10 @@ def force_step(
     unilateral : whether the contact only pushes.
     proportional : whether the error sets the motor's position instead of its speed.
     step : of the plant, s.
+    backlash : play between motor and link at the joint, rad.
     """
     arm = loop_arm(damping, friction)
-    plant = loop_plant(arm, stiffness, unilateral, step)
+    plant = loop_plant(arm, stiffness, unilateral, step, backlash)
     side = -1.0 if unilateral else 1.0  # the one-sided spring is below
     rows = []
     for _ in range(round(seconds / step)):

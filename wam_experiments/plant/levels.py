@@ -8,8 +8,8 @@ import numpy as np
 from wam_description.configuration import Configuration, packaged
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
-from wam_driver.plant import Plant
 from wam_driver.sensors import Encoders
+from wam_experiments.plant.effects import breakaway
 from wam_experiments.plant.ideal_testbed import (
     IMMOVABLE,
     STEP,
@@ -32,29 +32,18 @@ class MeasuredLevel(NamedTuple):
         return abs(self.plant / self.theory - 1.0)
 
 
-def _breakaway(plant: Plant, at_joint: bool, start: float) -> float:
-    """Torque, N m, at which a shaft at rest starts to turn, increased by 1e-5 of itself in each step."""
-    torque = start
-    while abs(plant.qd[0] if at_joint else plant.thetad[0]) < 1e-5:
-        torque *= 1.00001
-        if at_joint:
-            plant.push("link", np.zeros(3), np.array([0.0, 0.0, torque]))
-        plant.step([0.0 if at_joint else torque])
-    return torque
-
-
 def tension_friction(coefficient: float = 1e-4) -> MeasuredLevel:
     """Breakaway torque of the motor with friction proportional to the tension of both strands, c (T1 + T2), (6.5)."""
     arm = ideal_testbed(friction=(50.0, 50.0))  # the link does not move
     plant = released_plant(arm, tension_friction=(coefficient,))
-    return MeasuredLevel(_breakaway(plant, False, 0.06), coefficient * 2.0 * arm.circuits[0].pretension)
+    return MeasuredLevel(breakaway(plant, False, 0.06), coefficient * 2.0 * arm.circuits[0].pretension)
 
 
 def added_friction() -> MeasuredLevel:
     """Breakaway torque of the joint with an added Coulomb friction of 0.7 N m, motor free."""
     plant = released_plant(ideal_testbed(friction=(0.3, 0.3)))
     plant.set_added_friction((0.7,))
-    return MeasuredLevel(_breakaway(plant, True, 0.9), 1.0)
+    return MeasuredLevel(breakaway(plant, True, 0.9), 1.0)
 
 
 def circuit_damping() -> MeasuredLevel:

@@ -15,7 +15,8 @@ step_response   (5.2), (5.3), half cycles of (5.17) and (5.18)
 limit_cycles    stiction (5.8), (5.9); actuator (5.20) to (5.22)
 testbed         section 5.6: stable gain with friction, step size, saturation and delay
 transmission    chapter 4: force response by chirp, position of the reducer
-cables          chapter 6: efficiency (6.15), creep (6.19)
+cables          chapter 6: efficiency (6.15), creep (6.19) and its correction
+force_accuracy  force without feedback, 5.2; a sensor that is calibrated wrong, 2.2
 arm_forces      the arm presses, slides and is pushed
 one_link        node, loop and response of a testbed with one link, for the evaluations above
 """

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wam_description.arm import Arm
 from wam_experiments.thesis.recording import Recording, Step
@@ -11,6 +12,8 @@ from wam_theory import cable
 
 WITHIN = 0.02
 ROUNDING = 1e-6  # s
+LEFT = 0.05  # of the creep, that is left of it: friction and acceleration of the rotor count as load
+OWN_TORQUE = 0.02  # of the creep, its deviation from (6.19)
 REST = 0.1  # s before the motor turns, to average a small oscillation of the link
 
 
@@ -92,11 +95,33 @@ def creeping(runs: Mapping[str, Recording]) -> Result:
     )
 
 
-def crept(arm: Arm, travel: Numbers, load: float) -> Numbers:
+def corrected(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `creep-correction`: joint angles of the transform, with and without (6.19)."""
+    rows, curves = [], []
+    for name, run in runs.items():
+        joints, sensors, motors = run.joints("joint_states"), run.joints("joint_sensors"), run.joints("motor_states")
+        begin = run.step("out").begin
+        error = joints.position[:, 0] - np.interp(joints.time, sensors.time, sensors.position[:, 0])
+        error -= float(np.mean(error[(joints.time > begin - REST) & (joints.time < begin)]))  # elastic stretch
+        theta = motors.position[motors.time > begin, 0]
+        creep = float(crept(run.shared.arm, np.abs(np.diff(theta)).sum(), load_torque(run, run.step("out"))))
+        last = 1e3 * float(np.mean(error[joints.time > run.steps[-1].end - REST]))
+        label, left = name.replace("_", " "), 0.0 if run.parameters.node("transform")["creep_correction"] else creep
+        within = LEFT if not left else OWN_TORQUE
+        rows.append(
+            Comparison(
+                f"error of the joint angle, {label}", 1e3 * left, last, "mrad", within * 1e3 * creep, "(6.19)", True
+            )
+        )
+        curves.append(Curve("measured", label, joints.time, 1e3 * error))
+    return Result(rows, [Panel("error of the joint angle, from motor angles", "time [s]", "[mrad]", curves)])
+
+
+def crept(arm: Arm, travel: ArrayLike, load: float) -> Numbers:
     """Creep at the joint, rad, under a load at the joint, N m, over the motor's travel, (6.19)."""
     cables, ratio = arm.cables, arm.joint_from_motor[0]
     stages = zip(cables.stage_ratio, cables.stage_radius, cables.stage_ea, cables.stage_circuits, strict=True)
-    total = sum(n * cable.creep(travel / n, n * load * ratio / c, r, ea) for n, r, ea, c in stages)
+    total = sum(n * cable.creep(np.asarray(travel) / n, n * load * ratio / c, r, ea) for n, r, ea, c in stages)
     return np.asarray(total) * ratio
 
 

@@ -140,7 +140,9 @@ def deviations_in(page: str) -> dict[str, str]:
     found = {}
     for name, block in re.findall(r"<!-- experiment: (\S+) -->\n(.*?)<!-- end -->", page, re.DOTALL):
         rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in block.splitlines()]
-        bounded = [row[4].lstrip("+-") for row in rows if len(row) > 5 and row[4].endswith("%") and row[5].endswith("%")]
+        bounded = [
+            row[4].lstrip("+-") for row in rows if len(row) > 5 and row[4].endswith("%") and row[5].endswith("%")
+        ]
         if bounded:
             found[name] = max(bounded, key=percent)
     return found

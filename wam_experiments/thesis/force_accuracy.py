@@ -1,7 +1,6 @@
 """Accuracy of the contact force without feedback, 5.2, and with a sensor that is calibrated wrong, 2.2."""
 
 from collections.abc import Mapping
-from itertools import pairwise
 
 import numpy as np
 
@@ -24,7 +23,9 @@ def accuracy(runs: Mapping[str, Recording]) -> Result:
         if name != "open_loop":
             link = one_link(run)
             shown = response(run, link)
-            rows.append(_calibration(name.replace("_", " "), run, link, shown.force[shown.time > shown.time[-1] - LATE]))
+            rows.append(
+                _calibration(name.replace("_", " "), run, link, shown.force[shown.time > shown.time[-1] - LATE])
+            )
             curves.append(Curve("measured", name.replace("_", " "), shown.time, shown.force))
     return Result(rows, [panel, Panel("with feedback, 20 N commanded", "time [s]", "force [N]", curves)])
 
@@ -37,8 +38,9 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     expected = play(desired, friction)
     begin = float(desired[np.argmax(force > LEAST)])
     rows = [Comparison("deadband, F_des at which F_c begins", friction, begin - LEAST, "N", WITHIN, "5.2")]
-    for step, after in pairwise([*run.steps, None]):
-        last = len(force) - 1 if after is None else int(np.searchsorted(_times(run), after.begin)) - 1
+    times = run.joints("joint_sensors").time
+    for step in run.steps:
+        last = int(np.searchsorted(times, step.end)) - 1
         label = f"F_c at {desired[last]:.0f} N, {step.name}"
         rows.append(Comparison(label, float(expected[last]), float(force[last]), "N", WITHIN, "5.2"))
     worst = float(np.abs(force - expected).max() / expected.max())
@@ -46,10 +48,6 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     each = slice(None, None, 40)
     curves = [Curve("measured", "measured", desired[each], force[each]), Curve("predicted", "", desired, expected)]
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
-
-
-def _times(run: Recording) -> Numbers:
-    return run.joints("joint_sensors").time
 
 
 def _fed_forward(run: Recording, link: OneLink) -> tuple[Numbers, Numbers]:

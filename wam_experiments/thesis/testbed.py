@@ -52,8 +52,8 @@ def section_5_6(runs: Mapping[str, Recording]) -> Result:
     return Result(rows, panels)
 
 
-def as_told(runs: Mapping[str, Recording]) -> Result:
-    """The experiment `testbed-5.6-as-told`: verdict on every step and push, and the margin with the rod."""
+def as_described(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `testbed-5.6-as-described`: verdict on every step and push, and the margin with the rod."""
     rows = [row for name, run in runs.items() for row in verdicts(run, name.replace("_", " "))]
     below, above = (_ratio_at_rest(runs[f"rod_{side}_the_new_margin"]) for side in ("below", "above"))
     link, gains = below[0], [one.loop.gain for one, _ in (below, above)]
