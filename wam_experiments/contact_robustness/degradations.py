@@ -23,7 +23,7 @@ class Degradation(NamedTuple):
     ----------
     plant : values of the configuration that is simulated.
     model : values of the configuration of which the estimator has its arm.
-    torque_scale : (n,), measured over true torque of each motor.
+    torque_scale : measured over true torque, of each motor or one for all.
     torque_noise : sd of the measured torque, per torque.
     delay : samples by which measured torques are late.
     dropped : share of samples that do not arrive.
@@ -32,7 +32,7 @@ class Degradation(NamedTuple):
 
     plant: Values
     model: Values = ()
-    torque_scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
+    torque_scale: tuple[float, ...] = (1.0,)
     torque_noise: float = 0.0
     delay: int = 0
     dropped: float = 0.0
