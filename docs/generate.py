@@ -21,7 +21,7 @@ from wam_analysis.table import markdown
 from wam_control.dither import Dither
 from wam_control.force_loop import ForceLoop, ForceLoopParameters
 from wam_control.velocity_loop import VelocityLoopParameters
-from wam_description.arm import Shared, Timing
+from wam_description.arm import Arm, Shared, Timing
 from wam_description.configuration import Configuration
 from wam_description.constants import ARM_ASSUMED, ARM_PRINTED, TESTBED, Constant
 from wam_description.driver_contract import REQUIREMENTS
@@ -29,6 +29,7 @@ from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, fields
 from wam_description.topics import TOPICS
+from wam_description.transmission_map import TransmissionMap
 from wam_experiments import design_choices
 from wam_experiments.contact_benchmark import resting_push
 from wam_experiments.figures import backdrivability, open_loop, transmissions
@@ -281,6 +282,11 @@ def blocks() -> dict[str, Callable[[], str]]:
         **{f"task {name}": partial(task_of, name) for name in tasks()},
         **{f"claims, {title}": partial(claims_of, rows) for title, rows in claims.load(CLAIMS).items()},
         "verdict of the demonstration": verdict,
+        "joints of barrett-wam7": joints_of_today,
+        "motors of barrett-wam7": motors_of_today,
+        "demonstration of barrett-wam7": lambda: (
+            f"```text\n{(ROOT / 'docs' / 'barrett-demo.txt').read_text(encoding='utf-8')}```\n"
+        ),
         "examples/direct_run.py": lambda: listing("examples/direct_run.py"),
     }
 
@@ -299,6 +305,38 @@ def verdict() -> str:
     """The verdict of the demonstration, as `wam demo` prints it."""
     _, head, rest = (ROOT / "docs" / "demo.txt").read_text(encoding="utf-8").partition("Result,")
     return "\n```text\n" + f"{head}{rest}".partition("\n\n")[0].rstrip() + "\n```\n"
+
+
+@cache
+def today() -> Arm:
+    """The production WAM with its wrist."""
+    return Configuration.load(ROOT / "config" / "barrett-wam7.yaml").shared.arm
+
+
+def joints_of_today() -> str:
+    """Geometry, range and strength of its joints, as the configuration has them."""
+    joints, through = today().joints, TransmissionMap.of(today())
+    degrees = [f"{math.degrees(twist):.0f}" for twist in joints.twist]
+    strength = [f"{torque:.3g}" for torque in through.largest_joint_torques(today().motors.peak_torque)]
+    ranges = [f"{low:g} to {high:g}" for low, high in zip(joints.lower, joints.upper, strict=True)]
+    columns = zip(joints.names, degrees, joints.length, joints.offset, ranges, strength, strict=True)
+    head = ["joint", "alpha before it [deg]", "a before it [m]", "d [m]", "range [rad]", "peak torque [N m]"]
+    return markdown(head, [[name, *map(number, rest)] for name, *rest in columns])
+
+
+def motors_of_today() -> str:
+    """Its motors; the last two columns are assumed."""
+    motors, rows = today().motors, []
+    for i, motor in enumerate(motors.names):
+        ratios = zip(today().joints.names, TransmissionMap.of(today()).motor_from_joint[i].tolist(), strict=True)
+        turns = " ".join(f"{ratio:+.7g} {joint}" for joint, ratio in ratios if abs(ratio) > 1e-9)
+        known = (motors.inertia, motors.torque_constant, motors.peak_torque, motors.continuous_torque)
+        circuit = today().circuits[i]
+        assumed = (motors.static_friction[i], circuit.stiffness)
+        rows.append([motor, turns, *(number(values[i]) for values in known), *(f"{value:.3g}" for value in assumed)])
+    head = ["motor", "turns", "drive inertia [kg m²]", "torque constant [N m/A]", "peak torque [N m]",
+            "continuous torque [N m]", "static friction [N m], assumed", "cable [N m/rad], assumed"]  # fmt: skip
+    return markdown(head, rows)
 
 
 def task_of(name: str) -> str:
@@ -424,9 +462,19 @@ def pages() -> dict[Path, str]:
 
 
 def draw_demonstration() -> None:
-    """Run the demonstration in lockstep and keep its picture and its report."""
+    """Run the demonstration in lockstep and keep its pictures and its report."""
+    demonstrate(CONFIGURATION, "demo", is_moving=True)
+
+
+def draw_barrett() -> None:
+    """The same of the production WAM."""
+    demonstrate(ROOT / "config" / "barrett-wam7.yaml", "barrett-demo")
+
+
+def demonstrate(file: Path, kept: str, is_moving: bool = False) -> None:
+    """Run the demonstration of a configuration in lockstep and keep its report and picture by a name."""
     with tempfile.TemporaryDirectory(prefix="wam_docs_") as folder:
-        configuration = Configuration.load(CONFIGURATION).with_values({"recorder:directory": folder})
+        configuration = Configuration.load(file).with_values({"recorder:directory": folder})
         file = Path(folder) / "wam.yaml"
         file.write_text(configuration.text, encoding="utf-8")
         command = [
@@ -442,12 +490,13 @@ def draw_demonstration() -> None:
         ]
         done = subprocess.run([*command, "--config", str(file)], stdout=subprocess.PIPE, text=True, check=False)
         if done.returncode:
-            raise SystemExit("the demonstration failed, see above; docs/demo.* are unchanged")
+            raise SystemExit(f"the demonstration failed, see above; docs/{kept}.* are unchanged")
         report = done.stdout[done.stdout.index("Demonstration of") :].partition("\nbag ")[0].rstrip()
-        (ROOT / "docs" / "demo.txt").write_text(report + "\n", encoding="utf-8")
-        shutil.copyfile(Path(folder) / "demo" / "demo.png", ROOT / "docs" / "demo.png")
-        moving_picture.save(Path(folder) / "demo", ROOT / "docs" / "demo.webp")
-    print("docs/demo.png\ndocs/demo.txt\ndocs/demo.webp", flush=True)
+        (ROOT / "docs" / f"{kept}.txt").write_text(report + "\n", encoding="utf-8")
+        shutil.copyfile(Path(folder) / "demo" / "demo.png", ROOT / "docs" / f"{kept}.png")
+        if is_moving:
+            moving_picture.save(Path(folder) / "demo", ROOT / "docs" / f"{kept}.webp")
+    print(*(f"docs/{kept}{ending}" for ending in (".png", ".txt", *[".webp"] * is_moving)), sep="\n", flush=True)
 
 
 def draw_and_run_examples() -> None:
@@ -470,6 +519,7 @@ def draw_push() -> None:
 DRAWN = {
     "push": draw_push,
     "demonstration": draw_demonstration,
+    "barrett": draw_barrett,
     "tasks": draw_tasks,
     "examples": draw_and_run_examples,
 }

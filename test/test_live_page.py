@@ -81,23 +81,27 @@ def turned(wxyz: Any, vector: Any) -> np.ndarray[Any, Any]:
     return np.asarray(rotation @ np.asarray(vector, float))
 
 
-def test_links_are_drawn_where_the_simulator_has_them(server: Any) -> None:
-    scene = Scene(server, ARM, OBSTACLES, None)
-    scene.show(Snapshot(stamp=1, q=POSE))
-    model = mujoco.MjModel.from_xml_string(mjcf(ARM, 0.001, World(OBSTACLES, NO_SPRINGS), no_effects(ARM)))
+@pytest.mark.parametrize(
+    ("name", "pose"), [("wam", POSE), ("barrett-wam7", (0.3, 0.9, 0.2, 0.8, -0.4, 0.5, 1.1)), ("testbed", (0.2,))]
+)
+def test_links_are_drawn_where_the_simulator_has_them(server: Any, name: str, pose: tuple[float, ...]) -> None:
+    arm = Configuration.load(packaged(name)).shared.arm
+    scene = Scene(server, arm, OBSTACLES, None)
+    scene.show(Snapshot(stamp=1, q=pose))
+    model = mujoco.MjModel.from_xml_string(mjcf(arm, 0.001, World(OBSTACLES, NO_SPRINGS), no_effects(arm)))
     data = mujoco.MjData(model)
-    for name, angle in zip(ARM.joints.names, POSE, strict=True):
-        data.joint(name).qpos[0] = angle
+    for joint, angle in zip(arm.joints.names, pose, strict=True):
+        data.joint(joint).qpos[0] = angle
     mujoco.mj_kinematics(model, data)
-    for name in ARM.covers.names:
-        geom = data.geom(name)
-        tube = server.scene.get_handle_by_name(f"/arm/{name}/tube")
-        frame = scene.links[name]
+    for cover in arm.covers.names:
+        geom = data.geom(cover)
+        tube = server.scene.get_handle_by_name(f"/arm/{cover}/tube")
+        frame = scene.links[cover]
         middle = np.array(frame.position) + turned(frame.wxyz, tube.position)
         assert middle == pytest.approx(geom.xpos, abs=1e-6)
         axis = turned(frame.wxyz, turned(tube.wxyz, (0.0, 0.0, 1.0)))
         assert abs(axis @ geom.xmat.reshape(3, 3)[:, 2]) == pytest.approx(1.0, abs=1e-6)
-        length = 2.0 * (model.geom(name).size[0] + model.geom(name).size[1])
+        length = 2.0 * (model.geom(cover).size[0] + model.geom(cover).size[1])
         assert np.ptp(tube.vertices[:, 2]) == pytest.approx(length, rel=1e-3)
 
 

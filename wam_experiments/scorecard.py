@@ -43,10 +43,10 @@ def measures(configuration: Configuration) -> Measures:
         for another arm, for which the thesis has no numbers.
     """
     arm = configuration.shared.arm
-    if len(arm.joints.names) != 4 or len(arm.covers.names) != 2:
+    if arm.joints.twist != printed("link twist") or len(arm.covers.names) != 2:
         raise ValueError(
-            f"arm '{arm.name}' has {len(arm.joints.names)} joints and {len(arm.covers.names)} covers; the "
-            "scorecard is that of the MIT/WAM, which has 4 and 2: use the configuration 'wam'"
+            f"arm '{arm.name}' has other joints or links than the MIT/WAM, whose scorecard this is: "
+            "use the configuration 'wam', or one that builds on it"
         )
     driver = configuration.node("driver", DriverParameters)
     body, gears = RigidBody(arm), TransmissionMap.of(arm).motor_from_joint

@@ -3,6 +3,7 @@
 It is drawn from the parameters of the driver alone, so that every configuration draws itself.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -31,7 +32,6 @@ from wam_live.snapshot import Snapshot, size
 LONGEST_ARROW = 0.6  # m
 STIFFNESS = 60.0  # N/m, of the rubber band between the pointer and the link
 STRONGEST = 40.0  # N, that a drag pushes with
-BANDS = 4  # parts of the 90 % set that are drawn
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ class Scene:
             self._scene.add_cylinder(
                 f"/contact/likely{i}", 0.055, 1.0, channels("#f2a11a"), opacity=0.35, visible=False, cast_shadow=False
             )
-            for i in range(BANDS)
+            for i in range(len(arm.covers.names))
         ]
         self._band = self._scene.add_arrows(
             "/hand", np.zeros((1, 2, 3)), channels("#7a3db8"), shaft_radius=0.006, head_radius=0.016, head_length=0.04,
@@ -175,7 +175,7 @@ class Scene:
 
     def _show_likely(self, likely: Sequence[LikelyRange]) -> None:
         parts = [part for part in likely if part.cover in self.links and part.high > part.low]
-        for band, part in zip(self._bands, [*parts[:BANDS], *[None] * (BANDS - len(parts[:BANDS]))], strict=True):
+        for band, part in itertools.zip_longest(self._bands, parts[: len(self._bands)]):
             band.visible = part is not None
             if part is None:
                 continue

@@ -43,7 +43,7 @@ class HeldForce(NamedTuple):
     touched : start of the contact, s from the start, at most FRESH before it; NaN if the contact began earlier or is
         not known.  If it is known, rise and overshoot are those of the impact, and settling is timed from there.
     measured_accuracy, true_accuracy : in the steady part.
-    cycle : of the true force in its last 70 %, else of the measured one.
+    cycle : apart from the dither, of the true force in its last 70 %, else of the measured one.
     stability : of the error.
     node, predicted, largest : by theory; None if the bag has too few parameters.
     guarded : by the stability guard; None likewise.
@@ -99,6 +99,8 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
     if response is not None and touched > 0.0:
         response = response._replace(settling=max(response.settling - touched, 0.0))
     theory = _theory(recording, hold, cover, position)
+    timing = recording.parameters.timing
+    dither = timing.dither_cycle * timing.period if timing is not None else 0.0
     swung = None if len(measured) or len(true) else swinging(recording, hold)
     return HeldForce(
         hold=hold,
@@ -110,7 +112,9 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
         touched=touched,
         measured_accuracy=force_accuracy(np.full(int(np.sum(late)), hold.commanded), measured[late]),
         true_accuracy=force_accuracy(np.full(int(np.sum(late_true)), hold.commanded), true[late_true]),
-        cycle=_cycle(time_true[swings_true], true[swings_true]) or _cycle(time[swings], measured[swings]) or NO_CYCLE,
+        cycle=_cycle(time_true[swings_true], true[swings_true], dither)
+        or _cycle(time[swings], measured[swings], dither)
+        or NO_CYCLE,
         stability=_stability(hold, measured),
         node=theory.node,
         predicted=theory.predicted,
@@ -169,9 +173,16 @@ def _touch_down(recording: AnalysedRun, hold: Hold) -> float:
     return math.nan
 
 
-def _cycle(time: Numbers, value: Numbers) -> LimitCycle | None:
+def _cycle(time: Numbers, value: Numbers, dither: float) -> LimitCycle | None:
+    """What repeats in a force, apart from the dither of a period, s, which a mean over it takes out; 0 for none."""
     good = np.isfinite(value)
-    return limit_cycle(time[good], value[good]) if int(np.sum(good)) >= FEW and np.mean(good) > 0.95 else None
+    if int(np.sum(good)) < FEW or np.mean(good) <= 0.95:
+        return None
+    time, value = time[good], value[good]
+    if dither and (width := round(dither / float(np.median(np.diff(time))))) > 1:
+        value = np.convolve(value, np.full(width, 1.0 / width), "valid")
+        time = time[: len(value)]
+    return limit_cycle(time, value)
 
 
 def _stability(hold: Hold, measured: Numbers) -> Stability:

@@ -62,7 +62,7 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     for _ in range(MESSAGES):
         message = stack.newest(todo.topic)
         if todo.fault.moves:
-            made_effective(todo.topic, message)
+            made_effective(todo.topic, message, stack.cover)
         data = broken(message, todo.fault, chance, stack.stamp(), stack.serialize)
         if data is not None:
             stack.inject(publisher, data)

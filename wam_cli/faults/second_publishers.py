@@ -64,7 +64,7 @@ def _stream(topic: str, stack: WatchedStack) -> int:
         end = stack.stamp() + int(STREAMED * SECOND)
         while stack.stamp() < end and not stack.driver.safety.fault:
             message = stack.newest(topic)
-            made_effective(topic, message)
+            made_effective(topic, message, stack.cover)
             set_stamp(message, stack.stamp())
             stack.inject(publisher, stack.serialize(message))
             stack.run(0.001)

@@ -7,16 +7,21 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
+import numpy as np
 import yaml
 
 from wam_bag.contents import Contents, contents
 from wam_bag.losses import losses
+from wam_description.arm import Arm
 from wam_description.configuration import Configuration
+from wam_experiments.contact_benchmark.moves import MoveGenerator
 from wam_ros.bring_up import Composition
 
 STEP: Final = 2.0  # s of a move
-POSTURES: Final = ([0.0, -0.8, 0.0, 0.3], [0.3, -1.1, 0.1, 0.7], [-0.3, -0.9, -0.1, 0.9], [0.0, -1.3, 0.0, 1.0])
-PUSH: Final = {"cover": "outer_link", "place": 0.3, "newtons": [0.0, 8.0, 0.0], "begin": 0.5, "end": 1.0}
+POSTURES: Final = 4  # that are gone to, one after the other
+PUSH: Final = {"newtons": [0.0, 8.0, 0.0], "begin": 0.5, "end": 1.0}
+ALONG: Final = 0.75  # of the last cover, where it is pushed
+SEED: Final = 1
 GROWTH: Final = 20.0  # MB from a tenth of the run on to its end
 
 
@@ -66,7 +71,7 @@ def soak(configuration: Configuration, seconds: float, report: Callable[[int, in
     """Run the configured nodes for `seconds` of the arm's time, in the configured mode."""
     with TemporaryDirectory(prefix="wam_soak_") as folder:
         script = Path(folder, "scenario.yaml")
-        script.write_text(yaml.safe_dump({"steps": _steps(seconds)}), encoding="utf-8")
+        script.write_text(yaml.safe_dump({"steps": _steps(configuration.shared.arm, seconds)}), encoding="utf-8")
         nodes = [*configuration.shared.nodes, "scenario", "recorder"]
         own = {"scenario:script": str(script), "recorder:directory": folder, "recorder:name": "soak", "nodes": nodes}
         memory: list[float] = []
@@ -88,9 +93,12 @@ def lost_in(found: Contents) -> list[str]:
     return losses(found.path, found.metadata, found.attachments, counts).sentences(found.first)
 
 
-def _steps(seconds: float) -> list[dict[str, Any]]:
+def _steps(arm: Arm, seconds: float) -> list[dict[str, Any]]:
+    drawn = MoveGenerator(arm).moves(np.random.default_rng(SEED), arm.joints.start, POSTURES)
+    postures = [list(move.posture) for move in drawn]
+    push = {"cover": arm.covers.names[-1], "place": ALONG * arm.covers.length[-1], **PUSH}
     moves = [
-        {"name": f"move {i}", "seconds": STEP, "posture": POSTURES[i % len(POSTURES)], "push": PUSH}
+        {"name": f"move {i}", "seconds": STEP, "posture": postures[i % POSTURES], "push": push}
         for i in range(max(1, int(seconds / STEP)))
     ]
     return [

@@ -60,7 +60,7 @@ class WatchedStack:
 
     def __init__(self, configuration: Configuration, domain_id: int | None = None) -> None:
         shared = configuration.shared
-        self.configuration = configuration
+        self.configuration, self.cover = configuration, shared.arm.covers.names[-1]
         paced = {"timing.real_time_factor": 0.0} if hasattr(shared.timing, "real_time_factor") else {}
         configuration = configuration.with_values({"timing.timeout": 2.0, **paced})
         self._clock = AnsweredClock(shared.timing.period)
@@ -157,7 +157,7 @@ class WatchedStack:
         """Hold the arm where it is, press as commanded, push nothing."""
         values = {
             "joint_posture_command": State(self._held, [], []),
-            "force_command": Wrench("outer_link", self.commanded_force, (0.0, 0.0, 0.0)),
+            "force_command": Wrench(self.cover, self.commanded_force, (0.0, 0.0, 0.0)),
         }
         for topic, value in values.items():
             publisher, encode = self._commands[topic]

@@ -46,7 +46,7 @@ def _errors(axes: Axes, found: Sequence[EvaluatedContact]) -> None:
     for force, limit in ((5.0, 3.0), (10.0, 2.0), (20.0, 1.3)):
         axes.plot([0.8 * force, 1.2 * force], [limit, limit], color="black", lw=2)
     axes.set(
-        title="position on the outer link, in motion; bars: required medians",
+        title="position in motion; bars: required medians",
         xlabel="force [N]",
         ylabel=f"error [cm]; at {NO_POSITION:.0f}: no position",
         yscale="log",
@@ -88,7 +88,7 @@ def _reliability(axes: Axes, every: Sequence[EvaluatedContact], found: Sequence[
         float(np.mean([contact.credibility <= level for contact in outer])) if outer else math.nan for level in levels
     ]
     axes.plot((0, 1), (0, 1), color="black", lw=1)
-    axes.plot(levels, held, color=COLOURS[0], label="credible sets that contain the position, outer link")
+    axes.plot(levels, held, color=COLOURS[0], label="credible sets that contain the position")
     axes.plot(reported, right, "s", color=COLOURS[1], label="links identified correctly")
     axes.set(
         title="calibration", xlabel="reported probability", ylabel="share of contacts", xlim=(0, 1), ylim=(0, 1.02)

@@ -92,8 +92,15 @@ def touches(arm: Arm, random: np.random.Generator, times: Sequence[float]) -> li
     return found
 
 
+def _neighbours(arm: Arm, random: np.random.Generator) -> tuple[str, str]:
+    """Two covers, one behind the other."""
+    names = arm.covers.names
+    i = int(random.integers(len(names) - 1)) if len(names) > 2 else 0
+    return names[i], names[i + 1]
+
+
 def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float) -> list[Touch]:
-    inner, outer = arm.covers.names
+    inner, outer = _neighbours(arm, random)
     size = _size(random)
     if kind.startswith("second"):
         first_cover = str(random.choice((inner, outer)))
@@ -105,7 +112,7 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float) -> li
     if kind in ("tip along the tube", "end cap, oblique"):
         lean = 0.0 if kind == "tip along the tube" else float(random.uniform(0.1, 1.0))
         angle = float(random.uniform(-math.pi, math.pi))
-        length = arm.covers.length[1]
+        length = _length(arm, outer)
         force = (
             -size * math.cos(lean),
             size * math.sin(lean) * math.cos(angle),
@@ -116,7 +123,7 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float) -> li
         cover = str(random.choice((inner, outer)))
         touch = _side(arm, random, cover, size, begin, HOLD)
         place = float(random.uniform(0.0, NEAR_ELBOW))
-        return [touch._replace(kind=kind, place=place if cover == outer else arm.covers.length[0] - place)]
+        return [touch._replace(kind=kind, place=place if cover == outer else _length(arm, inner) - place)]
     if kind == "drag along the tube":
         touch = _side(arm, random, outer, size, begin, HOLD)
         along = float(random.choice((-1.0, 1.0))) * size
@@ -125,11 +132,15 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float) -> li
     if kind == "twist":
         touch = touch._replace(twist=float(random.choice((-0.5, 0.5))))
     if kind == "sliding":
-        middle = 0.5 * arm.covers.length[1]
+        middle = 0.5 * _length(arm, outer)
         touch = touch._replace(speed=SLIDE if touch.place < middle else -SLIDE)
     if kind == "impact":
         touch = touch._replace(end=begin + IMPACT)
     return [touch._replace(kind=kind)]
+
+
+def _length(arm: Arm, cover: str) -> float:
+    return arm.covers.length[arm.covers.names.index(cover)]
 
 
 def _size(random: np.random.Generator) -> float:

@@ -296,12 +296,12 @@ EFFECTIVE: Final = {
 }
 
 
-def made_effective(topic: str, message: Message) -> None:
-    """Give a message values that would move the arm, all within what the arm can do."""
+def made_effective(topic: str, message: Message, cover: str) -> None:
+    """Give a message values that would move the arm, all within what the arm can do; a force acts on the cover."""
     for name, value in EFFECTIVE.get(topic, {}).items():
         if name == "force":
             message.wrench.force.x, message.wrench.force.z = value, -value
-            message.header.frame_id = "outer_link"
+            message.header.frame_id = cover
         else:
             numbers = list(getattr(message, name))
             setattr(message, name, [number + value for number in numbers])

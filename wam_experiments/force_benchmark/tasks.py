@@ -23,6 +23,7 @@ FORCES, STIFFNESSES = (1.0, 40.0), (400.0, 4e5)  # N and N/m, uniform in the log
 FRICTIONS, STEEPEST = (0.0, 0.8), math.radians(75.0)  # of the surface; lean of a plane from the side of the link
 MARGIN = 0.1  # rad, of a start from the ends of the joints
 NEAR = 0.3  # rad, of a singular pose
+RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
 POSES = {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}  # shares
 ON_OUTER, AT_A_PLANE, DITHERED, PINNED, TARED, RAMPED = 0.85, 0.3, 0.4, 0.5, 0.5, 0.5  # shares
 LONGEST_RAMP, FIRST = 1.0, 0.2  # s, and the fraction of the force that it starts with
@@ -59,21 +60,42 @@ NOMINAL = TaskConditions(is_dithered=False, is_pinned=True, is_tared=False, ramp
 
 
 class Task(NamedTuple):
-    """One force on one surface: joint angles at the start (n,), rad; surface; force, N; conditions."""
+    """One force on one surface: joint angles at the start (n,), rad; surface; force, N; conditions; class of pose."""
 
     q: tuple[float, ...]
     surface: Surface
     force: float
     conditions: TaskConditions = NOMINAL
+    pose: str = "any"
 
-    @property
-    def pose(self) -> str:
-        """The class of the pose, one of `POSES`."""
-        if abs(self.q[3] - math.pi / 2.0) < NEAR:
+
+class ElbowJoint(NamedTuple):
+    """The joint between the first two covers: its index, and the angle at which they are in line, rad."""
+
+    joint: int
+    straight: float
+
+    @classmethod
+    def of(cls, body: RigidBody) -> "ElbowJoint":
+        """That of an arm, which has two covers or more."""
+        arm = body.arm
+        inner, outer = arm.covers.names[:2]
+        joint, zero = arm.links.names.index(arm.covers.links[1]), [0.0] * len(arm.joints.names)
+        pose = body.cover_pose(zero, outer)
+        axis = pose.rotation @ body.cover_jacobian(zero, outer)[3:, joint]
+        here, there = pose.rotation[:, 0], body.cover_pose(zero, inner).rotation[:, 0]
+        straight = math.atan2(float(axis @ np.cross(here, there)), float(here @ there))
+        exact = round(straight / RIGHT) * RIGHT
+        return cls(joint, exact if abs(exact - straight) < ROUNDING else straight)
+
+    def pose(self, q: Sequence[float]) -> str:
+        """The class of a pose, one of `POSES`; the shoulder's second joint is two before the elbow."""
+        bend = abs(q[self.joint] - self.straight)
+        if bend < NEAR:
             return "elbow nearly straight"
-        if abs(self.q[1]) < NEAR:
+        if abs(q[self.joint - 2]) < NEAR:
             return "theta2 near 0"
-        return "elbow near 90 deg" if abs(self.q[3]) < NEAR else "any"
+        return "elbow near 90 deg" if abs(bend - RIGHT) < NEAR else "any"
 
 
 def draw(arm: Arm, seed: int, number: int) -> Task:
@@ -82,12 +104,13 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     body = RigidBody(arm)
     conditions = _conditions(arm, random)
     force = _log_uniform(random, *FORCES)
-    q = _pose(arm, random)
+    elbow = ElbowJoint.of(body)
+    q = _pose(arm, elbow, random)
     surface = _surface(body, q, random)
     while not is_clear(body, q, surface):
-        q = _pose(arm, random)
+        q = _pose(arm, elbow, random)
         surface = _surface(body, q, random)
-    return Task(q, surface, force, conditions)
+    return Task(q, surface, force, conditions, elbow.pose(q))
 
 
 def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
@@ -96,7 +119,7 @@ def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
 
     motors, joints = len(arm.motors.names), len(arm.joints.names)
     return TaskConditions(
-        is_dithered=bool(random.random() < DITHERED),
+        is_dithered=bool(random.random() < DITHERED) or not arm.joint_sensors,
         is_pinned=bool(random.random() < PINNED),
         is_tared=bool(random.random() < TARED),
         ramp=float(random.uniform(0.0, LONGEST_RAMP)) if random.random() < RAMPED else 0.0,
@@ -108,23 +131,26 @@ def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
     )
 
 
-def _pose(arm: Arm, random: np.random.Generator) -> tuple[float, ...]:
+def _pose(arm: Arm, elbow: ElbowJoint, random: np.random.Generator) -> tuple[float, ...]:
     joints = arm.joints
     ends = zip(joints.lower, joints.upper, strict=True)
     q = [float(random.uniform(low + MARGIN, high - MARGIN)) for low, high in ends]
     kind, near = random.choice(list(POSES), p=list(POSES.values())), float(random.uniform(-NEAR, NEAR))
     if kind == "elbow nearly straight":
-        q[3] = math.pi / 2.0 + near
+        q[elbow.joint] = elbow.straight + near
     elif kind == "theta2 near 0":
-        q[1] = near
+        q[elbow.joint - 2] = near
     elif kind == "elbow near 90 deg":
-        q[3] = near
+        right = (elbow.straight - RIGHT, elbow.straight + RIGHT)
+        middle = 0.5 * (joints.lower[elbow.joint] + joints.upper[elbow.joint])
+        q[elbow.joint] = min(right, key=lambda angle: abs(angle - middle)) + near
     return tuple(q)
 
 
 def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -> Surface:
     covers = body.arm.covers
-    cover = covers.names[-1 if random.random() < ON_OUTER else 0]
+    share = random.random()
+    cover = covers.names[1 + int(share / ON_OUTER * (len(covers.names) - 1)) if share < ON_OUTER else 0]
     length = covers.length[covers.names.index(cover)]
     is_plane = cover == covers.names[-1] and bool(random.random() < AT_A_PLANE)
     lean = float(random.uniform(0.0, STEEPEST)) if is_plane else 0.0
