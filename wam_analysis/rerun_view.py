@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 
 from wam_analysis.arm_picture import side_view
 from wam_analysis.demo_traces import ForceSignal
-from wam_analysis.drawing import COLOURS, METRES_PER_NEWTON, channels
+from wam_analysis.drawing import (
+    BLOCK_COLOUR,
+    COLOURS,
+    FLOOR,
+    METRES_PER_NEWTON,
+    PEDESTAL,
+    PEDESTAL_COLOUR,
+    TUBE_COLOURS,
+    channels,
+)
 from wam_analysis.findings.analysed_run import AnalysedRun, by_names
 from wam_analysis.findings.timing import STAMPED
 from wam_analysis.recorded import RecordedArm, recorded_arm
@@ -170,7 +179,7 @@ def _log_arm(rerun: Any, stream: Any, recorded: RecordedArm, joints: tuple[Times
             radii=[covers.radius[i]],
             translations=[start],
             rotation_axis_angles=[rerun.RotationAxisAngle(axis=axis, radians=angle)],
-            colors=[(0x87, 0x91, 0x9C)],
+            colors=[channels(TUBE_COLOURS[i % len(TUBE_COLOURS)])],
             fill_mode="solid",
         )
         stream.log(f"arm/{cover}", capsule, static=True)
@@ -184,12 +193,20 @@ def _log_arm(rerun: Any, stream: Any, recorded: RecordedArm, joints: tuple[Times
 
 
 def _log_obstacles(rerun: Any, stream: Any, recorded: RecordedArm) -> None:
+    base = rerun.Cylinders3D(
+        lengths=[-FLOOR],
+        radii=[PEDESTAL],
+        centers=[(0.0, 0.0, 0.5 * FLOOR)],
+        colors=[channels(PEDESTAL_COLOUR)],
+        fill_mode="solid",
+    )
+    stream.log("arm/world/base", base, static=True)
     obstacles = recorded.obstacles
     for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
         triple = slice(3 * i, 3 * i + 3)
         centre, sizes = obstacles.positions[triple], obstacles.sizes[triple]
         quaternion = rerun.Quaternion(xyzw=_quaternion(*obstacles.rotations[triple]))
-        pose = {"centers": [centre], "quaternions": [quaternion], "colors": [(0xEC, 0xCA, 0x88)]}
+        pose = {"centers": [centre], "quaternions": [quaternion], "colors": [channels(BLOCK_COLOUR)]}
         if shape == "cylinder":
             solid = rerun.Cylinders3D(lengths=[2.0 * sizes[1]], radii=[sizes[0]], fill_mode="solid", **pose)
         else:
