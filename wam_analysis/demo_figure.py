@@ -167,7 +167,7 @@ def _seconds(summary: DemoSummary) -> Numbers:
     return seconds
 
 
-def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int = 78, most: int = 0) -> None:
+def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int = 76, most: int = 0) -> None:
     """Components along the commanded force; magnitudes if none is commanded.
 
     Parameters
@@ -187,9 +187,9 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
         return values
 
     commanded = np.where(pressed, traces.commanded.size, np.nan)
-    axes.plot(time, shown(traces.true, -1.0), color=TRUE, lw=1.6, label="true (simulator)", zorder=3)
+    axes.plot(time, shown(traces.true, -1.0), color=TRUE, lw=1.6, label="true", zorder=3)
     measured = np.where(pressed, traces.along(traces.measured), np.nan)
-    axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured (force loop)", zorder=6)
+    axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured", zorder=6)
     axes.plot(time, shown(traces.estimated, -1.0), color=ESTIMATED, lw=1.0, label="estimated", zorder=5)
     axes.plot(time, commanded, color=COMMANDED, lw=1.1, ls=(0, (1.2, 1.2)), label="commanded", zorder=7)
     axes.set_ylabel("force [N]")
@@ -203,7 +203,7 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     order = [3, 0, 1, 2]
     axes.legend(
         [handles[i] for i in order], [labels[i] for i in order], loc="lower center", bbox_to_anchor=(0.5, 1.0),
-        ncols=4 if room > 60 else 2, fontsize=9, handlelength=1.8, columnspacing=1.2, borderaxespad=0.2,
+        ncols=4 if room > 60 else 2, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2,
     )  # fmt: skip
     _frame(axes, summary, letter)
     _name_steps(axes, summary, room)
@@ -221,7 +221,7 @@ def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c
         if touch.reason:
             middle = _middle(summary, touch)
             axes.text(
-                middle, 0.07 * length, "not\nobservable", ha="center", fontsize=8, color=ESTIMATED, linespacing=0.95
+                middle, 0.07 * length, "not\nobservable", ha="center", fontsize=7.5, color=ESTIMATED, linespacing=0.95
             )
     axes.set_ylim(0.0, 1.12 * length)
     axes.set_ylabel("position [cm]")
@@ -270,5 +270,5 @@ def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:
             lines = textwrap.wrap(step.name, room, break_long_words=False)
             axes.text(
                 _middle(summary, step), 0.985, "\n".join(lines), transform=axes.get_xaxis_transform(), ha="center",
-                va="top", fontsize=8.0, linespacing=1.0, color="#555555", zorder=7,
+                va="top", fontsize=7.5, linespacing=1.1, color="#555555", zorder=7,
             )  # fmt: skip
