@@ -39,6 +39,8 @@ Times = NDArray[np.int64]
 APPLICATION = "wam_stack"
 PROGRAM = "rerun"
 TIMELINE = "time"
+# plots, each with the corner in which its legend covers no curve of the demonstration
+LEGENDS = {"force": "LeftTop", "position": "RightTop", "joints": "LeftBottom"}
 DISTANCE = 1.3  # of the eye, in heights of what it sees
 POSES = 100.0  # poses of the arm in a second at most
 
@@ -154,7 +156,10 @@ def _blueprint(rerun: Any, recorded: RecordedArm, joints: tuple[Times, Numbers] 
         side = side_view(recorded.arm, joints[1][len(joints[1]) // 2].tolist(), recorded.obstacles, aspect=1.0)
         position = side.centre - DISTANCE * side.height * side.axes[2]
         eye = show.EyeControls3D(position=position, look_target=side.centre, eye_up=[0.0, 0.0, 1.0])
-    plots = [show.TimeSeriesView(origin=f"/plots/{name}", name=name) for name in ("force", "position", "joints")]
+    plots = [
+        show.TimeSeriesView(origin=f"/plots/{name}", name=name, plot_legend=show.PlotLegend(corner))
+        for name, corner in LEGENDS.items()
+    ]
     right = show.Vertical(*plots, show.TextLogView(origin="/status", name="status"))
     left = show.Spatial3DView(origin="/arm", name="arm", eye_controls=eye)
     return show.Blueprint(
