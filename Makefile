@@ -76,13 +76,13 @@ site: $(STAMPS)/docs $(INSTALLED)  ## build the site docs/_build/html from the p
 
 define SITE
 rm -rf docs/api docs/_build/html; \
-$(PY) -P -m sphinx -n -q -j 2 -d docs/_build/doctrees docs docs/_build/html && \
+$(PY) -P -m sphinx -W --keep-going -n -q -j 2 -d docs/_build/doctrees docs docs/_build/html && \
 echo "site: docs/_build/html/index.html"
 endef
 
 constraints: $(STAMPS)/venv  ## pin the newest compatible versions in constraints.txt; then make clean test
 	@mkdir -p .cache
-	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[docs,ros,live,test,view]'
+	@$(PIP) install -q --dry-run --ignore-installed --report .cache/resolved.json '.[completion,docs,live,ros,test,view]'
 	@$(TIDY)
 	@$(PY) -c 'import json, pathlib, re; file = pathlib.Path("constraints.txt"); \
 	head = [line for line in file.read_text().splitlines() if line.startswith("#")]; \
@@ -106,21 +106,21 @@ $(STAMPS)/ros: $(STAMPS)/venv constraints.txt setup.py
 	@echo "Installing into $(VENV): about 1 GB, a minute or two the first time"
 	@$(TIDY)
 	@$(PIP) install -q -c constraints.txt setuptools
-	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[ros,live]'
+	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[completion,live,ros]'
 	@$(TIDY)
 	@touch $@
 
 $(STAMPS)/test: $(STAMPS)/ros
 	@echo "Installing the tools of the tests"
 	@$(TIDY)
-	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[ros,live,test]'
+	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[completion,live,ros,test]'
 	@$(TIDY)
 	@touch $@
 
 $(STAMPS)/docs: $(STAMPS)/test
 	@echo "Installing what builds the site"
 	@$(TIDY)
-	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[docs,ros,live,test]'
+	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[completion,docs,live,ros,test]'
 	@$(TIDY)
 	@touch $@
 

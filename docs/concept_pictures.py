@@ -11,9 +11,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch, Polygon
 
+from wam_analysis.drawing import INK, SHAFTS
 from wam_description.configuration import Configuration, packaged
 from wam_description.transmission_map import TransmissionMap
-from wam_experiments.figures.style import BLUE, GREEN, GREY, ORANGE, picture
+from wam_experiments.figures.style import GREY, picture
 from wam_theory.linear_loop import routh_gain
 from wam_theory.stability_map import largest_stable_steps
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
@@ -21,7 +22,7 @@ from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 FOLDER = Path(__file__).resolve().parent / "concepts"
 ZETA, GAMMA = 0.25, 1.5  # of figure 5.8: domain II
 NODE = FrictionNode(1.0, 1.0, 2.0, 2.0, 1.0, 1.0)  # with this zeta, forces in units of the friction
-INK = "#222222"
+INNER, OUTER, THIRD = SHAFTS[:3]
 
 
 def motor_space(file: Path) -> None:
@@ -33,7 +34,7 @@ def motor_space(file: Path) -> None:
     with picture(FOLDER / file, 7.2, 3.4) as figure:
         left, right = figure.subplots(1, 2)
         for axes, limits, name in ((left, peak, "peak torque"), (right, friction, "static friction")):
-            colour = BLUE if axes is left else ORANGE
+            colour = INNER if axes is left else OUTER
             corners = square * limits @ change.T
             axes.add_patch(Polygon(corners, facecolor=colour, alpha=0.15, edgecolor="none"))
             axes.add_patch(Polygon(corners, fill=False, edgecolor=colour, linewidth=1.6))
@@ -70,8 +71,8 @@ def loops(file: Path) -> None:
         axes.set(xlim=(0.0, 10.6), ylim=(-0.1, 3.3))
         axes.set_axis_off()
         for x, text, colour in (
-            (2.2, "force law\n200 Hz", ORANGE),
-            (4.4, "velocity loop of\neach motor, 1 kHz", BLUE),
+            (2.2, "force law\n200 Hz", OUTER),
+            (4.4, "velocity loop of\neach motor, 1 kHz", INNER),
             (6.6, "motor, with\nits friction", GREY),
             (8.6, "cables, links,\ncontact", GREY),
         ):
@@ -82,11 +83,11 @@ def loops(file: Path) -> None:
         axes.text(3.3, 2.45, "velocity", fontsize=8, ha="center")
         axes.text(5.5, 2.45, "torque", fontsize=8, ha="center")
         axes.text(10.0, 2.05, "force", fontsize=8, ha="center")
-        arrow(axes, (7.1, 1.57), (7.1, 1.0), (4.4, 1.0), (4.4, 1.57), colour=BLUE)
-        axes.text(5.75, 1.08, "motor velocity, measured at the shaft", fontsize=7.5, color=BLUE, ha="center")
-        arrow(axes, (9.9, 1.9), (9.9, 0.3), (2.2, 0.3), (2.2, 1.57), colour=ORANGE)
+        arrow(axes, (7.1, 1.57), (7.1, 1.0), (4.4, 1.0), (4.4, 1.57), colour=INNER)
+        axes.text(5.75, 1.08, "motor velocity, measured at the shaft", fontsize=7.5, color=INNER, ha="center")
+        arrow(axes, (9.9, 1.9), (9.9, 0.3), (2.2, 0.3), (2.2, 1.57), colour=OUTER)
         axes.text(
-            6.0, 0.38, "measured force: from the far end of the transmission", fontsize=8, color=ORANGE, ha="center"
+            6.0, 0.38, "measured force: from the far end of the transmission", fontsize=8, color=OUTER, ha="center"
         )
         arrow(axes, (6.6, 2.95), (6.6, 2.25), colour=GREY)
         axes.text(6.72, 2.75, "friction, ripple: corrected by the inner loop", fontsize=8, color=GREY)
@@ -98,9 +99,9 @@ def saturation(file: Path) -> None:
     gain = GAMMA * float(routh_gain(NODE.inertia, NODE.damping, NODE.transmission_stiffness, NODE.contact_stiffness))
     limit = 0.5 * largest
     cases = (
-        (0.6 * largest, math.inf, "small step", GREEN),
-        (1.8 * largest, math.inf, "large step", ORANGE),
-        (1.8 * largest, limit, "large step, F_error saturated", BLUE),
+        (0.6 * largest, math.inf, "small step", THIRD),
+        (1.8 * largest, math.inf, "large step", OUTER),
+        (1.8 * largest, limit, "large step, F_error saturated", INNER),
     )
     times = np.linspace(0.0, 60.0, 3000)
     with picture(FOLDER / file, 7.4, 2.5) as figure:
@@ -126,13 +127,13 @@ def lockstep(file: Path) -> None:
             late = 2
             states = [0.0, 1.0, 2.0, 5.0, 6.0] if waits else [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
             for k, at in enumerate(states):
-                arrow(axes, (at, 1.0), (at + 0.3, 0.0), colour=BLUE)
-                axes.text(at, 1.1, f"t{k + 1}", ha="center", fontsize=8, color=BLUE)
+                arrow(axes, (at, 1.0), (at + 0.3, 0.0), colour=INNER)
+                axes.text(at, 1.1, f"t{k + 1}", ha="center", fontsize=8, color=INNER)
                 answer = 4.5 if k == late else at + 0.45
                 if waits or k in (0, 1, late, 5, 6):
-                    arrow(axes, (answer, 0.0), (answer + 0.3, 1.0), colour=ORANGE)
-            axes.plot([2.3, 4.5], [-0.08, -0.08], color=ORANGE, linewidth=5, solid_capstyle="butt")
-            axes.text(3.4, -0.35, "this node is late", ha="center", fontsize=8, color=ORANGE)
+                    arrow(axes, (answer, 0.0), (answer + 0.3, 1.0), colour=OUTER)
+            axes.plot([2.3, 4.5], [-0.08, -0.08], color=OUTER, linewidth=5, solid_capstyle="butt")
+            axes.text(3.4, -0.35, "this node is late", ha="center", fontsize=8, color=OUTER)
             said = "the arm's time waits" if waits else "t4 to t6: the last command is held"
             axes.text(3.6 if waits else 4.0, 1.36, said, ha="center", fontsize=8, color=INK)
 

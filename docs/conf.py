@@ -43,21 +43,16 @@ html_css_files = ["site.css"]
 
 extensions = ["myst_parser", "sphinx.ext.apidoc", "sphinx.ext.autodoc", "numpydoc"]
 source_suffix = {".rst": "restructuredtext", ".md": "markdown", ".ipynb": "notebook"}
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "api/*/modules.rst"]
 nitpicky = True
 # types of numpy, ROS and MuJoCo in signatures: their documentation is not on this machine
 nitpick_ignore_regex = [("py:.*", ".*")]
 
 myst_heading_anchors = 3
 myst_links_external_new_tab = False
-
-# the tests build the site without the API reference: sphinx -t no_api
-has_api = not tags.has("no_api")  # type: ignore[name-defined]  # noqa: F821
-exclude_patterns += ["api/*/modules.rst"] if has_api else ["api/*"]
 apidoc_modules = [
     {"path": f"../{package}", "destination": f"api/{package}", "separate_modules": False, "max_depth": 3}
     for package in PACKAGES
-    if has_api
 ]
 autodoc_default_options = {"members": True, "show-inheritance": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
@@ -76,13 +71,8 @@ def text_of(app: Sphinx, docname: str, source: list[str]) -> None:
     if not page.is_file():
         return
     text = page.read_text(encoding="utf-8") if outside else source[0]
-    text = GLOB.sub(lambda found: found[0] if is_there(found[1]) else "", text)
+    text = GLOB.sub(lambda found: found[0] if any(HERE.glob(f"{found[1]}.*")) else "", text)
     source[0] = LINK.sub(lambda found: f"]({target(page.parent, found['path'])}{found['anchor'] or ''})", text)
-
-
-def is_there(pattern: str) -> bool:
-    """Whether a pattern of a toctree matches a page of this build."""
-    return any(HERE.glob(f"{pattern}.*")) and (has_api or not pattern.startswith("api/"))
 
 
 def target(folder: Path, path: str) -> str:

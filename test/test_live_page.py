@@ -42,7 +42,7 @@ from geometry_msgs.msg import WrenchStamped  # noqa: E402
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
-from wam_live.panel import POINTS, Controls, sample, status_page  # noqa: E402
+from wam_live.panel import POINTS, Controls, Play, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
@@ -241,6 +241,31 @@ def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> No
         shown.wait(lambda: "posture_gain" in panel._said.content and "refused" in panel._said.content, spin)
         panel.requests.put(Call("driver", "estop"))
         shown.wait(lambda: mode_of(shown) == "fault", spin)
+
+
+def test_a_scenario_is_played_into_a_running_stack_and_a_wrong_one_is_refused(
+    domain_id: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
+    script = tmp_path / "short.yaml"
+    steps = [
+        {"name": "enable", "seconds": 0.05, "request": "enable"},
+        {"name": "move", "seconds": 1.0, "posture": [0.1, -0.7, 0.0, 0.6]},
+    ]
+    script.write_text(json.dumps({"steps": steps}))
+    with running(domain_id) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel = shown.page.panel
+        assert panel is not None
+        panel.requests.put(Play("nosuch"))
+        shown.wait(lambda: "refused" in panel._said.content and "nosuch" in panel._said.content, spin)
+        start = panel.snapshot.q
+        panel.requests.put(Play(str(script)))
+        shown.wait(lambda: "the scenario has ended" in panel._said.content, spin)
+        assert abs(panel.snapshot.q[0] - start[0]) > 0.02, panel.snapshot
+        ended = panel.snapshot.stamp
+        shown.wait(lambda: panel.snapshot.stamp > ended + 10**8, spin)  # time goes on
 
 
 @pytest.fixture(scope="module")

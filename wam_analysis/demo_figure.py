@@ -5,7 +5,6 @@ import os
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -17,29 +16,14 @@ from matplotlib.figure import Figure
 from wam_analysis import arm_picture
 from wam_analysis.demo_summary import DemoSummary, StepContact
 from wam_analysis.demo_traces import ForceSignal, Numbers, Traces
-from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, TRUE
+from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, STYLE, TRUE
 from wam_analysis.recorded import RecordedArm
 from wam_description.arm import Arm
 from wam_description.signals import Contact
 from wam_sim.recording import RecordedStep
 
 DPI = 200
-SIZE = (10.0, 4.3)  # inches
-INK = "#222222"
-STYLE: Any = {
-    "font.family": "STIXGeneral",
-    "mathtext.fontset": "stix",
-    "font.size": 10.0,
-    "axes.linewidth": 0.7,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
-    "legend.frameon": False,
-}
+SIZE = (9.0, 4.0)  # inches
 
 
 def save(path: Path, summary: DemoSummary, recorded: RecordedArm, gl: Sequence[str] | None = None) -> tuple[str, ...]:
@@ -114,7 +98,7 @@ def draw_arm(
     _draw_contacts(axes, summary, arm, q, view)
     if letter is not None:
         title = f"{letter}the arm at {seconds_at(summary, moment.stamp):.1f} s and the force on it"
-        axes.text(0.02, 0.985, title, va="top", transform=axes.transAxes, fontsize=11)
+        axes.text(0.02, 1.0, title, va="bottom", transform=axes.transAxes, fontsize=10)
 
 
 def _draw_contacts(axes: Axes, summary: DemoSummary, arm: Arm, q: Sequence[float], view: arm_picture.View) -> None:
@@ -183,7 +167,7 @@ def _seconds(summary: DemoSummary) -> Numbers:
     return seconds
 
 
-def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int = 105, most: int = 0) -> None:
+def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int = 76, most: int = 0) -> None:
     """Components along the commanded force; magnitudes if none is commanded.
 
     Parameters
@@ -203,9 +187,9 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
         return values
 
     commanded = np.where(pressed, traces.commanded.size, np.nan)
-    axes.plot(time, shown(traces.true, -1.0), color=TRUE, lw=1.6, label="true (simulator)", zorder=3)
+    axes.plot(time, shown(traces.true, -1.0), color=TRUE, lw=1.6, label="true", zorder=3)
     measured = np.where(pressed, traces.along(traces.measured), np.nan)
-    axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured (force loop)", zorder=6)
+    axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured", zorder=6)
     axes.plot(time, shown(traces.estimated, -1.0), color=ESTIMATED, lw=1.0, label="estimated", zorder=5)
     axes.plot(time, commanded, color=COMMANDED, lw=1.1, ls=(0, (1.2, 1.2)), label="commanded", zorder=7)
     axes.set_ylabel("force [N]")
@@ -214,12 +198,12 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
         np.nanmax(values, initial=1.0)
         for values in (shown(traces.true, -1.0), shown(traces.estimated, -1.0), commanded)
     ]
-    axes.set_ylim(min(0.0, -0.02 * max(highest)), 1.6 * float(max(highest)))
+    axes.set_ylim(min(0.0, -0.02 * max(highest)), 1.38 * float(max(highest)))
     handles, labels = axes.get_legend_handles_labels()
     order = [3, 0, 1, 2]
     axes.legend(
         [handles[i] for i in order], [labels[i] for i in order], loc="lower center", bbox_to_anchor=(0.5, 1.0),
-        ncols=4 if room > 60 else 2, fontsize=9, handlelength=1.8, columnspacing=1.2, borderaxespad=0.2,
+        ncols=4 if room > 60 else 2, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2,
     )  # fmt: skip
     _frame(axes, summary, letter)
     _name_steps(axes, summary, room)
@@ -237,7 +221,7 @@ def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c
         if touch.reason:
             middle = _middle(summary, touch)
             axes.text(
-                middle, 0.07 * length, "not\nobservable", ha="center", fontsize=8, color=ESTIMATED, linespacing=0.95
+                middle, 0.07 * length, "not\nobservable", ha="center", fontsize=7.5, color=ESTIMATED, linespacing=0.95
             )
     axes.set_ylim(0.0, 1.12 * length)
     axes.set_ylabel("position [cm]")
@@ -269,7 +253,7 @@ def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
         begin, end = (step.begin - zero) / 1e9, (step.end - zero) / 1e9
         axes.axvspan(begin, end, facecolor=busy.get(step.begin, "white"), edgecolor="none", zorder=0)
         axes.axvline(begin, color="#b9bfc6", lw=0.5, zorder=1)
-    axes.text(-0.085, 1.0, letter, transform=axes.transAxes, va="top", ha="center", fontsize=11)
+    axes.text(-0.085, 1.0, letter, transform=axes.transAxes, va="top", ha="center", fontsize=10)
     axes.spines[["top", "right"]].set_visible(False)
 
 
@@ -286,5 +270,5 @@ def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:
             lines = textwrap.wrap(step.name, room, break_long_words=False)
             axes.text(
                 _middle(summary, step), 0.985, "\n".join(lines), transform=axes.get_xaxis_transform(), ha="center",
-                va="top", fontsize=7.5, linespacing=1.0, color="#555555", zorder=7,
+                va="top", fontsize=7.5, linespacing=1.1, color="#555555", zorder=7,
             )  # fmt: skip

@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 
 from wam_analysis.arm_picture import side_view
 from wam_analysis.demo_traces import ForceSignal
-from wam_analysis.drawing import COLOURS, METRES_PER_NEWTON, channels
+from wam_analysis.drawing import (
+    BLOCK_COLOUR,
+    COLOURS,
+    FLOOR,
+    METRES_PER_NEWTON,
+    PEDESTAL,
+    PEDESTAL_COLOUR,
+    TUBE_COLOURS,
+    channels,
+)
 from wam_analysis.findings.analysed_run import AnalysedRun, by_names
 from wam_analysis.findings.timing import STAMPED
 from wam_analysis.recorded import RecordedArm, recorded_arm
@@ -30,6 +39,8 @@ Times = NDArray[np.int64]
 APPLICATION = "wam_stack"
 PROGRAM = "rerun"
 TIMELINE = "time"
+# plots, each with the corner in which its legend covers no curve of the demonstration
+LEGENDS = {"force": "LeftTop", "position": "RightTop", "joints": "LeftBottom"}
 DISTANCE = 1.3  # of the eye, in heights of what it sees
 POSES = 100.0  # poses of the arm in a second at most
 
@@ -145,7 +156,10 @@ def _blueprint(rerun: Any, recorded: RecordedArm, joints: tuple[Times, Numbers] 
         side = side_view(recorded.arm, joints[1][len(joints[1]) // 2].tolist(), recorded.obstacles, aspect=1.0)
         position = side.centre - DISTANCE * side.height * side.axes[2]
         eye = show.EyeControls3D(position=position, look_target=side.centre, eye_up=[0.0, 0.0, 1.0])
-    plots = [show.TimeSeriesView(origin=f"/plots/{name}", name=name) for name in ("force", "position", "joints")]
+    plots = [
+        show.TimeSeriesView(origin=f"/plots/{name}", name=name, plot_legend=show.PlotLegend(corner))
+        for name, corner in LEGENDS.items()
+    ]
     right = show.Vertical(*plots, show.TextLogView(origin="/status", name="status"))
     left = show.Spatial3DView(origin="/arm", name="arm", eye_controls=eye)
     return show.Blueprint(
@@ -170,7 +184,7 @@ def _log_arm(rerun: Any, stream: Any, recorded: RecordedArm, joints: tuple[Times
             radii=[covers.radius[i]],
             translations=[start],
             rotation_axis_angles=[rerun.RotationAxisAngle(axis=axis, radians=angle)],
-            colors=[(0x87, 0x91, 0x9C)],
+            colors=[channels(TUBE_COLOURS[i % len(TUBE_COLOURS)])],
             fill_mode="solid",
         )
         stream.log(f"arm/{cover}", capsule, static=True)
@@ -184,12 +198,20 @@ def _log_arm(rerun: Any, stream: Any, recorded: RecordedArm, joints: tuple[Times
 
 
 def _log_obstacles(rerun: Any, stream: Any, recorded: RecordedArm) -> None:
+    base = rerun.Cylinders3D(
+        lengths=[-FLOOR],
+        radii=[PEDESTAL],
+        centers=[(0.0, 0.0, 0.5 * FLOOR)],
+        colors=[channels(PEDESTAL_COLOUR)],
+        fill_mode="solid",
+    )
+    stream.log("arm/world/base", base, static=True)
     obstacles = recorded.obstacles
     for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
         triple = slice(3 * i, 3 * i + 3)
         centre, sizes = obstacles.positions[triple], obstacles.sizes[triple]
         quaternion = rerun.Quaternion(xyzw=_quaternion(*obstacles.rotations[triple]))
-        pose = {"centers": [centre], "quaternions": [quaternion], "colors": [(0xEC, 0xCA, 0x88)]}
+        pose = {"centers": [centre], "quaternions": [quaternion], "colors": [channels(BLOCK_COLOUR)]}
         if shape == "cylinder":
             solid = rerun.Cylinders3D(lengths=[2.0 * sizes[1]], radii=[sizes[0]], fill_mode="solid", **pose)
         else:

@@ -7,6 +7,7 @@
 - page: the web server that holds both, reachable from this machine alone
 - stack_source: a running stack as the source
 - live_page: the page of a running stack, and what it asks of the stack
+- scenario_player: a scenario or task played into a running stack
 - hold: a topic that is published while somebody drags or presses
 - playback: a bag as the source
 """

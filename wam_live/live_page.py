@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from rclpy.node import Node
 
-from wam_description.arm import Shared
+from wam_description.arm import Shared, Timing
 from wam_description.parameters import build_part
 from wam_description.signals import Wrench
 from wam_description.topics import BY_NAME
@@ -18,7 +18,8 @@ from wam_description.world import World
 from wam_live.hold import HeldTopic
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import quiet, serve
-from wam_live.panel import NO_PRESS, SLIDERS, Controls, Press, Request, mode_of
+from wam_live.panel import NO_PRESS, SLIDERS, Controls, Play, Press, Request, mode_of
+from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import RELEASE, LinkPush, Scene
 from wam_live.snapshot import size
 from wam_live.stack_source import RunningStack
@@ -64,6 +65,7 @@ class LivePage:
         self._holds: dict[str, HeldTopic] = {}
         self._states: Any = None  # subscription while somebody presses
         self._live: dict[tuple[str, str], Any] = {}
+        self._player: ScenarioPlayer | None = None
 
     def run(self, until: Callable[[], bool]) -> None:
         """Serve the page until a condition holds; a stack that is not there yet is waited for."""
@@ -80,7 +82,8 @@ class LivePage:
             self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
             self.objects = objects = ObjectMeshes(self._server, world)
             self._live = {key: flat[key[0]][key[1]] for key in SLIDERS if key[1] in flat.get(key[0], {})}
-            self.panel = panel = Controls(self._server, shared.arm, self._live)
+            self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
+            self._player = ScenarioPlayer(shared, self._namespace)
             self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
             self._say(f"live page: http://{self._server.get_host()}:{self._port}")
             self._draw(source, scene, objects, panel, until)
@@ -89,7 +92,9 @@ class LivePage:
             self.close()
 
     def close(self) -> None:
-        """End the server and leave ROS."""
+        """End the server and leave ROS; a scenario that was begun here ends."""
+        if self._player is not None:
+            self._player.stop()
         if self._server is not None:
             with quiet():
                 self._server.stop()
@@ -129,6 +134,9 @@ class LivePage:
                     panel.show(snapshot, pushing)
             count += 1
             self._send(source, panel)
+            if self._player is not None and (ended := self._player.ended()):
+                panel.say(ended)
+                panel.requests.put(Call("driver", "pause", False))  # a scenario pauses the arm at its end
             while not panel.requests.empty():
                 self._ask(panel.requests.get(), source, panel)
 
@@ -193,7 +201,18 @@ class LivePage:
             hold.send(stamp, Wrench(*RELEASE))
             hold.end()
 
+    def _play(self, script: str, panel: Controls) -> None:
+        assert self._player is not None
+        if not script:
+            self._player.stop()
+            return
+        refusal = self._player.play(script)
+        panel.say(refusal or f"playing {script}", refused=bool(refusal))
+
     def _ask(self, request: Request, source: RunningStack, panel: Controls) -> None:
+        if isinstance(request, Play):
+            self._play(request.script, panel)
+            return
         if isinstance(request, Press):
             if any(request.force):
                 self._start_press(request, source, panel)
@@ -222,3 +241,10 @@ class LivePage:
             else:
                 self._live[request.node, name] = value
             panel.say(reasons or f"{name} = {value}", refused=bool(reasons))
+
+
+def dither_text(timing: Timing) -> str:
+    """What the page says of the dither, which cannot be switched while the arm runs: the estimator relies on it."""
+    if timing.dither_cycle:
+        return f"dither: {1.0 / (timing.dither_cycle * timing.period):.0f} Hz"
+    return "dither: off; contacts at rest need it: wam up --live --set timing.dither_cycle=40"

@@ -43,8 +43,15 @@ class Press(NamedTuple):
     force: Triple  # N
 
 
+class Play(NamedTuple):
+    """A scenario to be played, its name or file; '' stops the one that is played."""
+
+    script: str
+
+
 NO_PRESS: Final = Press(BASE, (0.0, 0.0, 0.0))
-Request = Call | SetParameters | Press
+FIRST_SCRIPT: Final = "demo_scenario"
+Request = Call | SetParameters | Press | Play
 
 
 class Controls:
@@ -55,6 +62,7 @@ class Controls:
     server : that shows them.
     arm : names of the covers.
     live : present values of live parameters by (node, name), for those of `SLIDERS`; None where the page plays a bag.
+    dither : about the dither, which is chosen when the nodes start.
 
     Attributes
     ----------
@@ -62,7 +70,9 @@ class Controls:
     snapshot : what is shown.
     """
 
-    def __init__(self, server: viser.ViserServer, arm: Arm, live: Mapping[tuple[str, str], Any] | None = None) -> None:
+    def __init__(
+        self, server: viser.ViserServer, arm: Arm, live: Mapping[tuple[str, str], Any] | None = None, dither: str = ""
+    ) -> None:
         self.requests: SimpleQueue[Request] = SimpleQueue()
         self._gui = gui = server.gui
         self.snapshot = Snapshot()
@@ -74,12 +84,15 @@ class Controls:
         if live is not None:
             self._add_buttons()
             self._add_press(arm)
+            self._add_scenario()
         self._force_plot = self._add_plot("force [N]", ("commanded", "measured", "estimated", "true"), {"auto": True})
         self._place_plot = self._add_plot(
             "position along the link [m]", ("estimated", "true"), {"auto": False, "range": (0.0, max(arm.covers.end))}
         )
         if live:
             self._add_sliders(live)
+        if dither:
+            gui.add_html(paragraph(html.escape(dither)))
 
     def show(self, snapshot: Snapshot, pushing: float = 0.0) -> None:
         """Show an instant; call it a few times a second."""
@@ -135,6 +148,12 @@ class Controls:
 
             self._gui.add_button("Press").on_click(press)
             self._gui.add_button("Let go").on_click(lambda _: self.requests.put(NO_PRESS))
+
+    def _add_scenario(self) -> None:
+        with self._gui.add_folder("Scenario or task", expand_by_default=False):
+            script = self._gui.add_text("file", FIRST_SCRIPT, hint="name, or path of a YAML file with steps")
+            self._gui.add_button("Play").on_click(lambda _: self.requests.put(Play(script.value.strip())))
+            self._gui.add_button("Stop").on_click(lambda _: self.requests.put(Play("")))
 
     def _add_sliders(self, live: Mapping[tuple[str, str], Any]) -> None:
         with self._gui.add_folder("Gains", expand_by_default=False):

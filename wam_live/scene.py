@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from wam_analysis.drawing import (
     BLOCK_COLOUR,
     COLOURS,
+    FLOOR,
+    LIKELY,
     METRES_PER_NEWTON,
     PEDESTAL,
     PEDESTAL_COLOUR,
@@ -78,7 +80,7 @@ class Scene:
         )
         self._bands = [
             self._scene.add_cylinder(
-                f"/contact/likely{i}", 0.055, 1.0, channels("#f2a11a"), opacity=0.35, visible=False, cast_shadow=False
+                f"/contact/likely{i}", 0.055, 1.0, channels(LIKELY), opacity=0.35, visible=False, cast_shadow=False
             )
             for i in range(len(arm.covers.names))
         ]
@@ -127,7 +129,6 @@ class Scene:
         return frame
 
     def _add_surroundings(self, obstacles: Obstacles) -> None:
-        floor = -1.0
         for i, (name, shape) in enumerate(zip(obstacles.names, obstacles.shapes, strict=True)):
             three = slice(3 * i, 3 * i + 3)
             sizes = obstacles.sizes[three]
@@ -143,10 +144,10 @@ class Scene:
                 thick = sizes[2] if shape == "box" else 0.002
                 self._scene.add_box(path, colour, (2.0 * sizes[0], 2.0 * sizes[1], 2.0 * thick), **place)
         self._scene.add_cylinder(
-            "/world/pedestal", PEDESTAL, -floor, channels(PEDESTAL_COLOUR), position=(0, 0, 0.5 * floor),
+            "/world/pedestal", PEDESTAL, -FLOOR, channels(PEDESTAL_COLOUR), position=(0, 0, 0.5 * FLOOR),
             cast_shadow=False,
         )  # fmt: skip
-        self._scene.add_grid("/world/floor", 4.0, 4.0, position=(0.0, 0.0, floor), cell_size=0.2)
+        self._scene.add_grid("/world/floor", 4.0, 4.0, position=(0.0, 0.0, FLOOR), cell_size=0.2)
 
     def _add_arrow(self, name: str) -> Any:
         return self._scene.add_arrows(

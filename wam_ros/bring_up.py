@@ -196,6 +196,11 @@ class NodeProcess:
         """Start the node."""
         self._process = _start(self._entry, self._arguments)
 
+    @property
+    def code(self) -> int | None:
+        """Exit code where it has ended."""
+        return self._process.poll()
+
     def stop(self) -> None:
         """End the node, the hard way where it does not end by itself."""
         self._process.terminate()

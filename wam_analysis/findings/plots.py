@@ -20,7 +20,7 @@ from wam_analysis.demo_figure import (
     draw_positions,
     seconds_at,
 )
-from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, SHAFTS, TRUE
+from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, SHAFTS, STYLE, TRUE
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.signals import envelope, forces_over_time, moving
 from wam_analysis.measures.loop_timing import latency
@@ -33,16 +33,12 @@ WIDE, NARROW = 9.6, 4.1  # inches
 MOST = {WIDE: 3000, NARROW: 1200}  # points of a line
 STILL = 1e-5  # rad or rad/s; a smaller range is not blown up
 PNG_DPI = 130
-STYLE: Any = {
-    "font.family": "DejaVu Sans",
+PAGE_STYLE: Any = {
+    **STYLE,
     "font.size": 10.0,
     "axes.titlesize": 10.0,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
     "axes.grid": True,
     "grid.color": "#e6e8eb",
-    "legend.frameon": False,
     "legend.fontsize": 9.0,
     "svg.fonttype": "path",
     "svg.hashsalt": "wam",
@@ -123,7 +119,7 @@ def _figure(width: float, height: float, draw: Draw) -> Figure:
 
 def _svg(section: str, title: str, draw: Draw, wide: float, narrow: float) -> Plot:
     pictures = []
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(PAGE_STYLE):
         for width, height in ((WIDE, wide), (NARROW, narrow)):
             stream = io.BytesIO()
             _figure(width, height, draw).savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
@@ -138,7 +134,7 @@ def _arm(analysis: Analysis) -> Plot:
     figure = Figure(figsize=(5.6, 4.2), dpi=PNG_DPI)
     FigureCanvasAgg(figure)
     stream = io.BytesIO()
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(PAGE_STYLE):
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         draw_arm(axes, recording.summary, recorded, arm_picture.GL, letter=None)
         figure.savefig(stream, format="png", metadata={"Software": None})

@@ -6,6 +6,7 @@ import sys
 import time
 from pathlib import Path
 
+from wam_bag.bag import read
 from wam_bag.errors import BagError
 from wam_cli.commands import (
     configuration_of,
@@ -22,6 +23,7 @@ from wam_control.scenario import load as steps_of
 from wam_description.configuration import Configuration
 from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
 from wam_ros.program import end_at_once_on_signals
+from wam_sim.recording import DONE, recorded_run
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,7 +63,7 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()  # the bag is closed
     told = _report(bag, bool(failures), task)
     if failures:
-        print(f"\nthe demonstration failed: {', '.join(failures)}", file=sys.stderr)
+        print(f"\nthe demonstration failed: {_cause(bag) or ', '.join(failures)}", file=sys.stderr)
         for command in _next(configuration.shared.timing.mode, bag if told else None):
             print(f"next: {command}", file=sys.stderr)
         return 1
@@ -123,6 +125,15 @@ def _report_of_task(task: Experiment, bag: Path) -> str:
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
     return f"{text(task, result)}\nbag      {bag}\npicture  {bag / 'task.png'}"
+
+
+def _cause(bag: Path) -> str:
+    """Why the scenario ended, as it was recorded; '' where that is not known."""
+    try:
+        outcome = recorded_run(read(bag, ["status"], may_lack=True)).outcome
+    except (BagError, OSError):
+        return ""
+    return "" if outcome == DONE else outcome
 
 
 def _next(mode: str, bag: Path | None) -> list[str]:

@@ -44,7 +44,9 @@ def play(configuration: Configuration, steps: list[ScenarioStep], bag: Path, giv
     return _with_nodes(configuration, given)
 
 
-def _simulated(configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace) -> PlayedDemo:
+def _simulated(
+    configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace
+) -> PlayedDemo:
     if runs_apart(configuration, given) or given.live:
         option = "--live" if given.live else "--processes" if given.processes else "--realtime"
         raise ValueError(f"{option} needs ROS; pip install 'wam_stack[ros,live]', or leave it out")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from wam_analysis.drawing import SHAFTS
 from wam_description.arm import Arm
 from wam_experiments.contact_benchmark.contacts import EvaluatedContact
 from wam_experiments.contact_benchmark.scenarios import KINDS
@@ -20,7 +21,7 @@ from wam_experiments.contact_benchmark.score import (
 )
 from wam_experiments.figures.style import panels
 
-COLOURS = ("#0b6fb8", "#d55e00", "#009e73", "#cc79a7")
+COLOURS = SHAFTS
 NO_POSITION = 60.0  # cm, at which contacts without a position are drawn
 BINS = 6
 
@@ -29,7 +30,7 @@ def figure(scores: Sequence[ScenarioScore], arm: Arm, file: Path) -> None:
     """Draw the figure into a file, and create its folder."""
     file.parent.mkdir(parents=True, exist_ok=True)
     found = on_outer_link(scores, arm)
-    with panels(file, 2, 3, 13.0, 7.4) as (_, flat):
+    with panels(file, 3, 2, 8.8, 10.4) as (_, flat):
         _errors(flat[0], found)
         _standard_deviations(flat[1], found)
         _reliability(flat[2], contacts_of(scores), found)

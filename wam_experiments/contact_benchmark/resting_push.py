@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
+from wam_analysis.drawing import ESTIMATED, LIKELY, TRUE
 from wam_control.contact_estimator import ContactEstimate
 from wam_control.scenario import Push, ScenarioStep
 from wam_description.arm import Arm
@@ -21,7 +22,6 @@ from wam_description.world import Obstacles
 from wam_sim.simulation import Simulation
 
 SIZE = (11.0, 4.6)  # in
-TRUE, ESTIMATED, CREDIBLE = "#222222", "#d62728", "#f2a020"
 METRES_PER_NEWTON = 0.02
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
 POSE = (0.1, -0.9, 0.2, 0.9)  # rad
@@ -70,7 +70,7 @@ def draw(axes: Axes, arm: Arm, q: Sequence[float], estimate: ContactEstimate, tr
             begin, end = (np.array(points[3 * i : 3 * i + 3]) for points in (covers.start, covers.end))
             fractions = [(x - begin[0]) / (end[0] - begin[0]) for x in (hypothesis.low, hypothesis.high)]
             ends = [body.point(q, hypothesis.cover, begin + fraction * (end - begin)) for fraction in fractions]
-            axes.plot(*view.project(np.array(ends)).T, color=CREDIBLE, linewidth=9.0, alpha=0.75, zorder=18)
+            axes.plot(*view.project(np.array(ends)).T, color=LIKELY, linewidth=9.0, alpha=0.75, zorder=18)
     _arrow(axes, arm, q, view, true, TRUE, 4.2)
     if estimate.link and math.isfinite(estimate.place):
         _arrow(axes, arm, q, view, Contact(estimate.link, estimate.place, estimate.force), ESTIMATED, 1.6)
@@ -83,6 +83,7 @@ def draw(axes: Axes, arm: Arm, q: Sequence[float], estimate: ContactEstimate, tr
         va="top",
         transform=axes.transAxes,
         fontsize=9,
+        color=TRUE,
     )
 
 

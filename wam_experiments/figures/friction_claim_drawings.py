@@ -4,9 +4,10 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
+from wam_analysis.drawing import TRUE
 from wam_experiments.figures.friction_claims import ORDERS, ZETAS, AsymmetricStart, HarmonicsOfFriction, KeptContact
 from wam_experiments.figures.series import Series
-from wam_experiments.figures.style import BLUE, GREY, ORANGE, SHADES, legend, picture
+from wam_experiments.figures.style import GREY, SHADES, THEORY, legend, picture
 
 
 def draw_start(numbers: AsymmetricStart, file: Path) -> None:
@@ -32,10 +33,10 @@ def draw_harmonics(numbers: HarmonicsOfFriction, file: Path) -> None:
             line_and_exact(left, hundred, colour, f"{order:g}.")
         left.set(title="a) harmonics of the velocity", xlabel=r"$\gamma$", ylabel="over the fundamental [%]")
         legend(left, loc="upper left")
-        right.semilogy(numbers.gamma, numbers.predicted, color=BLUE, linestyle="--", label="unstable, SIDF (5.16)")
-        right.semilogy(numbers.gamma, numbers.exact, color=BLUE, label="unstable, exact")
+        right.semilogy(numbers.gamma, numbers.predicted, color=THEORY, linestyle="--", label="unstable, SIDF (5.16)")
+        right.semilogy(numbers.gamma, numbers.exact, color=THEORY, label="unstable, exact")
         gamma, small, large = numbers.stable
-        right.semilogy(gamma, small, "o", color=ORANGE, mfc="none", markersize=6, label="stiction, after a small step")
+        right.semilogy(gamma, small, "o", color=TRUE, mfc="none", markersize=6, label="stiction, after a small step")
         right.semilogy(gamma, large, "+", color=SHADES[0], label="stiction, after a step of F")
         right.axvline(1.0, color=GREY, linewidth=0.7, linestyle=":")
         right.set(title="b) cycles", xlabel=r"$\gamma$", ylabel=r"amplitude of $F_c/F_{dynamic}$", ylim=(0.05, 200.0))

@@ -8,7 +8,7 @@ from wam_experiments.figures.bandwidth import Breakpoints
 from wam_experiments.figures.cables import Creep, EfficiencyNumbers
 from wam_experiments.figures.links import Grasp
 from wam_experiments.figures.series import Series
-from wam_experiments.figures.style import BLUE, GREY, SHADES, legend, picture, plant, theory_and_plant
+from wam_experiments.figures.style import GREY, SHADES, THEORY, legend, picture, plant, theory_and_plant
 
 HZ = 0.5 / np.pi
 
@@ -36,12 +36,15 @@ def draw_breakpoints(numbers: Breakpoints, file: Path) -> None:
         for axes in (first, second):
             axes.set(xscale="log", yscale="log", xlabel="contact stiffness at the joint [N m/rad]", ylabel="[Hz]")
             axes.axvline(numbers.crossover, color=GREY, linewidth=0.7, linestyle=":")
-        for series, label, colour in ((numbers.lower, r"$\omega_1$", BLUE), (numbers.upper, r"$\omega_2$", SHADES[2])):
+        for series, label, colour in (
+            (numbers.lower, r"$\omega_1$", THEORY),
+            (numbers.upper, r"$\omega_2$", SHADES[2]),
+        ):
             theory_and_plant(first, _hertz(series), colour, label)
         first.set(title="a) breakpoints (4.4), N = 14", ylim=(1.0, 2e3))
         legend(first, loc="upper left")
         x = numbers.lower.x
-        second.plot(x, HZ * numbers.lower.y, color=BLUE, label=r"$\omega_1$, N = 14  (4.4)")
+        second.plot(x, HZ * numbers.lower.y, color=THEORY, label=r"$\omega_1$, N = 14  (4.4)")
         second.plot(x, HZ * numbers.link, color=SHADES[3], linestyle="--", label=r"$\sqrt{k_c/J_l}$  (4.7)")
         second.plot(x, HZ * numbers.rotor, color=SHADES[4], linestyle="--", label=r"$\sqrt{k_{tr}/J_m}$  (4.7)")
         plant(second, _hertz(numbers.lower))
@@ -81,7 +84,7 @@ def draw_efficiency(numbers: EfficiencyNumbers, file: Path) -> None:
         left.set(title="two-stage testbed", xlabel="motor torque [N m]", ylabel="power out / power in", xlim=(0.0, 7.5))
         legend(left, loc="lower left")
         for n, row in zip(numbers.stages.tolist(), numbers.equal_stages, strict=True):
-            right.plot(1e2 * numbers.strain, row, color=BLUE, alpha=0.35 + 0.65 / n)
+            right.plot(1e2 * numbers.strain, row, color=THEORY, alpha=0.35 + 0.65 / n)
             right.text(3.03, row[-1], f"n = {n:g}", va="center", fontsize=8.0)
         right.set(
             title="n stages of equal stress",

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, TRUE
+from wam_analysis.drawing import BETWEEN, COMMANDED, REFUSED, RIGHT, WRONG
 from wam_experiments.figures.style import GREY, panels
 from wam_experiments.force_benchmark.evaluation import ForceTrial
 from wam_experiments.force_benchmark.outcome import TOLERANCE, TaskEnd
 from wam_experiments.force_benchmark.page import GROUPINGS, MOTORS, SENSORS, TaskGrouping, of_class
 
-COLOURS = {TaskEnd.DONE: MEASURED, TaskEnd.REFUSED: GREY, TaskEnd.ENDED: TRUE, TaskEnd.SILENT: ESTIMATED}
+COLOURS = {TaskEnd.DONE: RIGHT, TaskEnd.REFUSED: REFUSED, TaskEnd.ENDED: BETWEEN, TaskEnd.SILENT: WRONG}
 LEAST, MOST = 0.1, 10.0  # of the commanded force, drawn
 FORCES, RATIOS = (1, 2, 5, 10, 20, 40), (0.1, 0.2, 0.5, 1, 2, 5, 10)  # ticks, N and none
 
@@ -20,7 +20,7 @@ FORCES, RATIOS = (1, 2, 5, 10, 20, 40), (0.1, 0.2, 0.5, 1, 2, 5, 10)  # ticks, N
 def figure(trials: Sequence[ForceTrial], file: Path) -> None:
     """Draw the figure into a file, and create its folder."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    with panels(file, 2, 3, 13.0, 7.4) as (_, flat):
+    with panels(file, 3, 2, 8.8, 10.4) as (_, flat):
         _forces(flat[0], of_class(trials, GROUPINGS[0], SENSORS), SENSORS)
         _forces(flat[1], of_class(trials, GROUPINGS[0], MOTORS), MOTORS)
         _peaks(flat[2], trials)
@@ -53,7 +53,7 @@ def _forces(axes: Axes, trials: Sequence[ForceTrial], name: str) -> None:
 
 
 def _peaks(axes: Axes, trials: Sequence[ForceTrial]) -> None:
-    for is_over, colour, label in ((False, TRUE, "below"), (True, ESTIMATED, "above")):
+    for is_over, colour, label in ((False, RIGHT, "below"), (True, WRONG, "above")):
         own = [trial for trial in trials if trial.result.is_over is is_over and trial.result.peak > 0.0]
         stiffness = [trial.task.surface.stiffness for trial in own]
         ratio = [trial.result.peak / trial.result.limit for trial in own]

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from wam_analysis.drawing import PREDICTED, TRUE
 from wam_analysis.measures.limit_cycle import mean_cycle
 from wam_analysis.table import markdown
 from wam_experiments.figures.style import panels
 from wam_experiments.plant.effects import STUDIES, PlantCurve, resonances
 from wam_experiments.plant.levels import LEVELS
 
-BLUE, ORANGE = "#0b6fb8", "#d55e00"
 RATIOS = (4.0, 14.0, 60.0)
 STIFFNESS = np.geomspace(1e2, 1e5, 25)
 RAD_TO_HZ = 1.0 / (2.0 * np.pi)
@@ -25,7 +25,7 @@ def figure(file: Path) -> str:
     file : picture; its suffix is the format.
     """
     curves = {name: study() for name, study in STUDIES.items()}
-    with panels(file, 2, 5, 16.0, 6.2, dpi=150) as (picture, flat):
+    with panels(file, 4, 3, 9.0, 10.4) as (picture, flat):
         _curve(flat[0], curves["slack"], "slack of the loose strand", "stretch [rad]", "circuit torque [N m]")
         _curve(flat[1], curves["creep"], "creep, out and back (6.19)", "travel of the motor [rad]", "creep [mrad]", 1e3)
         _curve(flat[2], curves["efficiency"], "efficiency (6.15)", "motor torque [N m]", "power out / power in")
@@ -36,16 +36,16 @@ def figure(file: Path) -> str:
         _curve(flat[7], curves["impact"], "impact (3.1)", "stiffness [N/m]", "greatest force [N]")
         worst = _resonances(flat[8], flat[9])
         handles, labels = flat[0].get_legend_handles_labels()
-        picture.legend(handles, labels, loc="outside upper right", ncols=2, frameon=False)
+        for unused in flat[len(curves) + 1 :]:
+            unused.set_axis_off()
+        picture.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.66, 0.1), fontsize=9.0)
     return _table(curves, worst)
 
 
 def _curve(axes: Axes, curve: PlantCurve, title: str, x: str, y: str, scale: float = 1.0) -> None:
     step = max(1, len(curve.x) // 40)
-    axes.plot(curve.x, scale * curve.theory, color=BLUE, linewidth=1.5, label="theory")
-    axes.plot(
-        curve.x[::step], scale * curve.plant[::step], "o", color=ORANGE, markersize=3.2, mfc="none", label="plant"
-    )
+    axes.plot(curve.x, scale * curve.theory, color=PREDICTED, linewidth=1.5, label="theory")
+    axes.plot(curve.x[::step], scale * curve.plant[::step], "o", color=TRUE, markersize=3.2, mfc="none", label="plant")
     axes.set(title=title, xlabel=x, ylabel=y)
 
 
@@ -60,8 +60,8 @@ def _resonances(lower: Axes, upper: Axes) -> tuple[float, float]:
     for ratio in RATIOS:
         found = resonances(ratio, STIFFNESS)
         for i, (axes, curve) in enumerate(((lower, found.lower), (upper, found.upper))):
-            axes.loglog(curve.x, curve.theory * RAD_TO_HZ, color=BLUE, linewidth=1.5)
-            axes.loglog(curve.x[::2], curve.plant[::2] * RAD_TO_HZ, "o", color=ORANGE, markersize=3.2, mfc="none")
+            axes.loglog(curve.x, curve.theory * RAD_TO_HZ, color=PREDICTED, linewidth=1.5)
+            axes.loglog(curve.x[::2], curve.plant[::2] * RAD_TO_HZ, "o", color=TRUE, markersize=3.2, mfc="none")
             worst[i] = max(worst[i], float(np.abs(curve.plant / curve.theory - 1.0).max()))
         above = ratio > min(RATIOS)
         position = (found.upper.x[1], found.upper.theory[1] * RAD_TO_HZ)

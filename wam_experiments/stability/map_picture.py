@@ -7,7 +7,7 @@ import numpy as np
 
 from wam_analysis.drawing import MEASURED, TRUE
 from wam_control.loop_design import LoopDesign
-from wam_experiments.figures.style import GREY, ORANGE, picture
+from wam_experiments.figures.style import GREY, UNSTABLE, picture
 from wam_theory.linear_loop import gain_ratio
 from wam_theory.stability_map import largest_stable_steps
 
@@ -42,7 +42,7 @@ def draw(design: LoopDesign, file: Path) -> None:
             design.gamma,
             design.zeta,
             "o",
-            color=ORANGE,
+            color=UNSTABLE,
             mec="white",
             label=f"this loop: domain {design.verdict.domain}",
         )

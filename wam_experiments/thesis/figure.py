@@ -5,12 +5,13 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
+from wam_analysis.drawing import COLOURS, MEASURED, PREDICTED, SHAFTS
 from wam_experiments.figures.style import panels
 from wam_experiments.thesis.definition import Experiment
 from wam_experiments.thesis.rows import Panel, Result
 
-COLOURS = ("#d55e00", "#0b6fb8", "#009e73", "#cc79a7", "#7a5c00")
 MOST_POINTS = 2000
+WIDTH = {1: 5.4, 2: 8.4}  # inches, by columns
 FEW = 40  # points, below which each is drawn as a circle
 
 
@@ -24,7 +25,7 @@ def draw(experiment: Experiment, result: Result, file: Path) -> None:
     count = len(result.panels)
     columns = min(count, 2)
     rows = -(-count // columns)
-    with panels(file, rows, columns, 4.6 * columns, 2.6 * rows + 0.3) as (picture, axes):
+    with panels(file, rows, columns, WIDTH[columns], 2.6 * rows + 0.3) as (picture, axes):
         for panel, panel_axes in zip(result.panels, axes, strict=False):
             draw_panel(panel_axes, panel)
         for unused in axes[count:]:
@@ -34,24 +35,26 @@ def draw(experiment: Experiment, result: Result, file: Path) -> None:
 
 
 def draw_panel(axes: Axes, panel: Panel) -> None:
-    """Draw the curves of a panel: predictions dashed, measurements in colour."""
-    colour = -1
+    """Draw the curves of a panel: predictions dashed; what is commanded, true, estimated in the colours of that."""
+    several = sum(curve.role == "measured" and curve.label not in COLOURS for curve in panel.curves) > 1
+    others = iter(SHAFTS * 4)
     for curve in panel.curves:
         step = max(1, len(curve.x) // MOST_POINTS)
         x, y = curve.x[::step], curve.y[::step]
         if curve.role == "predicted":
-            axes.plot(x, y, color="black", linewidth=0.9, linestyle="--", label=curve.label or None, zorder=3)
+            colour, style = COLOURS.get(curve.label, PREDICTED), "-" if curve.label == "true" else "--"
+            axes.plot(x, y, color=colour, linewidth=1.1, linestyle=style, label=curve.label or None, zorder=3)
             continue
-        colour += 1
+        colour = COLOURS.get(curve.label) or (next(others) if several else MEASURED)
         label = curve.label or None
         if len(x) < FEW:
-            axes.plot(x, y, "o", color=COLOURS[colour % len(COLOURS)], markersize=3.5, mfc="none", label=label)
+            axes.plot(x, y, "o", color=colour, markersize=3.5, mfc="none", label=label)
         else:
-            axes.plot(x, y, color=COLOURS[colour % len(COLOURS)], linewidth=1.1, label=label)
+            axes.plot(x, y, color=colour, linewidth=1.1, label=label)
     axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
     if "x" in panel.logarithmic:
         axes.set_xscale("log")
     if "y" in panel.logarithmic:
         axes.set_yscale("log")
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(frameon=False, fontsize=7.5)
+        axes.legend(frameon=False, fontsize=8)

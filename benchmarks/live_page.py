@@ -1,0 +1,109 @@
+"""What the live page costs: real-time factor of lockstep with and without it, and its memory over minutes.
+
+The page has a client that takes everything, as a browser does, and draws nothing; a browser that draws without a
+graphics card would cost more than the page.
+"""
+
+import argparse
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from comparing import machine, ratios, save, spread, table
+
+from wam_cli.commands.live import PageProcess
+from wam_description.configuration import Configuration, packaged
+from wam_live.page import HOST, port_is_free
+from wam_ros.bring_up import Composition
+from wam_ros.run import NAMESPACE
+
+FIRST_PORT = 8190
+LONGEST_START, SETTLING = 120.0, 3.0  # s
+CLIENT = """
+import sys, time
+from websockets.sync.client import connect
+import viser
+with connect(sys.argv[1], max_size=None, subprotocols=[f"viser-v{viser.__version__}"]) as page:
+    while True:
+        page.recv()
+"""
+
+
+def resident(pid: int) -> float:
+    """Memory of a process, MB."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * 4096 / 1e6
+
+
+def factor(stack: Composition, seconds: float) -> float:
+    """Arm's seconds per second of the wall clock, over so many of them."""
+    driver: Any = stack.nodes["driver"]
+    begin, stamp = time.perf_counter(), driver.driver.stamp
+    stack.spin(lambda: time.perf_counter() - begin > seconds)
+    return (driver.driver.stamp - stamp) / 1e9 / (time.perf_counter() - begin)
+
+
+class Watched:
+    """A page and its client; leaving the context ends both."""
+
+    def __init__(self, stack: Composition, port: int) -> None:
+        self._stack, self._port = stack, port
+
+    def __enter__(self) -> int:
+        self._page = PageProcess(self._port, NAMESPACE)
+        end = time.monotonic() + LONGEST_START
+        self._stack.spin(lambda: not port_is_free(self._port) or time.monotonic() > end)
+        self._client = subprocess.Popen([sys.executable, "-c", CLIENT, f"ws://{HOST}:{self._port}"])
+        factor(self._stack, SETTLING)
+        if self._client.poll() is not None:
+            raise SystemExit("the client could not connect to the page")
+        return self._page._process.pid
+
+    def __exit__(self, *_: object) -> None:
+        self._client.kill()
+        self._client.wait()
+        self._page.close()
+
+
+def main() -> None:
+    """Measure in turns, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=4, help="default: %(default)s")
+    parser.add_argument("--seconds", type=float, default=5.0, help="of each part of a round; default: %(default)s")
+    parser.add_argument("--minutes", type=float, default=1.0, help="of the look at the memory; default: %(default)s")
+    parser.add_argument("--quick", action="store_true", help="short test run; nothing is written")
+    given = parser.parse_args()
+    if given.quick:
+        given.rounds, given.seconds, given.minutes = 1, 1.0, 0.05
+    ports = (port for port in range(FIRST_PORT, FIRST_PORT + 1000) if port_is_free(port))
+    values = {"timing.mode": "lockstep", "timing.real_time_factor": 0.0, "timing.timeout": LONGEST_START}
+    alone, watched = [], []
+    with Composition(Configuration.load(packaged("wam")).with_values(values)) as stack:
+        factor(stack, 2.0)
+        for _ in range(given.rounds):
+            before = factor(stack, given.seconds)
+            with Watched(stack, next(ports)):
+                watched.append(factor(stack, given.seconds))
+            alone.append(0.5 * (before + factor(stack, given.seconds)))
+        with Watched(stack, next(ports)) as pid:
+            factor(stack, 0.2 * 60.0 * given.minutes)
+            memory = []
+            for _ in range(20):
+                factor(stack, 0.8 * 60.0 * given.minutes / 20)
+                memory.append(resident(pid))
+    cost, growth = ratios(watched, alone), spread(np.array(memory) / memory[0])
+    print(machine())
+    memories = [f"{memory[0]:.0f}", f"{memory[-1]:.0f}", f"{growth:.3f}"]
+    rows = [
+        ["real-time factor with the page", f"{spread(alone):.2f}", f"{spread(watched):.2f}", f"{cost:.3f}"],
+        [f"memory of the page over {given.minutes:g} min [MB]", *memories],
+    ]
+    print(table(["live page", "without, or first", "with, or last", "ratio (middle half)"], rows))
+    save("live_page", given, {"factor_ratio": cost, "memory_ratio": growth, "memory": memory})
+
+
+if __name__ == "__main__":
+    main()

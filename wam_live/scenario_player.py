@@ -1,0 +1,56 @@
+"""A scenario that the page plays into a running stack: the scenario node as a process of its own."""
+
+from pathlib import Path
+
+from wam_control.scenario import load, script_file
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration
+from wam_description.parameters import ParameterError, values
+from wam_description.yaml_text import parameter_text
+from wam_ros.bring_up import NodeProcess
+
+NODE = "scenario"
+
+
+class ScenarioPlayer:
+    """Starts the scenario node beside a stack that has none.
+
+    Parameters
+    ----------
+    shared : parameters of the stack.
+    namespace : of the stack.
+    """
+
+    def __init__(self, shared: Shared, namespace: str) -> None:
+        self._shared, self._namespace = shared, namespace
+        self._node: NodeProcess | None = None
+
+    def play(self, script: str) -> str:
+        """Begin a scenario, named or as a file; returns why that is not possible, '' where it is."""
+        if NODE in self._shared.nodes:
+            return "this stack plays a scenario of its own; start it without --scenario"
+        if self._node is not None:
+            return "a scenario is being played; stop it first"
+        try:
+            file = script_file(script)
+            load(file, self._shared.arm)
+        except ParameterError as error:
+            return str(error)
+        text = parameter_text({f"/**/{NODE}": {**values(self._shared), "script": str(Path(file).resolve())}})
+        self._node = NodeProcess(Configuration(file, text, {}), NODE, self._namespace)
+        return ""
+
+    def ended(self) -> str:
+        """How the scenario ended, once; '' before and after."""
+        if self._node is None or (code := self._node.code) is None:
+            return ""
+        self.stop()
+        return (
+            "the scenario has ended" if code == 0 else "the scenario failed; why, is in its status and on the console"
+        )
+
+    def stop(self) -> None:
+        """End the scenario; the arm holds its posture."""
+        if self._node is not None:
+            self._node.close()
+            self._node = None
