@@ -12,7 +12,13 @@ from wam_experiments.force_benchmark.evaluation import ForceTrial
 from wam_experiments.force_benchmark.outcome import TOLERANCE, TaskEnd
 from wam_experiments.force_benchmark.page import GROUPINGS, MOTORS, SENSORS, TaskGrouping, of_class
 
-COLOURS = {TaskEnd.DONE: MEASURED, TaskEnd.REFUSED: GREY, TaskEnd.ENDED: TRUE, TaskEnd.SILENT: ESTIMATED}
+COLOURS = {
+    TaskEnd.DONE: MEASURED,
+    TaskEnd.REFUSED: GREY,
+    TaskEnd.GIVEN_UP: COMMANDED,
+    TaskEnd.ENDED: TRUE,
+    TaskEnd.SILENT: ESTIMATED,
+}
 LEAST, MOST = 0.1, 10.0  # of the commanded force, drawn
 FORCES, RATIOS = (1, 2, 5, 10, 20, 40), (0.1, 0.2, 0.5, 1, 2, 5, 10)  # ticks, N and none
 
