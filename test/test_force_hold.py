@@ -568,6 +568,15 @@ def test_a_force_that_swings_about_the_commanded_one_is_reported_until_it_rests(
 
 
 # ------------------------------------------------------------------------------------- commands
+def test_a_slow_swing_is_reported_too() -> None:
+    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), force_gain=(0.0,), contact_source="pinned")
+    loop, reported = force_loop(ARM, own), []
+    for k in range(400):
+        ask(loop, World(400.0, force=5.0 + 3.0 * math.sin(2.0 * math.pi * k * DT / 0.9)), down(5.0))
+        reported.append(loop.reaction is ForceReaction.NOT_REACHED)
+    assert all(reported[200:]), "each side lasts less than the settling time, and more than half of it"
+
+
 def test_a_limit_that_is_lowered_counts_for_the_command_in_force() -> None:
     loop = force_loop(ARM, OWN)
     assert any(ask(loop, World(400.0), down(40.0)).effort)

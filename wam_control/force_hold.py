@@ -81,7 +81,7 @@ class ForceHold:
         self._other = ""
         self._travel = self._conflict = self._missed = self._swings = self._assumed = self._strange = 0.0
         self._above = self._below = math.inf
-        self._uncertain = 0.0
+        self._uncertain = self._off = 0.0
 
     def approach_speed(
         self, axis: ForceAxis, point: ForcePoint, desired: float, parameters: ForceLoopParameters
@@ -283,11 +283,15 @@ class ForceHold:
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
                 "another direction, or bend the arm"
             )
-        if self._swings > lasting:
+        off = self._off + (
+            dt if is_off else -dt
+        )  # a slow swing is within the tolerance for the lesser part of the time
+        self._off = min(max(off, 0.0), 1.1 * lasting)
+        if max(self._swings, self._off) > lasting:
             return (
                 f"the force swings about {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N to either "
-                f"side, for {self._swings:.2g} s: the surface moves, the position is not known, or it is a limit "
-                "cycle; pin the position, or lower force_gain"
+                f"side, for {max(self._swings, self._off):.2g} s: the surface moves, the position is not known, or it "
+                "is a limit cycle; pin the position, or lower force_gain"
             )
         return ""
 
