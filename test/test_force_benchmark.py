@@ -128,7 +128,7 @@ def test_true_motors_give_another_torque_than_their_reported_one() -> None:
 
 # ------------------------------------------------------------------------------------ outcomes
 def trace(forces: Any, **more: Any) -> TaskTrace:
-    given = TaskTrace(np.array(forces, float), 1e-3, 0.005, 2.0, "", False, 0.0, 0.0145)
+    given = TaskTrace(np.array(forces, float), 1e-3, 0.005, 2.0, "", False, False, 0.0, 0.0145)
     return given._replace(**more)
 
 
@@ -146,7 +146,10 @@ def held(newtons: float, **more: Any) -> TaskTrace:
         (held(0.0), TaskEnd.SILENT),
         (held(11.1, reason="not reached"), TaskEnd.ENDED),
         (held(0.0, reason="not sensed", is_stopped=True, travel=0.0), TaskEnd.REFUSED),
-        (held(0.0, reason="not sensed", is_stopped=True, travel=0.1), TaskEnd.ENDED),
+        (held(0.0, reason="not sensed", is_stopped=True, travel=0.1), TaskEnd.GIVEN_UP),
+        (held(2.0, reason="another link", is_stopped=True), TaskEnd.GIVEN_UP),
+        (trace([0.0, 10.1] + [2.0] * 3000, reason="another link", is_stopped=True), TaskEnd.ENDED),
+        (held(2.0, reason="fault", is_stopped=True, is_fault=True), TaskEnd.ENDED),
         (held(0.0, reason="not reached", travel=0.0), TaskEnd.ENDED),
     ],
 )
@@ -307,7 +310,7 @@ def test_the_page_counts_what_went_in_and_lists_each_failure() -> None:
     assert rows["wrong force without a reason"] == ("1", False)
     assert rows["tasks refused with a reason"][0] == "0.5% of 200"
     text = page(found, 7, "wam evaluate force --seed 7", "picture.png")
-    assert "| all | 200 | 99% | 0% | 0% | 0% | 2 | 0 |" in text
+    assert "| all | 200 | 99% | 0% | 0% | 0% | 0% | 2 | 0 |" in text
     assert "`wam evaluate force --seed 7 --only 3`" in text
     assert "| sd of # N | 1 |" in text
     assert "Unreported cycles" not in text
@@ -318,10 +321,15 @@ def test_the_page_counts_what_went_in_and_lists_each_failure() -> None:
 
 def test_required_shares_are_of_the_accepted_tasks() -> None:
     found = trials()
-    sensors = sum(not t.task.conditions.is_dithered for t in found)
-    refusals = sum(not t.task.conditions.is_dithered and t.result.outcome is TaskEnd.REFUSED for t in found)
-    (row,) = [value for name, _, value, _ in required(found) if "joint sensors" in name]
-    assert f" of {sensors - refusals} (" in row
+    number = next(t.number for t in found[6:] if not t.task.conditions.is_dithered)
+    left = held(0.0, reason="another link", is_stopped=True)
+    found[number] = found[number]._replace(result=evaluated(DRAWN[number], left))
+    ends = [t.result.outcome for t in found if not t.task.conditions.is_dithered]
+    refusals, withdrawals = ends.count(TaskEnd.REFUSED), ends.count(TaskEnd.GIVEN_UP)
+    assert withdrawals == 1
+    strict, wide = [value for name, _, value, _ in required(found) if "joint sensors" in name]
+    assert f" of {len(ends) - refusals - withdrawals} (" in strict
+    assert f" of {len(ends) - refusals} (" in wide
 
 
 def test_a_wrong_option_is_refused_in_a_sentence(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -148,9 +148,16 @@ def test_an_arm_that_holds_is_pulled_back_to_where_the_hold_began() -> None:
     assert out.velocity == pytest.approx([-0.01 * PINNED.posture_gain] * 4)
 
 
-def test_the_hold_ends_only_well_below_the_limit() -> None:
+def test_a_hold_ends_and_a_force_begins_only_well_below_the_limit() -> None:
     loop = force_loop(ARM, replace(PINNED, contact_position=TIP))
-    for bend, reaction in ((0.4, "NONE"), (0.25, "NOT_SENSED"), (0.35, "NOT_SENSED"), (0.45, "NONE"), (0.35, "NONE")):
+    for bend, reaction in (
+        (0.35, "NOT_SENSED"),
+        (0.4, "NONE"),
+        (0.25, "NOT_SENSED"),
+        (0.35, "NOT_SENSED"),
+        (0.45, "NONE"),
+        (0.35, "NONE"),
+    ):
         press(loop, bent(bend), radial(bent(bend)), 5.0)
         assert loop.reaction is ForceReaction[reaction], bend
 
@@ -254,22 +261,99 @@ def test_a_contact_on_another_link_is_not_controlled_through_the_jacobian_of_thi
     def step(contact: Contact) -> Any:
         return loop.step(state, sensed, contact, None, command, None, None, DT)
 
+    step(NO_CONTACT)
+    moved = State([angle + 0.01 for angle in POSE], STILL, DRIVEN)
     for _ in range(30):
-        step(touch)
-    held = step(touch)
+        held = loop.step(moved, sensed, touch, None, command, None, None, DT)
     assert loop.reaction is ForceReaction.OTHER_LINK
     assert "inner_link is touched" in loop.refusals["force_command"]
-    assert held.velocity == STILL
-    for _ in range(20):  # a link that bounces off is still the one that is touched
+    assert held.velocity == pytest.approx([-0.01 * QUIET.posture_gain] * 4), "back to where it was free"
+    for _ in range(200):  # it does not touch again and again
         step(NO_CONTACT)
     assert loop.reaction is ForceReaction.OTHER_LINK
-    for _ in range(60):
-        step(NO_CONTACT)
-    assert loop.reaction is ForceReaction.NONE
+    loop.step(state, sensed, NO_CONTACT, None, None, None, None, DT)
+    step(NO_CONTACT)
+    assert loop.reaction is ForceReaction.NONE, "until the command ends"
     where_it_is = ForceCommand("inner_link", (0.0, 0.0, 5.0), torque_of_position((0.0, 0.0, 5.0), 0.4))
     for _ in range(30):
         loop.step(state, sensed, touch, None, where_it_is, None, None, DT)
     assert loop.reaction is not ForceReaction.OTHER_LINK
+
+
+def test_a_contact_of_which_the_link_stays_unknown_ends_the_command() -> None:
+    """Pressed on, the force could be many times the commanded one."""
+    vague = Contact("outer_link", 0.0, (0.0, 1.0, 0.0), 0.001, 0.55)
+    for source, reaction in (("estimated", ForceReaction.OTHER_LINK), ("pinned", ForceReaction.NONE)):
+        loop, world = force_loop(ARM, replace(QUIET, contact_source=source)), World(400.0, force=2.0)
+        for _ in range(120):
+            ask(loop, world, down(5.0), contact=vague)
+        assert loop.reaction is reaction
+        assert ("not known whether on outer_link" in loop.reason) is bool(reaction)
+
+
+def test_a_force_at_an_unknown_position_is_sensed_whatever_the_position_is() -> None:
+    loop = force_loop(ARM, OWN)
+    for place in (0.1, 0.28, 0.4):
+        levers = lever(POSE, DOWNWARDS, "outer_link", place)
+        sensed = State(POSE, STILL, (BODY.gravity_torque(POSE) + 20.0 * levers).tolist())
+        for _ in range(50):
+            out = loop.step(
+                State(POSE, STILL, DRIVEN), sensed, NO_CONTACT, None, ForceCommand("base", down(20.0)), None, None, DT
+            )
+        assert out.point.position_sd > 0.1
+        assert -out.measured[2] == pytest.approx(20.0, rel=0.04), "as a pinned position of 0.28 m it is off by 40 %"
+
+
+def test_an_unknown_or_late_contact_is_pressed_on_slowly() -> None:
+    """The force rises to the commanded one in no less than 0.3 s, or 0.1 s, on the stiffest surface."""
+    sure = Contact("outer_link", 0.28, (0.0, 1.0, 0.0), 0.01, 1.0)
+    speeds = {}
+    for name, contact, feedback in (
+        ("known", sure, "joint_sensors"),
+        ("unknown", NO_CONTACT, "joint_sensors"),
+        ("late", sure, "contact_estimate"),
+    ):
+        own = replace(QUIET, feedback=feedback, guard=replace(QUIET.guard, contact_stiffness=1e5))
+        loop, world = force_loop(ARM, own), World(400.0, force=2.0)
+        torques = (-2.0 * lever(POSE)).tolist()
+        for _ in range(20):
+            out = ask(loop, world, down(8.0), contact=contact, external=torques)
+        speeds[name] = float(lever(POSE) @ out.velocity)
+        whole = 8.0 * (1e-5 + out.axis.compliance)  # m
+    assert speeds["known"] > 1.2 * whole / 0.1
+    assert 0.5 * whole / 0.3 < speeds["unknown"] < 1.05 * whole / 0.3
+    assert 0.5 * whole / 0.1 < speeds["late"] < 1.05 * whole / 0.1
+
+
+def test_compliance_is_the_way_along_the_force_that_the_cables_give() -> None:
+    axis = axis_of(POSE, np.array(DOWNWARDS))
+    stiffness = [circuit.stiffness for circuit in ARM.circuits]
+    motors = np.reshape(ARM.joint_from_motor, (4, 4)).T @ axis.lever  # torque of each motor per newton
+    assert axis.compliance == pytest.approx(sum(tau * tau / k for tau, k in zip(motors, stiffness, strict=True)))
+
+
+def test_a_surface_too_hard_for_the_force_is_refused_before_anything_moves() -> None:
+    for stiffness, reaction in ((4e3, ForceReaction.NONE), (4e5, ForceReaction.TOO_SLOW)):
+        own = replace(PINNED, guard=replace(PINNED.guard, contact_stiffness=stiffness))
+        loop = force_loop(ARM, own)
+        out = press(loop, POSE, np.array(DOWNWARDS), 1.0, 3)
+        assert loop.reaction is reaction
+        assert any(out.velocity) is not bool(reaction)
+    assert "may be approached with" in loop.refusals["force_command"]
+    slow = replace(PINNED, force_gain=(1e-4,))
+    loop = force_loop(ARM, slow)
+    press(loop, POSE, np.array(DOWNWARDS), 10.0, 3)
+    assert "time constant of 2." in loop.reason or "time constant of 3." in loop.reason
+
+
+def test_errors_of_estimated_torques_grow_with_the_force() -> None:
+    for sensing, ratio in ((GIVEN.sensing, 1.0), (GIVEN.sensing.of_estimate, 3.0)):
+        quiet = replace(sensing, friction=0.0)
+        small, large = (
+            ForceAxes(ARM, BODY, quiet).axis(POSE, "outer_link", 0.28, 0.0, np.array(DOWNWARDS), force).force_sd
+            for force in (1.0, 40.0)
+        )
+        assert large / small >= ratio
 
 
 DOWNWARDS = (0.0, 0.0, -1.0)
@@ -415,7 +499,7 @@ def test_a_force_that_is_not_reached_is_reported() -> None:
 @pytest.mark.parametrize(
     ("source", "probability", "friction", "expected", "text"),
     [
-        ("estimated", 0.4, 0.1, ForceReaction.PLACE_ASSUMED, "it is not known where; 0.28 m of outer_link is assumed"),
+        ("estimated", 0.4, 0.1, ForceReaction.OTHER_LINK, "something is touched, and it is not known whether on outer"),
         ("estimated", 1.0, 0.1, ForceReaction.NONE, ""),
         ("estimated", 1.0, 0.3, ForceReaction.PLACE_ASSUMED, "the torques alone, so that the force is known to 0.56 N"),
         ("pinned", 0.4, 0.3, ForceReaction.NONE, ""),
@@ -484,6 +568,15 @@ def test_a_force_that_swings_about_the_commanded_one_is_reported_until_it_rests(
 
 
 # ------------------------------------------------------------------------------------- commands
+def test_a_slow_swing_is_reported_too() -> None:
+    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), force_gain=(0.0,), contact_source="pinned")
+    loop, reported = force_loop(ARM, own), []
+    for k in range(400):
+        ask(loop, World(400.0, force=5.0 + 3.0 * math.sin(2.0 * math.pi * k * DT / 0.9)), down(5.0))
+        reported.append(loop.reaction is ForceReaction.NOT_REACHED)
+    assert all(reported[200:]), "each side lasts less than the settling time, and more than half of it"
+
+
 def test_a_limit_that_is_lowered_counts_for_the_command_in_force() -> None:
     loop = force_loop(ARM, OWN)
     assert any(ask(loop, World(400.0), down(40.0)).effort)

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_force_loop import ARM, DT, GIVEN, OWN, World, ask, down, force_loop
+from test_force_loop import ARM, CONFIGURATION, DT, GIVEN, OWN, POSE, STILL, World, ask, down, force_loop, lever
 
-from wam_control.force_hold import ForceHold, ForceReaction
+from wam_control.force_hold import ForceReaction
+from wam_control.force_loop import ForceLoop, ForceOutput
 from wam_control.force_swing import Reversals, Shake
 
 LIMITS = replace(GIVEN.limits, settling_time=0.5)
@@ -55,13 +56,26 @@ def test_a_pinned_force_that_is_known_worse_than_ten_per_cent_is_reported_with_i
 
 
 def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_commanded() -> None:
-    hold = ForceHold()
-    stiff = replace(PINNED, guard=replace(PINNED.guard, contact_stiffness=1e5))
+    """The motion is watched before the arm moves: what it touches then does not count as shaking."""
+    own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
+    stiff = replace(own, guard=replace(own.guard, contact_stiffness=1e5))
+    shared = CONFIGURATION.shared
+    loop = ForceLoop(ARM, shared.servo, stiff, replace(shared.timing, dither_cycle=40))
+    world, axis = World(1e-9), lever(POSE)
 
-    def reason(force: float) -> str:
-        for k in range(80):
-            found = hold.shaken(5e-5 * math.cos(2.0 * math.pi * k / 8.0), force, stiff, DT)
-        return found
+    def press(force: float, amplitude: float, periods: int = 60) -> ForceOutput:
+        for k in range(periods):
+            world.q = (POSE + amplitude * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
+            out = ask(loop, world, down(force), external=STILL)
+        return out
 
-    assert "declare a softer surface" in reason(3.0)
-    assert reason(10.0) == ""
+    out = press(3.0, 1e-4)
+    assert loop.reaction is ForceReaction.SHAKEN
+    assert "declare a softer surface" in loop.reason
+    assert float(axis @ out.velocity) == pytest.approx(0.0, abs=2e-3)
+    assert float(axis @ press(30.0, 1e-4).velocity) > 0.01, "more force is commanded"
+    ask(loop, world, None)
+    press(3.0, 0.0)
+    assert loop.reaction is ForceReaction.NONE
+    press(3.0, 1e-4)
+    assert loop.reaction is ForceReaction.NONE, "the motion that was there before counts"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from arms import LEVER, changed, one_joint
 
-from wam_control.contact_position import position_is_certain
+from wam_control.contact_position import anywhere_sd, position_is_certain
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
 from wam_control.friction_verdict import Domain, friction_verdict, linear_margin, stable_error
 from wam_control.guard_watch import Watch
@@ -29,7 +29,7 @@ ARM, CLOCK = WAM.shared.arm, WAM.shared.timing
 OWN = WAM.node("force_loop", ForceLoopParameters)
 SERVO = WAM.shared.servo
 Loop = partial(ForceLoop, ARM, SERVO, timing=CLOCK)
-UNSURE = OWN.position_uncertainty_limit
+UNSURE = anywhere_sd(ARM.covers, "outer_link", 0.28)
 POUND_INCH = 0.1129848  # N m
 
 
@@ -184,6 +184,17 @@ def test_a_stiffer_surface_leaves_less_gain_and_a_lag_of_the_feedback_no_more() 
 
 
 STIFF = Servo(*(tuple(2.0 * gain for gain in gains) for gains in (SERVO.proportional_gain, SERVO.integral_gain)))
+
+
+def test_the_mean_over_a_cycle_of_the_dither_is_a_delay_that_leaves_less_gain() -> None:
+    own = guarded(replace(OWN, feedback="contact_estimate"), contact_stiffness=1e5, mode="warn")
+    own = guarded(own, posture=(-2.07, -0.11, -0.26, 1.58))
+    margins = []
+    for cycle in (0, 40):
+        found = ForceLoop(ARM, SERVO, own, replace(CLOCK, dither_cycle=cycle)).assessment
+        assert found is not None
+        margins.append(found.scale)
+    assert margins[1] < 0.6 * margins[0]
 
 
 def test_the_guard_follows_the_gains_of_the_velocity_loop() -> None:

@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_description.arm import Covers
 from wam_description.signals import BASE, Contact, ForceCommand, Triple
 
 STEEPEST = math.radians(30.0)  # lean of a force from the normal of a link, up to which its position is estimated well
@@ -17,7 +18,8 @@ class ForcePoint(NamedTuple):
     cover, position, position_sd : cover, position along it and its standard deviation, m.
     is_certain : whether the position is pinned, or the present estimate alone is certain enough to be used.
     is_pinned : whether the position is pinned.
-    is_assumed : whether the position is the configured one although it was to be estimated.
+    is_identified : whether it is pinned, or the link is that of the present estimate, whose position may be unknown.
+    is_doubtful : whether something is touched, and the position is not pinned nor the link identified.
     rejection : why the present estimate is not used, '' if it is or is not needed.
     conflict : why no force can be controlled there: something else is touched; '' if nothing is known of that.
     """
@@ -27,7 +29,8 @@ class ForcePoint(NamedTuple):
     position_sd: float
     is_certain: bool
     is_pinned: bool
-    is_assumed: bool
+    is_identified: bool
+    is_doubtful: bool
     rejection: str
     conflict: str
 
@@ -35,10 +38,16 @@ class ForcePoint(NamedTuple):
 class ContactPosition:
     """Selects the point of action, and keeps the last certain one as long as the contact lasts.
 
-    Without that memory an estimate near its limits would step the measured force back and forth.
+    Without that memory an estimate near its limits would step the measured force back and forth.  A position that is
+    not known may be anywhere on the cover: the force is then sensed apart from what depends on it.
+
+    Parameters
+    ----------
+    covers : of the arm.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, covers: Covers) -> None:
+        self._covers = covers
         self._last: tuple[str, float, float] | None = None
 
     def step(
@@ -57,21 +66,30 @@ class ContactPosition:
         if pinned is not None or parameters.contact_source == "pinned":
             self._last = None
             cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
-            return ForcePoint(cover, position, 0.0, True, True, False, "", _conflict(contact, cover, parameters))
+            conflict = _conflict(contact, cover, parameters)
+            return ForcePoint(cover, position, 0.0, True, True, True, False, "", conflict)
         problem = _problem(contact, lean, parameters) if contact.cover else ""
         if not contact.cover:
             self._last = None
         elif not problem:
             sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
             self._last = contact.cover, contact.place, sd
-        assumed = parameters.contact_cover, parameters.contact_position, parameters.position_uncertainty_limit
-        cover, position, sd = self._last or assumed
+        assumed = parameters.contact_cover, parameters.contact_position
+        cover, position, sd = self._last or (*assumed, anywhere_sd(self._covers, *assumed))
         if problem:
             used = "the last certain position is used" if self._last else "contact_cover and contact_position are used"
             problem = f"{problem}; {used}"
         is_certain = bool(contact.cover) and not problem
+        is_identified = contact.cover == cover and not contact.probability < parameters.link_probability_limit
         conflict = _conflict(contact, cover, parameters)
-        return ForcePoint(cover, position, sd, is_certain, False, self._last is None, problem, conflict)
+        is_doubtful = bool(contact.cover) and not is_identified
+        return ForcePoint(cover, position, sd, is_certain, False, is_identified, is_doubtful, problem, conflict)
+
+
+def anywhere_sd(covers: Covers, cover: str, position: float) -> float:
+    """Deviation from a position, m, rms, of one that is uniformly distributed over a cover, m."""
+    length = covers.length[covers.names.index(cover)]
+    return math.hypot(length / math.sqrt(12.0), position - length / 2.0)
 
 
 def pinned_position(command: ForceCommand | None) -> tuple[str, float] | None:

@@ -8,7 +8,7 @@ known size, f is sensed by generalised least squares, without shrinkage (s.l = 1
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +31,30 @@ class SensingParameters:
     torque_sd: float = parameter(
         "sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, live=True, before=0.1
     )
+    torque_fraction: float = parameter(
+        "the same, per torque of the commanded force", low=0.0, high=1.0, live=True, before=0.0
+    )
+    estimated_torque_sd: float = parameter(
+        "torque_sd with feedback contact_estimate", "N m", low=1e-6, high=1e3, live=True, before=0.1
+    )
+    estimated_torque_fraction: float = parameter(
+        "torque_fraction with feedback contact_estimate: constants and friction of the motors",
+        low=0.0,
+        high=1.0,
+        live=True,
+        before=0.0,
+    )
     friction: float = parameter(
         "sd of the tangential force on the link, per commanded force", low=0.0, high=2.0, live=True, before=0.0
+    )
+    zero_limit: float = parameter(
+        "largest external torque of a joint that is taken as zero when a force is commanded, where the arm is at rest "
+        "and the contact estimator finds no contact; 0: never",
+        "N m",
+        low=0.0,
+        high=1e3,
+        live=True,
+        before=0.0,
     )
     force_sd_limit: float = parameter(
         "standard deviation of the measured force up to which any force is controlled; where it is larger, and larger "
@@ -67,6 +89,11 @@ class SensingParameters:
         before=0.0,
     )
 
+    @property
+    def of_estimate(self) -> "SensingParameters":
+        """Those of torques that are estimated from the motors."""
+        return replace(self, torque_sd=self.estimated_torque_sd, torque_fraction=self.estimated_torque_fraction)
+
     def sd_limit(self, force: float) -> float:
         """Largest standard deviation, N, with which a commanded force, N, is controlled."""
         return max(self.force_sd_limit, self.force_sd_fraction * force)
@@ -85,6 +112,7 @@ class ForceAxis(NamedTuple):
     apparent_mass : sensed force per acceleration along the direction, kg.
     impact_mass : mass that hits a surface, with rotors, as the arm moves along the direction, kg.
     speed_fraction : velocity along the direction per commanded one, 0 to 1.
+    compliance : of the cables along the direction, m/N.
     precision : (n, n), inverse covariance of the torques apart from the force, 1/(N m)^2.
     """
 
@@ -96,6 +124,7 @@ class ForceAxis(NamedTuple):
     apparent_mass: float
     impact_mass: float
     speed_fraction: float
+    compliance: float
     precision: Array
 
     def unexplained(self, torques: Array) -> float:
@@ -121,6 +150,8 @@ class ForceAxes:
         motor_from_joint = np.linalg.inv(np.reshape(arm.joint_from_motor, (n, n)))
         self._armature = np.diag(arm.joints.armature)
         self._rotors = motor_from_joint.T @ (np.array(arm.motors.inertia)[:, None] * motor_from_joint)
+        cables = np.array([circuit.stiffness for circuit in arm.circuits])
+        self._compliance = np.linalg.inv(motor_from_joint.T @ (cables[:, None] * motor_from_joint))
 
     def inertia(self, q: Sequence[float]) -> Array:
         """Inertia at the joints with their armature (n, n), kg m^2, without rotors."""
@@ -165,11 +196,12 @@ class ForceAxes:
         square = float(lever @ lever)
         if square <= REACH * REACH:
             zero = np.zeros(n)
-            return ForceAxis(lever, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, np.zeros((n, n)))
+            return ForceAxis(lever, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n)))
         size = max(force, SMALLEST_FORCE)
         tangential = parameters.friction * size * (jacobian - np.outer(direction, lever))
         shift = direction @ (self._body.point_jacobian(q, cover, point + ALONG) - jacobian) * size
-        spread = parameters.torque_sd**2 * np.eye(n) + tangential.T @ tangential
+        spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * lever) ** 2)
+        spread += tangential.T @ tangential
         spread += position_sd**2 * np.outer(shift, shift)
         for torque in others:
             spread += np.outer(torque, torque)
@@ -188,4 +220,5 @@ class ForceAxes:
         unknown = max(length * length / 12.0 - position_sd**2, 0.0)
         lost = float(shift @ weighted) ** 2 * unknown / (1.0 + unknown * float(shift @ inverse @ shift))
         sd, free_sd = 1.0 / math.sqrt(precision), 1.0 / math.sqrt(max(precision - lost, 1e-12 * precision))
-        return ForceAxis(lever, sense, lever / damped, sd, free_sd, mass, impact, square / damped, inverse)
+        yielding = float(lever @ self._compliance @ lever)
+        return ForceAxis(lever, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse)

@@ -16,9 +16,16 @@ TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at le
 TOUCH = 0.2  # of the commanded force, from which something is touched
 UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the commanded force
 CONFLICT = 0.1  # s, after which another contact counts
+DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
+IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
+DETECTED = 0.08  # s, until a touch is detected there
+LATE = 0.1  # s, the same as IDENTIFIED where the position is known and the measured force is late
+SETTLED = 3.0  # time constants within the settling time
+CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
+WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
 
@@ -38,6 +45,7 @@ class ForceReaction(IntEnum):
     UNCERTAIN = 10  # goes on: the force is not known as well as it has to be reached
     CYCLE = 11  # goes on: the measured force is in a limit cycle
     SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
+    TOO_SLOW = 13  # holds: the surface is so stiff for the commanded force that the arm would hardly move towards it
 
     @property
     def holds(self) -> bool:
@@ -48,11 +56,17 @@ class ForceReaction(IntEnum):
             ForceReaction.NOTHING_TOUCHED,
             ForceReaction.TASK_REFUSED,
             ForceReaction.SHAKEN,
+            ForceReaction.TOO_SLOW,
         )
 
 
 class ForceHold:
-    """Watches one commanded force."""
+    """Watches one commanded force.
+
+    Attributes
+    ----------
+    is_touching : whether the measured force shows that something is touched.
+    """
 
     def __init__(self) -> None:
         self._turns, self._shake = Reversals(), Shake(SHAKE_SAMPLES)
@@ -62,42 +76,67 @@ class ForceHold:
         """Another force is commanded."""
         self._turns.reset()
         self._shake.reset()
-        self._way = self._shaken = 0.0
-        self._is_sensed, self._is_touching = True, False
+        self._way = self._watched = self._shaking = self._blocked = 0.0
+        self._is_sensed = self.is_touching = False
+        self._other = ""
         self._travel = self._conflict = self._missed = self._swings = self._assumed = self._strange = 0.0
         self._above = self._below = math.inf
-        self._uncertain = 0.0
+        self._uncertain = self._off = 0.0
 
-    def approach_speed(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> float:
-        """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1)."""
-        if self._is_touching or not parameters.limits.impact:
+    def approach_speed(
+        self, axis: ForceAxis, point: ForcePoint, desired: float, parameters: ForceLoopParameters
+    ) -> float:
+        """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
+
+        At a position that is not known, slower: what is touched has to be identified before the force is too large;
+        and where the measured force is late, as it is estimated from the motors.
+        """
+        if not parameters.limits.impact:
             return math.inf
-        largest = parameters.limits.impact * desired
-        return largest / math.sqrt(axis.impact_mass * parameters.guard.contact_stiffness)
+        stiffness = parameters.guard.contact_stiffness
+        yielding = 1.0 / stiffness + axis.compliance
+        is_known = point.is_pinned or point.is_certain
+        if self.is_touching:
+            is_late = parameters.feedback == "contact_estimate"  # it is the mean over a cycle of the dither
+            rise = LATE if is_known and is_late else IDENTIFIED
+            return desired * yielding / (rise * axis.speed_fraction) if is_late or not is_known else math.inf
+        slowest = CREEP / parameters.limits.settling_time
+        fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
+        return fastest if is_known else min(fastest, max(desired * yielding / DETECTED, slowest))
 
     def travel(self, distance: float) -> None:
         """Count a way along the force, m."""
         self._travel += distance
 
-    def shaken(self, moved: float, desired: float, parameters: ForceLoopParameters, dt: float) -> str:
-        """Why the arm shakes too much for the surface, '' where it does not; `moved` along the force in a period, m.
+    def watch_shaking(self, axis: ForceAxis, moved: Array, frequency: float, dt: float) -> bool:
+        """Watch the motion of the joints in a period (n,), rad, under a dither, rad/s; False where it is known.
 
-        On the stiffest surface the swing of the position makes a swing of the force of k_c times its size: above
-        twice the commanded force the contact is lost and hit again in every cycle of the dither.
+        It is watched before the arm moves: what is touched would add its own motion.
         """
-        self._way += moved
-        swing = self._shake.step(self._way)
-        force = parameters.guard.contact_stiffness * swing
-        is_strong = force > parameters.limits.shake_force * desired
-        lasting = self._shaken + (dt if is_strong else -dt)
-        self._shaken = min(max(lasting, 0.0), 2.0 * CONFLICT)
-        if self._shaken <= CONFLICT:
+        if self._watched >= WATCHED:
+            return False
+        self._way += float(axis.lever @ moved)
+        self._watched += dt
+        self._shaking = self._shake.step(self._way)
+        self._blocked = axis.impact_mass * frequency * frequency * self._shaking
+        return True
+
+    def _shaken(self, desired: float, parameters: ForceLoopParameters) -> str:
+        """Why the arm shakes too much for the surface, '' where it does not.
+
+        A soft surface follows the swing of the position, and the force swings by k_c times its size; a hard one stops
+        the swing with the force that moved the mass of the arm.  Above twice the commanded force the contact is lost
+        and hit again in every cycle of the dither.
+        """
+        force = min(parameters.guard.contact_stiffness * self._shaking, self._blocked)
+        if self.is_touching or force <= parameters.limits.shake_force * desired:
             return ""
         return (
-            f"the arm shakes by {swing:.2g} m along the force (dither): on {parameters.guard.contact_stiffness:g} N/m "
-            f"the force would swing by {force:.3g} N; allowed: limits.shake_force, {parameters.limits.shake_force:g} "
-            f"times the commanded {desired:.3g} N; the arm holds its position: use joint sensors, command more force, "
-            "or declare a softer surface (guard.contact_stiffness)"
+            f"the arm shakes by {self._shaking:.2g} m along the force (dither): on "
+            f"{parameters.guard.contact_stiffness:g} N/m the force would swing by {force:.3g} N; allowed: "
+            f"limits.shake_force, {parameters.limits.shake_force:g} times the commanded {desired:.3g} N; the arm holds "
+            "its position: use joint sensors, command more force, or declare a softer surface "
+            "(guard.contact_stiffness)"
         )
 
     def step(
@@ -123,22 +162,53 @@ class ForceHold:
         """
         limit = parameters.sensing.sd_limit(desired)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
-        self._is_touching = measured >= TOUCH * desired
-        if self._is_touching:
+        self.is_touching = measured >= TOUCH * desired
+        if self.is_touching:
             self._travel = 0.0
         # tangential forces grow with the force
         unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2
         is_strange = self._is_sensed and unexplained > UNEXPLAINED
-        lasting = self._conflict + (dt if is_strange and point.conflict else -FADING * dt)
-        self._conflict = min(max(lasting, 0.0), 2.0 * CONFLICT)
-        if self._conflict > CONFLICT:
-            other = point.conflict or "another link was touched"
-            return ForceReaction.OTHER_LINK, f"{other}; the arm holds its position"
+        self._conflict = max(self._conflict + dt * self._against(point, is_strange), 0.0)
+        if self._conflict > CONFLICT and not self._other:
+            touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
+            self._other = f"{touched}; the arm goes back to where it was free until the command ends"
+        held = self._held(axis, point, desired, limit, parameters)
+        if held[0].holds:
+            return held
+        is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired
+        self._strange = self._strange + dt if is_touching and is_strange else 0.0
+        is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
+        self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
+        self._uncertain = self._uncertain + dt if is_touching and axis.force_sd > known else 0.0
+        swing = parameters.limits.cycle_force * desired
+        is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
+        missed = self._not_reached(axis, measured, desired, parameters, dt)
+        if is_cycling:
+            return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
+        if missed:
+            return ForceReaction.NOT_REACHED, missed
+        return self._doubted(axis, point, desired, unexplained, parameters)
+
+    def _against(self, point: ForcePoint, is_strange: bool) -> float:
+        """How fast it counts that another link is touched: `CONFLICT` is full after so many s at 1."""
+        # at a pinned position the estimated link counts only where the torques are not those of the force
+        if point.conflict and (is_strange or not point.is_pinned):
+            return 1.0
+        return CONFLICT / DOUBTED if self.is_touching and point.is_doubtful else -FADING
+
+    def _held(
+        self, axis: ForceAxis, point: ForcePoint, desired: float, limit: float, parameters: ForceLoopParameters
+    ) -> tuple[ForceReaction, str]:
+        """Why the arm is held instead; `limit` of the standard deviation, N."""
+        if self._other:
+            return ForceReaction.OTHER_LINK, self._other
         if not self._is_sensed:
             return ForceReaction.NOT_SENSED, (
                 f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
-                f"of {point.cover}; allowed: {limit:g} N (sensing.force_sd_limit, force_sd_fraction); the arm holds "
-                "its position: bend the arm, or command another direction or place"
+                f"of {point.cover}; allowed: {limit:.3g} N, and {RESUME:g} of it to begin (sensing.force_sd_limit, "
+                "force_sd_fraction); the arm holds its position: bend the arm, or command more force, another "
+                "direction or place"
+                f"{'' if point.is_pinned else ', or pin the place'}"
             )
         if self._travel > parameters.limits.free_travel:
             return ForceReaction.NOTHING_TOUCHED, (
@@ -146,21 +216,39 @@ class ForceHold:
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
+        if shaken := self._shaken(desired, parameters):
+            return ForceReaction.SHAKEN, shaken
+        if self.is_touching:
+            return ForceReaction.NONE, ""
+        stiffness = 1.0 / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
+        pace = max(parameters.force_gain) * axis.speed_fraction * stiffness
+        if pace * parameters.limits.settling_time < SETTLED:
+            return ForceReaction.TOO_SLOW, (
+                f"with {axis.speed_fraction:.2g} of the commanded speed (sensing.apparent_mass_limit) the force would "
+                f"settle with a time constant of {1.0 / pace:.2g} s, and at most 1/{SETTLED:g} of "
+                "limits.settling_time is allowed; the arm holds its position: bend the arm, or command another "
+                "direction or place"
+            )
+        speed = self.approach_speed(axis, point, desired, parameters)
+        if speed * parameters.limits.settling_time < CREEP:
+            return ForceReaction.TOO_SLOW, (
+                f"a surface of {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness) may be approached "
+                f"with {1e3 * speed:.2g} mm/s for {desired:.3g} N (limits.impact), less than {1e3 * CREEP:g} mm within "
+                "limits.settling_time, in which friction moves the arm in jerks; it holds its position: command more "
+                "force, or declare a softer surface"
+            )
+        return ForceReaction.NONE, ""
+
+    def _doubted(
+        self,
+        axis: ForceAxis,
+        point: ForcePoint,
+        desired: float,
+        unexplained: float,
+        parameters: ForceLoopParameters,
+    ) -> tuple[ForceReaction, str]:
+        """Why the measured force may not be the true one, where that lasts."""
         lasting = parameters.limits.settling_time
-        is_touching = self._is_touching
-        self._strange = self._strange + dt if is_touching and is_strange else 0.0
-        least = tolerance(desired, parameters)
-        is_vague = not point.is_pinned and axis.free_sd > least
-        self._assumed = self._assumed + dt if is_touching and (point.is_assumed or is_vague) else 0.0
-        is_uncertain = axis.force_sd > parameters.sensing.reported_fraction * desired
-        self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
-        swing = parameters.limits.cycle_force * desired
-        is_cycling = self._turns.step(measured, swing, lasting, dt) and is_touching
-        missed = self._not_reached(axis, measured, desired, parameters, dt)
-        if is_cycling:
-            return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
-        if missed:
-            return ForceReaction.NOT_REACHED, missed
         if self._strange > lasting:
             return ForceReaction.NOT_EXPLAINED, (
                 f"the torques are not those of a force along the commanded direction at {point.position:.3g} m of "
@@ -195,11 +283,15 @@ class ForceHold:
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
                 "another direction, or bend the arm"
             )
-        if self._swings > lasting:
+        off = self._off + (
+            dt if is_off else -dt
+        )  # a slow swing is within the tolerance for the lesser part of the time
+        self._off = min(max(off, 0.0), 1.1 * lasting)
+        if max(self._swings, self._off) > lasting:
             return (
                 f"the force swings about {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N to either "
-                f"side, for {self._swings:.2g} s: the surface moves, the position is not known, or it is a limit "
-                "cycle; pin the position, or lower force_gain"
+                f"side, for {max(self._swings, self._off):.2g} s: the surface moves, the position is not known, or it "
+                "is a limit cycle; pin the position, or lower force_gain"
             )
         return ""
 
@@ -220,9 +312,9 @@ def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) ->
 
 def _place_assumed(axis: ForceAxis, point: ForcePoint) -> str:
     known = (
-        "it is not known where"
-        if point.is_assumed
-        else f"where it is known from the torques alone, so that the force is known to {axis.free_sd:.2g} N"
+        f"where it is known from the torques alone, so that the force is known to {axis.free_sd:.2g} N"
+        if point.is_identified
+        else "it is not known where"
     )
     return (
         f"something is touched and {known}; {point.position:.3g} m of {point.cover} is assumed, and the force is as "

@@ -19,8 +19,8 @@ from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_command import CommandAdmission
 from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
-from wam_control.force_loop_parameters import ForceLoopParameters, require_fit
-from wam_control.force_measurement import ForceMeasurement, LowPass
+from wam_control.force_loop_parameters import ForceLoopParameters, require_fit, sensing_of
+from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
 from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
@@ -37,6 +37,8 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
+REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
+LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
 class ForceOutput(NamedTuple):
@@ -91,12 +93,15 @@ class ForceLoop:
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
-        self._position = ContactPosition()
+        self._position = ContactPosition(arm.covers)
         self._contact_rejected = False
         self._held_at: list[float] | None = None
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
-        self._filter, self._delay = LowPass(), DelayLine()
+        self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
+        self._pressed_at: list[float] | None = None
+        self._free_at: list[float] = []
+        self._is_free = False
         self._transfer = BumplessTransfer(self._n)
         self._hold = ForceHold()
         self._axes = ""
@@ -148,14 +153,32 @@ class ForceLoop:
         require_fit(parameters, self._arm)
         self._supervision = Supervision(self._arm, servo, self._timing, parameters, self._joints)
         self._servo, self.parameters = servo, parameters
-        self._force_axes = ForceAxes(self._arm, self._body, parameters.sensing)
+        self._force_axes = ForceAxes(self._arm, self._body, sensing_of(parameters))
         self._limits = MotionLimits(self._arm, self._body, parameters.limits)
         self._tasks = TaskControl(self._arm, self._body, self._force_axes, parameters, self._supervision)
         self._transfer.restart()
 
-    def tare(self) -> None:
-        """Take the present external torques as zero."""
+    def tare(self) -> str:
+        """Take the present external torques as zero; '' or why they are not those of a free arm."""
+        if self._axes:
+            return "a force is commanded: end the command, and free the arm"
+        if not self._is_at_rest:
+            return "the arm moves: let it come to rest"
+        if not self._has_left:
+            return "the arm still is where it pressed: free it first"
         self._measurement.tare()
+        return ""
+
+    @property
+    def _is_at_rest(self) -> bool:
+        speed = self._motion.value
+        return speed is not None and float(np.abs(speed).max()) < REST
+
+    @property
+    def _has_left(self) -> bool:
+        """Whether the arm has moved away from where it last pressed on something."""
+        at = self._pressed_at
+        return at is None or any(abs(a - b) > LEFT for a, b in zip(at, self._joints, strict=True))
 
     def step(
         self,
@@ -196,6 +219,8 @@ class ForceLoop:
             task = None
             if own.mode != "open_loop":
                 command = torque = None  # a force that is not measured would grow without bounds
+        self._is_free = contact is not None and not contact.cover
+        self._motion.step(np.array(joints.velocity), STEADY, dt)
         contact = contact or NO_CONTACT
         if task is None and self._axes == TASK:
             self._reset(joints.position)
@@ -204,7 +229,7 @@ class ForceLoop:
         self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
         self.refusals, self.fallback = commands.refusals, ""
         self.reaction, self.reason = ForceReaction.NONE, ""
-        self._measurement.step(own, sensors, external)
+        self._measurement.step(own, sensors, external, dt)
         is_touched = own.feedback != "contact_estimate" or bool(contact.cover)
         present = self._measurement.external if is_touched else np.zeros(self._n)
         self._external = self._filter.step(present, own.force_filter, dt)
@@ -233,13 +258,19 @@ class ForceLoop:
         self._begin("")
 
     def _begin(self, axes: str) -> None:
-        """Control other axes, without a memory of the force on those before; '' for none."""
+        """Control other axes, without a memory of the force on those before; '' for none.
+
+        What a free arm at rest measures is the error of its model.
+        """
         self._hold.reset()
         self._delay.reset()
-        self._torque_before, self._q_before = [], []
+        self._torque_before, self._q_before, self._free_at = [], [], []
         self._axes = axes
         self._held_at = None
         self._transfer.restart()
+        limit = self.parameters.sensing.zero_limit
+        if axes and limit and self._is_free and self._is_at_rest and self._has_left and self._measurement.zero(limit):
+            self._filter.reset()
 
     def _force(
         self, q: Sequence[float], contact: Contact, command: ForceCommand | None, posture: list[float], dt: float
@@ -273,17 +304,22 @@ class ForceLoop:
             point,
             own.sensing.sd_limit(desired),
         )
-        reaction, reason = self._hold.step(force_axis, point, self._external[0], measured, desired, own, dt)
-        if own.feedback == "contact_estimate":
-            moved = [a - b for a, b in zip(q, self._q_before or q, strict=True)]
-            if not reaction.holds and (shaken := self._hold.shaken(float(force_axis.lever @ moved), desired, own, dt)):
-                reaction, reason = ForceReaction.SHAKEN, shaken
+        is_watching = False
+        if own.feedback == "contact_estimate" and self._timing.dither_cycle:
+            frequency = 2.0 * math.pi / (self._timing.dither_cycle * self._timing.period)
+            moved = np.array(q) - np.array(self._q_before or q)
+            is_watching = self._hold.watch_shaking(force_axis, moved, frequency, dt)
             self._q_before = list(q)
+        reaction, reason = self._hold.step(force_axis, point, self._external[0], measured, desired, own, dt)
         self._react(reaction, reason)
+        if self._hold.is_touching:
+            self._pressed_at = list(q)
+        if not contact.cover or not self._free_at:
+            self._free_at = list(q)
         if reaction.holds:
             self.refusals["force_command"] = reason
             if self._held_at is None:
-                self._held_at = list(q)
+                self._held_at = self._free_at if reaction is ForceReaction.OTHER_LINK else list(q)
                 self._transfer.restart()
             return out._replace(
                 velocity=[] if is_open else posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
@@ -296,7 +332,7 @@ class ForceLoop:
             return out._replace(effort=effort)
         speeds = self._delay.step(scalar.velocities([error], [desired - before], dt), own.delay_samples)
         speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
-        speed = min(speed, self._hold.approach_speed(force_axis, desired, own))
+        speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
         return out._replace(velocity=velocity, effort=effort)

@@ -165,5 +165,5 @@ class ForceLoopNode:
 
     def tare(self) -> Answer:
         """Take the present external torques as zero."""
-        self._loop.tare()
-        return Answer(True, "the present external torques now count as zero")
+        reason = self._loop.tare()
+        return Answer(not reason, reason or "the present external torques now count as zero")

@@ -125,6 +125,12 @@ class ForceLoopParameters:
     )
 
 
+def sensing_of(parameters: ForceLoopParameters) -> SensingParameters:
+    """How the force is sensed with the feedback of a parameter set."""
+    is_estimated = parameters.feedback == "contact_estimate"
+    return parameters.sensing.of_estimate if is_estimated else parameters.sensing
+
+
 def require_fit(parameters: ForceLoopParameters, arm: Arm) -> None:
     """Refuse parameters that do not fit the arm.
 

@@ -10,27 +10,43 @@ from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 
 Array = NDArray[np.float64]
+STEADY = 0.1  # s, time constant of the torques that are taken as zero
 
 
 class ForceMeasurement:
-    """External torques of the joints, and their tare.
+    """External torques of the joints, and what of them counts as zero.
 
     Attributes
     ----------
-    external : torques of the world on the joints (n,), N m, less the tare.
+    external : torques of the world on the joints (n,), N m, less the tare and the zero of the present command.
     """
 
     def __init__(self, body: RigidBody) -> None:
         self._body = body
         self._n = len(body.arm.joints.names)
-        self._tare = np.zeros(self._n)
+        self._tare, self._zero = np.zeros(self._n), np.zeros(self._n)
+        self._steady = LowPass()
         self.external = np.zeros(self._n)
 
     def tare(self) -> None:
         """Take the present external torques as zero."""
         self._tare = self._tare + self.external
 
-    def step(self, parameters: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None) -> None:
+    def zero(self, limit: float) -> bool:
+        """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
+        steady = self._steady.value
+        if steady is None or float(np.abs(steady - self._tare).max()) > limit:
+            return False
+        self._zero = steady - self._tare
+        return True
+
+    def step(
+        self,
+        parameters: ForceLoopParameters,
+        sensors: State | None,
+        estimated: Sequence[float] | None,
+        dt: float,
+    ) -> None:
         """Take the signals of one outer period.
 
         Parameters
@@ -39,8 +55,11 @@ class ForceMeasurement:
             less the strain.  joint_position: deflection of a known spring, section 5.6.
         sensors : joint-side sensors, None where there are none.
         estimated : estimated torques of the world on the joints (n,), N m.
+        dt : outer period, s.
         """
-        self.external = self._torque(parameters, sensors, estimated) - self._tare
+        torque = self._torque(parameters, sensors, estimated)
+        self._steady.step(torque, STEADY, dt)
+        self.external = torque - self._tare - self._zero
 
     def _torque(
         self, parameters: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None
@@ -55,17 +74,22 @@ class ForceMeasurement:
 
 
 class LowPass:
-    """First-order low pass of several values that starts at its first input."""
+    """First-order low pass of several values that starts at its first input.
+
+    Attributes
+    ----------
+    value : filtered values; None before the first input.
+    """
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
         """Forget all inputs."""
-        self._value: Array | None = None
+        self.value: Array | None = None
 
     def step(self, value: Array, time_constant: float, dt: float) -> tuple[Array, Array]:
         """Filtered values now and one period before; `time_constant` and `dt` in s."""
-        before = value if self._value is None else self._value
-        self._value = value if self._value is None else before + (value - before) * dt / (dt + time_constant)
-        return self._value, before
+        before = value if self.value is None else self.value
+        self.value = value if self.value is None else before + (value - before) * dt / (dt + time_constant)
+        return self.value, before

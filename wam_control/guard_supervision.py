@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from wam_control.contact_position import ForcePoint
-from wam_control.force_loop_parameters import ForceLoopParameters, force_law, task_of, torque_law
+from wam_control.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of, torque_law
 from wam_control.guard_report import report
 from wam_control.guard_watch import Watch, possible_contacts
 from wam_control.stability_guard import GuardAssessment, GuardedContact, StabilityGuard
@@ -45,7 +45,7 @@ class Supervision:
         self.force_law, self.torque_law = force_law(parameters), torque_law(parameters, arm.joints.names)
         self.assessment: GuardAssessment | None = None
         self.watch: Watch | None = None
-        self._guard = StabilityGuard(arm, servo, timing, parameters.guard, parameters.sensing)
+        self._guard = StabilityGuard(arm, servo, timing, parameters.guard, sensing_of(parameters))
         if parameters.guard.mode != "off" and parameters.mode != "open_loop":
             self._judge([parameters.guard.posture, q] if q else [parameters.guard.posture])
         self._report()

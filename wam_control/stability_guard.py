@@ -201,7 +201,7 @@ class StabilityGuard:
         """
         for contact in contacts:
             stiffness = self._stiffness(contact)
-            for late, feedback in product(sorted({0, self.parameters.extra_delay}), _lags(task.feedback)):
+            for late, feedback in product(self._delays(task), _lags(task.feedback)):
                 axes = self._axes(task, contact, late)
                 for part in self._parts(task):
                     yield self._loop.margin(contact.q, axes, part * stiffness, feedback, tried)
@@ -310,6 +310,12 @@ class StabilityGuard:
                     ),
                 )
         return least
+
+    def _delays(self, task: GuardedTask) -> list[int]:
+        """Inner periods by which a command may be later; the mean over a cycle of a dither is half a cycle old."""
+        extra = self.parameters.extra_delay
+        mean = self._timing.dither_cycle // 2 if task.feedback.kind == ESTIMATE else 0
+        return sorted({0, extra, extra + mean})
 
     def _parts(self, task: GuardedTask) -> tuple[float, ...]:
         """Fractions of the stiffness to consider; a known spring has its own alone."""

@@ -196,12 +196,12 @@ class TaskControl:
         found = []
         for axis in task.axes:
             if axis.place is not None:
-                found.append(ForcePoint(axis.cover, axis.place, 0.0, True, True, False, "", conflict))
+                found.append(ForcePoint(axis.cover, axis.place, 0.0, True, True, True, False, "", conflict))
                 continue
             length = self._covers.length[self._covers.names.index(axis.cover)]
-            place, sd = self._places.get(axis.cover, (length / 2.0, limit))
-            is_assumed = axis.cover not in self._places
-            found.append(ForcePoint(axis.cover, place, sd, not is_assumed, False, is_assumed, "", conflict))
+            place, sd = self._places.get(axis.cover, (length / 2.0, length / math.sqrt(12.0)))
+            is_known = axis.cover in self._places
+            found.append(ForcePoint(axis.cover, place, sd, is_known, False, is_known, False, "", conflict))
         return found
 
     def _contacts(self, states: Sequence[AxisState], q: Sequence[float]) -> list[GuardedContact]:
@@ -229,8 +229,8 @@ class TaskControl:
             return self._frame.velocity(state, force, anchor)
         laws = self._supervision.force_law, self._supervision.torque_law
         speed = factor * force_speed(state, *laws, force, state.force(before), dt)
-        if state.sensed and (desired := _desired(state)):
-            speed = min(speed, hold.approach_speed(state.sensed, desired, self._parameters))
+        if state.sensed and state.point and (desired := _desired(state)):
+            speed = min(speed, hold.approach_speed(state.sensed, state.point, desired, self._parameters))
         fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
         return min(max(speed, -fastest), fastest)
 

@@ -138,7 +138,7 @@ class TaskFrame:
                 "go to another posture"
             )
         for state in states:
-            most = self._sensing.sd_limit(abs(state.axis.value or 0.0) if state.axis.kind is AxisKind.FORCE else 0.0)
+            most = self._sensing.sd_limit(_size(state.axis))
             if state.sensed and state.force_sd > most:
                 return (
                     f"{state.axis.name}: the force is measured with a standard deviation of {state.force_sd:.3g} N; "

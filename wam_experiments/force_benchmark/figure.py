@@ -12,7 +12,13 @@ from wam_experiments.force_benchmark.evaluation import ForceTrial
 from wam_experiments.force_benchmark.outcome import TOLERANCE, TaskEnd
 from wam_experiments.force_benchmark.page import GROUPINGS, MOTORS, SENSORS, TaskGrouping, of_class
 
-COLOURS = {TaskEnd.DONE: RIGHT, TaskEnd.REFUSED: REFUSED, TaskEnd.ENDED: BETWEEN, TaskEnd.SILENT: WRONG}
+COLOURS = {
+    TaskEnd.DONE: RIGHT,
+    TaskEnd.REFUSED: REFUSED,
+    TaskEnd.GIVEN_UP: COMMANDED,
+    TaskEnd.ENDED: BETWEEN,
+    TaskEnd.SILENT: WRONG,
+}
 LEAST, MOST = 0.1, 10.0  # of the commanded force, drawn
 FORCES, RATIOS = (1, 2, 5, 10, 20, 40), (0.1, 0.2, 0.5, 1, 2, 5, 10)  # ticks, N and none
 

@@ -24,6 +24,7 @@ class TaskEnd(StrEnum):
 
     DONE = "within 10 %"
     REFUSED = "refused with a reason"
+    GIVEN_UP = "given up with a reason"
     ENDED = "ended with a reason"
     SILENT = "silent: wrong force without a reason"
 
@@ -39,6 +40,7 @@ class TaskTrace(NamedTuple):
     impact : largest force of the first touch by (3.1), N; 0 where nothing was touched.
     reason : why the loop or the driver does not do the task, at the end; '' if it does.
     is_stopped : whether the loop holds the arm instead, or the driver is in fault, at the end.
+    is_fault : whether the driver is in fault.
     predicted_cycle : peak to peak of the limit cycle that the guard reports, N.
     gain : force gain in use, m/s/N.
     """
@@ -49,6 +51,7 @@ class TaskTrace(NamedTuple):
     impact: float
     reason: str
     is_stopped: bool
+    is_fault: bool
     predicted_cycle: float
     gain: float
 
@@ -117,6 +120,8 @@ def _outcome(task: Task, trace: TaskTrace, mean: float, peak: float) -> TaskEnd:
         return TaskEnd.REFUSED
     if abs(mean - task.force) <= TOLERANCE * task.force and not trace.is_stopped:
         return TaskEnd.DONE
+    if trace.is_stopped and not trace.is_fault and peak <= task.force:
+        return TaskEnd.GIVEN_UP
     return TaskEnd.ENDED if trace.reason else TaskEnd.SILENT
 
 

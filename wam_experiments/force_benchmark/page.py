@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from wam_analysis.table import markdown, plain
-from wam_experiments.contact_benchmark.statistics import share
+from wam_experiments.contact_benchmark.statistics import Interval, share
 from wam_experiments.force_benchmark.evaluation import ForceTrial
 from wam_experiments.force_benchmark.outcome import OVERSHOOT, TOLERANCE, TaskEnd
 from wam_experiments.force_benchmark.surfaces import GAP
@@ -29,7 +29,7 @@ STIFFNESS_ENDS = {"400 to 4000": 4e3, "4000 to 40 000": 4e4, "40 000 to 400 000"
 FORCE_ENDS = {"1 to 3": 3.0, "3 to 10": 10.0, "10 to 40": 40.0}  # N
 LISTED = 40  # failures of one kind
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-HEAD = ("", "tasks", "within 10 %", "refused", "ended", "silent", "above the limit", "cycles unreported")
+HEAD = ("", "tasks", "within 10 %", "refused", "given up", "ended", "silent", "above the limit", "cycles unreported")
 
 
 class TaskGrouping(NamedTuple):
@@ -73,12 +73,16 @@ def required(trials: Sequence[ForceTrial]) -> list[tuple[str, str, str, bool]]:
     """What is required: name, required and found value, and whether it is met."""
     rows = []
     for name, least in REQUIRED.items():
-        accepted = [t for t in of_class(trials, GROUPINGS[0], name) if t.result.outcome is not TaskEnd.REFUSED]
-        if accepted:
-            found = share(sum(t.result.outcome is TaskEnd.DONE for t in accepted), len(accepted))
-            text = f"{found.value:.1%} of {found.observed} ({found.low:.1%} to {found.high:.1%})"
-            title = f"accepted tasks within {TOLERANCE:.0%}, {name}"
-            rows.append((title, f"at least {least:.0%}", text, found.value >= least))
+        own = of_class(trials, GROUPINGS[0], name)
+        title = f"accepted tasks within {TOLERANCE:.0%}, {name}"
+        for more, needed, declined in (
+            ("", f"at least {least:.0%}", (TaskEnd.REFUSED, TaskEnd.GIVEN_UP)),
+            (", and those given up count as accepted", "", (TaskEnd.REFUSED,)),
+        ):
+            accepted = [trial for trial in own if trial.result.outcome not in declined]
+            if accepted:
+                found = share(sum(t.result.outcome is TaskEnd.DONE for t in accepted), len(accepted))
+                rows.append((title + more, needed, _text(found), not needed or found.value >= least))
     for title, count in (
         (f"true force above {OVERSHOOT:g} times the commanded plus the impact (3.1)", sum(map(_is_over, trials))),
         ("limit cycles that nothing reports", sum(trial.result.cycles_silently for trial in trials)),
@@ -88,9 +92,17 @@ def required(trials: Sequence[ForceTrial]) -> list[tuple[str, str, str, bool]]:
     done = [trial for trial in trials if trial.result.outcome is TaskEnd.DONE]
     warned = sum(bool(trial.result.reason) for trial in done)
     rows.append(("tasks within 10 % of which a warning is reported all the same", "", f"{warned} of {len(done)}", True))
-    refusals = share(sum(trial.result.outcome is TaskEnd.REFUSED for trial in trials), len(trials))
-    rows.append(("tasks refused with a reason", "", f"{refusals.value:.1%} of {refusals.observed}", True))
+    believed = [t for t in trials if not t.result.reason]
+    right = share(sum(t.result.outcome is TaskEnd.DONE for t in believed), max(len(believed), 1))
+    rows.append((f"of the tasks without any reason reported, within {TOLERANCE:.0%}", "", _text(right), True))
+    for end in (TaskEnd.REFUSED, TaskEnd.GIVEN_UP):
+        found = share(sum(trial.result.outcome is end for trial in trials), len(trials))
+        rows.append((f"tasks {end.value}", "", f"{found.value:.1%} of {found.observed}", True))
     return rows
+
+
+def _text(found: Interval) -> str:
+    return f"{found.value:.1%} of {found.observed} ({found.low:.1%} to {found.high:.1%})"
 
 
 def _is_over(trial: ForceTrial) -> bool:
@@ -190,9 +202,10 @@ def page(trials: Sequence[ForceTrial], seed: int, repeat: str, picture: str) -> 
     repeat : command that writes this page.
     picture : the figure's path relative to the page.
     """
-    rows = [[*row[:3], "met" if row[3] else "**MISSED**"] for row in required(trials)]
-    for row in rows[-2:]:
-        row[-1] = ""
+    rows = [
+        [title, needed, found, "" if not needed else "met" if is_met else "**MISSED**"]
+        for title, needed, found, is_met in required(trials)
+    ]
     parts = [
         PREFACE.format(command=repeat, count=len(trials)),
         f"![True against commanded force, outcomes by class, peaks]({picture})",
@@ -245,9 +258,10 @@ RULES = f"""## Method
 * The user declares the stiffness of the surface and the pose, and takes the largest `force_gain` that the guard
   accepts, at most the configured one. A pinned contact position is the true one; with an estimated one the
   configuration stays as it is.
-* Refused: the loop reports a reason and neither moves nor touches anything, or the stack does not start. Ended: the
-  force is not within 10 %, or the arm is held, and a reason is reported. Silent: the force is wrong and nothing is
-  reported.
+* Refused: the loop reports a reason and neither moves nor touches anything, or the stack does not start. Given up:
+  the arm has moved or touched, then holds with a reason, and the true force was never above the commanded one, as
+  where another link is touched than commanded. Ended: the force is not within 10 %, or the arm is held, and a reason
+  is reported. Silent: the force is wrong and nothing is reported. Accepted is what is neither refused nor given up.
 * Above the limit: at some time the true force is above {OVERSHOOT:g} times the commanded plus the impact of (3.1), for
   which all kinetic energy of links and rotors at the first touch goes into the surface.
 * A cycle is a motion of the force that repeats in the last 2 s, above 10 % of the commanded force peak to peak. It

@@ -28,6 +28,7 @@ class _Standing(NamedTuple):
 
     reason: str
     is_stopped: bool
+    is_fault: bool
     predicted_cycle: float
 
 
@@ -112,6 +113,7 @@ class TaskWatch:
             impact=impact,
             reason=standing.reason,
             is_stopped=standing.is_stopped,
+            is_fault=standing.is_fault,
             predicted_cycle=standing.predicted_cycle,
             gain=self._gain,
         )
@@ -122,6 +124,7 @@ class TaskWatch:
         return _Standing(
             fault or node.refusals.get("force_command", "") or node.reason,
             bool(fault) or node.force_reaction.holds,
+            bool(fault),
             float(node.guard_report.facts.get("limit cycle [N]", 0.0)),
         )
 
