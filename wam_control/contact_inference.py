@@ -127,7 +127,7 @@ def _elbow(covers: Sequence[_Cover]) -> _Elbow | None:
 def detection_statistic(torques: Sequence[float], precision: Array) -> float:
     """r^T S^-1 r of external torques r, (n,), N m, with the inverse of their covariance S, (n, n)."""
     r = np.array(torques)
-    return float(r @ precision @ r)
+    return float(r.dot(precision).dot(r))
 
 
 class ContactInference:

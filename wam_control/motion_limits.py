@@ -123,7 +123,7 @@ class MotionLimits:
     def _against_the_world(self, velocity: list[float], q: Sequence[float], external: Array) -> tuple[list[float], str]:
         """Without the part that does work on the world, where its force is above the limit."""
         most = self._parameters.contact_force
-        power = float(external @ velocity)
+        power = float(external.dot(velocity))
         if power >= 0.0 or (force := least_force(self._body, q, external)) <= BEGIN * most:
             return velocity, ""
         part = min((force - BEGIN * most) / max((1.0 - BEGIN) * most, 1e-9), 1.0)
@@ -162,4 +162,4 @@ def least_force(body: RigidBody, q: Sequence[float], external: Array) -> float:
     """Smallest force at the tool that gives external torques of this size, N; a force nearer to the base is larger."""
     jacobian = body.tool_jacobian(q)
     largest = math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1]))
-    return math.sqrt(float(external @ external)) / largest if largest > 0.0 else 0.0
+    return math.sqrt(float(external.dot(external))) / largest if largest > 0.0 else 0.0

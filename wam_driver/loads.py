@@ -76,7 +76,7 @@ class CoverLoads:
         """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""
         for cover, (force, torque) in self.pushes.items():
             rotation, origin = self._rotation[cover], self._origin[cover]
-            force, torque = rotation @ force, rotation @ torque  # noqa: PLW2901
+            force, torque = rotation.dot(force), rotation.dot(torque)  # noqa: PLW2901
             mujoco.mj_applyFT(self._model, self._data, force, torque, origin, self._body[cover], self._applied)
 
     def measure(self) -> list[Load]:

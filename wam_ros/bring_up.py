@@ -17,6 +17,7 @@ from rclpy.node import Node
 
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
+from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node
 from wam_ros.run import NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
@@ -277,6 +278,8 @@ class Composition:
         names = node_names(configuration)
         self._connection = Connection(domain_id=domain_id)
         self.context, self.executor = self._connection.context, self._connection.executor
+        if configuration.shared.timing.mode == "lockstep":
+            BUSES[self.context] = LocalBus(self.executor, names.values())
         self.nodes: dict[str, Node] = {}
         self._may_end: dict[str, Any] = {}
         try:

@@ -21,9 +21,11 @@ from wam_description.topics import STATUS, Topic
 from wam_description.wiring import Declaration
 from wam_ros.claims import Claims
 from wam_ros.header import header
+from wam_ros.local_bus import BUSES
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
 from wam_ros.qos import DEPTH, qos
 from wam_ros.run import NAMESPACE, end_of_delivery
+from wam_ros.tolerance import TolerantNode
 from wam_ros.wire import decoder, encoder, stamp_of
 
 DIAGNOSTICS = "/diagnostics"
@@ -70,7 +72,7 @@ class Ports:
     claims : who publishes what this node works on.
     """
 
-    def __init__(self, node: Node, declaration: Declaration, shared: Shared, interface: Interface) -> None:
+    def __init__(self, node: TolerantNode, declaration: Declaration, shared: Shared, interface: Interface) -> None:
         self.node, self.shared, self.interface = node, shared, interface
         self.counts: Counter[str] = Counter()
         self.refusals: Counter[str] = Counter()
@@ -87,6 +89,7 @@ class Ports:
         self._absent: set[str] = set()
         self._refused: Counter[str] = Counter()  # by kind
         self._logged: dict[str, tuple[float, int]] = {}  # by kind: when, and how many had been refused by then
+        self._bus = BUSES.get(node.context)
         self._subscriptions: dict[str, Subscription] = {}
         self._claimed: dict[str, Subscription] = {}
         self.claims = Claims(node, self._claimed)
@@ -113,6 +116,8 @@ class Ports:
     def _send(self, topic: str, message: Any) -> None:
         self._published[topic] += 1
         self._publishers[topic].publish(message)
+        if self._bus is not None:
+            self._bus.send(self._full[topic], message)
 
     def feed(
         self,
@@ -133,18 +138,23 @@ class Ports:
         decode = decoder(self.interface.topics[topic], self.shared, arrays)
 
         def receive(data: bytes) -> None:
-            if subscription.get_publisher_count() > 1 and (rivals := self.claims.rivals(topic)):
+            if is_local:  # what a second publisher sends does not come here
+                if rivals := self.problems.get(topic):
+                    raise Refused(rivals)
+            elif subscription.get_publisher_count() > 1 and (rivals := self.claims.rivals(topic)):
                 self.set_problem(topic, rivals)
                 raise Refused(rivals)
             stamp = stamp_of(data)
             if accepts is None or accepts(stamp):
                 take(stamp, decode(data))
 
-        self.listen(topic, receive, raw=True)
+        is_local = self.listen(topic, receive, raw=True)
         self._claimed[topic] = subscription = self._subscriptions[topic]
 
-    def listen(self, topic: str, take: Callable[[Any], None], raw: bool = False) -> None:
+    def listen(self, topic: str, take: Callable[[Any], None], raw: bool = False) -> bool:
         """Subscribe; a message that `take` refuses is counted and reported, and the last good one is used.
+
+        Returns whether the messages come without the middleware, see `wam_ros.local_bus`.
 
         Parameters
         ----------
@@ -166,7 +176,15 @@ class Ports:
             profile.depth = NEWEST  # a late node works on the newest state
         kind = message_type(row)
         name = topic_name(self.node, row)
-        self._subscriptions[topic] = self.node.create_subscription(kind, name, receive, profile, raw=raw)
+        bus, is_local = self._bus, False
+        if bus is not None and raw and not row.latched and bus.carries(self.interface.publishers(topic)):
+            bus.subscribe(self.node.resolve_topic_name(name), self.node.bearing(receive, f"a message on {topic}"))
+            profile.depth, is_local = 1, True
+        subscription = self.node.create_subscription(kind, name, receive, profile, raw=raw)
+        if is_local:
+            self.node.leave_unserved(subscription)
+        self._subscriptions[topic] = subscription
+        return is_local
 
     def refuse(self, topic: str, reason: str, kind: str = "") -> None:
         """Count a refused message; one a second of each kind, or of each topic without one, is logged."""

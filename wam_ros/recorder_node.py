@@ -1,9 +1,8 @@
 """Node `recorder`: writes every topic of the interface table to a bag, with the parameters of all nodes."""
 
-import inspect
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.tolerance import TolerantNode
 
 EVERY = "*"
+DRAIN_PERIOD = 0.01  # s, between two looks for messages; one after the other by the executor they cost twice as much
 LONGEST_WAIT = 1.0  # s, at the end, for messages that were announced
 MOST_STATUSES, LONGEST_COUNT = 64, 16  # in a message of /diagnostics; digits
 
@@ -74,6 +74,7 @@ class RecorderNode(TolerantNode):
         offered = {full_name: qos(topic) for full_name, topic in chosen.items()}
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
         self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender, self.get_namespace())
+        self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
         # it subscribes to all topics, recorded or not: every publisher waits for its subscription
         self._inlets = {name: self._listen(name, topic) for name, topic in topics.items()}
         own_name = RecorderInterface.name
@@ -90,6 +91,7 @@ class RecorderNode(TolerantNode):
         self._dropped = 0
         self._failed = False
         steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(DRAIN_PERIOD, self._drain, clock=steady)
         self.create_timer(0.1, self.attend, clock=steady)
         if shared.timing.mode == "realtime":  # in lockstep nothing is published by the wall clock
             self.create_timer(1.0, self._report, clock=steady)
@@ -117,8 +119,9 @@ class RecorderNode(TolerantNode):
     def _listen(self, name: str, topic: Topic) -> Any:
         profile = qos(topic)
         profile.depth = DEPTH
-        receiver = _Receiver(self.recorder, name, self._take_totals if topic.name == DIAGNOSTICS else None)
-        return self.create_subscription(message_type(topic), name, receiver, profile, raw=True)
+        subscription = self.create_subscription(message_type(topic), name, lambda data: None, profile, raw=True)
+        self.leave_unserved(subscription)  # `_drain` fetches its messages
+        return subscription
 
     def _take_totals(self, data: bytes) -> None:
         """Take what the nodes report about the messages that they have published."""
@@ -198,13 +201,23 @@ class RecorderNode(TolerantNode):
         )
 
     def _drain(self) -> None:
-        for subscription in self._inlets.values():
+        """Record what has arrived, in the order in which it was sent: the time of a message may be that before it."""
+        arrived: list[tuple[int, str, bytes, int, int]] = []
+        for name, subscription in self._inlets.items():
             with subscription.handle:
                 for _ in range(DEPTH):
                     taken = subscription.handle.take_message(subscription.msg_type, True)
                     if taken is None:
                         break
-                    subscription.callback(*taken)
+                    data, info = taken
+                    received = info["received_timestamp"] or time.time_ns()
+                    number = info["publication_sequence_number"] or 0
+                    arrived.append((info["source_timestamp"], name, data, received, number))
+        arrived.sort(key=itemgetter(0))
+        for sent, name, data, received, number in arrived:
+            self.recorder.receive(name, data, received, sent, number)
+            if name == self._diagnostics_name:
+                self._take_totals(data)
 
     def _attach_parameters(self) -> None:
         """Attach the known parameters, if these are more than were attached before."""
@@ -227,30 +240,3 @@ class RecorderNode(TolerantNode):
             self.get_logger().warning(f"{self.bag.path}: {counts}")
         else:
             self.get_logger().info(f"{self.bag.path}: {counts}")
-
-
-class _Receiver:
-    """Callback of one topic.
-
-    Its signature requests the message info.  The events executor of rclpy 7.1 then passes message and
-    info as one tuple, the other executors as two arguments.
-    """
-
-    __signature__ = inspect.signature(lambda data, info: None)
-
-    def __init__(self, recorder: Recorder, name: str, take: Callable[[bytes], None] | None) -> None:
-        self._receive = recorder.receive
-        self._name = name
-        self._take = take
-
-    def __call__(self, *taken: Any) -> None:
-        data, info = taken if len(taken) == 2 else taken[0]
-        self._receive(
-            self._name,
-            data,
-            info["received_timestamp"] or time.time_ns(),
-            info["source_timestamp"],
-            info["publication_sequence_number"] or 0,
-        )
-        if self._take is not None:
-            self._take(data)

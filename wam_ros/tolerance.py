@@ -34,6 +34,7 @@ class TolerantNode(Node):
     _exception_time = 0.0  # of the newest one, s
     _exception_fault = ""
     _exception_timer: Any = None
+    _unserved: tuple[Any, ...] = ()
 
     def destroy_node(self) -> None:
         """As that of rclpy; what the executor still has for this node is of no use any more."""
@@ -50,13 +51,22 @@ class TolerantNode(Node):
 
     def create_subscription(self, msg_type: Any, topic: str, callback: Any, *more: Any, **options: Any) -> Any:
         """As that of rclpy."""
-        bearing = self._bearing(callback, f"a message on {topic}")
+        bearing = self.bearing(callback, f"a message on {topic}")
         return super().create_subscription(msg_type, topic, bearing, *more, **options)
+
+    @property
+    def subscriptions(self) -> Any:
+        """As that of rclpy, without those whose messages no executor is to fetch."""
+        return (found for found in super().subscriptions if found not in self._unserved)
+
+    def leave_unserved(self, subscription: Any) -> None:
+        """Let no executor fetch the messages of a subscription."""
+        self._unserved = (*self._unserved, subscription)
 
     def create_timer(self, timer_period_sec: float, callback: Any, *more: Any, **options: Any) -> Any:
         """As that of rclpy."""
         name = getattr(callback, "__name__", "a timer")
-        return super().create_timer(timer_period_sec, self._bearing(callback, name), *more, **options)
+        return super().create_timer(timer_period_sec, self.bearing(callback, name), *more, **options)
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Any, **options: Any) -> Any:
         """As that of rclpy."""
@@ -66,7 +76,9 @@ class TolerantNode(Node):
             srv_type, srv_name, self._serving(callback, f"a request to {srv_name}"), **options
         )
 
-    def _bearing(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
+    def bearing(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
+        """A callback that does nothing once the node has ended; what it raises is a fault."""
+
         @functools.wraps(callback)  # rclpy looks at its signature
         def bear(*arguments: Any) -> Any:
             if self._has_ended:

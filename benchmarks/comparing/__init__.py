@@ -52,6 +52,13 @@ def arguments(text: str, rounds: int, quick_rounds: int) -> argparse.Namespace:
     return given
 
 
+def mark(value: float, must: float, aim: float) -> str:
+    """Which of two limits a value reaches; the smaller the better where the aim is below what must be."""
+    sign = 1.0 if aim > must else -1.0
+    reached = next((name for name, limit in (("aim", aim), ("must", must)) if sign * value >= sign * limit), "below")
+    return f"{reached} [{must:g}, {aim:g}]"
+
+
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table as text, first column left-aligned, the others right-aligned."""
     return "\n".join(plain([head], rows))
