@@ -57,6 +57,8 @@ setup(
         "live": ["viser>=1.1,<1.2"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
+        # bags of ROS 1 and of SQLite: `wam analyse`
+        "rosbags": ["rosbags"],
         "test": [
             "colcon-common-extensions",
             "mcap-ros2-support",

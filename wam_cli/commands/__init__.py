@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
 from wam_description.configuration import Configuration, packaged
 from wam_sim.batch import executor
 from wam_sim.pieces import default_folder
@@ -120,6 +121,29 @@ def batch_of(given: argparse.Namespace) -> Iterator[BatchOptions]:
         writable_directory("--keep", given.keep)
     with executor(given.workers, given.dask) as found:
         yield BatchOptions(found, None if given.fresh else given.keep, Progress(given.command, sys.stderr))
+
+
+def take_topic_map(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options of what is taken from another robot's recording."""
+    other = parser.add_argument_group("a recording of another robot", "each may be repeated")
+    for option, name, words in (
+        ("--topic", "TOPIC", "analyse this topic only; of any type, with --map"),
+        ("--joint", "JOINT", "analyse this joint only; or the names of joints that have none in the messages"),
+        ("--command", "TOPIC", "what is commanded; else topics named command, cmd, desired, reference, target, goal"),
+        (
+            "--map",
+            "QUANTITY=FIELD",
+            f"field of the messages, as effort=current or position=state.q; {', '.join(MAPPED)}",
+        ),
+        ("--unit", "QUANTITY=UNIT", "of what was recorded, as position=deg or effort=mA, or a factor as effort=0.12"),
+    ):
+        dest = f"only_{option[2:]}"  # `command` is that of the program
+        other.add_argument(option, dest=dest, action="append", default=[], metavar=name, help=words)
+
+
+def topic_map_of(given: argparse.Namespace) -> TopicMap:
+    """What the options of `take_topic_map` name; errors are those of `topic_map`."""
+    return topic_map(given.only_topic, given.only_joint, given.only_command, given.only_map, given.only_unit)
 
 
 def take_seeds(parser: argparse.ArgumentParser, seeds: Sequence[int], of: str) -> None:
