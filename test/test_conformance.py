@@ -1,13 +1,15 @@
 """Drivers tested against the contract: the simulated one and the skeleton keep it, a broken one fails row by row."""
 
 import math
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import RosWorld
+from conftest import LONG, RosWorld
 from sensor_msgs.msg import JointState
 
 from wam_cli.commands.conform import driver_alone
@@ -65,9 +67,39 @@ def wrong(bench: Bench, attempts: int = PATIENT) -> list[str]:
 
 
 @pytest.mark.slow
-def test_the_simulated_driver_keeps_the_contract(ros: RosWorld, tmp_path: Path) -> None:
-    configuration = simulated()
-    assert wrong(Bench(ros, tmp_path, configuration, lambda **given: make_node("driver", **given))) == []
+def test_the_simulated_driver_keeps_the_contract_as_a_process_of_its_own(domain_id: int) -> None:
+    command = [sys.executable, "-P", "-m", "wam_cli.main", "conform", "--share", str(SHARE), "--attempts", str(PATIENT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10 * LONG)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"{len(REQUIREMENTS)} ok, 0 WRONG, 0 not tested" in done.stdout
+
+
+class Heldup:
+    """A probe that pauses, or not."""
+
+    longest_pause = 0.0
+
+    def be_proper(self) -> None:
+        """Nothing to end."""
+
+
+@pytest.mark.parametrize(("pause", "tries"), [(0.001, 2), (1.0, 6)])
+def test_an_attempt_that_the_machine_held_up_does_not_count(
+    pause: float, tries: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    probe: Any = Heldup()
+    tested = Conformance(probe, DriverContract.of(simulated().shared, SHARE), 2)
+    made = []
+
+    def check() -> str:
+        made.append(pause)
+        probe.longest_pause = pause
+        return "it is wrong"
+
+    monkeypatch.setattr(tested, "_rate", check)
+    row = tested.row("rate")
+    assert (row.verdict, len(made)) == (WRONG, tries)
+    assert ("held up" in row.found) == (pause > conformance.PAUSE)
 
 
 @pytest.mark.slow
