@@ -12,12 +12,10 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import yaml
+from typing import NamedTuple
 
 from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
-from wam_description.configuration import Configuration, packaged
+from wam_description.configuration import Configuration, option_values, packaged
 from wam_sim.batch import executor
 from wam_sim.pieces import default_folder
 from wam_sim.progress import Progress
@@ -61,26 +59,7 @@ def configuration_of(given: argparse.Namespace) -> Configuration:
     name: str = given.config
     loaded = Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
     values = getattr(given, "values", [])
-    return loaded.with_values(dict(map(_value, values))) if values else loaded
-
-
-def _value(text: str) -> tuple[str, Any]:
-    """Parameter and value of an option --set; a whole number is what the parameter's class makes of it.
-
-    Raises
-    ------
-    ValueError
-        where it is none.
-    """
-    name, equals, value = text.partition("=")
-    if not (name.strip() and equals and value.strip()):
-        raise ValueError(f"--set is '{text}'; write [node:]parameter=value, e.g. force_loop:force_gain=[0.01]")
-    try:
-        return name.strip(), yaml.safe_load(value)
-    except yaml.YAMLError as error:
-        raise ValueError(
-            f"--set {name.strip()}: '{value}' is no value of YAML: {str(error).partition(chr(10))[0]}"
-        ) from error
+    return loaded.with_values(option_values(values)) if values else loaded
 
 
 class BatchOptions(NamedTuple):
