@@ -16,7 +16,7 @@ from wam_cli.commands.conform import driver_alone
 from wam_description.configuration import Configuration, packaged
 from wam_description.driver_contract import REQUIREMENTS, DriverContract
 from wam_description.signals import Answer, State
-from wam_ros import conformance
+from wam_ros import conformance, message_checks
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_probe import DriverProbe
 from wam_ros.node import make_node
@@ -96,7 +96,7 @@ def test_an_attempt_that_the_machine_held_up_does_not_count(
         probe.longest_pause = pause
         return "it is wrong"
 
-    monkeypatch.setattr(tested, "_rate", check)
+    monkeypatch.setitem(conformance.CHECKS, "rate", lambda bench: check())
     row = tested.row("rate")
     assert (row.verdict, len(made)) == (WRONG, tries)
     assert ("held up" in row.found) == (pause > conformance.PAUSE)
@@ -122,7 +122,7 @@ def test_without_a_driver_no_row_but_the_interface_is_tested(
     ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("START", "LOOK"):
-        monkeypatch.setattr(conformance, name, 0.05)
+        monkeypatch.setattr(message_checks, name, 0.05)
     monkeypatch.setattr("wam_ros.driver_probe.PATIENCE", 0.05)
     bench = Bench(ros, tmp_path, simulated(), lambda **given: ros.node("nobody"))
     rows = list(bench.conformance(1).rows())
