@@ -64,6 +64,8 @@ setup(
         "live": ["viser>=1.1,<1.2"],
         # ROS 2 Jazzy as wheels, for machines without ROS; never required, so that pip leaves a real ROS alone
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
+        # bags of ROS 1 and of SQLite: `wam analyse`
+        "rosbags": ["rosbags"],
         "test": [
             "colcon-common-extensions",
             "mcap-ros2-support",
@@ -84,7 +86,8 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
         (f"share/{name}", ["package.xml"]),
         *((f"share/{name}/{folder}", sorted(glob(f"{folder}/*.yaml"))) for folder in CONFIGURATIONS),
-        (f"share/{name}/launch", sorted(glob("launch/*.launch.py"))),
+        (f"share/{name}/launch", sorted(glob("launch/*.launch.*"))),
+        (f"share/{name}/rviz", sorted(glob("rviz/*.rviz"))),
         (f"lib/{name}", launchers),
     ],
     entry_points={"console_scripts": ["wam = wam_cli.program:main", *console_scripts]},

@@ -1,9 +1,9 @@
-"""Start every node of one configuration, all in one process or each in its own.
+"""Start every node of one configuration, all in one process or each in its own, with transforms and RViz.
 
-    ros2 launch wam_stack wam.launch.py config:=wam namespace:=wam processes:=true record:=true
+    ros2 launch wam_stack wam.launch.py config:=wam namespace:=wam rviz:=true scenario:=demo_scenario bag:=bags/first
 
-`ros2 launch wam_stack wam.launch.py --show-args` describes the arguments.  All nodes end with the launch,
-however it ends.
+`ros2 launch wam_stack wam.launch.py --show-args` describes the arguments; wam.launch.xml takes the same.  All nodes end
+with the launch, however it ends, and the launch ends with the first of them.
 """
 
 import atexit
@@ -13,18 +13,27 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
+from ament_index_python.packages import get_package_share_directory, get_packages_with_prefixes
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, LogInfo, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from wam_description.configuration import Configuration, packaged
-from wam_ros.run import PARENT
+from wam_control.scenario import load, script_file
+from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.urdf import urdf
+from wam_ros.run import NAMESPACE, PARENT
 
 CONFIGURED = "configured"
+SWITCH = ["true", "false"]
 ARGUMENTS = {  # name: default, description, allowed values
     "config": ("wam", "name of an installed configuration (wam, testbed), or path of a YAML file", None),
-    "namespace": ("wam", "namespace of the arm; a second arm on this machine needs another one", None),
+    "overrides": (
+        "",
+        "values in place of the configuration's: 'force_loop:force_gain=[0.01]; timing.period=0.002'",
+        None,
+    ),
+    "namespace": (NAMESPACE, "namespace of the arm; a second arm on this machine needs another one", None),
     "mode": (
         CONFIGURED,
         "lockstep waits for every command, realtime runs on the steady clock, configured is what the file says",
@@ -33,46 +42,134 @@ ARGUMENTS = {  # name: default, description, allowed values
     "processes": (
         "false",
         "a process for each node; false: all nodes in one process, unless the mode is realtime",
-        ["true", "false"],
+        SWITCH,
     ),
+    "scenario": ("", "scenario that is played: name of an installed one, or path of a YAML file; empty: none", None),
     "record": (
         "false",
         "record every topic into a bag in the directory that the configuration names (recorder: directory)",
-        ["true", "false"],
+        SWITCH,
     ),
+    "bag": ("", "path of a new bag into which every topic is recorded; empty: as record says", None),
+    "log_level": ("info", "least severity of what the nodes print", ["debug", "info", "warn", "error", "fatal"]),
+    "tf": (
+        "auto",
+        "robot_state_publisher for /tf and /tf_static; auto: where it is installed",
+        ["auto", *SWITCH],
+    ),
+    "frame_prefix": ("", "put before every frame of /tf; the frames in the arm's own messages have none", None),
+    "rviz": ("false", "RViz with the arm, contacts and forces", SWITCH),
+    "use_sim_time": ("true", "robot_state_publisher and RViz take the arm's /clock", SWITCH),
 }
 
 
 def start_nodes(context: LaunchContext) -> list[Any]:
-    """All nodes in one process, or one process per node, with the parameters of the configuration."""
-    config, namespace, mode, processes, record = (
-        LaunchConfiguration(argument).perform(context) for argument in ARGUMENTS
-    )
-    is_path = config.endswith((".yaml", ".yml"))
-    configuration = Configuration.load(Path(config).resolve() if is_path else packaged(config))
-    if mode != CONFIGURED:
-        configuration = configuration.with_values({"timing.mode": mode})
+    """All nodes in one process, or one process per node, with the parameters of the configuration; viewers."""
+    given = {argument: LaunchConfiguration(argument).perform(context) for argument in ARGUMENTS}
+    configuration = chosen(given)
+    namespace = given["namespace"].strip("/")
     folder = tempfile.TemporaryDirectory(prefix="wam_stack_")
     atexit.register(folder.cleanup)
     parameters = Path(folder.name, "parameters.yaml")
     parameters.write_text(configuration.text, encoding="utf-8")
     # what is started ends with this process, even where a signal ends it before it can stop its children
-    environment = {PARENT: str(os.getpid())}
-    if configuration.shared.timing.mode == "lockstep" and processes == "false":
+    ends: dict[str, Any] = {"additional_env": {PARENT: str(os.getpid())}, "output": "screen"}
+    ends["on_exit"] = Shutdown(reason="a node of the arm has ended")
+    viewers = [*transforms(configuration, given, namespace, ends), *rviz(given, namespace, Path(folder.name))]
+    if configuration.shared.timing.mode == "lockstep" and given["processes"] == "false":
         command = [sys.executable, "-m", "wam_cli.main", "up", "--config", str(parameters), "--namespace", namespace]
-        command += ["--record"] if record == "true" else []
-        return [ExecuteProcess(cmd=command, additional_env=environment, output="screen")]
-    return [
+        return [ExecuteProcess(cmd=[*command, "--log-level", given["log_level"]], **ends), *viewers]
+    nodes = [
         Node(
             package="wam_stack",
             executable="node" if ":" in entry else entry,
             arguments=[entry] if ":" in entry else [],
+            ros_arguments=["--log-level", given["log_level"]],
             namespace=namespace,
             parameters=[str(parameters)],
-            additional_env=environment,
+            **ends,
+        )
+        for entry in configuration.shared.nodes
+    ]
+    return [*nodes, *viewers]
+
+
+def chosen(given: dict[str, str]) -> Configuration:
+    """The configuration with what the arguments change; scenario and recorder are nodes of it."""
+    name = given["config"]
+    is_path = name.endswith((".yaml", ".yml"))
+    configuration = Configuration.load(Path(name).resolve() if is_path else packaged(name))
+    values = option_values([text for text in given["overrides"].split(";") if text.strip()])
+    values |= {"timing.mode": given["mode"]} if given["mode"] != CONFIGURED else {}
+    more = []
+    if given["scenario"]:
+        file = script_file(given["scenario"]).resolve()
+        load(file, configuration.shared.arm)  # refused before any node starts
+        more.append("scenario")
+        values["scenario:script"] = str(file)
+    if given["record"] == "true" or given["bag"]:
+        more.append("recorder")
+    if given["bag"]:
+        bag = Path(given["bag"]).resolve()
+        values |= {"recorder:directory": str(bag.parent), "recorder:name": bag.name}
+    values |= {"nodes": [*configuration.shared.nodes, *more]} if more else {}
+    return configuration.with_values(values) if values else configuration
+
+
+def own_names(namespace: str, prefix: str) -> list[tuple[str, str]]:
+    """Names of a second arm: its clock, and its tree of frames where no prefix tells them from those of another arm."""
+    if namespace == NAMESPACE:
+        return []
+    tree = [] if prefix else [("/tf", "tf"), ("/tf_static", "tf_static")]
+    return [("/clock", "clock"), *tree]
+
+
+def transforms(configuration: Configuration, given: dict[str, str], namespace: str, ends: dict[str, Any]) -> list[Any]:
+    """robot_state_publisher, or a line that says why there is none."""
+    if given["tf"] == "false":
+        return []
+    if given["tf"] == "auto" and "robot_state_publisher" not in get_packages_with_prefixes():
+        return [LogInfo(msg="no /tf: install robot_state_publisher (apt install ros-jazzy-robot-state-publisher)")]
+    return [
+        Node(
+            package="robot_state_publisher",
+            executable="robot_state_publisher",
+            namespace=namespace,
+            parameters=[
+                {
+                    "robot_description": urdf(configuration.shared.arm),
+                    "frame_prefix": given["frame_prefix"],
+                    "use_sim_time": given["use_sim_time"] == "true",
+                }
+            ],
+            # the driver publishes the description itself, latched: one publisher is enough
+            remappings=[("robot_description", "~/robot_description"), *own_names(namespace, given["frame_prefix"])],
+            additional_env=ends["additional_env"],
             output="screen",
         )
-        for entry in [*configuration.shared.nodes, *(["recorder"] if record == "true" else [])]
+    ]
+
+
+def rviz(given: dict[str, str], namespace: str, folder: Path) -> list[Any]:
+    """RViz with the view of the package, in the namespace of the arm; closing it ends nothing."""
+    if given["rviz"] == "false":
+        return []
+    view = Path(get_package_share_directory("wam_stack"), "rviz", "wam.rviz").read_text(encoding="utf-8")
+    prefix = given["frame_prefix"]
+    view = view.replace("Fixed Frame: base_link", f"Fixed Frame: {prefix}base_link")
+    view = view.replace('TF Prefix: ""', f"TF Prefix: {prefix.rstrip('/')!r}").replace("/wam/", f"/{namespace}/")
+    file = folder / "wam.rviz"
+    file.write_text(view, encoding="utf-8")
+    return [
+        Node(
+            package="rviz2",
+            executable="rviz2",
+            namespace=namespace,
+            arguments=["-d", str(file)],
+            parameters=[{"use_sim_time": given["use_sim_time"] == "true"}],
+            remappings=own_names(namespace, prefix),
+            output="screen",
+        )
     ]
 
 

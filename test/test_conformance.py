@@ -1,20 +1,22 @@
 """Drivers tested against the contract: the simulated one and the skeleton keep it, a broken one fails row by row."""
 
 import math
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import RosWorld
+from conftest import LONG, RosWorld
 from sensor_msgs.msg import JointState
 
 from wam_cli.commands.conform import driver_alone
 from wam_description.configuration import Configuration, packaged
 from wam_description.driver_contract import REQUIREMENTS, DriverContract
 from wam_description.signals import Answer, State
-from wam_ros import conformance
+from wam_ros import conformance, message_checks
 from wam_ros.conformance import NOT_TESTED, OK, WRONG, Conformance
 from wam_ros.driver_probe import DriverProbe
 from wam_ros.node import make_node
@@ -65,9 +67,39 @@ def wrong(bench: Bench, attempts: int = PATIENT) -> list[str]:
 
 
 @pytest.mark.slow
-def test_the_simulated_driver_keeps_the_contract(ros: RosWorld, tmp_path: Path) -> None:
-    configuration = simulated()
-    assert wrong(Bench(ros, tmp_path, configuration, lambda **given: make_node("driver", **given))) == []
+def test_the_simulated_driver_keeps_the_contract_as_a_process_of_its_own(domain_id: int) -> None:
+    command = [sys.executable, "-P", "-m", "wam_cli.main", "conform", "--share", str(SHARE), "--attempts", str(PATIENT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10 * LONG)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"{len(REQUIREMENTS)} ok, 0 WRONG, 0 not tested" in done.stdout
+
+
+class Heldup:
+    """A probe that pauses, or not."""
+
+    longest_pause = 0.0
+
+    def be_proper(self) -> None:
+        """Nothing to end."""
+
+
+@pytest.mark.parametrize(("pause", "tries"), [(0.001, 2), (1.0, 6)])
+def test_an_attempt_that_the_machine_held_up_does_not_count(
+    pause: float, tries: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    probe: Any = Heldup()
+    tested = Conformance(probe, DriverContract.of(simulated().shared, SHARE), 2)
+    made = []
+
+    def check() -> str:
+        made.append(pause)
+        probe.longest_pause = pause
+        return "it is wrong"
+
+    monkeypatch.setitem(conformance.CHECKS, "rate", lambda bench: check())
+    row = tested.row("rate")
+    assert (row.verdict, len(made)) == (WRONG, tries)
+    assert ("held up" in row.found) == (pause > conformance.PAUSE)
 
 
 @pytest.mark.slow
@@ -90,7 +122,7 @@ def test_without_a_driver_no_row_but_the_interface_is_tested(
     ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("START", "LOOK"):
-        monkeypatch.setattr(conformance, name, 0.05)
+        monkeypatch.setattr(message_checks, name, 0.05)
     monkeypatch.setattr("wam_ros.driver_probe.PATIENCE", 0.05)
     bench = Bench(ros, tmp_path, simulated(), lambda **given: ros.node("nobody"))
     rows = list(bench.conformance(1).rows())

@@ -11,8 +11,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import pytest
 import yaml
@@ -23,9 +25,12 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from wam_cli.commands import up
-from wam_description.configuration import packaged
+from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import NODES as TABLE
+from wam_description.parameters import ParameterError
+from wam_description.topics import BY_NAME
 from wam_ros.network import occupant
+from wam_ros.node import named_file
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[1]
@@ -37,6 +42,7 @@ SHIPPED = (
     "setup.py",
     "config",
     "launch",
+    "rviz",
     "resource",
     "scripts",
 )
@@ -130,7 +136,7 @@ def test_ament_index_finds_the_package(installed, monkeypatch):
     assert (share / "package.xml").read_bytes() == (ROOT / "package.xml").read_bytes()
     for folder in ("config", "config/experiments", "config/experiments/sets"):
         assert files_in(share / folder) == {path.name for path in ROOT.glob(f"{folder}/*.yaml")}
-    assert files_in(share / "launch") == {path.name for path in ROOT.glob("launch/*.launch.py")}
+    assert files_in(share / "launch") == {path.name for path in ROOT.glob("launch/*.launch.*")}
 
 
 def test_every_node_is_where_ros2_run_looks(installed):
@@ -227,10 +233,16 @@ def launch_file(prefix, monkeypatch):
         "launch.actions": {
             "DeclareLaunchArgument": lambda name, **more: SimpleNamespace(name=name, **more),
             "ExecuteProcess": SimpleNamespace,
+            "LogInfo": SimpleNamespace,
             "OpaqueFunction": SimpleNamespace,
+            "Shutdown": SimpleNamespace,
         },
         "launch.substitutions": {
             "LaunchConfiguration": lambda name: SimpleNamespace(perform=lambda context: context[name])
+        },
+        "ament_index_python.packages": {
+            "get_package_share_directory": lambda name: str(prefix / "share" / name),
+            "get_packages_with_prefixes": lambda: {"wam_stack": str(prefix)},
         },
         "launch_ros": {},
         "launch_ros.actions": {"Node": SimpleNamespace},
@@ -242,7 +254,11 @@ def launch_file(prefix, monkeypatch):
     return {argument.name: argument for argument in declared}, start.function
 
 
-CHOSEN = {"config": "wam", "namespace": "left", "mode": "lockstep", "processes": "true", "record": "true"}
+CHOSEN = {
+    "config": "wam", "overrides": "", "namespace": "left", "mode": "lockstep", "processes": "true", "scenario": "",
+    "record": "true", "bag": "", "log_level": "info", "tf": "false", "frame_prefix": "", "rviz": "false",
+    "use_sim_time": "true",
+}  # fmt: skip
 
 
 def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(prefix, launch_file):
@@ -255,6 +271,9 @@ def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(pr
     assert {node.package for node in nodes} == {"wam_stack"}
     assert {node.namespace for node in nodes} == {"left"}
     config["/**"]["ros__parameters"]["timing"]["mode"] = "lockstep"
+    config["/**"]["ros__parameters"]["nodes"].append("recorder")
+    assert all(node.on_exit.reason for node in nodes), "the launch ends with the first node"
+    assert all(node.ros_arguments == ["--log-level", "info"] for node in nodes)
     assert all(yaml.safe_load(Path(*node.parameters).read_text()) == config for node in nodes)
     assert len(start({**CHOSEN, "record": "false"})) == len(nodes) - 1
     assert len(start({**CHOSEN, "mode": "realtime", "processes": "false"})) == len(nodes)
@@ -267,8 +286,10 @@ def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):
     options = argparse.ArgumentParser()
     up.arguments(options)
     chosen = options.parse_args(whole.cmd[4:])
-    assert (chosen.namespace, chosen.record) == ("left", True)
-    assert yaml.safe_load(Path(chosen.config).read_text())["/**"]["ros__parameters"]["timing"]["mode"] == "lockstep"
+    assert (chosen.namespace, chosen.log_level) == ("left", "info")
+    shared = yaml.safe_load(Path(chosen.config).read_text())["/**"]["ros__parameters"]
+    assert (shared["timing"]["mode"], shared["nodes"][-1]) == ("lockstep", "recorder")
+    assert whole.on_exit.reason
     assert whole.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
 
 
@@ -278,9 +299,76 @@ def test_every_launch_argument_has_a_description_and_a_default_that_is_allowed(l
         assert len(argument.description) > 20
         assert argument.choices is None or argument.default_value in argument.choices
     defaults = {name: argument.default_value for name, argument in declared.items()}
-    (whole,) = start(defaults)
+    whole, note = start(defaults)
+    assert note.msg.startswith("no /tf: install robot_state_publisher")
     file = Path(whole.cmd[whole.cmd.index("--config") + 1])
     assert file.read_text() == packaged("wam").read_text()
+
+
+def test_launch_plays_a_scenario_into_a_bag_with_values_of_its_own(launch_file, tmp_path):
+    _, start = launch_file
+    given = {"scenario": "demo_scenario", "record": "false", "bag": str(tmp_path / "first"), "processes": "false"}
+    values = {"overrides": "force_loop:force_gain=[0.002]; timing.real_time_factor=0.0"}
+    (whole,) = start(CHOSEN | given | values)
+    config = Configuration.load(whole.cmd[whole.cmd.index("--config") + 1])
+    assert config.shared.nodes[-2:] == ("scenario", "recorder")
+    assert config.sections["scenario"]["script"] == str(packaged("demo_scenario", "scenario"))
+    recorder = config.sections["recorder"]
+    assert (recorder["directory"], recorder["name"]) == (str(tmp_path), "first")
+    assert config.sections["force_loop"]["force_gain"] == [0.002]
+    assert config.shared.timing.real_time_factor == 0.0
+    with pytest.raises(ParameterError, match="no scenario 'nosuch'"):
+        start({**CHOSEN, "scenario": "nosuch"})
+    with pytest.raises(ParameterError, match="--set is 'gain'; write"):
+        start({**CHOSEN, "overrides": "gain"})
+
+
+def test_launch_starts_transforms_and_rviz_in_the_namespace_of_the_arm(launch_file):
+    _, start = launch_file
+    viewers = {"record": "false", "processes": "false", "tf": "true", "rviz": "true"}
+    for more, fixed, tree in (({}, "base_link", True), ({"frame_prefix": "left/"}, "left/base_link", False)):
+        _, state, rviz = start(CHOSEN | viewers | more)
+        assert (state.package, rviz.package) == ("robot_state_publisher", "rviz2")
+        assert {state.namespace, rviz.namespace} == {"left"}
+        (parameters,) = state.parameters
+        robot = ElementTree.fromstring(parameters["robot_description"])
+        children = {joint.find("child").get("link") for joint in robot.iter("joint")}
+        assert {link.get("name") for link in robot.iter("link")} - children == {"base_link"}, "the root, by REP 120"
+        assert parameters["frame_prefix"] == more.get("frame_prefix", "")
+        assert parameters["use_sim_time"] is rviz.parameters[0]["use_sim_time"] is True
+        assert (("/tf", "tf") in state.remappings) == (("/tf", "tf") in rviz.remappings) == tree
+        assert ("/clock", "clock") in rviz.remappings
+        view = yaml.safe_load(Path(rviz.arguments[1]).read_text())["Visualization Manager"]
+        assert view["Global Options"]["Fixed Frame"] == fixed
+        topics = [
+            shown[key]["Value"] for shown in view["Displays"] for key in ("Topic", "Description Topic") if key in shown
+        ]
+        assert {topic.removeprefix("/left/") for topic in topics} <= set(BY_NAME)
+        (model,) = [shown for shown in view["Displays"] if shown["Class"].endswith("RobotModel")]
+        assert model["TF Prefix"] == more.get("frame_prefix", "").rstrip("/")
+    _, state, _ = start(CHOSEN | viewers | {"namespace": "wam"})
+    assert state.remappings == [("robot_description", "~/robot_description")]
+
+
+def test_the_launch_file_in_xml_has_the_same_arguments_and_defaults(prefix, launch_file):
+    declared, _ = launch_file
+    tree = ElementTree.parse(prefix / "share" / "wam_stack" / "launch" / "wam.launch.xml").getroot()
+    assert {arg.get("name"): arg.get("default") for arg in tree.findall("arg")} == {
+        name: argument.default_value for name, argument in declared.items()
+    }
+    (include,) = tree.findall("include")
+    passed = {arg.get("name"): arg.get("value") for arg in include.findall("arg")}
+    assert passed == {name: f"$(var {name})" for name in declared}
+    assert include.get("file") == "$(find-pkg-share wam_stack)/launch/wam.launch.py"
+
+
+def test_a_node_takes_an_installed_configuration_by_its_name(tmp_path):
+    with ExitStack() as files:
+        taken = [named_file("testbed", before, files) for before in ("--params-file", "-r")]
+        assert Configuration.load(taken[0]).sections == Configuration.load(packaged("testbed")).sections
+        assert taken[1] == "testbed"
+        with pytest.raises(ParameterError, match="no configuration 'nosuch' comes with wam_stack"):
+            named_file("nosuch", "--params-file", files)
 
 
 @pytest.mark.parametrize(

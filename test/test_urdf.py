@@ -10,6 +10,8 @@ import pytest
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
+from wam_description.ros2_control import urdf_with_ros2_control
+from wam_description.topics import BY_NAME
 from wam_description.urdf import urdf
 
 JOINTS = ["joint1", "joint2", "joint3", "joint4"]
@@ -121,5 +123,20 @@ def test_every_link_has_one_parent_and_contact_frames_exist(arm: Arm) -> None:
     robot = ET.fromstring(urdf(arm))
     links = {link.get("name") for link in robot.iter("link")}
     children = [child.get("link") for child in robot.iter("child")]
-    assert {*arm.links.names, "inner_link", "outer_link", "tool", "base"} == links
-    assert sorted(children, key=str) == sorted(links - {"base"}, key=str)
+    assert {*arm.links.names, "inner_link", "outer_link", "tool", "base", "base_link"} == links
+    assert sorted(children, key=str) == sorted(links - {"base_link"}, key=str)
+
+
+def test_the_tag_of_ros2_control_names_joints_limits_and_topics_of_the_arm(arm: Arm) -> None:
+    robot = ET.fromstring(urdf_with_ros2_control(arm, "/left/"))
+    (system,) = robot.findall("ros2_control")
+    assert [joint.get("name") for joint in system.findall("joint")] == list(arm.joints.names)
+    for i, joint in enumerate(system.findall("joint")):
+        limits = {param.get("name"): float(param.text or "") for param in joint.findall("command_interface/param")}
+        assert limits == {"min": arm.joints.lower[i], "max": arm.joints.upper[i]}
+        assert [state.get("name") for state in joint.findall("state_interface")] == ["position", "velocity"]
+    params = {param.get("name"): param.text or "" for param in system.findall("hardware/param")}
+    states, commands = (params[f"joint_{kind}_topic"].removeprefix("/left/") for kind in ("states", "commands"))
+    assert BY_NAME[states].type == BY_NAME[commands].type == "sensor_msgs/msg/JointState"
+    robot.remove(system)
+    assert len(pin.buildModelFromXML(ET.tostring(robot, encoding="unicode")).names) == 5, "else it is the URDF"

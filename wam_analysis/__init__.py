@@ -3,6 +3,7 @@
 recorded        the arm and its controllers, built from the parameters in a bag
 measures        step responses, limit cycles, friction ...: functions of arrays
 findings        the analysis behind `wam analyse`: sections of sentences and numbers, as text, HTML and JSON
+foreign         recordings of other robots: any bag with joints, wrenches or mapped topics
 identification  from a recording of free motion to the controllers' model, behind `wam identify`
 demo_traces     forces and contacts of a run on one time base
 demo_summary    the demonstration in numbers

@@ -13,6 +13,7 @@
 - transmission_map: motors to joints and back, (A.5)
 - rigid_body, jacobian: kinematics and dynamics of the links; the hand Jacobian (A.7) in closed form
 - mjcf, urdf: the arm as a model for MuJoCo and for ROS
+- ros2_control: the URDF with the tag for controllers of ros2_control
 - mjcf_objects: free bodies and doors in the model for MuJoCo
 - contact_pairs: what may touch what, and the law of each contact force
 - wiring, synchroniser: declaration of a node; its inputs brought together by stamp

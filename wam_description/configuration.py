@@ -3,7 +3,7 @@
 import hashlib
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
@@ -146,6 +146,27 @@ class Configuration(NamedTuple):
         except ParameterError as error:
             where = SHARED if section == SHARED else f"/**/{section}"
             raise ParameterError(f"{self.path}, section '{where}': {error}") from error
+
+
+def option_values(texts: Iterable[str]) -> dict[str, Any]:
+    """Parameters and values as an option gives them, for `Configuration.with_values`; each '[node:]parameter=value'.
+
+    Raises
+    ------
+    ParameterError
+        where one is none.
+    """
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise ParameterError(f"--set is '{text}'; write [node:]parameter=value, e.g. force_loop:force_gain=[0.01]")
+        try:
+            found[name.strip()] = yaml.safe_load(value)
+        except yaml.YAMLError as error:
+            reason = str(error).partition("\n")[0]
+            raise ParameterError(f"--set {name.strip()}: '{value}' is no value of YAML: {reason}") from error
+    return found
 
 
 def packaged(name: str, kind: str = "configuration") -> Path:

@@ -1,7 +1,8 @@
 """The arm as URDF, for robot_state_publisher, viewers and other tools.
 
-Links: ``base``, the links of the arm, a frame for each cover (named like the cover, so that
-contacts find it in TF) and ``tool``.  The tubes are drawn as cylinders with spheres at both ends.
+Links: ``base_link``, the root by REP 120, ``base`` in the same place, the links of the arm, a frame for
+each cover (named like the cover, so that contacts find it in TF) and ``tool``.  The tubes are drawn as
+cylinders with spheres at both ends.
 """
 
 from collections.abc import Iterable
@@ -15,6 +16,7 @@ from wam_description.arm import Arm
 from wam_description.rigid_body import cover_placement, joint_placement
 from wam_description.transmission_map import TransmissionMap
 
+ROOT = "base_link"
 BASE = "base"
 TOOL = "tool"
 
@@ -26,7 +28,9 @@ def urdf(arm: Arm) -> str:
     above which the driver faults.  Lengths in m, angles in rad, frames of (A.4).
     """
     robot = Element("robot", name=arm.name)
+    SubElement(robot, "link", name=ROOT)
     SubElement(robot, "link", name=BASE)
+    _add_fixed(robot, ROOT, BASE, _origin((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     for i in range(len(arm.links.names)):
         _add_link(robot, arm, i)
     for i in range(len(arm.covers.names)):

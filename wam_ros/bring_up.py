@@ -31,7 +31,11 @@ TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
 
 
 def start(
-    configuration: Configuration, apart: bool, is_stopped: Callable[[], bool], namespace: str = NAMESPACE
+    configuration: Configuration,
+    apart: bool,
+    is_stopped: Callable[[], bool],
+    namespace: str = NAMESPACE,
+    log_level: str = "info",
 ) -> "Composition | Processes":
     """Start the nodes of a configuration.
 
@@ -41,6 +45,7 @@ def start(
     apart : a process for each node; otherwise all in this one.
     is_stopped : whether the start is to be broken off.
     namespace : namespace of the nodes.
+    log_level : least severity of what they print.
 
     Raises
     ------
@@ -48,7 +53,9 @@ def start(
         where there is no such node, or one of this name runs already in this namespace.
     """
     require_places(node_names(configuration).values(), namespace)
-    return Processes(configuration, namespace) if apart else Composition(configuration, namespace, None, is_stopped)
+    if apart:
+        return Processes(configuration, namespace, log_level)
+    return Composition(configuration, namespace, None, is_stopped, log_level)
 
 
 def node_names(configuration: Configuration) -> dict[str, str]:
@@ -78,6 +85,7 @@ class Processes:
     ----------
     configuration : values for all nodes; its `shared.nodes` says which ones are started.
     namespace : namespace of the nodes.
+    log_level : least severity of what they print.
 
     Attributes
     ----------
@@ -87,15 +95,15 @@ class Processes:
 
     bag_failure = ""
 
-    def __init__(self, configuration: Configuration, namespace: str = NAMESPACE) -> None:
+    def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, log_level: str = "info") -> None:
         names = node_names(configuration)
         prepare_logging_directory()
         self.killed: list[str] = []
         self._stack = ExitStack()
         parameters = self._stack.enter_context(parameter_file(configuration))
+        own = ["--params-file", str(parameters), "--log-level", log_level]
         self._processes = {
-            name: _start(entry, ["--params-file", str(parameters), "-r", f"__ns:=/{namespace.strip('/')}"])
-            for entry, name in names.items()
+            name: _start(entry, [*own, "-r", f"__ns:=/{namespace.strip('/')}"]) for entry, name in names.items()
         }
 
     def __enter__(self) -> "Processes":
@@ -257,6 +265,7 @@ class Composition:
     namespace : namespace of the nodes.
     domain_id : ROS domain, the one of the environment where None.
     is_stopped : no further node is made once it is true.
+    log_level : least severity of what they print.
 
     Attributes
     ----------
@@ -274,9 +283,10 @@ class Composition:
         namespace: str = NAMESPACE,
         domain_id: int | None = None,
         is_stopped: Callable[[], bool] = lambda: False,
+        log_level: str = "info",
     ) -> None:
         names = node_names(configuration)
-        self._connection = Connection(domain_id=domain_id)
+        self._connection = Connection(["wam", "--ros-args", "--log-level", log_level], domain_id)
         self.context, self.executor = self._connection.context, self._connection.executor
         if configuration.shared.timing.mode == "lockstep":
             BUSES[self.context] = LocalBus(self.executor, names.values())

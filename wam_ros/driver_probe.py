@@ -57,6 +57,7 @@ class DriverProbe(Node):
     is_answering : whether states are answered.
     after : messages that are sent after the next answers, made from the stamp of the state.
     wanted : makes the answer from stamp and currents; None for the proper one.
+    longest_pause : s, in which this node itself did not run.
     """
 
     def __init__(self, shared: Shared, current: float, spin: Spin, **ros: Any) -> None:
@@ -70,6 +71,7 @@ class DriverProbe(Node):
         self.diagnostics: set[str] = set()
         self.commanded = list(self._carrying)
         self.answered = 0
+        self.longest_pause = 0.0
         self.is_answering = True
         self.after: list[Callable[[int], Any]] = []
         self.wanted: Callable[[int, list[float]], Any] | None = None
@@ -174,9 +176,12 @@ class DriverProbe(Node):
 
     def wait(self, until: Callable[[], Any], seconds: float = REPLY) -> bool:
         """Whether something becomes true within some seconds."""
-        end = time.monotonic() + seconds
-        while not (found := until()) and time.monotonic() < end:
+        now = time.monotonic()
+        end = now + seconds
+        while not (found := until()) and now < end:
             self._spin(SPIN)
+            before, now = now, time.monotonic()
+            self.longest_pause = max(self.longest_pause, now - before)
         return bool(found)
 
     def watch(self, seconds: float) -> None:

@@ -5,8 +5,11 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -14,6 +17,7 @@ from rclpy.node import Node
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
+from wam_description.configuration import Configuration, packaged
 from wam_description.interface import Feed, Interface, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import Level, NodeStatus
@@ -329,4 +333,19 @@ def main() -> None:
         declared(name)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
-    run(lambda **ros: make_node(name, **ros))
+    with ExitStack() as files:
+        try:
+            arguments = [named_file(given, before, files) for before, given in pairwise(["", *sys.argv])]
+        except ParameterError as error:
+            raise SystemExit(f"error: {error}") from None
+        run(lambda **ros: make_node(name, **ros), arguments)
+
+
+def named_file(given: str, before: str, files: ExitStack) -> str:
+    """An argument of the command line; after --params-file the file of an installed configuration for its name."""
+    if before != "--params-file" or Path(given).exists() or given.endswith((".yaml", ".yml")):
+        return given
+    text = Configuration.load(packaged(given)).text
+    file = Path(files.enter_context(TemporaryDirectory(prefix="wam_stack_")), "parameters.yaml")
+    file.write_text(text, encoding="utf-8")
+    return str(file)

@@ -12,7 +12,6 @@ guarded                the stability guard on a recorded press
 transmission_signals   motors, cables and joints on one time base
 motion                 sections about stick and slip, friction and ripple
 power                  section about efficiency and backdrivability
-other_robots           joints and forces of another robot, and their friction
 frequency              section about the velocity loops
 timing                 section about the loop, and provenance
 tabulated              tables of subjects and quantities

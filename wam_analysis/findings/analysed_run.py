@@ -16,7 +16,6 @@ Times = NDArray[np.int64]
 
 SHORTEST_HOLD = 0.3  # s; a shorter one is part of a ramp
 SMALL = 0.01  # N; commanded forces that differ by less are equal
-FOREIGN = ("sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped")
 
 
 class Hold(NamedTuple):
@@ -44,12 +43,16 @@ class Hold(NamedTuple):
 
 
 class AnalysedRun(NamedTuple):
-    """What the analyses take from a bag: its run, forces and contacts over time, parameters, and held forces."""
+    """What the analyses take from a bag: its run, forces and contacts over time, parameters, and held forces.
+
+    `is_foreign` is whether it is a recording of another robot.
+    """
 
     run: RecordedRun
     summary: DemoSummary
     parameters: PredictionParameters
     holds: tuple[Hold, ...]
+    is_foreign: bool = False
 
     @property
     def bag(self) -> Bag:

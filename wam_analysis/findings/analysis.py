@@ -10,10 +10,13 @@ from wam_analysis.findings.finding import Section, shown, times
 from wam_analysis.findings.force import cycle_section, force_section
 from wam_analysis.findings.held_force import HeldForce, held_forces
 from wam_analysis.findings.motion import MotionFindings, motion_sections
-from wam_analysis.findings.other_robots import friction_of_others, signals_of_others
-from wam_analysis.findings.swinging import cycles_of_others
 from wam_analysis.findings.timing import extent, provenance, timing_section
-from wam_bag.bag import Bag, JointColumns, WrenchColumns, read
+from wam_analysis.foreign.reading import foreign_bag, is_of_other_encoding, needs_rosbags
+from wam_analysis.foreign.sections import foreign_sections
+from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
+from wam_bag.bag import Bag, BagError, read
+from wam_bag.contents import contents
+from wam_bag.losses import PARAMETERS, RECORDING
 
 LONGEST = 160  # characters of a note on the parameters
 Progress = Callable[[str], None]
@@ -24,13 +27,13 @@ TOPICS_READ = (
     "gravity_effort", "force_command", "force_measured", "contact/wrench", "contact/point", "contact/hypotheses",
     "sim/contact/wrench", "sim/contact/point", "sim/disturbance", "sim/joint_states", "status", "/diagnostics",
 )  # fmt: skip
-OWN = (
-    "motor_states",
-    "force_command",
-    "contact/wrench",
-    "sim/joint_states",
-    "status",
-)  # only bags of this stack have these
+OWN = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
+    "motor_states": "sensor_msgs/msg/JointState",
+    "force_command": "geometry_msgs/msg/WrenchStamped",
+    "contact/wrench": "geometry_msgs/msg/WrenchStamped",
+    "sim/joint_states": "sensor_msgs/msg/JointState",
+    "status": "diagnostic_msgs/msg/DiagnosticStatus",
+}
 
 
 class Analysis(NamedTuple):
@@ -55,45 +58,67 @@ class Analysis(NamedTuple):
         return f"Analysis({self.recording.run.bag!r}, {self.duration:.1f} s, {len(self.sections)} sections)"
 
 
-def analyse(path: str | Path, progress: Progress) -> Analysis:
+def analyse(path: str | Path, progress: Progress, given: TopicMap = NOTHING_GIVEN) -> Analysis:
     """Read a bag and analyse it.
 
     Parameters
     ----------
-    path : bag directory or .mcap file, of this stack or of another robot with JointState or WrenchStamped.
+    path : bag directory or file, of this stack or of another robot with JointState, WrenchStamped or mapped topics.
     progress : called with each stage of the work.
+    given : topics, joints, fields and units of another robot's bag.
 
     Raises
     ------
     BagError
         if the bag cannot be read.
+    ValueError
+        if it has not what is given.
     """
+    path = Path(path)
     progress(f"reading {path}")
-    bag = read(path, TOPICS_READ, may_lack=True)
-    if not any(len(columns.log_time_ns) for columns in bag.topics.values()):
-        progress("it has none of the stack's topics; reading all")
-        bag = read(path)
-    return analyse_bag(bag, progress)
+    if not given.is_given and _is_own(path):
+        return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress)
+    progress("it is of another robot")
+    return analyse_foreign_bag(foreign_bag(path, given), given)
+
+
+def analyse_foreign_bag(bag: Bag, given: TopicMap = NOTHING_GIVEN) -> Analysis:
+    """Analyse the joints and wrenches of another robot's bag, see `wam_analysis.foreign.reading.foreign_bag`."""
+    sections = foreign_sections(bag, given)
+    recording = analysed_run(bag)._replace(is_foreign=True)
+    nothing = MotionFindings((), None, {}, {})
+    sections = (_verdict(sections), *sections)
+    return Analysis(recording, (), nothing, extent(bag.topics), provenance(recording), sections)
+
+
+def _is_own(path: Path) -> bool:
+    """Whether a bag is of this stack: by what its recorder left in it, or by its topics."""
+    if needs_rosbags(path):
+        return False
+    try:
+        found = contents(path)
+    except BagError:
+        if path.is_file() and path.suffix == ".mcap" and is_of_other_encoding(path):
+            return False
+        raise
+    if PARAMETERS in found.attachments or RECORDING in found.metadata:
+        return True
+    spaces = [name[: -len(own)] for name, one in found.topics.items() for own, kind in OWN.items()
+              if name.endswith(f"/{own}") and one.type == kind]  # fmt: skip
+    return any(spaces.count(space) > 1 for space in spaces)
 
 
 def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
-    """Analyse a bag that has been read, see `analyse`."""
+    """Analyse a bag of this stack that has been read, see `analyse`."""
     progress("forces and contacts")
     recording = analysed_run(bag)
     held = held_forces(recording)
-    foreign = _foreign(bag)
-    others = signals_of_others(bag) if foreign else {}
-    if foreign:
-        middle: tuple[Section, ...] = (cycles_of_others(others),)
-    else:
-        middle = (force_section(recording, held), cycle_section(recording, held), contact_section(recording))
+    middle = (force_section(recording, held), cycle_section(recording, held), contact_section(recording))
     progress("friction, ripple, power and frequency")
     motion = motion_sections(recording)
-    moved = motion.sections if not foreign else (*motion.sections[:1], friction_of_others(others))
     progress("timing")
-    timing = timing_section(recording)
     duration = extent(bag.topics)
-    sections = (_happened(recording, duration, foreign), *middle, *moved, timing)
+    sections = (_happened(recording, duration), *middle, *motion.sections, timing_section(recording))
     return Analysis(recording, held, motion, duration, provenance(recording), (_verdict(sections), *sections))
 
 
@@ -104,7 +129,7 @@ def _verdict(sections: tuple[Section, ...]) -> Section:
     return Section("verdict", "Verdict", tuple(said) or (silent,), ())
 
 
-def _happened(recording: AnalysedRun, duration: float, foreign: list[str]) -> Section:
+def _happened(recording: AnalysedRun, duration: float) -> Section:
     """What happened, in a few sentences."""
     summary = recording.summary
     sentences = [f"INCOMPLETE: {line}" for line in summary.lost]
@@ -120,7 +145,6 @@ def _happened(recording: AnalysedRun, duration: float, foreign: list[str]) -> Se
         sentences.append(f"It touched something in {_count(len(touches), 'step')}.")
     faults = [note for note in summary.notes if note.startswith("driver fault")]
     sentences += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
-    sentences += foreign
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
     sentences += [_brief(f"{note[0].upper()}{note[1:]}.") for note in recording.run.parameters.notes]
@@ -139,18 +163,3 @@ def _brief(note: str) -> str:
 
 def _count(number: int, name: str) -> str:
     return f"{number} {name}{'s' * (number != 1)}"
-
-
-def _foreign(bag: Bag) -> list[str]:
-    """Messages of JointState and WrenchStamped, if the bag has none of the stack's own topics."""
-    own = tuple(f"/{name}" for name in OWN)
-    if any(name.endswith(own) and len(columns.log_time_ns) for name, columns in bag.topics.items()):
-        return []
-    sentences = ["This is not a recording of this stack."]
-    for name, columns in sorted(bag.topics.items()):
-        if isinstance(columns, JointColumns) and len(columns.stamp_ns):
-            sentences.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")
-        elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
-            largest = float((columns.force**2).sum(axis=1).max()) ** 0.5
-            sentences.append(f"{name}: {len(columns.stamp_ns)} forces, up to {shown(largest, 'N')}.")
-    return sentences

@@ -39,7 +39,8 @@ def moving(recording: AnalysedRun) -> dict[str, JointColumns | WrenchColumns]:
         if isinstance(columns, (JointColumns, WrenchColumns)) and len(columns.stamp_ns) >= FEWEST
     }
     joints = {n: c for n, c in topics.items() if isinstance(c, JointColumns) and c.position.size}
-    own = [f"{recording.namespace}/{name}" for name in ORDER if f"{recording.namespace}/{name}" in joints]
+    own = [name for name in (f"{recording.namespace}/{seen}" for seen in ORDER) if name in joints]
+    own = [] if recording.is_foreign else own
     shown: dict[str, JointColumns | WrenchColumns] = dict(joints) if not own else {own[0]: joints[own[0]]}
     if forces_over_time(recording) is None:
         wrenches = {n: c for n, c in topics.items() if isinstance(c, WrenchColumns) and np.any(c.force != 0.0)}

@@ -1,4 +1,4 @@
-"""Cycles of motors and joints: under a force that was not recorded, and in the bags of other robots."""
+"""Cycles of motors and joints under a force that was not recorded."""
 
 import math
 from typing import NamedTuple
@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.findings.analysed_run import AnalysedRun, Hold
-from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.measures.limit_cycle import limit_cycle
+from wam_analysis.findings.finding import Finding, shown
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.stability import StabilityVerdict
 from wam_analysis.measures.swings import Swings, swings
-from wam_bag.bag import JointColumns, WrenchColumns
+from wam_bag.bag import JointColumns
 
 Numbers = NDArray[np.float64]
 
@@ -20,7 +19,6 @@ LATE = 0.7  # of a hold, at its end: its range is that of the motion without the
 LEAST = 0.05  # of that range: a smaller change is no swing
 LOUD = 8.0  # standard deviations of the noise: likewise
 STILL = 1e-4  # rad; a shaft that moves less does not swing
-SURE = 0.8  # confidence from which a cycle is reported
 
 
 class Swinging(NamedTuple):
@@ -86,46 +84,6 @@ def swinging_findings(name: str, found: Swinging) -> list[Finding]:
         Finding(f"{name}: period", "s", one.period),
         Finding(f"{name}: growth per half cycle", "", one.growth, note=f"{one.verdict}; {one.number} swings"),
     ]
-
-
-def cycles_of_others(topics: dict[str, JointColumns | WrenchColumns]) -> Section:
-    """What repeats in the joints and forces of another robot, whatever it was commanded."""
-    sentences, findings = [], []
-    for topic, columns in topics.items():
-        for name, unit, value in _signals(topic, columns):
-            found = limit_cycle(columns.stamp_ns / 1e9, value)
-            if not found.confidence >= SURE:
-                continue
-            findings += [
-                Finding(f"{name}: cycle, peak to peak", unit, found.peak_to_peak),
-                Finding(f"{name}: frequency", "Hz", 1.0 / found.period),
-                Finding(f"{name}: confidence", "", found.confidence),
-            ]
-            sentences.append(
-                f"{name} repeats at {shown(1.0 / found.period, 'Hz')}, {shown(found.peak_to_peak, unit)} peak to peak "
-                f"(confidence {found.confidence:.2f}); whether it was commanded to is not in this bag."
-            )
-    told = tuple(sentences) or ("Nothing in this recording repeats three times.",)
-    return Section("stability", "Cycles", told, tuple(findings), (), tuple(sentences))
-
-
-def _signals(topic: str, columns: JointColumns | WrenchColumns) -> list[tuple[str, str, Numbers]]:
-    """Name, unit and values of what may cycle: positions, and each force along which it varies most."""
-    if isinstance(columns, WrenchColumns):
-        force = columns.force
-        if len(force) < 20 or not np.all(np.isfinite(force)) or not np.any(np.ptp(force, axis=0) > 0.0):
-            return []
-        way = np.linalg.eigh(np.cov(force.T))[1][:, -1]
-        return [(topic, "N", force @ way)]
-    return [
-        (name, "rad", columns.position[:, i])
-        for i, name in enumerate(columns.names)
-        if columns.position.shape[1] and np.all(np.isfinite(columns.position[:, i])) and _moves(columns.position[:, i])
-    ]
-
-
-def _moves(value: Numbers) -> bool:
-    return bool(np.ptp(value) > max(STILL, LOUD * noise(value))) if len(value) > 20 else False
 
 
 def at_the_contact(found: Swinging, motors: tuple[str, ...], motor_per_metre: Numbers) -> float:

@@ -6,6 +6,7 @@ regressor   motor torques per parameter
 fit         estimate, covariance by jackknife, cross-validation
 stribeck    the Stribeck velocity of each motor
 base_set    combinations of inertial parameters that gravity depends on
+recorded_loop  friction node and force loop of chapter 5, as far as a recording of any arm shows them
 overlay     the estimate as a configuration for --config
 report      the table, and the warnings
 """

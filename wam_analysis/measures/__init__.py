@@ -3,6 +3,8 @@
 response            rise, settling and overshoot of a step
 force_accuracy      accuracy of a held force, dynamic range
 limit_cycle         amplitude, period and confidence of a limit cycle
+episodes            limit cycles that fill a part of a recording
+lines               lines in the spectrum, above the noise
 swings              cycles of which only a few swings were recorded
 stability           whether a response settles, cycles or diverges
 stick_slip_phases   phases of rest and of motion

@@ -31,6 +31,7 @@ class Friction(NamedTuple):
     offset : torque that does not change its sign.
     static_error, dynamic_error, viscous_error, inertia_error : standard errors of the first four.
     breakaways : their number.
+    residual : rms of the averaged torque that the fit in motion leaves.
     """
 
     static: float
@@ -43,10 +44,17 @@ class Friction(NamedTuple):
     viscous_error: float
     inertia_error: float
     breakaways: int
+    residual: float
 
 
 def identify_friction(
-    time: Numbers, velocity: Numbers, torque: Numbers, rest: float, window: float, use: Mask | None = None
+    time: Numbers,
+    velocity: Numbers,
+    torque: Numbers,
+    rest: float,
+    window: float,
+    use: Mask | None = None,
+    load: Numbers | None = None,
 ) -> Friction:
     """Identify torque = F_dynamic sgn(v) + b v + J a + c in motion, and F_static at the start of motion.
 
@@ -63,6 +71,8 @@ def identify_friction(
     rest : speed up to which the shaft is at rest, rad/s.
     window : s.
     use : (n,), samples that may be used; None for all.
+    load : (n, k), torques of unknown size that also act, as those of a weight over the angle; None for none.  Their
+        part is identified in motion and taken off.
 
     Returns
     -------
@@ -76,9 +86,11 @@ def identify_friction(
     velocity, torque = np.where(allowed, velocity, 0.0), np.where(allowed, torque, 0.0)
     period = float(time[-1] - time[0]) / (n - 1)
     half = max(1, round(window / period / 2.0))
-    solution, errors = _in_motion(velocity, torque, rest, half, period, allowed)
-    dynamic, viscous, inertia, offset = solution
-    statics = _breakaways(velocity, torque - (0.0 if math.isnan(offset) else offset), rest, 2 * half, allowed)
+    acting = np.empty((n, 0)) if load is None else np.where(allowed[:, np.newaxis], load, 0.0)
+    solution, errors, left = _in_motion(velocity, torque, acting, rest, half, period, allowed)
+    dynamic, viscous, inertia, offset = solution[:4]
+    free = torque - acting @ np.nan_to_num(np.array(solution[4:])) - (0.0 if math.isnan(offset) else offset)
+    statics = _breakaways(velocity, free, rest, 2 * half, allowed)
     if math.isfinite(dynamic):
         statics = statics[statics >= dynamic]  # what moved at less was creeping
         middle = (dynamic + float(np.percentile(statics, 75.0))) / 2.0 if len(statics) else math.nan
@@ -87,18 +99,20 @@ def identify_friction(
         statics = statics[:0]  # it never slid: what ended its rest was no breakaway
     static = float(np.median(statics)) if len(statics) else math.nan
     error = 1.4826 * float(np.median(np.abs(statics - static))) / math.sqrt(len(statics)) if len(statics) else math.nan
-    return Friction(static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics))
+    return Friction(
+        static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics), left
+    )
 
 
 _NAN = math.nan
-_UNSEEN = Friction(_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0)
+_UNSEEN = Friction(_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0, _NAN)
 
 
 def _in_motion(
-    velocity: Numbers, torque: Numbers, rest: float, half: int, period: float, allowed: Mask
-) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
-    """Dynamic, viscous, inertia and offset by least squares, and the errors of the first three."""
-    nothing = ((math.nan,) * 4, (math.nan,) * 3)
+    velocity: Numbers, torque: Numbers, load: Numbers, rest: float, half: int, period: float, allowed: Mask
+) -> tuple[tuple[float, ...], tuple[float, ...], float]:
+    """Dynamic, viscous, inertia, offset and factors of the load by least squares, their errors, rms of the rest."""
+    nothing = ((math.nan,) * (4 + load.shape[1]), (math.nan,) * 4, math.nan)
     triangle = np.pad(np.concatenate([np.arange(1, half + 2), np.arange(half, 0, -1)]).astype(float), 2)
     slope = np.gradient(triangle / triangle.sum())
     triangle /= triangle.sum()
@@ -112,15 +126,16 @@ def _in_motion(
         return nothing
     v = np.convolve(velocity, triangle, "same")[rows]
     acceleration = np.convolve(velocity, slope, "same")[rows] / period
-    columns = np.column_stack([np.where(onward[rows], 1.0, -1.0), v, acceleration, np.ones(len(rows))])
+    acting = [np.convolve(column, triangle, "same")[rows] for column in load.T]
+    columns = np.column_stack([np.where(onward[rows], 1.0, -1.0), v, acceleration, np.ones(len(rows)), *acting])
     wanted = np.convolve(torque, triangle, "same")[rows]
     return _robust(columns, wanted, len(triangle), _halves(rows))
 
 
 def _robust(
     columns: Numbers, wanted: Numbers, width: int, half: NDArray[np.int64]
-) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
-    """Least squares without outliers; a column without information gives NaN.
+) -> tuple[tuple[float, ...], tuple[float, ...], float]:
+    """Least squares without outliers, standard errors, rms of the rest; a column without information gives NaN.
 
     The averages of `width` samples overlap, so the errors count one sample in `width`.  What the law leaves out, such
     as creep of the cables, is similar within a motion and not noise: if the halves of motions, numbered by `half`,
@@ -128,7 +143,7 @@ def _robust(
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     both = bool(np.ptp(columns[:, 0]) > 0.0)  # one direction only: dry friction and offset look the same
-    used = [i for i in range(4) if scale[i] > 0.0 and (i != 3 or both)]
+    used = [i for i in range(columns.shape[1]) if scale[i] > 0.0 and (i != 3 or both)]
     keep = np.ones(len(wanted), dtype=np.bool_)
     solution, rest = np.zeros(len(used)), wanted
     for _ in range(4):
@@ -143,13 +158,10 @@ def _robust(
     a = columns[keep][:, used] / scale[used]
     freedom = max(len(a) / width - len(used), 1.0)
     covariance = np.linalg.pinv(a.T @ a) * float(np.sum(rest[keep] ** 2)) / freedom
-    found, errors = np.full(4, math.nan), np.full(4, math.nan)
+    found, errors = np.full(len(scale), math.nan), np.full(len(scale), math.nan)
     found[used] = solution / scale[used]
     errors[used] = np.maximum(np.sqrt(np.diag(covariance)), _disagreement(a, wanted[keep], half[keep])) / scale[used]
-    return (
-        (float(found[0]), float(found[1]), float(found[2]), float(found[3])),
-        (float(errors[0]), float(errors[1]), float(errors[2])),
-    )
+    return tuple(found.tolist()), tuple(errors.tolist()), float(np.sqrt(np.mean(rest[keep] ** 2)))
 
 
 def _halves(rows: NDArray[np.intp]) -> NDArray[np.int64]:

@@ -12,11 +12,10 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import yaml
-
-from wam_description.configuration import Configuration, packaged
+from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
+from wam_description.configuration import Configuration, option_values, packaged
 from wam_live.page import PORT
 from wam_sim.batch import executor
 from wam_sim.pieces import default_folder
@@ -61,26 +60,7 @@ def configuration_of(given: argparse.Namespace) -> Configuration:
     name: str = given.config
     loaded = Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
     values = getattr(given, "values", [])
-    return loaded.with_values(dict(map(configured_value, values))) if values else loaded
-
-
-def configured_value(text: str) -> tuple[str, Any]:
-    """Parameter and value of an option --set; a whole number is what the parameter's class makes of it.
-
-    Raises
-    ------
-    ValueError
-        where it is none.
-    """
-    name, equals, value = text.partition("=")
-    if not (name.strip() and equals and value.strip()):
-        raise ValueError(f"--set is '{text}'; write [node:]parameter=value, e.g. force_loop:force_gain=[0.01]")
-    try:
-        return name.strip(), yaml.safe_load(value)
-    except yaml.YAMLError as error:
-        raise ValueError(
-            f"--set {name.strip()}: '{value}' is no value of YAML: {str(error).partition(chr(10))[0]}"
-        ) from error
+    return loaded.with_values(option_values(values)) if values else loaded
 
 
 def take_time(parser: argparse.ArgumentParser) -> None:
@@ -176,6 +156,29 @@ def batch_of(given: argparse.Namespace) -> Iterator[BatchOptions]:
         writable_directory("--keep", given.keep)
     with executor(given.workers, given.dask) as found:
         yield BatchOptions(found, None if given.fresh else given.keep, Progress(given.command, sys.stderr))
+
+
+def take_topic_map(parser: argparse.ArgumentParser) -> None:
+    """Give a command the options of what is taken from another robot's recording."""
+    other = parser.add_argument_group("a recording of another robot", "each may be repeated")
+    for option, name, words in (
+        ("--topic", "TOPIC", "analyse this topic only; of any type, with --map"),
+        ("--joint", "JOINT", "analyse this joint only; or the names of joints that have none in the messages"),
+        ("--command", "TOPIC", "what is commanded; else topics named command, cmd, desired, reference, target, goal"),
+        (
+            "--map",
+            "QUANTITY=FIELD",
+            f"field of the messages, as effort=current or position=state.q; {', '.join(MAPPED)}",
+        ),
+        ("--unit", "QUANTITY=UNIT", "of what was recorded, as position=deg or effort=mA, or a factor as effort=0.12"),
+    ):
+        dest = f"only_{option[2:]}"  # `command` is that of the program
+        other.add_argument(option, dest=dest, action="append", default=[], metavar=name, help=words)
+
+
+def topic_map_of(given: argparse.Namespace) -> TopicMap:
+    """What the options of `take_topic_map` name; errors are those of `topic_map`."""
+    return topic_map(given.only_topic, given.only_joint, given.only_command, given.only_map, given.only_unit)
 
 
 def take_seeds(parser: argparse.ArgumentParser, seeds: Sequence[int], of: str) -> None:

@@ -8,12 +8,14 @@ from pathlib import Path
 from wam_analysis.findings.analysis import analyse
 from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
-from wam_cli.commands import writable_file
+from wam_cli.commands import take_topic_map, topic_map_of, writable_file
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("bag", type=Path, help="directory of the bag, or its .mcap file")
+    parser.add_argument(
+        "bag", type=Path, help="directory of the bag, or its file: MCAP, or .bag and .db3 through rosbags"
+    )
     parser.add_argument(
         "--html", type=Path, metavar="FILE", help="also write one HTML page with pictures; it needs no network"
     )
@@ -21,6 +23,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--json", metavar="FILE", help="also write the numbers as JSON; '-' prints JSON instead of the text"
     )
     parser.add_argument("--quiet", action="store_true", help="no progress output")
+    take_topic_map(parser)
 
 
 def run(given: argparse.Namespace) -> int:
@@ -29,13 +32,14 @@ def run(given: argparse.Namespace) -> int:
         writable_file("--html", given.html)
     if given.json and given.json != "-":
         writable_file("--json", Path(given.json))
+    mapped = topic_map_of(given)
     begin = time.monotonic()
 
     def progress(doing: str) -> None:
         if not given.quiet:
             print(f"{time.monotonic() - begin:5.1f} s  {doing}", file=sys.stderr, flush=True)
 
-    analysis = analyse(given.bag, progress)
+    analysis = analyse(given.bag, progress, mapped)
     if given.json == "-":
         print(json_text(analysis))
     else:

@@ -10,8 +10,9 @@ from typing import Any, Final
 
 import yaml
 
-from wam_cli.commands import configured_value, namespace
+from wam_cli.commands import namespace
 from wam_description.arm import Shared
+from wam_description.configuration import option_values
 from wam_description.parameters import build_part
 from wam_description.signals import BASE, Wrench
 from wam_description.topics import BY_NAME, TABLE
@@ -87,7 +88,7 @@ def _get(given: argparse.Namespace, stack: CalledStack) -> int:
 
 
 def _set(given: argparse.Namespace, stack: CalledStack) -> int:
-    key, value = configured_value(given.value)
+    ((key, value),) = option_values([given.value]).items()
     node, _, name = key.partition(":")
     values = stack.parameters(node)
     if name not in values:

@@ -5,7 +5,16 @@ import math
 import sys
 from pathlib import Path
 
-from wam_cli.commands import at_least, configuration_of, take_configuration, writable_file
+from wam_analysis.findings.finding import shown
+from wam_analysis.identification.recorded_loop import LoopNumber, recorded_loop
+from wam_cli.commands import (
+    at_least,
+    configuration_of,
+    take_configuration,
+    take_topic_map,
+    topic_map_of,
+    writable_file,
+)
 from wam_control.force_loop import ForceLoop
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.loop_design import loop_design
@@ -22,6 +31,13 @@ PLANT = {  # option: what it is
     "friction": "dynamic (Coulomb) friction, N m or N",
     "gain": "G_I, rad/s per N m or m/s per N",
 }
+LOOP = {  # option: default, what it is
+    "limit": (math.inf, "saturation of the error; default: none"),
+    "deadband": (0.0, "of the error; default: 0"),
+    "rate": (0.0, "of the samples, Hz; default: 0, a continuous loop"),
+    "delay": (0.0, "from sample to command, s; default: 0"),
+}
+NUMBERS = (*PLANT, "stiction", *LOOP)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,15 +47,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of the random sets; default: 1")
     take_configuration(parser)
     parser.set_defaults(config="")
-    own = parser.add_argument_group("a force loop of your own", "all but the last six are needed; consistent units")
+    own = parser.add_argument_group("a force loop of your own", "the first six are needed; consistent units")
     for name, text in PLANT.items():
         own.add_argument(f"--{name}", type=float, help=text)
     own.add_argument("--stiction", type=float, help="static friction; default: the dynamic one")
-    own.add_argument("--limit", type=float, default=math.inf, help="saturation of the error; default: none")
-    own.add_argument("--deadband", type=float, default=0.0, help="of the error; default: 0")
-    own.add_argument("--rate", type=float, default=0.0, help="of the samples, Hz; default: 0, a continuous loop")
-    own.add_argument("--delay", type=float, default=0.0, help="from sample to command, s; default: 0")
+    for name, (_, text) in LOOP.items():
+        own.add_argument(f"--{name}", type=float, help=text)
+    own.add_argument(
+        "--bag", type=Path, help="take from this recording what is not given: wam identify for a force loop"
+    )
     own.add_argument("--picture", type=Path, help="write the stability map with the loop on it, PNG, PDF or SVG")
+    take_topic_map(parser)
 
 
 def run(given: argparse.Namespace) -> int:
@@ -49,10 +67,7 @@ def run(given: argparse.Namespace) -> int:
     """
     if given.config:
         return _assess_configuration(configuration_of(given))
-    missing = [name for name in PLANT if getattr(given, name) is None]
-    if len(missing) < len(PLANT):
-        if missing:
-            raise ValueError(f"--{missing[0]} is missing, {PLANT[missing[0]]}; give all of --{', --'.join(PLANT)}")
+    if given.bag or any(getattr(given, name) is not None for name in PLANT):
         return _assess(given)
     if given.picture:
         raise ValueError(f"--picture shows a loop of your own; give --{', --'.join(PLANT)}")
@@ -80,12 +95,24 @@ def _assess_configuration(configuration: Configuration) -> int:
 
 
 def _assess(given: argparse.Namespace) -> int:
-    stiction = given.friction if given.stiction is None else given.stiction
-    node = FrictionNode(given.inertia, given.damping, given.transmission, given.contact, given.friction, stiction)
-    loop = IntegralLoop(given.gain, error_limit=given.limit, deadband=given.deadband)
     if given.picture:
         writable_file("--picture", given.picture)
-    design = loop_design(node, loop, given.rate, given.delay)
+    known = recorded_loop(given.bag, topic_map_of(given)) if given.bag else {}
+    known |= {name: LoopNumber(value, "given") for name in NUMBERS if (value := getattr(given, name)) is not None}
+    if missing := [name for name in PLANT if name not in known]:
+        raise ValueError(
+            f"--{missing[0]} is missing, {PLANT[missing[0]]}; "
+            + (f"{given.bag} does not show it" if given.bag else f"give all of --{', --'.join(PLANT)}")
+        )
+    if given.bag:
+        for name, one in known.items():
+            print(f"{name:<13}{shown(one.value):>10}  {one.origin}")
+        print()
+    value = {name: default for name, (default, _) in LOOP.items()} | {name: one.value for name, one in known.items()}
+    stiction = max(value.get("stiction", 0.0), value["friction"]) if given.stiction is None else given.stiction
+    loop = IntegralLoop(value["gain"], error_limit=value["limit"], deadband=value["deadband"])
+    plant = value["inertia"], value["damping"], value["transmission"], value["contact"], value["friction"], stiction
+    design = loop_design(FrictionNode(*plant), loop, value["rate"], value["delay"])
     print(design.text())
     if given.picture:
         draw(design, given.picture)

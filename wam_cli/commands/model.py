@@ -2,10 +2,11 @@
 
 import argparse
 
-from wam_cli.commands import configuration_of, take_configuration
+from wam_cli.commands import configuration_of, namespace, take_configuration
 from wam_description.effects import Effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
+from wam_description.ros2_control import urdf_with_ros2_control
 from wam_description.urdf import urdf
 from wam_description.world import World
 
@@ -13,6 +14,12 @@ from wam_description.world import World
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("format", choices=("urdf", "mjcf"))
+    parser.add_argument(
+        "--ros2-control",
+        type=namespace,
+        metavar="NAMESPACE",
+        help="URDF with the tag <ros2_control>, for the arm in this namespace",
+    )
     take_configuration(parser)
 
 
@@ -21,8 +28,10 @@ def run(given: argparse.Namespace) -> int:
     configuration = configuration_of(given)
     shared = configuration.shared
     if given.format == "urdf":
-        print(urdf(shared.arm))
+        print(urdf_with_ros2_control(shared.arm, given.ros2_control) if given.ros2_control else urdf(shared.arm))
         return 0
+    if given.ros2_control:
+        raise ValueError("--ros2-control is a tag of URDF; print wam model urdf")
 
     section = configuration.sections["driver"]
     world, effects = build_part(World, section, "world."), build_part(Effects, section, "effects.")

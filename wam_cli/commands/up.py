@@ -30,6 +30,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--namespace", type=namespace, default=NAMESPACE, help="namespace of the nodes; default: %(default)s"
     )
+    parser.add_argument(
+        "--log-level",
+        choices=("debug", "info", "warn", "error", "fatal"),
+        default="info",
+        help="least severity of what the nodes print; default: %(default)s",
+    )
     take_page(parser, default=False)
     take_configuration(parser)
 
@@ -56,7 +62,7 @@ def run(given: argparse.Namespace) -> int:
     apart = runs_apart(configuration, given)
     with (
         page_beside(given, given.namespace) as close_page,
-        start(configuration, apart, lambda: stop.is_set, given.namespace) as stack,
+        start(configuration, apart, lambda: stop.is_set, given.namespace, given.log_level) as stack,
     ):
         if not stop.is_set:
             where = "processes of their own" if apart else "this process"

@@ -1,0 +1,394 @@
+"""Bags of other robots: what was planted in ten is found within 2 %, and nothing is found in ten quiet ones."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from foreign_bags import MOTORS, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
+
+from wam_analysis.findings.analysis import Analysis, analyse
+from wam_analysis.findings.page import page
+from wam_analysis.foreign import reading
+from wam_analysis.foreign.topic_map import TopicMap, topic_map
+from wam_bag.bag import BagError
+
+PANDA = [f"panda_joint{i}" for i in range(1, 8)]
+UR = [f"{n}_joint" for n in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
+RATE = 250.0
+CLOSE = 0.02
+Made = tuple[Path, TopicMap]
+
+
+def times(seconds: float, rate: float = RATE) -> Any:
+    return np.arange(0.0, seconds, 1.0 / rate)
+
+
+def chance(seed: int) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def sine(time: Any, frequency: float, size: float, begin: float = 0.0, end: float = math.inf) -> Any:
+    """A cycle of this peak to peak between two times."""
+    return 0.5 * size * np.sin(2.0 * np.pi * frequency * time) * ((time >= begin) & (time < end))
+
+
+def at_rest(time: Any, names: list[str], seed: int, noise: float = 1e-5) -> Any:
+    return np.linspace(-1.0, 1.0, len(names)) + noise * chance(seed).normal(size=(len(time), len(names)))
+
+
+def swung(time: Any, seed: int) -> tuple[Any, Any, Any]:
+    """Position, velocity and acceleration of a motion with several frequencies."""
+    drawn = chance(seed)
+    waves = [(0.5, 0.31), (0.3, 0.53), (0.15, 1.07), (0.05, 1.9)]
+    phases = drawn.uniform(0.0, 6.0, len(waves))
+    parts = [(a, 2.0 * np.pi * f, p) for (a, f), p in zip(waves, phases, strict=True)]
+    return (
+        sum(a * np.sin(w * time + p) for a, w, p in parts),
+        sum(a * w * np.cos(w * time + p) for a, w, p in parts),
+        sum(-a * w * w * np.sin(w * time + p) for a, w, p in parts),
+    )
+
+
+DRY, VISCOUS, INERTIA, WEIGHT = 0.8, 0.4, 0.12, 6.0
+
+
+def loaded(q: Any, v: Any, a: Any, weight: float, seed: int) -> Any:
+    friction = DRY * np.sign(v) + VISCOUS * v + INERTIA * a
+    return friction + weight * np.sin(q + 0.4) + 0.02 * chance(seed).normal(size=len(q))
+
+
+def found(made: Made) -> tuple[Analysis, dict[str, float]]:
+    analysis = analyse(made[0], lambda doing: None, made[1])
+    return analysis, {one.name: one.measured for section in analysis.sections for one in section.findings}
+
+
+def seven_joints(path: Path) -> tuple[Made, dict[str, float]]:
+    """A cycle in one of seven joints, friction in another."""
+    time = times(30.0)
+    position, velocity, effort = at_rest(time, PANDA, 1), np.zeros((len(time), 7)), np.zeros((len(time), 7))
+    position[:, 3] += sine(time, 3.1, 0.02)
+    q, v, a = swung(time, 2)
+    position[:, 1], velocity[:, 1], effort[:, 1] = q, v, loaded(q, v, a, 0.0, 3)
+    sent = joints("/joint_states", time, PANDA, position=position, velocity=velocity, effort=effort)
+    planted = {"panda_joint4: frequency": 3.1, "panda_joint4: cycle, peak to peak": 0.02}
+    planted |= {"panda_joint2: dry friction": DRY, "panda_joint2: viscous friction": VISCOUS}
+    return (by_mcap_ros2(path, sent), TopicMap()), planted | {"panda_joint2: inertia": INERTIA}
+
+
+def cycle_in_a_window_with_gaps(path: Path) -> tuple[Made, dict[str, float]]:
+    """A cycle from 8 to 22 s; the recorder lost two times half a second."""
+    time = times(30.0)
+    position = at_rest(time, UR, 4)
+    position[:, 4] += sine(time, 7.3, 0.004, 8.0, 22.0)
+    kept = ~(((time > 3.0) & (time < 3.5)) | ((time > 26.0) & (time < 26.5)))
+    sent = joints("/joint_states", time[kept], UR, position=position[kept], velocity=np.zeros_like(position[kept]))
+    planted = {"wrist_2_joint: frequency": 7.3, "wrist_2_joint: cycle, peak to peak": 0.004}
+    planted |= {"wrist_2_joint: begin": 8.0, "wrist_2_joint: end": 22.0, "/joint_states: longest gap": 0.5}
+    return (by_rosbags(path, sent), TopicMap()), planted | {"wrist_2_joint, 7.3 Hz: frequency": 7.3}
+
+
+def wrench_beside_joints(path: Path) -> tuple[Made, dict[str, float]]:
+    """Two arms with prefixes, and a wrench that cycles."""
+    time = times(20.0)
+    names = [f"{side}_{name}" for side in ("left", "right") for name in UR]
+    force = 0.1 * chance(5).normal(size=(len(time), 3)) + [0.0, 0.0, -8.0]
+    force[:, 1] += sine(time, 5.2, 2.4)
+    sent = joints("/arms/joint_states", time, names, position=at_rest(time, names, 6))
+    sent += wrenches("/left/ft_sensor/wrench", time, force, "left_tool0")
+    planted = {
+        "/left/ft_sensor/wrench force.y: frequency": 5.2,
+        "/left/ft_sensor/wrench force.y: cycle, peak to peak": 2.4,
+    }
+    return (by_mcap_ros2(path, sent), TopicMap()), planted | {"/left/ft_sensor/wrench force.y, 5.2 Hz: amplitude": 1.2}
+
+
+def no_velocities_and_a_weight(path: Path) -> tuple[Made, dict[str, float]]:
+    """Velocities are empty, positions in steps of an encoder, and gravity loads the joint."""
+    time = times(60.0)
+    q, v, a = swung(time, 7)
+    quantum = 2.0 * math.pi / 2**17
+    position = np.column_stack([quantum * np.rint(q / quantum), np.zeros(len(time))])
+    effort = np.column_stack([loaded(q, v, a, WEIGHT, 8), np.zeros(len(time))])
+    sent = joints("/robot/joint_states", time, ["j1", "j2"], position=position, effort=effort)
+    planted = {"j1: dry friction": DRY, "j1: viscous friction": VISCOUS, "j1: inertia": INERTIA}
+    return (by_rosbags(path, sent), TopicMap()), planted
+
+
+def two_senders_of_a_topic(path: Path) -> tuple[Made, dict[str, float]]:
+    """Arm and gripper publish on one topic, best effort: some are lost, all come late by chance."""
+    time, drawn = times(30.0), chance(9)
+    kept = np.sort(drawn.permutation(len(time))[: int(0.96 * len(time))])
+    delay = 1e-3 * drawn.random(len(time))
+    position = at_rest(time, UR, 10)
+    position[:, 2] += sine(time, 4.1, 0.01)
+    arm = joints("/joint_states", time[kept], UR, position=position[kept])
+    arm = [one._replace(received=one.received + late) for one, late in zip(arm, delay, strict=False)]
+    slow = times(30.0, 31.0) + 0.0007
+    gripper = joints("/joint_states", slow, ["finger"], position=at_rest(slow, ["finger"], 11))
+    planted = {"elbow_joint: frequency": 4.1, "elbow_joint: cycle, peak to peak": 0.01}
+    timing = {f"/joint_states of {', '.join(UR)}: missed periods": float(kept[-1] - kept[0] + 1 - len(kept))}
+    return (by_mcap_ros2(path, arm + gripper), TopicMap()), planted | timing
+
+
+def two_frames_of_a_topic(path: Path) -> tuple[Made, dict[str, float]]:
+    """Two force sensors publish on one topic; one of them cycles."""
+    time = times(20.0)
+    quiet, loud = (0.05 * chance(seed).normal(size=(len(time), 3)) for seed in (12, 13))
+    loud[:, 2] += sine(time, 2.7, 6.0)
+    sent = wrenches("/wrench", time, quiet, "left_tool") + wrenches("/wrench", time + 1e-4, loud, "right_tool")
+    name = "/wrench (right_tool) force.z"
+    return (by_rosbags(path, sent), TopicMap()), {f"{name}: frequency": 2.7, f"{name}: cycle, peak to peak": 6.0}
+
+
+def steps_of_a_force(path: Path) -> tuple[Made, dict[str, float]]:
+    """A force follows its command with 0.15 s, 3 % too low."""
+    time, tau = times(20.0), 0.15
+    command = np.where(time < 5.0, 0.0, np.where(time < 12.0, 20.0, 35.0))
+    force = np.zeros((len(time), 3))
+    for i in range(1, len(time)):
+        force[i, 2] = force[i - 1, 2] + (0.97 * command[i - 1] - force[i - 1, 2]) * (
+            1.0 - math.exp(-1.0 / (RATE * tau))
+        )
+    noisy = 0.02 * chance(14).normal(size=force.shape) - force  # of the environment on the sensor
+    asked = wrenches("/controller/target_wrench", time[::5], np.column_stack([0 * command, 0 * command, command])[::5])
+    name = "/ft wrench, 20 N at 5.0 s"
+    planted = {f"{name}: rise time 10-90 %": math.log(9.0) * tau, f"{name}: force in the steady state": 19.4}
+    planted |= {"/ft wrench, 35 N at 12.0 s: force in the steady state": 33.95}
+    planted |= {f"{name}: settling time to 5 %": math.log(20.0) * tau}
+    planted = {k.replace("/ft wrench", "/ft/wrench"): v for k, v in planted.items()}
+    return (by_mcap_ros2(path, asked + wrenches("/ft/wrench", time, noisy)), TopicMap()), planted
+
+
+def commanded_and_not(path: Path) -> tuple[Made, dict[str, float]]:
+    """One joint follows a commanded sine and cycles on top of it, the other cycles at a constant command."""
+    time = times(30.0)
+    asked = np.column_stack([0.8 * np.sin(2.0 * np.pi * 0.5 * time), np.full(len(time), 0.3)])
+    position = asked + 1e-5 * chance(15).normal(size=asked.shape)
+    position[:, 0] = 0.79 * np.sin(2.0 * np.pi * 0.5 * (time - 0.03)) + sine(time, 9.7, 0.006)
+    position[:, 1] += sine(time, 6.3, 0.01)
+    sent = joints("/joint_states", time, ["a", "b"], position=position)
+    sent += joints("/joint_command", time[::2], ["a", "b"], position=asked[::2])
+    planted = {"b: frequency": 6.3, "b: cycle, peak to peak": 0.01, "a: frequency": 0.5, "a: cycle, peak to peak": 1.58}
+    planted |= {"a from 0.0 s: frequency": 9.7, "a from 0.0 s: cycle, peak to peak": 0.006}
+    return (by_rosbags(path, sent), TopicMap()), planted
+
+
+def stick_slip_of_ros1(path: Path) -> tuple[Made, dict[str, float]]:
+    """ROS 1, degrees: 24 slips of 0.2 s, at rest in between, while the command moves steadily."""
+    time = times(24.0)
+    speed = 20.0 * np.clip((0.1 - np.abs(time % 1.0 - 0.5)) / 0.004, 0.0, 1.0) + 0.01 * chance(18).normal(
+        size=len(time)
+    )
+    position = np.cumsum(speed) / RATE  # deg
+    sent = joints("/joint_states", time, ["slide"], position=position[:, np.newaxis], velocity=speed[:, np.newaxis])
+    sent += joints("/joint_reference", time, ["slide"], position=(4.0 * time)[:, np.newaxis])
+    units = topic_map([], [], [], [], ["position=deg", "velocity=deg/s"])
+    return (by_rosbags(path, sent, "ros1"), units), {"slide: slips": 24.0, "slide: at rest": 80.0}
+
+
+def mapped_currents(path: Path) -> tuple[Made, dict[str, float]]:
+    """A type of its own in SQLite: currents of motors, 0.25 N m/A."""
+    time = times(30.0)
+    q, v, a = swung(time, 16)
+    current = loaded(q, v, a, 0.0, 17) / 0.25
+    sent = [
+        Sent("/drives", MOTORS, t, t, "", {"q": [q[i], 0.0], "dq": [v[i], 0.0], "current": [current[i], 0.0]})
+        for i, t in enumerate(time.tolist())
+    ]
+    fields = ["position=q", "velocity=dq", "effort=current"]
+    given = topic_map(["/drives"], ["base", "arm"], [], fields, ["effort=0.25"])
+    planted = {"base: dry friction": DRY, "base: viscous friction": VISCOUS, "base: inertia": INERTIA}
+    return (by_rosbags(path, sent, "sqlite3"), given), planted
+
+
+PLANTED: list[Callable[[Path], tuple[Made, dict[str, float]]]] = [
+    seven_joints, cycle_in_a_window_with_gaps, wrench_beside_joints, no_velocities_and_a_weight, two_senders_of_a_topic,
+    two_frames_of_a_topic, steps_of_a_force, commanded_and_not, stick_slip_of_ros1, mapped_currents,
+]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", PLANTED, ids=lambda plant: plant.__name__)
+def test_what_was_planted_is_found_within_two_percent(plant: Any, tmp_path: Path) -> None:
+    made, planted = plant(tmp_path / "bag")
+    _, numbers = found(made)
+    assert {name: numbers.get(name) for name in planted} == pytest.approx(planted, rel=CLOSE)
+
+
+# quiet ones
+
+
+def resting(path: Path) -> Made:
+    time = times(20.0)
+    return by_mcap_ros2(path, joints("/joint_states", time, PANDA, position=at_rest(time, PANDA, 20))), TopicMap()
+
+
+def noisy_wrench(path: Path) -> Made:
+    time = times(20.0)
+    return by_rosbags(path, wrenches("/wrench", time, chance(21).normal(size=(len(time), 3)))), TopicMap()
+
+
+def drifting_wrench(path: Path) -> Made:
+    time = times(20.0)
+    drift = np.cumsum(0.02 * chance(22).normal(size=(len(time), 3)), axis=0)
+    return by_mcap_ros2(path, wrenches("/wrench", time, drift)), TopicMap()
+
+
+def ringing(path: Path) -> Made:
+    """An impact rings down: no limit cycle."""
+    time = times(20.0)
+    ring = np.where(time > 2.0, np.exp(-(time - 2.0) / 1.5) * np.sin(2.0 * np.pi * 6.0 * (time - 2.0)), 0.0)
+    force = 0.02 * chance(23).normal(size=(len(time), 3))
+    force[:, 0] += 8.0 * ring
+    return by_rosbags(path, wrenches("/wrench", time, force)), TopicMap()
+
+
+def moved_once_and_back(path: Path) -> Made:
+    time = times(20.0)
+    way = np.clip(time - 4.0, 0.0, 2.0) - np.clip(time - 12.0, 0.0, 2.0)
+    position = at_rest(time, ["a"], 24) + 0.3 * way[:, np.newaxis]
+    return by_rosbags(path, joints("/joint_states", time, ["a"], position=position), "sqlite3"), TopicMap()
+
+
+def frictionless_with_gravity(path: Path) -> Made:
+    """Two joints swing; weight and inertia alone load them, and each other."""
+    time = times(40.0)
+    (p, _, a), (q, _, b) = swung(time, 25), swung(time, 26)
+    noise = 0.02 * chance(27).normal(size=(len(time), 2))
+    effort = np.column_stack(
+        [3.0 * np.sin(p) + 2.0 * np.sin(p + q) + 0.2 * a + 0.05 * b, 2.0 * np.sin(p + q) + 0.05 * b]
+    )
+    sent = joints("/joint_states", time, ["p", "q"], position=np.column_stack([p, q]), effort=effort + noise)
+    return by_mcap_ros2(path, sent), TopicMap()
+
+
+def one_commanded_sine(path: Path) -> Made:
+    time = times(20.0)
+    asked = np.sin(2.0 * np.pi * 0.7 * time)[:, np.newaxis]
+    got = 0.97 * np.sin(2.0 * np.pi * 0.7 * (time - 0.02))[:, np.newaxis] + 1e-5 * chance(28).normal(
+        size=(len(time), 1)
+    )
+    sent = joints("/joint_states", time, ["a"], position=got) + joints("/cmd/joints", time, ["a"], position=asked)
+    return by_mcap_ros2(path, sent), TopicMap()
+
+
+def coarse_encoder(path: Path) -> Made:
+    """An encoder with 4096 steps flickers by chance."""
+    time = times(20.0)
+    quantum = 2.0 * math.pi / 4096
+    steps = quantum * np.rint(0.5 + 0.3 * chance(29).normal(size=(len(time), 2)))
+    return by_rosbags(path, joints("/joint_states", time, ["a", "b"], position=steps)), TopicMap()
+
+
+def lossy_and_reset(path: Path) -> Made:
+    """Every tenth message is lost by chance, and the clock of the stamps starts again."""
+    time = times(20.0)
+    kept = time[chance(30).random(len(time)) > 0.1]
+    sent = joints("/joint_states", kept, ["a"], position=at_rest(kept, ["a"], 31))
+    sent = [one._replace(stamp=one.stamp if one.stamp < 10.0 else one.stamp - 10.0) for one in sent]
+    return by_mcap_ros2(path, sent), TopicMap()
+
+
+def wandering(path: Path) -> Made:
+    """Joints that were led by hand: smooth, and never the same twice."""
+    time, drawn = times(40.0), chance(32)
+    speed = np.zeros((len(time), 3))
+    for i in range(1, len(time)):
+        speed[i] = 0.995 * speed[i - 1] + 0.01 * drawn.normal(size=3)
+    sent = joints("/joint_states", time, ["a", "b", "c"], position=np.cumsum(speed, axis=0) / RATE)
+    return by_rosbags(path, sent, "ros1"), TopicMap()
+
+
+QUIET: list[Callable[[Path], Made]] = [
+    resting, noisy_wrench, drifting_wrench, ringing, moved_once_and_back, frictionless_with_gravity, one_commanded_sine,
+    coarse_encoder, lossy_and_reset, wandering,
+]  # fmt: skip
+
+
+THERE = {  # frequencies that these have, though no cycle
+    "ringing": [6.0],
+    "one_commanded_sine": [0.7],
+    "frictionless_with_gravity": [0.31, 0.53, 1.07, 1.9, 0.3, 0.5, 0.15],  # of the motion, its sums and harmonics
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", QUIET, ids=lambda make: make.__name__)
+def test_nothing_is_found_in_a_quiet_bag(make: Any, tmp_path: Path) -> None:
+    analysis, numbers = found(make(tmp_path / "bag"))
+    invented = [name for name in numbers if name.endswith(("dry friction", "viscous friction", "inertia"))]
+    sections = {section.key: section for section in analysis.sections}
+    assert invented == []
+    assert sections["stability"].verdict == sections["stick_slip"].verdict == sections["force"].verdict == ()
+    lines = [one.measured for one in sections["frequency"].findings if one.quantity == "frequency"]
+    assert all(any(f == pytest.approx(known, rel=CLOSE) for known in THERE.get(make.__name__, ())) for f in lines)
+
+
+# ways in
+
+
+def test_a_mapped_mcap_of_json_is_read(tmp_path: Path) -> None:
+    time = times(12.0)
+    position = 1e3 * (at_rest(time, ["x", "y"], 33) + np.column_stack([sine(time, 3.1, 0.02), np.zeros(len(time))]))
+    sent = joints("/state", time, ["x", "y"], position=position)
+    given = topic_map(["/state"], [], [], ["name=state.name", "position=state.position", "stamp=time"], ["position=mm"])
+    _, numbers = found((by_json(tmp_path / "bag", sent), given))
+    assert numbers["x: frequency"] == pytest.approx(3.1, rel=CLOSE)
+    assert numbers["x: cycle, peak to peak"] == pytest.approx(0.02, rel=CLOSE)
+    assert numbers["/state: period"] == pytest.approx(4.0, rel=1e-3)
+    wrong = topic_map(["/state"], [], [], ["position=state.angle"], [])
+    with pytest.raises(ValueError, match=r"no field 'state.angle'; its messages have time, state"):
+        found((tmp_path / "bag.mcap", wrong))
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    time = times(4.0, 50.0)
+    sent = joints("/ur/joint_states", time, UR, position=at_rest(time, UR, 34))
+    sent += joints("/ur/motor_states", time, UR, position=at_rest(time, UR, 35))
+    return by_rosbags(tmp_path / "small", sent + wrenches("/ft/wrench", time, at_rest(time, ["x", "y", "z"], 36)))
+
+
+def test_a_topic_that_is_named_as_one_of_ours_makes_no_recording_of_ours(small: Path) -> None:
+    analysis, numbers = found((small, TopicMap()))
+    assert "not a recording of this stack" in " ".join(analysis.sections[1].sentences)
+    assert {"/ur/joint_states: period", "/ur/motor_states: period", "/ft/wrench: period"} <= numbers.keys()
+    assert "/ur/motor_states elbow_joint: at rest" in numbers
+    assert page(analysis).count("<img") >= 3
+
+
+def test_only_what_is_named_is_analysed(small: Path) -> None:
+    given = topic_map(["/ur/joint_states"], ["elbow_joint"], [], [], [])
+    _, numbers = found((small, given))
+    assert {name.partition(":")[0] for name in numbers} == {"elbow_joint", "/ur/joint_states"}
+    with pytest.raises(ValueError, match=r"no topic /nothing; its topics: /ft/wrench, /ur/joint_states"):
+        found((small, TopicMap(topics=("/nothing",))))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (([], [], [], ["speed=v"], []), "--map is 'speed=v'"),
+        (([], [], [], ["effort"], []), "--map is 'effort'"),
+        (([], [], [], [], ["effort=lbf"]), "'lbf' is neither a number nor one of rad"),
+        (([], [], [], [], ["stamp=s"]), "--unit is 'stamp=s'"),
+    ],
+)
+def test_an_option_that_says_nothing_is_refused(options: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        topic_map(*options)
+
+
+def test_without_rosbags_a_sentence_says_how_to_read_the_bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    time = times(1.0, 50.0)
+    bag = by_rosbags(tmp_path / "bag", joints("/joint_states", time, ["a"], position=at_rest(time, ["a"], 37)), "ros1")
+
+    def nowhere(name: str) -> Any:
+        raise ImportError(name)
+
+    monkeypatch.setattr(reading.importlib, "import_module", nowhere)
+    with pytest.raises(BagError, match=r"rosbags reads it: pip install 'wam_stack\[rosbags\]'$"):
+        found((bag, TopicMap()))

@@ -1,0 +1,70 @@
+"""Response of a measured force to the steps of its command."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.foreign.sources import Source, pieces
+from wam_analysis.measures.response import StepResponse, step_response
+
+Numbers = NDArray[np.float64]
+
+SHORTEST = 0.3  # s; a shorter constant command is part of a ramp
+SMALL = 0.01  # N; commands that differ by less are equal
+STEADY = 0.4  # of a hold, at its end
+BEFORE = 0.1  # s before a step, whose mean is where it begins
+BAND = 0.05  # of the step: settled
+FORCE = ("force.x", "force.y", "force.z")
+
+
+class ForceStep(NamedTuple):
+    """A step of a command and its response, N along the change of the command.
+
+    Attributes
+    ----------
+    label : of the measured wrench.
+    begin : s.
+    before, commanded : forces before and from the step on.
+    response : of the measured force.
+    """
+
+    label: str
+    begin: float
+    before: float
+    commanded: float
+    response: StepResponse
+
+
+def force_steps(measured: Source, command: Source) -> list[ForceStep]:
+    """The steps of a command of a force, and how the measured force followed; its sign may be that of the reaction."""
+    asked = np.column_stack([command.values[axis] for axis in FORCE])
+    changed = np.flatnonzero(np.any(np.abs(np.diff(asked, axis=0)) > SMALL, axis=1)) + 1
+    begins = [0, *changed.tolist()]
+    ends = [*command.time[changed].tolist(), float(measured.time[-1])]
+    stretches = pieces(measured)
+    rows = np.maximum(np.searchsorted(command.time, measured.time, side="right") - 1, 0)
+    got = np.column_stack([measured.values[axis] for axis in FORCE])
+    sign = np.sign(float(np.sum((got - got.mean(axis=0)) * (asked[rows] - asked[rows].mean(axis=0))))) or 1.0
+    found = []
+    for last, row, end in zip([0, *begins[:-1]], begins, ends, strict=True):
+        begin = float(command.time[row])
+        change = asked[row] - asked[last]
+        size = float(np.linalg.norm(change))
+        if size <= SMALL or end - begin < SHORTEST:
+            continue
+        way = change / size
+        for piece in stretches:
+            value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(FORCE))
+            before = (piece.time < begin) & (piece.time >= begin - BEFORE)
+            after = (piece.time >= begin) & (piece.time < end)
+            if not np.any(before) or int(np.sum(after)) < 8 or float(piece.time[after][-1]) < end - BEFORE:
+                continue
+            try:
+                response = step_response(
+                    piece.time[after] - begin, value[after], float(np.mean(value[before])), STEADY * (end - begin), BAND
+                )
+            except ValueError:
+                continue
+            found.append(ForceStep(measured.label, begin, float(asked[last] @ way), float(asked[row] @ way), response))
+    return found

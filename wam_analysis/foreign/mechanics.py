@@ -1,0 +1,105 @@
+"""Stick-slip, friction and inertia of the joints of another robot."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.foreign.sources import Piece, Source, pieces
+from wam_analysis.measures.friction import Friction, identify_friction
+from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+
+Numbers = NDArray[np.float64]
+
+REST = 0.002  # rad/s or m/s; a slower joint is at rest, unless the noise is larger
+NOISY = 6.0  # standard deviations of the noise of a velocity: likewise
+BRIEFEST = 0.01  # s; a shorter stick or slip is chatter
+WINDOW = 0.03  # s over which friction is averaged
+FEWEST_SAMPLES = 6  # in that window
+BETTER = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
+SURE = 0.25  # of a number; with a larger standard error it is not identifiable
+BELOW_ZERO = 3.0  # standard errors: a fit in which one number is so negative holds more than friction
+
+
+class Sticking(NamedTuple):
+    """How a joint moved.
+
+    Attributes
+    ----------
+    stuck : fraction of the time at rest.
+    slips, reversals : motions between, and those against the one before.
+    commanded : fraction of the rest in which it was commanded to move; NaN without a command.
+    """
+
+    stuck: float
+    slips: int
+    reversals: int
+    commanded: float
+
+
+def sticking(source: Source, command: Source | None) -> Sticking | None:
+    """Rest and motion of a joint; None without a velocity."""
+    still = slips = reversals = total = disobeyed = 0
+    for piece in pieces(source):
+        if "velocity" not in piece.values:
+            return None
+        rest = _rest(piece)
+        period = float(piece.time[1] - piece.time[0])
+        phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(BRIEFEST / period)))
+        total += len(piece.time)
+        still += round(phases.stuck * len(piece.time))
+        slips, reversals = slips + len(phases.slips), reversals + phases.reversals
+        if command is not None:
+            moves = np.abs(_commanded_speed(command, piece.time)) > rest
+            disobeyed += sum(int(np.sum(moves[a:b])) for a, b in phases.sticks.tolist())
+    if not total:
+        return None
+    return Sticking(still / total, slips, reversals, disobeyed / still if command is not None and still else math.nan)
+
+
+def _rest(piece: Piece) -> float:
+    return max(REST, NOISY * piece.noise["velocity"])
+
+
+def _commanded_speed(command: Source, time: Numbers) -> Numbers:
+    if "velocity" in command.values and np.any(command.values["velocity"]):
+        return np.interp(time, command.time, command.values["velocity"])
+    if "position" not in command.values:
+        return np.zeros(len(time))
+    return np.interp(time, command.time, np.gradient(command.values["position"], command.time))
+
+
+def friction(source: Source) -> Friction | None:
+    """Friction and inertia of a joint that its weight may load; None without effort, velocity or an answer.
+
+    The load is that of a weight on the joint itself, over its angle, a sin q + b cos q + c, where this explains the
+    effort better than a constant: in a motion of one frequency, inertia and weight are the same.
+    """
+    some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
+    if not some:
+        return None
+    period = float(some[0].time[1] - some[0].time[0])
+    window = max(WINDOW, FEWEST_SAMPLES * period)
+    blank = np.full(2 * round(window / period) + 2, math.nan)  # between two pieces
+    joined = {
+        q: np.concatenate([part for piece in some for part in (piece.values[q], blank)])
+        for q in ("position", "velocity", "effort")
+        if q in some[0].values
+    }
+    time = period * np.arange(len(joined["velocity"]), dtype=np.float64)
+    rest = max(_rest(piece) for piece in some)
+    found = identify_friction(time, joined["velocity"], joined["effort"], rest, window)
+    if "position" in joined and source.units["position"] == "rad":
+        weight = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])])
+        loaded = identify_friction(time, joined["velocity"], joined["effort"], rest, window, load=weight)
+        found = loaded if loaded.residual < BETTER * found.residual else found
+    numbers = ((found.viscous, found.viscous_error), (found.inertia, found.inertia_error))
+    if not is_sure(found.dynamic, found.dynamic_error) or any(v < -BELOW_ZERO * e for v, e in numbers):
+        return None
+    return found
+
+
+def is_sure(value: float, error: float) -> bool:
+    """Whether a number that has to be above zero is identified."""
+    return value > 0.0 and error < SURE * value

@@ -1,0 +1,221 @@
+"""The analysis of another robot's recording: a section for each question."""
+
+import math
+from collections.abc import Sequence
+
+from wam_analysis.findings.finding import Finding, Section, shown, times
+from wam_analysis.foreign.cycles import COMMANDED_CYCLE, LIMIT_CYCLE, FoundCycle, cycles, lines
+from wam_analysis.foreign.forces import ForceStep, force_steps
+from wam_analysis.foreign.mechanics import friction, is_sure, sticking
+from wam_analysis.foreign.sources import Source, sources
+from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.measures.loop_timing import stamp_timing
+from wam_bag.bag import Bag, JointColumns, WrenchColumns
+
+DISOBEYED = 0.5  # of the time at rest, in which a joint was commanded to move: it sticks
+TURNING = 5.0  # % of the time at rest that a motion back and forth has where it turns
+
+
+def foreign_sections(bag: Bag, given: TopicMap) -> tuple[Section, ...]:
+    """Sections in the order of those of a bag of this stack."""
+    found = sources(bag, given)
+    states = [one for one in found if not one.is_command]
+    commands = [one for one in found if one.is_command]
+    return (
+        _happened(bag, commands),
+        _forces(states, commands),
+        _cycles(states, commands),
+        _stick_slip(states, commands),
+        _friction(states),
+        _spectrum(states),
+        _timing(found),
+    )
+
+
+def _command_of(source: Source, commands: Sequence[Source]) -> Source | None:
+    """The command of a joint by its name; of a wrench the one in its frame, or with none."""
+    if source.is_joint:
+        return next((one for one in commands if one.name == source.name), None)
+    return next((one for one in commands if not one.is_joint and _share_frame(source, one)), None)
+
+
+def _share_frame(one: Source, other: Source) -> bool:
+    return one.frame == other.frame or not one.frame or not other.frame
+
+
+def _happened(bag: Bag, commands: Sequence[Source]) -> Section:
+    sentences = ["This is not a recording of this stack."]
+    for name, columns in sorted(bag.topics.items()):
+        if isinstance(columns, JointColumns) and len(columns.stamp_ns):
+            sentences.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")
+        elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
+            largest = float((columns.force**2).sum(axis=1).max()) ** 0.5
+            sentences.append(f"{name}: {len(columns.stamp_ns)} forces, up to {shown(largest, 'N')}.")
+    others = sum(count for name, count in bag.counts.items() if name not in bag.topics and count)
+    if others:
+        sentences.append(f"{others} messages of other topics were not analysed; --topic and --map name their fields.")
+    if commands:
+        topics = ", ".join(dict.fromkeys(one.topic for one in commands))
+        sentences.append(f"Taken as commands: {topics}.")
+    return Section("happened", "What happened", tuple(sentences), ())
+
+
+# forces
+
+
+def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
+    steps: list[ForceStep] = []
+    for one in states:
+        command = None if one.is_joint else _command_of(one, commands)
+        steps += [] if command is None else force_steps(one, command)
+    sentences, findings = [], []
+    for step in steps:
+        name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
+        response = step.response
+        over = 100.0 * response.overshoot
+        sentences.append(
+            f"{name}: from {shown(step.before, 'N')}, {shown(response.final, 'N')} in the steady state; rose in "
+            f"{shown(response.rise, 's')}, {_settled(response.settling)}, overshot by {over:.0f} %."
+        )
+        findings += [
+            Finding(f"{name}: force in the steady state", "N", abs(response.final), abs(step.commanded)),
+            Finding(f"{name}: rise time 10-90 %", "s", response.rise),
+            Finding(f"{name}: settling time to 5 %", "s", response.settling),
+            Finding(f"{name}: overshoot", "%", over),
+            Finding(f"{name}: ripple", "N", response.ripple),
+        ]
+    if steps:
+        worst = max(steps, key=lambda step: abs(step.response.final - step.commanded))
+        error = shown(abs(worst.response.final - worst.commanded), "N")
+        verdict = f"{len(steps)} force steps; the largest steady error is {error} of {shown(worst.commanded, 'N')}."
+        return Section("force", "Force", tuple(sentences), tuple(findings), (), (verdict,))
+    return Section("force", "Force", ("No step of a commanded force was recorded.",), ())
+
+
+def _settled(seconds: float) -> str:
+    return f"settled to 5 % after {shown(seconds, 's')}" if math.isfinite(seconds) else "did not settle to 5 %"
+
+
+# cycles and spectrum
+
+
+def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
+    found = [cycle for one in states for cycle in cycles(one, _command_of(one, commands))]
+    sentences, findings, verdict = [], [], []
+    taken: set[str] = set()
+    for one in found:
+        label = one.label if one.label not in taken else f"{one.label} from {one.begin:.1f} s"
+        taken.add(one.label)
+        sentence = _cycle_sentence(one)
+        sentences.append(sentence)
+        if one.origin != COMMANDED_CYCLE:
+            verdict.append(sentence)
+        findings += [
+            Finding(f"{label}: cycle, peak to peak", one.unit, one.peak_to_peak, note=one.origin),
+            Finding(f"{label}: frequency", "Hz", one.frequency, note=one.origin),
+            Finding(f"{label}: begin", "s", one.begin),
+            Finding(f"{label}: end", "s", one.end),
+            Finding(f"{label}: confidence", "", one.confidence),
+        ]
+    told = tuple(sentences) or ("Nothing in this recording repeats five times.",)
+    return Section("stability", "Cycles", told, tuple(findings), (), tuple(verdict))
+
+
+def _cycle_sentence(one: FoundCycle) -> str:
+    size = f"{shown(one.peak_to_peak, one.unit)} peak to peak"
+    where = f"from {one.begin:.1f} to {one.end:.1f} s (confidence {one.confidence:.2f})"
+    frequency = shown(one.frequency, "Hz")
+    if one.origin == LIMIT_CYCLE:
+        return f"{one.label}: limit cycle of {size} at {frequency} {where}; it was not commanded."
+    if one.origin == COMMANDED_CYCLE:
+        return f"{one.label} repeats at {frequency}, {size}, {where}, as it was commanded."
+    return f"{one.label} repeats at {frequency}, {size}, {where}; whether it was commanded to is not in this bag."
+
+
+def _spectrum(states: Sequence[Source]) -> Section:
+    sentences, findings = [], []
+    for label, unit, line in (found for one in states for found in lines(one)):
+        sentences.append(f"{label}: {shown(line.frequency, 'Hz')}, amplitude {shown(line.amplitude, unit)}.")
+        findings.append(Finding(f"{label}, {shown(line.frequency, 'Hz')}: amplitude", unit, line.amplitude))
+        findings.append(Finding(f"{label}, {shown(line.frequency, 'Hz')}: frequency", "Hz", line.frequency))
+    told = tuple(sentences) or ("No frequency is above the noise.",)
+    return Section("frequency", "Spectrum", told, tuple(findings))
+
+
+# mechanics
+
+
+def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section:
+    sentences, findings, verdict = [], [], []
+    for one in states:
+        found = sticking(one, _command_of(one, commands)) if one.is_joint else None
+        if found is None:
+            continue
+        findings += [
+            Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),
+            Finding(f"{one.label}: slips", "", float(found.slips), note=f"{found.reversals} reverse the direction"),
+        ]
+        if not found.slips:
+            sentences.append(f"{one.label}: never moved.")
+            continue
+        sentence = f"{one.label}: at rest for {100.0 * found.stuck:.0f} % of the time, slipped {times(found.slips)}"
+        if found.commanded > DISOBEYED and found.slips > 2 and 100.0 * found.stuck > TURNING:
+            sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
+            verdict.append(f"{sentence}.")
+        sentences.append(f"{sentence}.")
+    told = tuple(sentences) or ("No velocity was recorded.",)
+    return Section("stick_slip", "Stick and slip", told, tuple(findings), (), tuple(verdict))
+
+
+def _friction(states: Sequence[Source]) -> Section:
+    sentences, findings = [], []
+    for one in states:
+        found = friction(one) if one.is_joint else None
+        if found is None:
+            continue
+        effort, speed = one.units["effort"], one.units.get("velocity", "rad/s")
+        numbers = [("dry friction", effort, found.dynamic, found.dynamic_error)]
+        if is_sure(found.viscous, found.viscous_error):
+            numbers.append(
+                ("viscous friction", f"{effort} s/{speed.partition('/')[0]}", found.viscous, found.viscous_error)
+            )
+        if is_sure(found.inertia, found.inertia_error):
+            inertia = "kg m2" if effort == "N m" else f"{effort} s2/{speed.partition('/')[0]}"
+            numbers.append(("inertia", inertia, found.inertia, found.inertia_error))
+        findings += [Finding(f"{one.label}: {what}", unit, value, error=error) for what, unit, value, error in numbers]
+        told = ", ".join(f"{what} {shown(value)} +- {shown(error, unit)}" for what, unit, value, error in numbers)
+        sentences.append(f"{one.label}: {told}.")
+    if sentences:
+        assumed = "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone:"
+        return Section("friction", "Friction", (assumed, *sentences), tuple(findings), (), tuple(sentences))
+    why = "The friction of the joints cannot be identified: no effort in this bag that friction and inertia explain."
+    return Section("friction", "Friction", (why,), ())
+
+
+# timing
+
+
+def _timing(found: Sequence[Source]) -> Section:
+    clocks: dict[tuple[str, str, int, float], list[Source]] = {}
+    for one in found:
+        clocks.setdefault((one.topic, one.frame, len(one.time), float(one.time[0])), []).append(one)
+    sentences, findings, verdict = [], [], []
+    topics = [key[0] for key in clocks]
+    for (topic, frame, *_), those in clocks.items():
+        name = topic
+        if topics.count(topic) > 1:
+            name += f" ({frame})" if frame and all(key[1] != frame for key in clocks if key[0] != topic) else ""
+            name += f" of {', '.join(one.name for one in those)}" if those[0].is_joint else ""
+        timing = stamp_timing((those[0].time * 1e9).round().astype("int64"), (those[0].received * 1e9).astype("int64"))
+        findings += [
+            Finding(f"{name}: period", "ms", 1e3 * timing.period),
+            Finding(f"{name}: missed periods", "", float(timing.missed)),
+            Finding(f"{name}: longest gap", "s", timing.longest_gap),
+            Finding(f"{name}: reception jitter", "ms", 1e3 * timing.jitter, note="standard deviation"),
+        ]
+        if timing.missed:
+            gap = shown(timing.longest_gap, "s")
+            sentences.append(f"{name}: {timing.missed} periods without a message, the longest gap {gap}.")
+            verdict.append(sentences[-1])
+    told = tuple(sentences) or ("Every period has its message." if findings else "No stamped topic was recorded.",)
+    return Section("timing", "Timing", told, tuple(findings), (), tuple(verdict))

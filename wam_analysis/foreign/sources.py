@@ -1,0 +1,201 @@
+"""One joint or one wrench of one sender: gaps, doubled stamps and lacking velocities handled."""
+
+import math
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.foreign.topic_map import TopicMap
+from wam_analysis.measures.runs import noise
+from wam_bag.bag import Bag, JointColumns, WrenchColumns
+
+Numbers = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+FEWEST = 20  # messages of a source, and of a piece of it
+FILLED = 5.5  # periods of the longest gap that is filled by interpolation
+IRREGULAR = 0.01  # of a period: stamps that differ more are put on a constant rate
+RESET = 1_000_000_000  # ns by which a stamp goes back where a clock was reset
+PRECISE = 0.01  # of the largest speed: noise of a velocity that is made from positions
+WIDEST = 0.03  # s about each sample that such a velocity is taken from
+COMMAND = re.compile(r"(^|[/_ ])(command|commands|cmd|desired|reference|ref|target|setpoint|goal)($|[/_ ])")
+AXES = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
+
+
+class Source(NamedTuple):
+    """A joint or a wrench.
+
+    Attributes
+    ----------
+    label : unique in the recording: the joint where one topic has it, else with the topic and its frame.
+    topic, name, frame : where it comes from; `name` is that of the joint, '' for a wrench.
+    is_command : whether the values are commanded.
+    time : (n,), s from the first stamp of the recording, rising.
+    received : (n,), s from the first stamp, when the recorder got them.
+    values : (n,) by quantity: position, velocity, effort, or the axes of the wrench; all finite.
+    units : by quantity.
+    """
+
+    label: str
+    topic: str
+    name: str
+    frame: str
+    is_command: bool
+    time: Numbers
+    received: Numbers
+    values: dict[str, Numbers]
+    units: dict[str, str]
+
+    @property
+    def is_joint(self) -> bool:
+        """Whether it is a joint, not a wrench."""
+        return bool(self.name)
+
+
+class Piece(NamedTuple):
+    """A stretch without gaps, at a constant rate: time (n,), s; values (n,) and sd of the noise by quantity."""
+
+    time: Numbers
+    values: dict[str, Numbers]
+    noise: dict[str, float]
+
+
+def sources(bag: Bag, given: TopicMap) -> list[Source]:
+    """The joints and wrenches of a bag, each once for each topic and frame."""
+    found: list[Source] = []
+    enough = {
+        topic: (columns, _rising(columns.stamp_ns, columns.log_time_ns))
+        for topic, columns in sorted(bag.topics.items())
+        if isinstance(columns, (JointColumns, WrenchColumns)) and len(columns.stamp_ns) >= FEWEST
+    }
+    origin = min((int(stamps.min()) for _, stamps in enough.values()), default=0)
+    for topic, (columns, stamps) in enough.items():
+        is_command = topic in given.commands or bool(COMMAND.search(topic))
+        frames = np.asarray(columns.frames, dtype=str)
+        time, received = (stamps - origin) / 1e9, (columns.log_time_ns - origin) / 1e9
+        for frame in dict.fromkeys(frames.tolist()):
+            rows = frames == frame
+            for name, values, units in _parts(columns, given):
+                one = Source(topic, topic, name, frame, is_command, time[rows], received[rows], values, units)
+                if (whole := _whole(one, rows)) is not None:
+                    found.append(whole)
+    return _labelled(found)
+
+
+def _rising(stamps: Times, received: Times) -> Times:
+    """The stamps, or the times of reception where the stamps are of a clock that was reset or never set."""
+    steps = np.diff(stamps)
+    return received if np.any(steps < -RESET) or not np.any(steps) else stamps
+
+
+def _parts(
+    columns: JointColumns | WrenchColumns, given: TopicMap
+) -> list[tuple[str, dict[str, Numbers], dict[str, str]]]:
+    """Name, values and units of each joint, or of the wrench."""
+    if isinstance(columns, WrenchColumns):
+        both = np.hstack([columns.force, columns.torque])
+        units = {axis: given.scaled(axis.partition(".")[0])[1] for axis in AXES}
+        return [("", {axis: both[:, i] for i, axis in enumerate(AXES)}, units)]
+    quantities = {q: getattr(columns, q) for q in ("position", "velocity", "effort")}
+    units = {q: given.scaled(q)[1] for q in quantities}
+    return [
+        (name, {q: values[:, i] for q, values in quantities.items() if values.shape[1]}, units)
+        for i, name in enumerate(columns.names)
+        if not given.joints or name in given.joints
+    ]
+
+
+def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
+    """The source with the values of its own messages that all it has are known in, each stamp once; None if too few."""
+    values = {q: v[own] for q, v in one.values.items()}
+    known = {q: np.isfinite(v) for q, v in values.items()}
+    most = max((int(np.sum(there)) for there in known.values()), default=0)
+    kept = {q: v for q, v in values.items() if 2 * int(np.sum(known[q])) > most > 0}
+    if not kept:
+        return None
+    rows = np.flatnonzero(np.logical_and.reduce([known[q] for q in kept]))
+    rows = rows[np.unique(one.time[rows], return_index=True)[1]]
+    if len(rows) < FEWEST:
+        return None
+    values = {q: v[rows].astype(np.float64) for q, v in kept.items()}
+    return one._replace(time=one.time[rows], received=one.received[rows], values=values)
+
+
+def _labelled(found: list[Source]) -> list[Source]:
+    """Each with a label of its own: as short as it can be."""
+    result = []
+    for one in found:
+        others = [two for two in found if two is not one and two.name == one.name]
+        label = one.name if one.name and not any(two.is_command == one.is_command for two in others) else one.topic
+        if one.name and label == one.topic:
+            label = f"{one.topic} {one.name}"
+        if any(two.topic == one.topic for two in others):
+            label += f" ({one.frame or 'no frame'})"
+        result.append(one._replace(label=label))
+    return result
+
+
+def pieces(source: Source) -> list[Piece]:
+    """The stretches of a source between gaps, at a constant rate; velocities made from positions if need be."""
+    period = float(np.median(np.diff(source.time)))
+    begins = np.flatnonzero(np.diff(source.time, prepend=-math.inf) > FILLED * period)
+    found = []
+    for begin, end in zip(begins.tolist(), [*begins[1:].tolist(), len(source.time)], strict=True):
+        if end - begin < FEWEST:
+            continue
+        time = source.time[begin:end]
+        values = {q: v[begin:end] for q, v in source.values.items()}
+        if float(np.max(np.abs(np.diff(time) - period))) > IRREGULAR * period:
+            even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / period) + 1)
+            values = {q: np.interp(even, time, v) for q, v in values.items()}
+            time = even
+        sd = {q: resolution(v) for q, v in values.items()}
+        if "position" in values and "velocity" not in values:
+            values["velocity"], sd["velocity"] = differentiated(time, values["position"])
+        found.append(Piece(time, values, sd))
+    return found
+
+
+def longest(some: list[Piece]) -> Piece | None:
+    """The longest of the pieces."""
+    return max(some, key=lambda piece: len(piece.time), default=None)
+
+
+def resolution(value: Numbers) -> float:
+    """Standard deviation of the noise of a signal, or of its rounding to the steps of an encoder."""
+    steps = np.abs(np.diff(value))
+    steps = steps[steps > 0.0]
+    if not len(steps):
+        return 0.0
+    quantum = float(np.min(steps))
+    counts = steps / quantum
+    is_rounded = bool(np.all(np.abs(counts - np.rint(counts)) < 0.05)) and float(np.median(counts)) < 1e3
+    return max(float(noise(value)), quantum / math.sqrt(12.0) if is_rounded else 0.0)
+
+
+def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
+    """Rate of a position, and its noise: slope of a line through as many samples as it needs, within `WIDEST`.
+
+    Parameters
+    ----------
+    time : (n,), s, at a constant rate.
+    position : (n,).
+    """
+    period = float(time[1] - time[0])
+    slope = np.gradient(position, period)
+    speed, sd = float(np.percentile(np.abs(slope), 95.0)), resolution(position) / period
+    half = 1
+    while half * period < WIDEST / 2.0 and _of_slope(sd, half) > PRECISE * speed and len(position) > 2 * half + 2:
+        half += 1
+    if half > 1:
+        k = np.arange(half, -half - 1, -1)
+        inner = np.convolve(position, k / (float(k @ k) * period), "valid")
+        slope = np.pad(inner, half, "edge")
+    return slope, _of_slope(sd, half)
+
+
+def _of_slope(sd: float, half: int) -> float:
+    """Noise of the slope of a line through 2 `half` + 1 samples, for noise per sample interval."""
+    return sd / math.sqrt(half * (half + 1) * (2 * half + 1) / 3.0)

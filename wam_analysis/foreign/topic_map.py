@@ -1,0 +1,89 @@
+"""Which topics, joints and fields of a recording hold which quantity, and in which unit."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+QUANTITIES = {"position": "rad", "velocity": "rad/s", "effort": "N m", "force": "N", "torque": "N m"}  # unit of ROS
+MAPPED = (*QUANTITIES, "name", "stamp")
+UNITS = {  # as given: factor, unit that is shown
+    "rad": (1.0, "rad"), "deg": (math.pi / 180.0, "rad"), "turn": (2.0 * math.pi, "rad"),
+    "rad/s": (1.0, "rad/s"), "deg/s": (math.pi / 180.0, "rad/s"), "rpm": (math.pi / 30.0, "rad/s"),
+    "m": (1.0, "m"), "mm": (1e-3, "m"), "m/s": (1.0, "m/s"), "mm/s": (1e-3, "m/s"),
+    "N": (1.0, "N"), "mN": (1e-3, "N"), "kN": (1e3, "N"),
+    "Nm": (1.0, "N m"), "N m": (1.0, "N m"), "mNm": (1e-3, "N m"), "mN m": (1e-3, "N m"),
+    "A": (1.0, "A"), "mA": (1e-3, "A"),
+}  # fmt: skip
+
+
+class TopicMap(NamedTuple):
+    """What is taken from a recording.
+
+    Attributes
+    ----------
+    topics : the only ones that are analysed; all if empty.
+    joints : the only ones; where a message has no names, the names of its values.
+    commands : topics of commands, besides those whose name says so.
+    fields : path in the message by quantity, such as 'effort': 'current'.
+    units : factor and unit that is shown by quantity.
+    """
+
+    topics: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    commands: tuple[str, ...] = ()
+    fields: Mapping[str, str] = {}
+    units: Mapping[str, tuple[float, str]] = {}
+
+    def scaled(self, quantity: str) -> tuple[float, str]:
+        """Factor and shown unit of a quantity."""
+        return self.units.get(quantity, (1.0, QUANTITIES[quantity]))
+
+    @property
+    def is_given(self) -> bool:
+        """Whether it says anything."""
+        return any(self)
+
+
+NOTHING_GIVEN = TopicMap()
+
+
+def topic_map(
+    topics: Sequence[str], joints: Sequence[str], commands: Sequence[str], fields: Sequence[str], units: Sequence[str]
+) -> TopicMap:
+    """The map of the options of `wam analyse`.
+
+    Parameters
+    ----------
+    fields : QUANTITY=FIELD; the field is a path of names, as actual.positions.
+    units : QUANTITY=UNIT, or QUANTITY=FACTOR for what is multiplied to have the unit of ROS.
+
+    Raises
+    ------
+    ValueError
+        which says what is allowed.
+    """
+    found = {}
+    for option in fields:
+        quantity, _, field = option.partition("=")
+        if quantity not in MAPPED or not field:
+            raise ValueError(f"--map is '{option}'; write QUANTITY=FIELD, with a quantity of {', '.join(MAPPED)}")
+        found[quantity] = field
+    factors = {}
+    for option in units:
+        quantity, _, unit = option.partition("=")
+        if quantity not in QUANTITIES:
+            raise ValueError(f"--unit is '{option}'; write QUANTITY=UNIT, with a quantity of {', '.join(QUANTITIES)}")
+        factors[quantity] = _unit(quantity, unit)
+    return TopicMap(tuple(topics), tuple(joints), tuple(commands), found, factors)
+
+
+def _unit(quantity: str, text: str) -> tuple[float, str]:
+    if text in UNITS:
+        return UNITS[text]
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = 0.0
+    if factor == 0.0 or not math.isfinite(factor):
+        raise ValueError(f"--unit {quantity}: '{text}' is neither a number nor one of {', '.join(UNITS)}")
+    return factor, QUANTITIES[quantity]

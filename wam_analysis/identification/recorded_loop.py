@@ -1,0 +1,148 @@
+"""The friction node and the force loop of chapter 5, as far as a recording shows them."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wam_analysis.findings.analysed_run import Hold, by_names
+from wam_analysis.findings.analysis import Analysis, analyse
+from wam_analysis.findings.finding import shown
+from wam_analysis.findings.prediction import node_at
+from wam_analysis.foreign.mechanics import friction, is_sure
+from wam_analysis.foreign.reading import foreign_bag
+from wam_analysis.foreign.sources import Source, sources
+from wam_analysis.foreign.topic_map import TopicMap
+from wam_description.arm import Arm
+from wam_description.transmission_map import TransmissionMap
+
+QUANTITIES = ("static friction", "dynamic friction", "viscous friction")
+
+
+class LoopNumber(NamedTuple):
+    """A number and where it is from."""
+
+    value: float
+    origin: str
+
+
+def recorded_loop(path: Path, given: TopicMap) -> dict[str, LoopNumber]:
+    """What a recording shows of a force loop, by the names of the options of `wam guard`.
+
+    Of another robot it is inertia, damping, friction and rate of a joint, in N m and rad: the one that is given, else
+    the only one that is identifiable.  Of this stack it is all of the loop at its largest held force, along the force,
+    in N and m: the identified friction of the joints, everything else by the parameters in the bag.
+
+    Parameters
+    ----------
+    path : bag.
+    given : topics, joints, fields and units of another robot's bag.
+
+    Raises
+    ------
+    ValueError
+        if nothing can be identified, or there is a choice; the message says which.
+    """
+    analysis = analyse(path, lambda doing: None, given)
+    if not analysis.recording.is_foreign:
+        return _at_the_contact(path, analysis)
+    found = {
+        one.label: (one, friction(one))
+        for one in sources(foreign_bag(path, given), given)
+        if one.is_joint and not one.is_command
+    }
+    seen = {label: (one, fit) for label, (one, fit) in found.items() if fit is not None}
+    if not seen:
+        raise ValueError(
+            f"{path} shows friction and inertia of none of its joints: {', '.join(found) or 'it has none'}"
+        )
+    if len(seen) > 1:
+        raise ValueError(f"{path} shows friction of {', '.join(seen)}; choose one with --joint")
+    ((label, (joint, fit)),) = seen.items()
+    values = {"friction": _identified(label, fit.dynamic, fit.dynamic_error), "rate": _rate(joint)}
+    if is_sure(fit.viscous, fit.viscous_error):
+        values["damping"] = _identified(label, fit.viscous, fit.viscous_error)
+    if is_sure(fit.inertia, fit.inertia_error):
+        values["inertia"] = _identified(label, fit.inertia, fit.inertia_error)
+    if fit.breakaways > 1:
+        values["stiction"] = _identified(label, max(fit.static, fit.dynamic), fit.static_error)
+    return values
+
+
+def _identified(label: str, value: float, error: float) -> LoopNumber:
+    return LoopNumber(value, f"identified, {label}, +- {shown(error)}")
+
+
+def _rate(joint: Source) -> LoopNumber:
+    return LoopNumber(1.0 / float(np.median(np.diff(joint.time))), f"of the stamps of {joint.topic}")
+
+
+def _at_the_contact(path: Path, analysis: Analysis) -> dict[str, LoopNumber]:
+    """The node and the loop at the largest force that was held at a known pose against a known surface."""
+    parameters = analysis.recording.parameters
+    arm, loop, timing = parameters.arm, parameters.force_loop, parameters.timing
+    if arm is None or loop is None or timing is None:
+        raise ValueError(f"{path} has no parameters of the arm: {parameters.note}")
+    better, names = _with_identified(arm, analysis)
+    for largest in sorted(analysis.held, key=lambda one: -one.hold.commanded):
+        q, cover, direction = _pose(analysis, arm, largest.hold), largest.hold.frame, largest.hold.force
+        if q is None or cover not in arm.covers.names or not np.isfinite(largest.position):
+            continue
+        node = node_at(parameters, better, q, cover, largest.position, direction)
+        if node is not None and np.isfinite(node.contact_stiffness):
+            break
+    else:
+        raise ValueError(
+            f"{path} has no force that was held on a link at a known pose, on a surface of known stiffness"
+        )
+    recorded = f"parameters in the bag, {largest.hold.name}"
+    origin = f"identified friction of {', '.join(names)}; else {recorded}" if names else recorded
+    axis = int(np.argmax(np.abs(direction)))
+
+    def along(values: Any) -> float:
+        return float(np.broadcast_to(values, 3)[axis])
+
+    return {
+        "inertia": LoopNumber(node.inertia, recorded),
+        "damping": LoopNumber(node.damping, origin),
+        "transmission": LoopNumber(node.transmission_stiffness, recorded),
+        "contact": LoopNumber(node.contact_stiffness, recorded),
+        "friction": LoopNumber(node.dynamic_friction, origin),
+        "stiction": LoopNumber(max(node.static_friction, node.dynamic_friction), origin),
+        "gain": LoopNumber(along(loop.force_gain), recorded),
+        "limit": LoopNumber(along(loop.force_error_limit), recorded),
+        "deadband": LoopNumber(along(loop.force_deadband), recorded),
+        "rate": LoopNumber(1e9 / timing.outer_period_ns, recorded),
+        "delay": LoopNumber(timing.outer_delay * timing.period, recorded),
+    }
+
+
+def _pose(analysis: Analysis, arm: Arm, hold: Hold) -> list[float] | None:
+    """Angles of the joints in the middle of a hold, rad; None if they were not recorded."""
+    run = analysis.recording.run
+    for topic in ("sim/joint_states", "joint_states", "joint_sensors", "motor_states"):
+        columns = run.joints(topic)
+        names = arm.motors.names if topic == "motor_states" else arm.joints.names
+        found = None if columns is None else by_names(columns, "position", names)
+        if columns is None or found is None:
+            continue
+        row = max(int(np.searchsorted(columns.stamp_ns, (hold.begin + hold.end) // 2, side="right")) - 1, 0)
+        q = found[row].tolist()
+        if np.all(np.isfinite(q)):
+            return TransmissionMap.of(arm).joint_positions(q) if topic == "motor_states" else q
+    return None
+
+
+def _with_identified(arm: Arm, analysis: Analysis) -> tuple[Arm, list[str]]:
+    """The arm with the friction of its joints that the recording shows, and their names."""
+    (section,) = [one for one in analysis.sections if one.key == "friction"]
+    numbers = {one.name: one.measured for one in section.findings if np.isfinite(one.measured)}
+    joints, names = arm.joints, []
+    for quantity in QUANTITIES:
+        field = quantity.replace(" ", "_")
+        old = zip(joints.names, getattr(joints, field), strict=True)
+        values = [numbers.get(f"{name}: {quantity}", value) for name, value in old]
+        names += [name for name in joints.names if f"{name}: {quantity}" in numbers]
+        joints = replace(joints, **{field: tuple(values)})
+    return replace(arm, joints=joints), list(dict.fromkeys(names))

@@ -1,0 +1,142 @@
+"""A driver under test: brought into a state, its currents and its mode looked at."""
+
+import math
+import statistics
+from collections.abc import Callable
+
+from wam_description.driver_contract import REPLY, DriverContract
+from wam_ros.driver_probe import Arrived, DriverProbe
+
+TRIES = 3  # to enable
+SETTLE = 0.1  # s
+BAD = 0.15  # of the peak current, in commands that have to be refused
+Restart = Callable[[], None]
+
+
+class Untested(Exception):
+    """A row cannot be tested; the text says why."""
+
+
+class DriverBench:
+    """What the checks of the rows do with a driver.
+
+    Parameters
+    ----------
+    probe : in the place of the velocity loop.
+    contract : numbers of the arm.
+    end, restart : end the driver as SIGTERM does and start it again; None where it is not ours to end.
+    """
+
+    def __init__(
+        self, probe: DriverProbe, contract: DriverContract, end: Restart | None = None, restart: Restart | None = None
+    ) -> None:
+        self.probe, self.contract = probe, contract
+        self.end, self.restart = end, restart
+
+    def brake(self) -> None:
+        """To braked, from any state."""
+        self.probe.ask("enable", False)
+        self.probe.ask("reset_fault")
+
+    def enable(self) -> None:
+        """From any state to enabled, with commands that come."""
+        probe = self.probe
+        answer = (False, "")
+        for _ in range(TRIES):
+            self.brake()
+            probe.is_answering = True
+            probe.watch(SETTLE)
+            answer = probe.ask("enable", True)
+            if answer[0] and probe.wait(lambda: probe.status.mode == "enabled"):
+                probe.forget()
+                probe.watch(SETTLE)
+                if probe.status.mode == "enabled":
+                    return
+        raise Untested(f"the driver cannot be enabled: {answer[1] or probe.status.message or 'no answer'}")
+
+    def states(self) -> list[Arrived]:
+        """The states that came."""
+        states = list(self.probe.arrived["motor_states"])
+        if len(states) < 10:
+            raise Untested(f"{len(states)} motor_states came")
+        return states
+
+    def flow(self, state: Arrived) -> list[float]:
+        """Currents by the effort of a state, A."""
+        effort = list(state.message.effort)
+        return [t / k for t, k in zip(effort, self.contract.torque_constant, strict=False)]
+
+    def is_zero(self, state: Arrived) -> bool:
+        """Whether no current flows, by the effort of a state."""
+        flow = self.flow(state)
+        return all(abs(i) <= self.tolerance(0.0, peak) for i, peak in zip(flow, self.contract.peak, strict=False))
+
+    @staticmethod
+    def tolerance(current: float, peak: float) -> float:
+        """Largest difference of a current from the commanded one, A."""
+        return 0.1 * abs(current) + 0.005 * peak
+
+    def last_flow(self) -> int:
+        """Stamp of the newest state with a current, ns, 0 where there is none."""
+        return max((state.stamp for state in self.states() if not self.is_zero(state)), default=0)
+
+    def stops(self, after: int, limit: float) -> str:
+        """What is wrong with how the current stops, counted from a stamp, ns, that was the last good one."""
+        self.probe.watch(REPLY)
+        late = (self.last_flow() - after) * 1e-9
+        if late > limit + 1e-9 * self.contract.outer_period:
+            return f"current still flows {late * 1e3:.0f} ms later; allowed: {limit * 1e3:.0f} ms"
+        return ""
+
+    def in_mode(self, mode: str) -> str:
+        """What is wrong with the mode, '' where it is this one."""
+        probe = self.probe
+        if probe.wait(lambda: probe.status.mode == mode):
+            return ""
+        return f"status.mode is '{probe.status.mode}'; it has to be '{mode}'"
+
+    def compare(self) -> str:
+        """What is wrong with the currents that flow, against those commanded."""
+        probe, contract = self.probe, self.contract
+        self.enable()
+        differences: list[list[float]] = [[] for _ in contract.motors]
+        for _ in range(20):
+            probe.watch(0.01)
+            if not (probe.arrived["motor_states"] and probe.arrived["motor_currents"]):
+                continue
+            flow = self.flow(probe.arrived["motor_states"][-1])
+            sent = list(probe.arrived["motor_currents"][-1].message.effort)
+            if len(flow) != len(contract.motors) or len(sent) != len(contract.motors):
+                return "an effort is missing"
+            for i, (by_effort, current) in enumerate(zip(flow, sent, strict=True)):
+                wanted = probe.commanded[i]
+                limit = self.tolerance(wanted, contract.peak[i])
+                worst = max(abs(by_effort - wanted), abs(current - wanted))
+                differences[i].append(worst if worst > limit else 0.0)
+        if probe.status.mode != "enabled":
+            return f"it does not stay enabled: {probe.status.message}"
+        for i, found in enumerate(differences):
+            if statistics.median(found or [math.inf]):
+                return (
+                    f"{contract.motors[i]}: commanded {probe.commanded[i]:.3g} A, motor_currents has {sent[i]:.3g}, "
+                    f"effort of motor_states is {flow[i] * contract.torque_constant[i]:.3g} N m"
+                )
+        return ""
+
+    def bears(self, messages: dict[str, Callable[[int], object]]) -> str:
+        """What is wrong with how bad commands after good ones are taken."""
+        probe = self.probe
+        for what, make in messages.items():
+            self.enable()
+            probe.after = [make] * 5
+            probe.wait(lambda: not probe.after)
+            probe.watch(SETTLE)
+            for state in self.states():
+                if not all(map(math.isfinite, state.message.effort)):
+                    return f"{what}: the effort is no longer finite"
+                for i, flow in enumerate(self.flow(state)):
+                    if flow > 0.7 * BAD * self.contract.peak[i]:
+                        return f"{what}: its {flow:.3g} A reached {self.contract.motors[i]}"
+            if probe.status.mode != "enabled":
+                return f"{what}: the driver does not stay enabled: {probe.status.message}"
+        return ""
