@@ -76,15 +76,18 @@ def draw(found: list[Press], limit: float, file: str) -> None:
     mpl.use("agg")
     from matplotlib import pyplot
 
+    from wam_analysis.drawing import PREDICTED, SHAFTS, STYLE
+
+    mpl.rcParams.update(STYLE)
     figure, axes = pyplot.subplots(figsize=(6.4, 3.4), layout="constrained")
     gains = [row.gain for row in found]
-    axes.loglog(gains, [row.peak / NEWTONS for row in found], ".-", color="#0072b2", label="largest force")
+    axes.loglog(gains, [row.peak / NEWTONS for row in found], ".-", color=SHAFTS[0], label="largest force")
     axes.loglog(
-        gains, [max(row.ripple, 1e-3) / NEWTONS for row in found], ".-", color="#d55e00", label="ripple at the end"
+        gains, [max(row.ripple, 1e-3) / NEWTONS for row in found], ".-", color=SHAFTS[1], label="ripple at the end"
     )
-    axes.axvline(limit, color="#777777", linestyle=":", label="largest gain that the guard accepts")
+    axes.axvline(limit, color=PREDICTED, linestyle=":", label="largest gain that the guard accepts")
     axes.set(xlabel="force gain [m/s/N]", ylabel="over the commanded force")
-    axes.legend(frameon=False)
+    axes.legend(loc="center left")
     figure.savefig(file, dpi=150)
     print(file)
 

@@ -17,7 +17,7 @@ BLOCK_COLOUR: Final = "#ecca88"
 OBJECT_COLOUR: Final = "#5f93bd"
 PEDESTAL_COLOUR: Final = "#c9ced4"
 PEDESTAL: Final = 0.07  # m, radius of the drawn base, which is not in the parameters
-FLOOR: Final = -1.0  # m, height at which the drawn base stands
+FLOOR: Final = -1.0  # m, height of the foot of the drawn base
 METRES_PER_NEWTON: Final = 0.015  # length of an arrow
 
 

@@ -257,7 +257,9 @@ class Arm:
             else:
                 here, where = "arm.tool", f"arm.tool is at {_point(self.tool)} m"
                 beyond = [end - tool for end, tool in zip(ends, self.tool, strict=True)]
-                apart = max(0.0, sum(a * b for a, b in zip(beyond, x, strict=True)))  # a tool may be beyond the link
+                short = sum(a * b for a, b in zip(beyond, x, strict=True))
+                is_on_axis = math.dist(beyond, [short * along for along in x]) <= TOLERANCE
+                apart = max(0.0, short) if is_on_axis else 0.0  # a tool may be beyond the link or next to it
             require(
                 apart <= TOLERANCE,
                 f"{name}: by arm.covers.length it ends at {_point(ends)} m in the frame of {links[link]}, but {where}"

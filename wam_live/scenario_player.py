@@ -13,7 +13,7 @@ NODE = "scenario"
 
 
 class ScenarioPlayer:
-    """Starts the scenario node beside a stack that has none.
+    """Starts the scenario node for a stack that has none.
 
     Parameters
     ----------
