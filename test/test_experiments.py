@@ -602,6 +602,7 @@ def test_creep_estimate_adds_up_out_and_back() -> None:
     assert states[0].position[0] - states[1].position[0] == pytest.approx(2.0 * loss * 3.0 / 14.0)
 
 
+@pytest.mark.slow
 def test_margin_with_friction_is_where_errors_at_rest_neither_grow_nor_shrink(tmp_path: Path) -> None:
     run = load("testbed-5.6-as-described")
     added = {"driver:effects.added_coulomb_friction": [0.949]}

@@ -158,7 +158,7 @@ def test_command_draws_what_is_named_and_refuses_what_is_not(
     with pytest.raises(SystemExit) as ended:
         main(["figures", *options, "5.4"])
     assert ended.value.code == 1
-    assert "no figure 5.4; choose from 3.1, 3.2.6, 4.9" in capsys.readouterr().err
+    assert "no figure 5.4; choose from 1.1, 2.1.1, 2.1.2, 3.1" in capsys.readouterr().err
 
 
 def test_command_writes_the_map_as_a_table(tmp_path: Path) -> None:

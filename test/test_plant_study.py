@@ -77,6 +77,7 @@ def test_level_is_as_near_to_theory_as_promised(name: str, most: float) -> None:
     assert LEVELS[name]().error < most
 
 
+@pytest.mark.slow
 def test_loss_under_torque_control_is_creep_and_no_friction_of_the_torque() -> None:
     """6.4.4 calls it friction: the joint has all of the torque in both directions, and the motor turns further."""
     for speed in (0.5, -0.5):

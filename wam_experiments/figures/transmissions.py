@@ -259,5 +259,5 @@ def table() -> str:
     for i, (name, form) in enumerate(ROWS):
         scale = 1e3 if "mrad" in name else 1.0
         values = [scale * value[i] for _, *pair in found for value in pair]
-        rows.append((name, *("" if math.isnan(value) else form.format(value) for value in values)))
+        rows.append((name, *("" if math.isnan(value) else form.format(round(value, 6) + 0.0) for value in values)))
     return markdown(head, rows)
