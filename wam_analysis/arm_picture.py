@@ -95,7 +95,7 @@ def tubes(arm: Arm, q: Sequence[float]) -> list[Tube]:
             body.point(q, name, covers.start[3 * i : 3 * i + 3]),
             body.point(q, name, covers.end[3 * i : 3 * i + 3]),
             covers.radius[i],
-            TUBE_COLOURS[i % 2],
+            TUBE_COLOURS[i % len(TUBE_COLOURS)],
         )
         for i, name in enumerate(covers.names)
     ]
@@ -212,7 +212,7 @@ def render(
         "floor": floor_height(obstacles),
         "pedestal": PEDESTAL,
         "colours": {
-            **{name: to_rgb(TUBE_COLOURS[i % 2]) for i, name in enumerate(arm.covers.names)},
+            **{name: to_rgb(TUBE_COLOURS[i % len(TUBE_COLOURS)]) for i, name in enumerate(arm.covers.names)},
             **{name: to_rgb(BLOCK_COLOUR) for name in obstacles.names},
             **{
                 name: to_rgb(OBJECT_COLOUR)

@@ -122,11 +122,11 @@ class Links:
         high=100.0,
     )
     product: tuple[float, ...] = parameter(
-        "the other elements xy xz yz of the same inertia tensor; where they are not given, the axes are principal",
+        "the other elements xy xz yz of the same inertia tensor; zero where the axes are principal",
         "kg m^2",
         low=-100.0,
         high=100.0,
-        derived=_no_products,
+        before=_no_products,
     )
 
     def __post_init__(self) -> None:

@@ -19,7 +19,7 @@ UNKNOWN: Final = "none"  # in place of the names of identified parameters, where
 
 
 def _products(others: Mapping[str, Any]) -> tuple[float, ...]:
-    """Those of the arm, none where it does not give them."""
+    """Those of the arm, none in a recording from before there were any."""
     return tuple(others.get("arm.links.product", (0.0,) * (3 * len(others["arm.links.names"]))))
 
 

@@ -26,6 +26,7 @@ WARM = 2  # iterations that start near the solution
 IDENTIFIED = 0.3  # standard deviation per prior one, up to which the motion shows a parameter
 NOT_NEGATIVE = ("motors.static_", "motors.load_", "motors.viscous", "joints.")
 PINNED = 1e-6  # prior standard deviation, of its own, of a parameter at its limit
+LIGHTEST = 0.1  # of the present mass of a link and inertia of a rotor, below which no estimate goes
 
 
 class Identification(NamedTuple):
@@ -122,16 +123,18 @@ def _estimate(regressor: Regressor, sought: Unknowns, start: Array | None = None
     values, prior_sd, centre = sought.present, sought.prior_sd.copy(), sought.present.copy()
     if start is not None:
         values = start
-    limited = np.array([name.startswith(NOT_NEGATIVE) for name in sought.names])
+    least = np.array([0.0 if name.startswith(NOT_NEGATIVE) else -np.inf for name in sought.names])
+    for inert in map(sought.places, ("links.mass", "motors.inertia")):
+        least[inert] = LIGHTEST * sought.present[inert]
     part = _parts(regressor.equations(values))
     for _ in range(ITERATIONS if start is None else WARM):
         equations = regressor.equations(values)
         normal = _normal(equations, part, values)
         prior = prior_sd**-2
         values = _solve(normal.information.sum(0), normal.vector.sum(0), prior, centre)
-        below = limited & (values < 0.0)
-        prior_sd[below], centre[below] = PINNED * sought.prior_sd[below], 0.0
-        values = np.where(below, 0.0, values)
+        below = values < least
+        prior_sd[below], centre[below] = PINNED * sought.prior_sd[below], least[below]
+        values = np.maximum(values, least)
     information, vector = normal.information.sum(0), normal.vector.sum(0)
     without = np.array(
         [_solve(information - i, vector - v, prior_sd**-2, centre) for i, v in zip(*normal, strict=True)]

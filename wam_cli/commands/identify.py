@@ -64,6 +64,8 @@ def run(given: argparse.Namespace) -> int:
     _refuse_other_arm(run_in_bag, shared)
     found = identify(shared, recorded_motion(run_in_bag, shared.arm))
     print(report(shared, found, str(bag)))
+    if run_in_bag.parameters.nodes.get("driver", {}).get("timing.dither_cycle", 0):
+        print("warning: recorded with the dither, which falsifies all of it; record with timing.dither_cycle 0")
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
         values = model_values(shared, found, bag.name) | estimator_values(configuration)
@@ -101,7 +103,8 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
     text = yaml.safe_dump(scenario(configuration, given.seed, given.seconds), sort_keys=False, default_flow_style=None)
     command = f"wam identify --excite {given.excite} --seed {given.seed} --seconds {given.seconds:g}"
     given.excite.write_text(f"# Moves that show the arm's parameters: {command}\n{text}", encoding="utf-8")
-    print(f"written: {given.excite}; on an arm of yours: wam up --record --scenario {given.excite}", flush=True)
+    still = " --set timing.dither_cycle=0" if configuration.shared.timing.dither_cycle else ""
+    print(f"written: {given.excite}; on an arm of yours: wam up --record --scenario {given.excite}{still}", flush=True)
     if given.only_write:
         return None
     name = f"identify_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
@@ -109,6 +112,7 @@ def _excite(configuration: Configuration, given: argparse.Namespace) -> Path | N
         "nodes": [*configuration.shared.nodes, "scenario", "recorder"],
         "timing.mode": "lockstep",
         "timing.real_time_factor": 0.0,
+        "timing.dither_cycle": 0,
         "scenario:script": str(given.excite.resolve()),
         "recorder:directory": str(given.directory),
         "recorder:name": name,
