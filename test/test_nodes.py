@@ -148,7 +148,9 @@ class Hand:
             self.ros.wait(lambda: self.driver.currents == self.currents or self.driver.safety.fault)
             if not self.driver.safety.fault:
                 return
-            assert "stale" in self.driver.safety.fault
+            assert any(words in self.driver.safety.fault for words in ("stale", "did not run")), (
+                self.driver.safety.fault
+            )
             self.ask("reset_fault")
         pytest.fail("the watchdog stops the driver again and again")
 

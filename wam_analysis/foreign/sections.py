@@ -22,7 +22,7 @@ def foreign_sections(bag: Bag, given: TopicMap) -> tuple[Section, ...]:
     states = [one for one in found if not one.is_command]
     commands = [one for one in found if one.is_command]
     return (
-        _happened(bag, commands),
+        _happened(bag, commands, given),
         _forces(states, commands),
         _cycles(states, commands),
         _stick_slip(states, commands),
@@ -43,8 +43,13 @@ def _share_frame(one: Source, other: Source) -> bool:
     return one.frame == other.frame or not one.frame or not other.frame
 
 
-def _happened(bag: Bag, commands: Sequence[Source]) -> Section:
-    sentences = ["This is not a recording of this stack."]
+def _happened(bag: Bag, commands: Sequence[Source], given: TopicMap) -> Section:
+    what = (
+        "Analysed as that of another robot, as the options say."
+        if given.is_given
+        else "This is not a recording of this stack."
+    )
+    sentences = [what]
     for name, columns in sorted(bag.topics.items()):
         if isinstance(columns, JointColumns) and len(columns.stamp_ns):
             sentences.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")

@@ -1,17 +1,20 @@
 """Limit cycles that fill only a part of a recording: found in windows, each with its beginning and end."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.limit_cycle import LimitCycle, limit_cycle
+from wam_analysis.measures.runs import smoothed
 
 Numbers = NDArray[np.float64]
 
 SURE = 0.8  # confidence from which a cycle is reported
 FEWEST = 5  # cycles of an episode; fewer repeat by chance in one of many windows
 BRIEFEST = 64  # samples of a window
+SLOWEST = 4  # cycles in a window, slower changes are drift when a cycle is looked for
 EDGE = 1.5  # cycles at an end within the recording that are not evaluated: it is not known better
 
 
@@ -39,11 +42,12 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     free = np.ones(n, dtype=np.bool_)
     found: list[Episode] = []
     while length >= min(BRIEFEST, n):
+        level = value - smoothed(value, length // SLOWEST)
         for begin in range(0, n - length + 1, max(length // 2, 1)):
             rows = slice(begin, begin + length)
             if not np.all(free[rows]):
                 continue
-            cycle = _cycle(time[rows], value[rows], least)
+            cycle = _cycle(time[rows], value[rows], least) or _cycle(time[rows], level[rows], least)
             if cycle is None:
                 continue
             flat = _without_drift(time, value, cycle.period)
@@ -51,7 +55,9 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             edge = round(EDGE * cycle.period / float(time[1] - time[0]))
             inner = slice(first + edge if first else 0, last - edge if last < n else n)
             inner = inner if inner.stop - inner.start >= length else rows
-            cycle = _cycle(time[inner], value[inner], least) or _cycle(time[inner], flat[inner], least)
+            period = _refined(time[inner], flat[inner], cycle.period)
+            both = [_cycle(time[inner], signal[inner], least, period) for signal in (flat, value)]
+            cycle = max(filter(None, both), key=lambda one: round(one.confidence, 2), default=None)
             free[first:last] = False  # also where it decays: its last part is no limit cycle
             if cycle is not None:
                 found.append(Episode(float(time[first]), float(time[last - 1]), cycle))
@@ -59,11 +65,11 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     return sorted(found, key=lambda episode: episode.begin)
 
 
-def _cycle(time: Numbers, value: Numbers, least: float) -> LimitCycle | None:
+def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan) -> LimitCycle | None:
     """The cycle of a window, None where none is sure."""
     if len(value) < 2 or not np.ptp(value) > least:
         return None
-    cycle = limit_cycle(time, value)
+    cycle = limit_cycle(time, value, period)
     return cycle if cycle.confidence >= SURE and cycle.cycles >= FEWEST and cycle.peak_to_peak > least else None
 
 
@@ -72,11 +78,25 @@ def _width(time: Numbers, period: float) -> int:
     return max(2 * round(period / float(time[1] - time[0])), 2)
 
 
-def _without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
-    """A signal without what changes slowly: less its mean over two periods."""
+def _refined(time: Numbers, flat: Numbers, period: float) -> float:
+    """The period by the drift of the phase of its first harmonic: an error of it blurs the mean of many cycles."""
     width = _width(time, period)
-    mean = np.convolve(np.pad(value, (width // 2, width - 1 - width // 2), "edge"), np.ones(width) / width, "valid")
-    flat: Numbers = value - mean
+    turns = flat * np.exp(-2j * np.pi * (time - time[0]) / period)
+    phase = np.unwrap(np.angle(np.convolve(turns, np.ones(width) / width, "valid")))
+    if len(phase) < width:
+        return period
+    slope = float(np.polynomial.polynomial.polyfit(time[: len(phase)], phase, 1)[1])
+    return 1.0 / (1.0 / period + slope / (2.0 * math.pi))
+
+
+def _without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
+    """A signal without what changes slowly: less its mean over exactly two periods, of which a cycle has none."""
+    half = period / float(time[1] - time[0])
+    reach = math.ceil(half) + 1
+    total = np.concatenate([[0.0], np.cumsum(np.pad(value, reach, "edge"))])
+    middle = np.arange(len(value)) + reach + 0.5
+    ends = (np.interp(middle + way * half, np.arange(len(total)), total) for way in (1.0, -1.0))
+    flat: Numbers = value - (next(ends) - next(ends)) / (2.0 * half)
     return flat
 
 

@@ -44,7 +44,7 @@ class LimitCycle(NamedTuple):
 NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, math.nan, np.empty(0))
 
 
-def limit_cycle(time: Numbers, value: Numbers) -> LimitCycle:
+def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> LimitCycle:
     """Find the cycle that repeats in a signal.
 
     The period is the lag with the highest autocorrelation, refined over all cycles.  The signal is then
@@ -54,6 +54,7 @@ def limit_cycle(time: Numbers, value: Numbers) -> LimitCycle:
     ----------
     time : (n,), s, at a constant rate.
     value : (n,), the signal, without NaN.
+    period : s, if it is known better than by the autocorrelation.
 
     Returns
     -------
@@ -67,7 +68,7 @@ def limit_cycle(time: Numbers, value: Numbers) -> LimitCycle:
     centre = np.linspace(-1.0, 1.0, n)
     flat = value - np.mean(value)
     flat = flat - centre * float(centre @ flat) / float(centre @ centre)
-    lag = _period(flat)
+    lag = _period(flat) if math.isnan(period) else period / seconds
     if not lag >= SHORTEST:
         return NO_CYCLE
     phase = np.arange(n) / lag % 1.0
