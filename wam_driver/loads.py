@@ -81,6 +81,8 @@ class CoverLoads:
 
     def measure(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
+        if not (self._data.ncon or self.pushes or self._springs):
+            return []
         parts: dict[str, list[PartialLoad]] = {name: [] for name in self._origin}
         for cover, part in chain(self._contacts(), self._pushed(), self._sprung()):
             parts[cover].append(part)

@@ -81,6 +81,8 @@ class TrueObjects:
 
     def measure(self) -> list[ObjectState]:
         """The state of every object at the start of the last step."""
+        if not self.names:
+            return []
         by_arm, by_others = np.zeros((len(self.names), 6)), np.zeros((len(self.names), 6))
         for i, wrench, is_arm in self._contacts():
             (by_arm if is_arm else by_others)[i] += wrench

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wam_description.interface import Feed
-from wam_description.signals import State
+from wam_description.signals import Point, State, Table, Wrench
 from wam_description.synchroniser import Inlet, Inputs
 from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
 from wam_description.wiring import Declaration, Outputs, mask
@@ -19,7 +19,7 @@ class TopicValue(NamedTuple):
 
 
 Rows = dict[str, list[TopicValue]]
-Row = tuple[int, tuple[float, ...], str]  # a TopicValue
+Write = Callable[[list[float], Any], str]  # appends the numbers of a value, returns its frame
 
 
 class Bus:
@@ -31,8 +31,8 @@ class Bus:
     """
 
     def __init__(self, topics: Mapping[str, Topic]) -> None:
-        flat = {name: _FLAT.get(topic.type) for name, topic in topics.items()}
-        self._routes = {name: _Route(_Log(write) if write else None, []) for name, write in flat.items()}
+        writes = {name: _WRITES.get(topic.type) for name, topic in topics.items()}
+        self._routes = {name: _Route(_Log(write) if write else None, []) for name, write in writes.items()}
         self._rows: Rows = {}
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
@@ -90,13 +90,13 @@ class _Log:
 
     Parameters
     ----------
-    flat : a value as time, numbers and frame.
+    write : of the type of the topic.
     """
 
-    __slots__ = ("_ends", "_flat", "_frames", "_numbers", "_stamps")
+    __slots__ = ("_ends", "_frames", "_numbers", "_stamps", "_write")
 
-    def __init__(self, flat: Callable[[int, Any], Row]) -> None:
-        self._flat = flat
+    def __init__(self, write: Write) -> None:
+        self._write = write
         self._clear()
 
     def _clear(self) -> None:
@@ -107,11 +107,10 @@ class _Log:
 
     def add(self, stamp: int, value: Any) -> None:
         """Keep the numbers of one message."""
-        _, numbers, frame = self._flat(stamp, value)
+        numbers = self._numbers
+        self._frames.append(self._write(numbers, value))
         self._stamps.append(stamp)
-        self._frames.append(frame)
-        self._numbers += numbers
-        self._ends.append(len(self._numbers))
+        self._ends.append(len(numbers))
 
     def take(self) -> list[TopicValue]:
         """The messages since the last call."""
@@ -175,14 +174,41 @@ def _nothing(_: Any) -> Outputs:
     return {}
 
 
-_FLAT: dict[str, Callable[[int, Any], Row]] = {
-    JOINT_STATE: lambda stamp, value: (stamp, (*value.position, *value.velocity, *value.effort), ""),
-    WRENCH: lambda stamp, value: (stamp, (*value.force, *value.torque), value.frame),
-    POINT: lambda stamp, value: (stamp, value.position, value.frame),
-    TABLE: lambda stamp, value: (stamp, tuple([number for row in value.rows for number in row]), value.frame),
+def _write_state(numbers: list[float], value: State) -> str:
+    position, velocity, effort = value
+    numbers += position
+    numbers += velocity
+    numbers += effort
+    return ""
+
+
+def _write_wrench(numbers: list[float], value: Wrench) -> str:
+    numbers += value.force
+    numbers += value.torque
+    return value.frame
+
+
+def _write_point(numbers: list[float], value: Point) -> str:
+    numbers += value.position
+    return value.frame
+
+
+def _write_table(numbers: list[float], value: Table) -> str:
+    for row in value.rows:
+        numbers += row
+    return value.frame
+
+
+_WRITES: dict[str, Write] = {
+    JOINT_STATE: _write_state,
+    WRENCH: _write_wrench,
+    POINT: _write_point,
+    TABLE: _write_table,
 }
 
 
 def flat(topic: Topic, stamp: int, value: Any) -> TopicValue:
     """A value of a topic of numbers as one row."""
-    return TopicValue(*_FLAT[topic.type](stamp, value))
+    numbers: list[float] = []
+    frame = _WRITES[topic.type](numbers, value)
+    return TopicValue(stamp, tuple(numbers), frame)
