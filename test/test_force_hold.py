@@ -493,6 +493,9 @@ def test_a_force_that_is_not_reached_is_reported() -> None:
     assert "3 N are measured and 5 N commanded" in loop.reason
     assert any(out.velocity), "and it goes on"
     ask(loop, World(400.0, force=4.9), down(5.0))
+    assert "off 5 N by more than 0.5 N" in loop.reason, "it is reported until it has been right for some time"
+    for _ in range(30):
+        ask(loop, World(400.0, force=4.9), down(5.0))
     assert loop.reaction is ForceReaction.NONE
 
 

@@ -23,6 +23,7 @@ LATE = 0.1  # s, the same as IDENTIFIED where the position is known and the meas
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
+KEPT = 1.25  # settling times, up to which a force off the tolerance is remembered
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
@@ -277,21 +278,24 @@ class ForceHold:
         self._above = 0.0 if is_off and error < 0.0 else self._above + dt
         self._below = 0.0 if is_off and error > 0.0 else self._below + dt
         self._swings = self._swings + dt if max(self._above, self._below) < SWING * lasting else 0.0
+        # within the tolerance for the lesser part of the time, or not yet for long
+        self._off = min(max(self._off + (dt if is_off else -dt), 0.0), KEPT * lasting)
         if abs(self._missed) > lasting:
             return (
                 f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s; the arm "
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
                 "another direction, or bend the arm"
             )
-        off = self._off + (
-            dt if is_off else -dt
-        )  # a slow swing is within the tolerance for the lesser part of the time
-        self._off = min(max(off, 0.0), 1.1 * lasting)
-        if max(self._swings, self._off) > lasting:
+        if self._swings > lasting:
             return (
                 f"the force swings about {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N to either "
-                f"side, for {max(self._swings, self._off):.2g} s: the surface moves, the position is not known, or it "
-                "is a limit cycle; pin the position, or lower force_gain"
+                f"side, for {self._swings:.2g} s: the surface moves, the position is not known, or it is a limit "
+                "cycle; pin the position, or lower force_gain"
+            )
+        if self._off > lasting:
+            return (
+                f"the force was off {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N for most of "
+                f"the last {2.0 * lasting:.2g} s: it comes slowly, the surface moves, or it is a slow limit cycle"
             )
         return ""
 

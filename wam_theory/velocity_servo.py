@@ -84,11 +84,12 @@ def is_stable(period_map: Array) -> bool:
 
 
 def least_damping(period_map: Array, slow: float) -> float:
-    """Smallest damping ratio of the modes slower than `slow`, rad per period; 1 where there is none.
+    """Smallest damping ratio of the slow modes; 1 where there is none.
 
     Parameters
     ----------
     period_map : (m, m), state after a period from the state before it.
+    slow : largest size of a mode that counts, rad per period.
     """
     values = np.linalg.eigvals(period_map).astype(np.complex128)
     rates = np.log(values[np.abs(values) > MEMORY])
