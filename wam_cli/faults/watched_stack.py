@@ -29,7 +29,7 @@ from wam_ros.run import NAMESPACE
 from wam_ros.wire import Encode, encoder, stamp_of
 
 LONGEST_START: Final = 120.0  # s of wall time
-PATIENCE: Final = 60.0  # s of wall time without progress and without a fault that is a hang, also on a busy machine
+PATIENCE: Final = 15.0  # s of work without progress and without a fault that is a hang
 ANSWERED, ATTEMPTS = 0.5, 20  # s, for each attempt to ask a service
 REST: Final = 0.2  # s of wall time after which the time of an arm in fault is known to be at rest
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
