@@ -199,13 +199,16 @@ class ForceAxes:
             return ForceAxis(lever, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n)))
         size = max(force, SMALLEST_FORCE)
         tangential = parameters.friction * size * (jacobian - np.outer(direction, lever))
-        shift = direction @ (self._body.point_jacobian(q, cover, point + ALONG) - jacobian) * size
+        slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
+        shift = direction @ slide * size
+        # friction at another position has another lever
+        turned = parameters.friction * size * (slide - np.outer(direction, direction @ slide))
+        moved = np.outer(shift, shift) + turned.T @ turned
         spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * lever) ** 2)
         spread += tangential.T @ tangential
-        spread += position_sd**2 * np.outer(shift, shift)
         for torque in others:
             spread += np.outer(torque, torque)
-        inverse = np.asarray(np.linalg.inv(spread), np.float64)
+        inverse = np.asarray(np.linalg.inv(spread + position_sd**2 * moved), np.float64)
         weighted = inverse @ lever
         precision = float(lever @ weighted)
         sense: Array = weighted / precision
@@ -215,10 +218,8 @@ class ForceAxes:
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        # anywhere along the cover: the covariance grows by a multiple of shift shift' [Sherman and Morrison]
         length = self._covers.length[self._covers.names.index(cover)]
-        unknown = max(length * length / 12.0 - position_sd**2, 0.0)
-        lost = float(shift @ weighted) ** 2 * unknown / (1.0 + unknown * float(shift @ inverse @ shift))
-        sd, free_sd = 1.0 / math.sqrt(precision), 1.0 / math.sqrt(max(precision - lost, 1e-12 * precision))
+        anywhere = spread + max(length * length / 12.0, position_sd**2) * moved
+        sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(lever @ np.linalg.solve(anywhere, lever))))
         yielding = float(lever @ self._compliance @ lever)
         return ForceAxis(lever, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse)
