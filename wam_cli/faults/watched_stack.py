@@ -31,11 +31,17 @@ from wam_ros.wire import Encode, encoder, stamp_of
 LONGEST_START: Final = 120.0  # s of wall time
 PATIENCE: Final = 15.0  # s of work without progress and without a fault that is a hang
 ANSWERED, ATTEMPTS = 0.5, 20  # s, for each attempt to ask a service
-REST: Final = 0.2  # s of wall time after which the time of an arm in fault is known to be at rest
+IDLE: Final = 0.25  # s of work that a second of waiting counts as
+REST: Final = 0.2  # s of work after which the time of an arm in fault is known to be at rest
 UNKNOWN: Final = ("contact/point", "contact/hypotheses", "sim/contact/point", "contact/markers")  # may hold NaN
 UNEXPECTED: Final = "unexpected "  # in the status of a node whose callback raised (wam_ros.tolerance)
 EVENTS: Final = "/parameter_events"
 SECOND: Final = 1_000_000_000
+
+
+def worked() -> float:
+    """A clock that runs with the work of this process, so that a starved one has time, and slowly while it waits, s."""
+    return time.process_time() + IDLE * time.monotonic()
 
 
 class NodeEndedError(RuntimeError):
@@ -202,10 +208,10 @@ class WatchedStack:
             raise TimeoutError(f"no {what} within {LONGEST_START:g} s")
 
     def wait(self, until: Callable[[], Any], patience: float = PATIENCE) -> bool:
-        """Spin until something is true; False where it is not within `patience`, s of wall time."""
-        end = time.monotonic() + patience
+        """Spin until something is true; False where it is not within `patience`, s of work."""
+        end = worked() + patience
         while not until():
-            if time.monotonic() > end:
+            if worked() > end:
                 return False
             self.spin_once()
         return True
@@ -215,14 +221,14 @@ class WatchedStack:
         end, last = self.driver.stamp + int(seconds * SECOND), 0
         while self.driver.stamp < end:
             if self.driver.stamp != last:
-                last, since = self.driver.stamp, time.monotonic()
+                last, since = self.driver.stamp, worked()
             self.spin_once()
             self._look()
-            rest = time.monotonic() - since
+            rest = worked() - since
             if rest > REST and self.driver.safety.mode is Mode.FAULT:
                 return
             if rest > PATIENCE:
-                self._escape(f"the arm's time is at rest for {PATIENCE:g} s without a fault")
+                self._escape(f"the arm's time is at rest for {PATIENCE:g} s of work without a fault")
                 return
 
     def stamp(self) -> int:
@@ -247,15 +253,15 @@ class WatchedStack:
 
     def recover(self) -> str:
         """Do what an operator does after a fault; returns why the arm cannot be enabled, '' where it can."""
-        end = time.monotonic() + PATIENCE
+        end = worked() + PATIENCE
         message = ""
-        while time.monotonic() < end:
+        while worked() < end:
             if self.driver.safety.mode is Mode.ENABLED and self._goes_on():
                 return ""
             self.ask("reset_fault")
             message = self.ask("enable", True)
             self.wait(lambda: self.driver.safety.mode is Mode.ENABLED, 0.2)
-        return f"the arm cannot be enabled again within {PATIENCE:g} s: {message or self.driver.safety.fault}"
+        return f"the arm cannot be enabled again within {PATIENCE:g} s of work: {message or self.driver.safety.fault}"
 
     def _goes_on(self) -> bool:
         before = self.driver.stamp
