@@ -207,7 +207,7 @@ def test_the_upper_arm_shows_its_moment_only_and_elbow_and_wrist_are_watched(arm
     through = TransmissionMap.of(arm)
     theta, thetad = through.motor_positions(q), through.motor_velocities(qd)
     none = [0.0] * len(q)
-    watched = {one.quantity: one.value for one in LimitWatch(arm, 2.0, 3.0).watched(theta, thetad, none, none)}
+    watched = {one.quantity: one.value for one in LimitWatch(arm, 1e-9, 1e-9).watched(theta, thetad, none, none)}
     for cover in arm.covers.names[1:]:
         before, after = (body.point(np.array(q) + s * 1e-6 * np.array(qd), cover, (0, 0, 0)) for s in (-1, 1))
         speed = float(np.linalg.norm(after - before)) / 2e-6

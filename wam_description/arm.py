@@ -253,7 +253,11 @@ class Arm:
                 joint = (joints.length[link + 1], -math.sin(twist) * offset, math.cos(twist) * offset)
                 here = f"arm.joints.offset and length of {joints.names[link + 1]}, arm.covers.origin"
                 where = f"{joints.names[link + 1]} is at {_point(joint)} m"
-                apart = math.dist(ends, joint)
+                beyond = [end - there for end, there in zip(ends, joint, strict=True)]
+                along = sum(a * b for a, b in zip(beyond, x, strict=True))
+                beside = math.sqrt(max(0.0, sum(a * a for a in beyond) - along * along))
+                beside = max(0.0, beside - covers.radius[k])  # the axis of a joint may cross the tube anywhere
+                apart = math.hypot(along, beside)
             else:
                 here, where = "arm.tool", f"arm.tool is at {_point(self.tool)} m"
                 beyond = [end - tool for end, tool in zip(ends, self.tool, strict=True)]
