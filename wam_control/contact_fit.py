@@ -131,7 +131,7 @@ class ContactFit:
         cells: list[Cell] = []
         for i, link in enumerate(links):
             cells += self._cells(i, link, log_density[i], top)
-            cells += self._at_ends(i, link) + self._along(i, full[i], top)
+            cells += [cell for cell in self._at_ends(i, link) + self._along(i, full[i]) if cell[0] > top - REACH]
         parts = self._parts(sorted(cells, reverse=True))
         return [self._fit(i, link, *part) for i, (link, part) in enumerate(zip(links, parts, strict=True))]
 
@@ -226,7 +226,7 @@ class ContactFit:
             if mass == 0.0:
                 result.append((0.0, 0.5 * (start + end), (end - start) ** 2 / 12.0, math.nan, math.nan, 0.0))
                 continue
-            mean = first / mass
+            mean = min(max(first / mass, start), end)
             ends = (max(low, start), min(high, end)) if low < high else (math.nan, math.nan)
             result.append((mass / total, mean, max(0.0, second / mass - mean * mean), *ends, along / mass))
         return result
@@ -238,7 +238,7 @@ class ContactFit:
         log_weight = math.log(self._end_weight / END) if self._end_weight else -math.inf
         return [(link.log_density(x) - link.constant + log_weight, x, END, i, False) for x in places]
 
-    def _along(self, i: int, gram: list[list[float]], top: float) -> list[Cell]:
+    def _along(self, i: int, gram: list[list[float]]) -> list[Cell]:
         """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
 
         A force along the tube equals the same force at its start: no joint torques distinguish them.
@@ -263,7 +263,7 @@ class ContactFit:
             g2[6] + end * g4[6],
         )
         caps = [base + _log_evidence(rr, ra, aa, precision, across, (lean * size) ** 2) for lean in LEANS]
-        cells: list[Cell] = [(value, x, width, i, True) for x in self._row[i]] if value > top - REACH else []
+        cells: list[Cell] = [(value, x, width, i, True) for x in self._row[i]]
         return cells + [(cap - math.log(len(LEANS) * END), end, END, i, True) for cap in caps]
 
     def _fit(
@@ -275,7 +275,7 @@ class ContactFit:
         variance: float,
         low: float,
         high: float,
-        along: float,
+        along_tube: float,
     ) -> Fit:
         force, explained, (s11, s12, s22) = link.force(place)
         step = 0.5 * self._widths[i]
@@ -297,7 +297,7 @@ class ContactFit:
             probability=probability,
             low=low,
             high=high,
-            along=along,
+            along=along_tube,
         )
 
 
