@@ -79,7 +79,7 @@ class VelocityFit:
 
     def _uniform(self, half: int, dt: float) -> Array:
         if self._kept[:2] != (half, dt):
-            self._kept = half, dt, _weights(dt * np.arange(-half, half + 1))
+            self._kept = half, dt, _weights(np.array([dt * k for k in range(-half, half + 1)]))
         return self._kept[2]
 
     def _follow(self, dt: float) -> None:
