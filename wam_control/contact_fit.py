@@ -131,7 +131,7 @@ class ContactFit:
         cells: list[Cell] = []
         for i, link in enumerate(links):
             cells += self._cells(i, link, log_density[i], top)
-            cells += [cell for cell in self._at_ends(i, link) + self._along(i, full[i]) if cell[0] > top - REACH]
+            cells += self._at_ends(i, link, top - REACH) + self._along(i, full[i], top - REACH)
         parts = self._parts(sorted(cells, reverse=True))
         return [self._fit(i, link, *part) for i, (link, part) in enumerate(zip(links, parts, strict=True))]
 
@@ -231,14 +231,17 @@ class ContactFit:
             result.append((mass / total, mean, max(0.0, second / mass - mean * mean), *ends, along / mass))
         return result
 
-    def _at_ends(self, i: int, link: "_Link") -> list[Cell]:
+    def _at_ends(self, i: int, link: "_Link", floor: float) -> list[Cell]:
         """A contact where two links meet, which is more frequent there than elsewhere along them."""
+        if not self._end_weight:
+            return []
         start, end = self._ends[i]
         places = [start + 0.5 * END] * (i > 0) + [end - 0.5 * END] * (i + 1 < len(self._ends))
-        log_weight = math.log(self._end_weight / END) if self._end_weight else -math.inf
-        return [(link.log_density(x) - link.constant + log_weight, x, END, i, False) for x in places]
+        offset = math.log(self._end_weight / END) - link.constant
+        values = [link.log_density(x) + offset for x in places]
+        return [(value, x, END, i, False) for value, x in zip(values, places, strict=True) if value > floor]
 
-    def _along(self, i: int, gram: list[list[float]]) -> list[Cell]:
+    def _along(self, i: int, gram: list[list[float]], floor: float) -> list[Cell]:
         """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
 
         A force along the tube equals the same force at its start: no joint torques distinguish them.
@@ -263,8 +266,9 @@ class ContactFit:
             g2[6] + end * g4[6],
         )
         caps = [base + _log_evidence(rr, ra, aa, precision, across, (lean * size) ** 2) for lean in LEANS]
-        cells: list[Cell] = [(value, x, width, i, True) for x in self._row[i]]
-        return cells + [(cap - math.log(len(LEANS) * END), end, END, i, True) for cap in caps]
+        cells: list[Cell] = [(value, x, width, i, True) for x in self._row[i]] if value > floor else []
+        caps = [cap - math.log(len(LEANS) * END) for cap in caps]
+        return cells + [(cap, end, END, i, True) for cap in caps if cap > floor]
 
     def _fit(
         self,

@@ -15,6 +15,7 @@ LONGEST = 0.0081  # s, of a window: motion is nearly uniform in it
 VELOCITY_SD = 0.04  # rad/s, above which the next longer window is taken, while there is one
 THIRD = 1.25 / math.sqrt(20.0)  # sd of an angle per mean size of its third difference, of variance 1 + 9 + 9 + 1
 UP, DOWN = 5e-3, 2.5e-3  # per sample, how fast that mean is followed
+LARGEST = 1.0  # rad, of a third difference; more is a false reading
 UNIFORM = 0.01  # relative difference of two periods that count as equal
 
 
@@ -91,6 +92,8 @@ class VelocityFit:
                 moved = d.position[i] - a.position[i]
                 if abs(moved) > 3.0 * dt * self._rest:
                     size = abs(moved + 3.0 * (b.position[i] - c.position[i]))
+                    if not size < LARGEST:
+                        continue
                     self._third[i] += (UP if size > mean else DOWN) * (size - mean)
         self.sd = self._velocity_sd(dt)
         longer = self._choice + 1
