@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from contact_truth import L3, L4, torques
 
-from wam_control import contact_inference
+from wam_control import contact_fit, contact_inference
 from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.contact_inference import ContactInference, Hypothesis, detection_statistic
 from wam_description.arm import Arm
@@ -19,8 +19,9 @@ CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.y
 ARM = CONFIGURATION.shared.arm
 PARAMETERS = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).inference
 INFERENCE = ContactInference(ARM, RigidBody(ARM), PARAMETERS)
+UNIFORM = dataclasses.replace(PARAMETERS, end_weight=0.0, along_weight=0.0)  # contacts across the tubes, everywhere
 EXACT = ContactInference(
-    ARM, RigidBody(ARM), dataclasses.replace(PARAMETERS, force_scale=1e4, moment_arm_offset=0.0, friction=0.0)
+    ARM, RigidBody(ARM), dataclasses.replace(UNIFORM, force_scale=1e4, moment_arm_offset=0.0, friction=0.0)
 )
 POSE = (0.0, -1.05, 0.0, 0.5)
 SD = 0.02
@@ -218,7 +219,7 @@ def evidence(q: tuple[float, ...], tau: np.ndarray, cover: str) -> float:
 )
 def test_odds_of_the_links_are_those_of_brute_force(cover: str, x: float, force: tuple[float, float, float]) -> None:
     tau = torques(POSE, cover, (x, 0, 0.04064 / L3 * x if cover == "inner_link" else 0), force)
-    found = INFERENCE.infer(POSE, tau.tolist(), np.linalg.inv(COARSE))
+    found = ContactInference(ARM, RigidBody(ARM), UNIFORM).infer(POSE, tau.tolist(), np.linalg.inv(COARSE))
     odds = math.log(of(found, "inner_link").probability / of(found, "outer_link").probability)
     inner, outer = (
         evidence(POSE, tau, name) + math.log(w) for name, w in zip(ARM.covers.names, PARAMETERS.weights, strict=True)
@@ -310,3 +311,67 @@ def test_the_set_is_no_wider_for_coarse_places() -> None:
         lengths[places] = np.array([one.high - one.low for one in found])
     assert lengths[25].min() > 6 * L4 / 25, "many places, none looked at more closely"
     assert abs(np.mean(lengths[25] - lengths[200])) < 0.002
+
+
+TIPS = [(0.3, -1.0, 0.2, 0.9), (-0.4, -1.4, 0.6, 1.3), (0.0, -0.8, -0.5, 0.6)]
+
+
+@pytest.mark.parametrize("q", TIPS)
+@pytest.mark.parametrize("size", [3.0, 10.0, 30.0])
+def test_a_push_on_the_tip_along_the_tube_is_one_at_the_elbow_and_no_link_is_certain(
+    q: tuple[float, ...], size: float
+) -> None:
+    tip, elbow = (torques(q, "outer_link", (x, 0, 0), (-size, 0, 0)) for x in (L4, 0.0))
+    np.testing.assert_allclose(tip, elbow, atol=1e-6)
+    found = infer(q, "outer_link", (L4, 0, 0), (-size, 0, 0))
+    assert found[0].probability < 0.95
+    assert contact_inference.ALONG in of(found, "outer_link").reason
+    blind = ContactInference(ARM, RigidBody(ARM), UNIFORM).infer(q, tip.tolist(), W)[0]
+    assert blind.cover == "inner_link"
+    assert blind.probability > max(0.9, found[0].probability)
+
+
+def test_a_push_across_the_tube_is_not_taken_for_one_along_it() -> None:
+    for x in (0.1, 0.2, 0.3):
+        found = infer(POSE, "outer_link", (x, 0, 0), (0, 4, 3))[0]
+        assert found.cover == "outer_link"
+        assert found.probability > 0.95
+        assert contact_inference.ALONG not in found.reason
+        assert found.place == pytest.approx(x, abs=0.02)
+
+
+def along_by_quadrature(q: tuple[float, ...], tau: np.ndarray) -> float:
+    """Log probability of torques for a force along the tube on its end, its size by quadrature, less that of none."""
+    axial, across = (torques(q, "outer_link", (L4, 0, 0), e) for e in ((1, 0, 0), (0, 1, 0)))
+    second = torques(q, "outer_link", (L4, 0, 0), (0, 0, 1))
+    scale, precision = PARAMETERS.force_scale, np.linalg.inv(COARSE)
+    size = abs(axial @ precision @ tau) / (axial @ precision @ axial + scale**-2)
+    logs = []
+    for lean in (0.05, 0.5):
+        side = (lean * size) ** 2 * (np.outer(across, across) + np.outer(second, second))
+        forces = np.linspace(-6 * scale, 6 * scale, 4001)
+        prior = -0.5 * (forces / scale) ** 2 - math.log(scale * math.sqrt(2 * math.pi))
+        rest = tau - forces[:, None] * axial
+        fit = -0.5 * np.einsum("ki,ij,kj->k", rest, np.linalg.inv(COARSE + side), rest)
+        widening = -0.5 * (np.linalg.slogdet(COARSE + side)[1] - np.linalg.slogdet(COARSE)[1])
+        logs.append(np.logaddexp.reduce(prior + fit) + math.log(forces[1] - forces[0]) + widening)
+    return float(np.logaddexp.reduce(logs) - math.log(2)) + 0.5 * float(tau @ precision @ tau)
+
+
+def test_odds_of_a_force_along_the_tube_are_those_of_quadrature() -> None:
+    q = TIPS[0]
+    tau = torques(q, "outer_link", (L4, 0, 0), (-4, 1, 0)) + np.array([0.05, -0.05, 0.03, -0.02])
+    axial = torques(q, "outer_link", (L4, 0, 0), (1, 0, 0))
+    assert np.linalg.norm(axial) > 0.1
+    precision = np.linalg.inv(COARSE)
+    rows = np.stack((tau, *(torques(q, "outer_link", (L4, 0, 0), e) for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))))
+    g = rows @ precision @ rows.T
+    scale = PARAMETERS.force_scale
+    size = abs(g[0, 1]) / (g[1, 1] + scale**-2)
+    products = (g[2, 2], g[2, 3], g[3, 3], g[0, 2], g[0, 3], g[1, 2], g[1, 3])
+    logs = [
+        contact_fit._log_evidence(g[0, 0], g[0, 1], g[1, 1], scale**-2, products, (lean * size) ** 2)
+        for lean in contact_fit.LEANS
+    ]
+    found = np.logaddexp.reduce(logs) - math.log(2) + 0.5 * g[0, 0]
+    assert found == pytest.approx(along_by_quadrature(q, tau), abs=1e-3)

@@ -21,7 +21,9 @@ from wam_sim.simulation import Simulation
 CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
 ARM = CONFIGURATION.shared.arm
 PARAMETERS = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
-OWN = dataclasses.replace(PARAMETERS.observer, mass_scale=(1.0,) * 4, friction_scale=1.0, payload=(0.0, 0.0))
+OWN = dataclasses.replace(
+    PARAMETERS.observer, mass_scale=(1.0,) * 4, friction_scale=1.0, payload=(0.0, 0.0), payload_uncertainty=0.0
+)
 POSE = (0.2, -1.05, 0.3, 0.5)
 DRIVE = np.array([joint_torques(e) for e in np.eye(4)]).T
 DT = 1e-3

@@ -10,7 +10,8 @@ import pytest
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
 from wam_control.contact_estimator import ContactEstimatorParameters
-from wam_control.momentum_observer import MomentumObserver, ObserverParameters
+from wam_control.momentum_observer import MomentumObserver
+from wam_control.observer_parameters import ObserverParameters
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
@@ -20,6 +21,17 @@ CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.y
 ARM = CONFIGURATION.shared.arm
 NOMINAL = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
 EXACT = dataclasses.replace(NOMINAL, mass_scale=(1.0,) * 4, friction_scale=1.0, payload=(0.0, 0.0))
+KNOWN = dataclasses.replace(
+    EXACT,
+    mass_uncertainty=0.0,
+    moving_uncertainty=0.0,
+    asymmetry_uncertainty=0.0,
+    load_uncertainty=0.0,
+    payload_uncertainty=0.0,
+    motor_torque_sd=0.003,
+    motor_torque_fraction=0.0,
+    motor_noise=0.0,
+)
 FREE = dataclasses.replace(EXACT, friction_scale=0.0)
 DT = 1e-3
 NONE = np.zeros(4)
@@ -136,7 +148,7 @@ def test_declared_uncertainty_covers_a_nominal_model_that_is_wrong(sensors: bool
 
 def test_uncertainty_of_joints_2_and_3_comes_from_both_motors() -> None:
     """At rest: sd^2 = N2^2 (sd_2^2 + sd_3^2) and a quarter of it, sd of stiction plus the drive's own."""
-    only_stiction = dataclasses.replace(EXACT, mass_uncertainty=0.0, rest_uncertainty=0.5, motor_torque_sd=0.003)
+    only_stiction = dataclasses.replace(KNOWN, rest_uncertainty=0.5)
     observer = MomentumObserver(ARM, only_stiction, use_joint_sensors=False)
     state = State(motor_from_joint(np.array(POSE)).tolist(), [0.0] * 4, [0.1] * 4)
     for _ in range(3):
@@ -151,7 +163,7 @@ def test_uncertainty_of_joints_2_and_3_comes_from_both_motors() -> None:
 
 def test_one_motor_that_rests_couples_the_errors_of_joints_2_and_3() -> None:
     """cov(2, 3) = N2^2/2 (sd_2^2 - sd_3^2): a diagonal covariance would lose it."""
-    alone = dataclasses.replace(EXACT, mass_uncertainty=0.0, rest_uncertainty=1.0, moving_uncertainty=0.0)
+    alone = dataclasses.replace(KNOWN, rest_uncertainty=1.0, shape_uncertainty=0.0)
     observer = MomentumObserver(ARM, alone, use_joint_sensors=False)
     state = State(motor_from_joint(np.array(POSE)).tolist(), [0.0, 0.0, 9.0, 0.0], [0.1] * 4)
     for _ in range(3):

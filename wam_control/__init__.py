@@ -34,6 +34,12 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``loop_design``                   the same for a force loop of your own
 ``contact_estimator``             what touches the arm: observer, detection and inference together
 ``momentum_observer``             - external joint torques and their covariance
+``observer_parameters``           - its parameters
+``velocity_fit``                  - velocities of the motors from their angles
+``shaft_friction``                - nominal friction of motors and joints, and where it is uncertain
+``model_errors``                  - the errors of the model, tracked in free motion
+``model_prior``                   - what is known of them before: stated, or identified
+``tool_load``                     - torques of a mass at the tool
 ``contact_inference``             - which link is touched, where and how hard
 ``contact_fit``                   - the probability of contact positions along straight links
 ``contact_table``                 hypotheses as rows of numbers, as the topic carries them, and back

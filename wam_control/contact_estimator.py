@@ -12,8 +12,10 @@ from wam_control.contact_inference import (
     InferenceParameters,
     detection_statistic,
 )
-from wam_control.momentum_observer import MomentumObserver, ObserverParameters
+from wam_control.momentum_observer import MomentumObserver
+from wam_control.observer_parameters import ObserverParameters
 from wam_description.arm import Arm, Timing
+from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
@@ -43,7 +45,7 @@ class ContactEstimate(NamedTuple):
     ----------
     external_torques : (n,), torques of the world on the joints, N m.
     torque_sd : (n,), their standard deviations, N m.
-    statistic : r^T S^-1 r of the external torques.
+    statistic : r^T S^-1 r of the external torques; the larger one where there is a second, faster estimate of them.
     in_contact : whether a contact is detected.
     link : name of the cover in contact, '' without contact.
     place : contact position, m along the cover's x axis, NaN where it cannot be observed.
@@ -55,6 +57,7 @@ class ContactEstimate(NamedTuple):
     moment : (3,), N m, of that force about the origin of the cover's frame.
     hypotheses : every explanation, the most probable first, empty without contact.
     reason : why the position is NaN or the estimate not reliable, '' where neither.
+    warning : which part of the model is off, '' for none.
     """
 
     external_torques: tuple[float, ...]
@@ -70,6 +73,7 @@ class ContactEstimate(NamedTuple):
     moment: tuple[float, float, float]
     hypotheses: tuple[Hypothesis, ...]
     reason: str
+    warning: str = ""
 
 
 NOTHING = (0.0, 0.0, 0.0)
@@ -84,6 +88,7 @@ class ContactEstimator:
     arm : the arm as configured; the observer's model differs from it by its own factors.
     timing : periods of the loops; the observer's time constant must cover two inner periods.
     parameters : of observer, detection and inference.
+    model : the identified model of the arm with its covariance, None for none.
 
     Raises
     ------
@@ -91,7 +96,9 @@ class ContactEstimator:
         where joint sensors are to be used and the arm has none, or parameters do not fit each other.
     """
 
-    def __init__(self, arm: Arm, timing: Timing, parameters: ContactEstimatorParameters) -> None:
+    def __init__(
+        self, arm: Arm, timing: Timing, parameters: ContactEstimatorParameters, model: ArmModel | None = None
+    ) -> None:
         require(
             arm.joint_sensors or not parameters.use_joint_sensors,
             "parameter 'use_joint_sensors' is true but arm.joint_sensors is false; set it to false",
@@ -102,7 +109,9 @@ class ContactEstimator:
             f"it must be at least two periods, {2.0 * timing.period:g} s",
         )
         self._parameters = parameters
-        self._observer = MomentumObserver(arm, parameters.observer, parameters.use_joint_sensors, timing.dither_cycle)
+        self._observer = MomentumObserver(
+            arm, parameters.observer, parameters.use_joint_sensors, timing.dither_cycle, model
+        )
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
         self._in_contact = self._is_blind = False
@@ -156,9 +165,13 @@ class ContactEstimator:
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
         precision = np.asarray(np.linalg.inv(covariance), np.float64)
         statistic = detection_statistic(torques, precision)
+        fast = observer.fast_torques() if statistic <= parameters.detect else None
+        if fast is not None:
+            statistic = max(statistic, detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64)))
         self._in_contact = statistic > (parameters.release if self._in_contact else parameters.detect)
+        observer.follow(statistic, self._in_contact)
         if not self._in_contact:
-            return _nothing(torques, sd, statistic, "no contact")
+            return _nothing(torques, sd, statistic, "no contact", observer.warning)
         hypotheses = self._inference.infer(observer.q, torques, precision)
         best = hypotheses[0]
         return ContactEstimate(
@@ -175,10 +188,18 @@ class ContactEstimator:
             moment=best.moment,
             hypotheses=hypotheses,
             reason=best.reason,
+            warning=observer.warning,
         )
 
+    @property
+    def model_errors(self) -> dict[str, float]:
+        """Errors of the model that are tracked between contacts, by name; of joint sensors none."""
+        return self._observer.model_errors
 
-def _nothing(torques: tuple[float, ...], sd: tuple[float, ...], statistic: float, reason: str) -> ContactEstimate:
+
+def _nothing(
+    torques: tuple[float, ...], sd: tuple[float, ...], statistic: float, reason: str, warning: str = ""
+) -> ContactEstimate:
     return ContactEstimate(
         external_torques=torques,
         torque_sd=sd,
@@ -193,4 +214,5 @@ def _nothing(torques: tuple[float, ...], sd: tuple[float, ...], statistic: float
         moment=NOTHING,
         hypotheses=(),
         reason=reason,
+        warning=warning,
     )

@@ -11,6 +11,7 @@ from wam_description.signals import (
     Answer,
     Contact,
     ContactView,
+    Level,
     LikelyRange,
     NodeStatus,
     Point,
@@ -30,9 +31,10 @@ class ContactEstimatorNode:
     services = ("tare",)
 
     def __init__(self, shared: Shared, own: ContactEstimatorParameters) -> None:
-        self._estimator = ContactEstimator(shared.model_arm, shared.timing, own)
+        self._estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
         self._covers, self._timing = shared.arm.covers.names, shared.timing
         self._in_contact: bool | None = None
+        self._warned = ""
         self.unused = frozenset() if own.use_joint_sensors else frozenset({"joint_sensors"})
         self.estimate = self._estimator.estimate()
 
@@ -68,7 +70,15 @@ class ContactEstimatorNode:
         if estimate.in_contact is not self._in_contact:
             self._in_contact = estimate.in_contact
             outputs["contact/in_contact"] = estimate.in_contact
+        if estimate.warning != self._warned:
+            self._warned = estimate.warning
+            level = Level.WARN if estimate.warning else Level.OK
+            outputs["status"] = NodeStatus(level, estimate.warning, stamp=inputs.stamp)
         return outputs
+
+    def diagnostics(self) -> dict[str, float]:
+        """The errors of the model as they are tracked between contacts, by name."""
+        return self._estimator.model_errors
 
     def take_status(self, status: NodeStatus) -> None:
         """Follow the brakes in realtime.

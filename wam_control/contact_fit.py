@@ -27,6 +27,8 @@ FEW = 6  # positions in a peak; with fewer, it is refined
 PARTS = 12  # pieces of a refined peak, two thirds of a standard deviation each
 ROUNDING = 1e-12  # of a determinant; below it is rounding error
 WEAK_PRIOR = 1e-9  # of the force prior: avoids a division by zero in directions that no joint measures
+END = 0.01  # m, length of the end of a link
+LEANS = (0.05, 0.5)  # force across the tube per force along it, on its end
 SET = 0.9  # probability of the set that is reported
 
 
@@ -45,6 +47,7 @@ class Fit(NamedTuple):
     residual : what the best contact does not explain, chi^2.
     probability : of this link among all.
     low, high : m, ends of the part of the link that is in the 90 % set, NaN where none is.
+    along : probability that the force is along the tube, of a contact on this link.
     """
 
     place: float
@@ -58,12 +61,14 @@ class Fit(NamedTuple):
     probability: float
     low: float
     high: float
+    along: float
 
 
 Terms = tuple[Triple, Triple, Triple, Triple, Triple]
 Triangle = tuple[float, ...]  # 15: the rows of the upper triangle of a matrix 5 by 5, one after the other
-# a piece of a link: log of the probability density of a contact, per metre; position and width, m; link
-Cell = tuple[float, float, float, int]
+# a piece of a link: log of the probability density of a contact, per metre; position and width, m; link; whether it is
+# that of a force along the tube
+Cell = tuple[float, float, float, int, bool]
 
 
 class ContactFit:
@@ -78,6 +83,8 @@ class ContactFit:
     moment_arm_offset : sd of the distance between the line of the force and the axis of the tube, per radius.
     friction : sd of the friction force along the link, per force.
     positions : number of positions tried on each link, at least 3.
+    end_weight : weight of a contact where two links meet, on each.
+    along_weight : weight of a force along the last link on its surface, and of one on its end.
     """
 
     def __init__(
@@ -91,6 +98,8 @@ class ContactFit:
         moment_arm_offset: float,
         friction: float,
         positions: int,
+        end_weight: float,
+        along_weight: float,
     ) -> None:
         self._ends = list(zip(start, end, strict=True))
         self._radius = list(radius)
@@ -98,6 +107,7 @@ class ContactFit:
         # logs of the metres over which a contact is distributed
         self._log_length = [math.log((b - a) / weight) for (a, b), weight in zip(self._ends, weights, strict=True)]
         self._precision, self._friction = force_scale**-2, friction
+        self._end_weight, self._along_weight = end_weight, along_weight
         self._widths = [(b - a) / positions for a, b in self._ends]
         steps = (np.arange(positions) + 0.5) / positions  # the middle of each
         row = np.array([a + (b - a) * steps for a, b in self._ends])
@@ -121,6 +131,7 @@ class ContactFit:
         cells: list[Cell] = []
         for i, link in enumerate(links):
             cells += self._cells(i, link, log_density[i], top)
+            cells += self._at_ends(i, link, top - REACH) + self._along(i, full[i], top - REACH)
         parts = self._parts(sorted(cells, reverse=True))
         return [self._fit(i, link, *part) for i, (link, part) in enumerate(zip(links, parts, strict=True))]
 
@@ -149,7 +160,7 @@ class ContactFit:
         top_value = max(values)
         if top_value <= floor:
             return []
-        cells = [(value, x, width, i) for value, x in zip(values, row, strict=True) if value > floor]
+        cells = [(value, x, width, i, False) for value, x in zip(values, row, strict=True) if value > floor]
         if len(cells) >= FEW:
             return cells
         peak = values.index(top_value)
@@ -171,36 +182,37 @@ class ContactFit:
             left, right = (end - sd, end) if x > end else (start, start + sd)
         part = (right - left) / PARTS
         positions = [left + (k + 0.5) * part for k in range(PARTS)]
-        return [(at + bend * (position - x) ** 2, position, part, i) for position in positions]
+        return [(at + bend * (position - x) ** 2, position, part, i, False) for position in positions]
 
     @staticmethod
     def _three(link: "_Link", x: float, near: float) -> tuple[float, float, float]:
         return link.log_density(x - near), link.log_density(x), link.log_density(x + near)
 
-    def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float]]:
-        """Probability, mean and variance of the position, low and high end of the 90 % set, of each link.
+    def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float, float]]:
+        """Of each link: probability, mean and variance of the position, ends of the 90 % set, fraction of forces along.
 
         The set takes the most probable positions first: `cells` are in this order.
         """
         top = cells[0][0]
-        sums = [[0.0, 0.0, 0.0] for _ in self._ends]
+        sums = [[0.0, 0.0, 0.0, 0.0] for _ in self._ends]
         weights = []
-        for value, x, width, i in cells:
+        for value, x, width, i, is_along in cells:
             weight = math.exp(value - top) * width
             weights.append(weight)
             mine = sums[i]
             mine[0] += weight
             mine[1] += weight * x
             mine[2] += weight * (x * x + width * width / 12.0)
+            mine[3] += weight * is_along
         total, passed = sum(weights), 0.0
         enough = SET * total
         inside = [[math.inf, -math.inf] for _ in self._ends]
-        for weight, (_, x, width, i) in zip(weights, cells, strict=True):
+        for weight, (_, x, width, i, _) in zip(weights, cells, strict=True):
             if passed >= enough:
                 break
-            # of the last piece only the part that fills the set, on the side of the others
+            # of the last piece only the part that fills the set, on the side of the others; an end is not divided
             passed += weight
-            unused = width * (passed - enough) / weight if passed > enough else 0.0
+            unused = width * (passed - enough) / weight if passed > enough and width != END else 0.0
             part, half = inside[i], 0.5 * width
             low, high = x - half, x + half
             if part[0] > part[1]:
@@ -210,17 +222,64 @@ class ContactFit:
             elif high - unused > part[1]:
                 part[1] = high - unused
         result = []
-        for (mass, first, second), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
+        for (mass, first, second, along), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
             if mass == 0.0:
-                result.append((0.0, 0.5 * (start + end), (end - start) ** 2 / 12.0, math.nan, math.nan))
+                result.append((0.0, 0.5 * (start + end), (end - start) ** 2 / 12.0, math.nan, math.nan, 0.0))
                 continue
-            mean = first / mass
+            mean = min(max(first / mass, start), end)
             ends = (max(low, start), min(high, end)) if low < high else (math.nan, math.nan)
-            result.append((mass / total, mean, max(0.0, second / mass - mean * mean), *ends))
+            result.append((mass / total, mean, max(0.0, second / mass - mean * mean), *ends, along / mass))
         return result
 
+    def _at_ends(self, i: int, link: "_Link", floor: float) -> list[Cell]:
+        """A contact where two links meet, which is more frequent there than elsewhere along them."""
+        if not self._end_weight:
+            return []
+        start, end = self._ends[i]
+        places = [start + 0.5 * END] * (i > 0) + [end - 0.5 * END] * (i + 1 < len(self._ends))
+        offset = math.log(self._end_weight / END) - link.constant
+        values = [link.log_density(x) + offset for x in places]
+        return [(value, x, END, i, False) for value, x in zip(values, places, strict=True) if value > floor]
+
+    def _along(self, i: int, gram: list[list[float]], floor: float) -> list[Cell]:
+        """A force along the last link: on its surface, anywhere, or on its end, with little or much force across.
+
+        A force along the tube equals the same force at its start: no joint torques distinguish them.
+        """
+        (rr, ra1, ra2, rb1, rb2, _, ra), g1, g2, g3, g4, _, axial = gram
+        aa, precision, weight = axial[6], self._precision, self._along_weight
+        if not weight or aa < WEAK_PRIOR * precision or i + 1 < len(self._ends):
+            return []
+        start, end = self._ends[i]
+        size = abs(ra) / (aa + precision) + LEAST_FORCE
+        base = math.log(weight / precision)
+        surface = (g3[3], g3[4], g4[4], rb1, rb2, g3[6], g4[6])
+        value = base + _log_evidence(rr, ra, aa, precision, surface, 0.5 * (self._radius[i] * size) ** 2)
+        value, width = value - math.log(end - start), self._widths[i]
+        across = (
+            g1[1] + end * (2.0 * g1[3] + end * g3[3]),
+            g1[2] + end * (g1[4] + g2[3] + end * g3[4]),
+            g2[2] + end * (2.0 * g2[4] + end * g4[4]),
+            ra1 + end * rb1,
+            ra2 + end * rb2,
+            g1[6] + end * g3[6],
+            g2[6] + end * g4[6],
+        )
+        caps = [base + _log_evidence(rr, ra, aa, precision, across, (lean * size) ** 2) for lean in LEANS]
+        cells: list[Cell] = [(value, x, width, i, True) for x in self._row[i]] if value > floor else []
+        caps = [cap - math.log(len(LEANS) * END) for cap in caps]
+        return cells + [(cap, end, END, i, True) for cap in caps if cap > floor]
+
     def _fit(
-        self, i: int, link: "_Link", probability: float, place: float, variance: float, low: float, high: float
+        self,
+        i: int,
+        link: "_Link",
+        probability: float,
+        place: float,
+        variance: float,
+        low: float,
+        high: float,
+        along_tube: float,
     ) -> Fit:
         force, explained, (s11, s12, s22) = link.force(place)
         step = 0.5 * self._widths[i]
@@ -242,6 +301,7 @@ class ContactFit:
             probability=probability,
             low=low,
             high=high,
+            along=along_tube,
         )
 
 
@@ -283,6 +343,25 @@ class _Link:
         known = (v1 * v1 * n22 - 2.0 * v1 * v2 * n12 + v2 * v2 * n11) / (n11 * n22 - n12 * n12)
         information = f1 * f1 * b11 + 2.0 * f1 * f2 * b12 + f2 * f2 * b22 - known
         return 1.0 / math.sqrt(information) if information > 0.0 else math.inf
+
+
+def _log_evidence(
+    rr: float, ra: float, aa: float, precision: float, across: tuple[float, ...], variance: float
+) -> float:
+    """Log of the probability of the torques for one force and two more across it of a variance.
+
+    -1/2 (r^T S'^-1 r + log abs(S')/abs(S)), S' = S + a a^T / precision + variance (c_1 c_1^T + c_2 c_2^T); `across` are
+    the products c_1 c_1, c_1 c_2, c_2 c_2, r c_1, r c_2, a c_1, a c_2, weighted with S^-1.
+    """
+    c11, c12, c22, r1, r2, a1, a2 = across
+    n11, n22 = 1.0 + variance * c11, 1.0 + variance * c22
+    n12 = variance * c12
+    determinant = n11 * n22 - n12 * n12
+    w11, w12, w22 = variance * n22 / determinant, -variance * n12 / determinant, variance * n11 / determinant
+    rr -= w11 * r1 * r1 + 2.0 * w12 * r1 * r2 + w22 * r2 * r2
+    aa -= w11 * a1 * a1 + 2.0 * w12 * a1 * a2 + w22 * a2 * a2
+    ra -= w11 * r1 * a1 + w12 * (r1 * a2 + r2 * a1) + w22 * r2 * a2
+    return -0.5 * (rr - ra * ra / (aa + precision) + math.log(1.0 + aa / precision) + math.log(determinant))
 
 
 def _terms(triangle: Triangle, precision: float) -> Terms:

@@ -25,6 +25,8 @@ NEAR = math.cos(math.radians(20.0))  # how close to an ambiguous pose or directi
 
 SHOULDER_JOINTS = 3  # of the arms whose elbow the reasons name
 
+NOTED = 0.05  # probability of a force along the tube above which that is a reason why the link is not identified
+
 MOMENT_ONLY = "measures only the moment: the contact position is unknown, the force is a lower bound"
 BENT = "elbow at 90 deg and force in plane: contact position and force cannot be separated"
 STRAIGHT = "elbow straight and force out of plane: contact position and force cannot be separated"
@@ -34,7 +36,8 @@ ELBOW = "tau3 and tau4 near 0: a contact at the elbow and one on the inner link 
 STRAIGHT_LINK = "elbow straight and force out of plane: the links cannot be distinguished"
 LINKS = "the torques do not identify the link"
 MORE = "one contact does not explain the torques"
-REASONS = (MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE)  # as bits of a number
+ALONG = "a force along the tube and one at its start cannot be distinguished"
+REASONS = (MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE, ALONG)  # as bits of a number
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,15 @@ class InferenceParameters:
         "sd of the distance between the line of the force and the tube's axis, per radius", low=0.0, high=2.0
     )
     friction: float = parameter("sd of the friction force along a cover, per force", low=0.0, high=2.0)
+    end_weight: float = parameter(
+        "relative frequency of contacts where two links meet, on each", low=0.0, high=1e3, before=0.0
+    )
+    along_weight: float = parameter(
+        "relative frequency of forces along the last link: on its surface, and on its end",
+        low=0.0,
+        high=1e3,
+        before=0.0,
+    )
     positions: int = parameter("contact positions tried along a link", low=9, high=200)
     identification_threshold: float = parameter(
         "probability from which the link in contact is identified", low=0.5, high=1.0
@@ -151,6 +163,8 @@ class ContactInference:
             moment_arm_offset=parameters.moment_arm_offset,
             friction=parameters.friction,
             positions=parameters.positions,
+            end_weight=parameters.end_weight,
+            along_weight=parameters.along_weight,
         )
         self._elbow = _elbow(covers)
 
@@ -188,6 +202,8 @@ class ContactInference:
         reasons = [self._why_unknown(q, cover, fit)] if is_unknown else []
         if ambiguity:
             reasons.append(ambiguity)
+        if fit.along > (NOTED if ambiguity else 0.5):
+            reasons.append(ALONG)
         if fit.residual > self._parameters.largest_residual:
             reasons.append(MORE)
         place = end[0] if is_unknown else fit.place

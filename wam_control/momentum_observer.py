@@ -3,63 +3,27 @@
 De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), section III-E.
 """
 
-import dataclasses
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_description.arm import Arm, Joints, Motors
-from wam_description.parameters import parameter, require
+from wam_control.model_errors import ModelErrors, Observation
+from wam_control.model_prior import model_prior
+from wam_control.observer_parameters import ObserverParameters
+from wam_control.shaft_friction import ShaftFriction
+from wam_control.tool_load import ToolLoad
+from wam_control.velocity_fit import VelocityFit
+from wam_description.arm import Arm
+from wam_description.model import ArmModel
+from wam_description.parameters import require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.transmission_map import TransmissionMap
 
+Array = NDArray[np.float64]
 SETTLED = 2.0  # time constants from the first sample until the estimate is ready
-LOAD_DIVISOR = 4  # samples per update of the payload's torque, which changes slowly
-NO_MASS = 1e-6  # kg, the smallest mass that a link may have
-
-
-@dataclass(frozen=True)
-class ObserverParameters:
-    """The observer's nominal model, which differs from the plant, and its uncertainty."""
-
-    time_constant: float = parameter("time in which the estimate reaches 63 % of a step", "s", low=1e-3, high=1.0)
-    mass_scale: tuple[float, ...] = parameter(
-        "nominal mass and inertia of each link per configured one", low=0.1, high=10.0
-    )
-    friction_scale: float = parameter("nominal friction per configured friction", low=0.0, high=10.0)
-    mass_uncertainty: float = parameter("sd of the model torque of inertia and gravity, per torque", low=0.0, high=1.0)
-    moving_uncertainty: float = parameter(
-        "sd of the friction of a moving shaft, per dynamic friction", low=0.0, high=10.0
-    )
-    rest_uncertainty: float = parameter(
-        "sd of the friction of a shaft at rest, per static friction", low=0.0, high=10.0
-    )
-    motor_rest_velocity: float = parameter(
-        "motor speed above which Coulomb friction is full", "rad/s", low=1e-6, high=100.0
-    )
-    joint_rest_velocity: float = parameter(
-        "joint speed above which Coulomb friction is full", "rad/s", low=1e-6, high=100.0
-    )
-    friction_memory: float = parameter(
-        "time constant with which the friction of a shaft that came to rest becomes unknown", "s", low=1e-4, high=1.0
-    )
-    motor_torque_sd: float = parameter("sd of the motor torques", "N m", low=1e-6, high=100.0)
-    joint_torque_sd: float = parameter("sd of the joints' strain gauges", "N m", low=1e-6, high=100.0)
-    payload: tuple[float, ...] = parameter(
-        "smallest and largest mass that the tool may carry", "kg", low=0.0, high=50.0
-    )
-
-    def __post_init__(self) -> None:
-        low, high = self.payload if len(self.payload) == 2 else (1.0, 0.0)
-        require(
-            low <= high,
-            f"parameter 'observer.payload' is {list(self.payload)}; it needs the smallest and the largest mass",
-        )
 
 
 class MomentumObserver:
@@ -76,7 +40,8 @@ class MomentumObserver:
 
     The error of friction is a bias, not noise: a wrong level stays wrong in every sample, with the
     sign of the motion.  So the signed fraction of Coulomb friction, and the fraction of the time that
-    a shaft is at rest, go through the same filter as the torques.
+    a shaft is at rest, go through the same filter as the torques.  On the motor side these errors, those of
+    masses and an unknown payload are tracked (`ModelErrors`).
 
     A dither of the motor torques (velocity loop) keeps the shafts moving: torques and fractions are
     averaged over the last `dither_cycle` samples, one whole cycle, in which the sign of friction and
@@ -88,10 +53,22 @@ class MomentumObserver:
     parameters : the nominal model and its uncertainty.
     use_joint_sensors : whether samples are the joint sensors', else the motors'.
     dither_cycle : samples in a cycle of the dither, 0 where there is none.
+    model : the identified model with its covariance, of which `arm` has the means; None for none.
+
+    Attributes
+    ----------
+    q : (n,), joint angles, rad.
+    age : s, since the first sample.
+    is_ready : whether enough samples came.
     """
 
     def __init__(
-        self, arm: Arm, parameters: ObserverParameters, use_joint_sensors: bool, dither_cycle: int = 0
+        self,
+        arm: Arm,
+        parameters: ObserverParameters,
+        use_joint_sensors: bool,
+        dither_cycle: int = 0,
+        model: ArmModel | None = None,
     ) -> None:
         n = len(arm.joints.names)
         require(
@@ -101,39 +78,53 @@ class MomentumObserver:
         self._n, self._parameters, self._link_side = n, parameters, use_joint_sensors
         self._body = RigidBody(arm, parameters.mass_scale)
         self._map = TransmissionMap.of(arm)
+        self._squared = np.square(self._map.joint_from_motor)
         inverse = self._map.motor_from_joint
-        self._motor_from_joint = inverse
-        self._carried: NDArray[np.float64] = np.zeros((n, n))
+        self._carried: Array = np.zeros((n, n))
         if not use_joint_sensors:
             self._carried = inverse.T @ np.diag(arm.motors.inertia) @ inverse + np.diag(arm.joints.armature)
-        rest, rest_joint = parameters.motor_rest_velocity, parameters.joint_rest_velocity
-        self._motor_friction = _Friction(arm.motors, parameters, rest, parameters.motor_torque_sd)
-        self._joint_friction = _Friction(arm.joints, parameters, rest_joint, 0.0)
-        self._zero = [0.0] * n
-        self._unknown: tuple[list[float], list[float]] = ([0.0] * (2 * n), [0.0] * (2 * n))
+        self._motors = ShaftFriction(arm.motors, parameters, parameters.motor_rest_velocity)
+        self._joints = ShaftFriction(arm.joints, parameters, parameters.joint_rest_velocity)
+        self._velocity = VelocityFit(n, parameters.motor_rest_velocity)
         self._cycle = 0 if use_joint_sensors else dither_cycle
-        self._load: _Load | None = None
-        if parameters.payload[1] > 0.0:
-            self._load = _Load(arm, parameters.payload)
+        fast = parameters.detection_time
+        self._times = [parameters.time_constant]
+        if 0.0 < fast < parameters.time_constant and not use_joint_sensors and not self._cycle:
+            self._times.append(fast)
+        self._is_payload_declared = parameters.payload[1] > 0.0
+        self._load: ToolLoad | None = None
+        if self._is_payload_declared or (parameters.payload_uncertainty > 0.0 and not use_joint_sensors):
+            self._load = ToolLoad(arm, parameters.payload)
+        self._levels = np.array([*self._motors.dynamic, *self._joints.dynamic])
+        self._statics = np.array([*self._motors.static, *self._joints.static])
+        self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
+        payload_sd = 0.0
+        if self._load is not None:
+            payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
+        prior = model_prior(arm, parameters, payload_sd, model)
+        noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
+        self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
         self.reset()
 
     def reset(self) -> None:
         """Forget all samples."""
         n = self._n
         self.q: list[float] = [0.0] * n
-        self._residual: list[float] = [0.0] * n
-        self._model_torque: list[float] = [0.0] * n
-        self._sliding, self._resting = self._unknown  # of motors, then of joints
-        self._ring = np.zeros((max(1, self._cycle), 5 * n))
+        self._filtered = [_Filtered([0.0] * n, [0.0] * n, np.zeros(9 * n)) for _ in self._times]
+        self._ring = np.zeros((max(1, self._cycle), 10 * n))
         self._filled = 0
         if self._load is not None:
             self._load.reset()
         self._momentum: list[float] | None = None
-        self._motor_friction.reset()
-        self._joint_friction.reset()
+        self._inertia = self._carried
+        self._motors.reset()
+        self._joints.reset()
+        self._velocity.reset()
+        self._errors.reset()
         self._known: list[float] = [0.0] * n
         self._bias: list[float] = [0.0] * n
-        self._gap = self._age = 0.0
+        self._gap = self.age = self._followed = 0.0
+        self._seen: Observation | None = None
         self.is_ready = False
 
     def observe(self, state: State, dt: float) -> bool:
@@ -160,103 +151,167 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._link_side:
-            return self._update(_Torques(position, velocity, effort, self._zero, *self._unknown), dt)
+            return self._update(_Sample(position, velocity, effort, [0.0] * n, None), dt)
         if not any(effort) and max(map(abs, velocity)) < self._parameters.motor_rest_velocity:
             # at rest without current, brakes or stiction hold: motor torques carry no information
             self.reset()
             return True
-        return self._update(self._from_motors(position, velocity, effort, dt), dt)
+        fitted = self._velocity.take(state, dt + self._gap)
+        self._gap = 0.0
+        return fitted is None or self._update(self._from_motors(fitted.state, fitted.dt), fitted.dt)
 
-    def _from_motors(self, theta: list[float], thetad: list[float], tau_motor: list[float], dt: float) -> "_Torques":
+    def _from_motors(self, state: State, dt: float) -> "_Sample":
+        theta, thetad, tau_motor = state
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
         # with dither a shaft stops at both ends of each swing, held there by the external torque
         keep = 0.0 if self._cycle else math.exp(-dt / self._parameters.friction_memory)
-        motor_friction, motor_sliding, motor_resting = self._motor_friction.of(thetad, keep)
-        joint_friction, joint_sliding, joint_resting = self._joint_friction.of(qd, keep)
-        through = self._map.joint_torques(motor_friction)
-        friction = [through[i] + joint_friction[i] for i in range(self._n)]
-        torques = self._map.joint_torques(tau_motor)
-        return _Torques(q, qd, torques, friction, motor_sliding + joint_sliding, motor_resting + joint_resting)
+        motor, joint = self._motors.of(thetad, keep, dt), self._joints.of(qd, keep, dt)
+        through = self._map.joint_torques(motor.friction)
+        friction = [through[i] + joint.friction[i] for i in range(self._n)]
+        sliding = motor.sliding + joint.sliding
+        loaded = [abs(tau - f) * share for tau, f, share in zip(tau_motor, motor.friction, motor.sliding, strict=True)]
+        signals = [
+            *sliding,
+            *map(abs, sliding),
+            *motor.resting,
+            *joint.resting,
+            *motor.shape,
+            *joint.shape,
+            *loaded,
+        ]
+        return _Sample(q, qd, self._map.joint_torques(tau_motor), friction, signals)
 
-    def _update(self, sample: "_Torques", dt: float) -> bool:
-        body, (q, qd, tau, friction, sliding, resting) = self._body, sample
+    def _update(self, sample: "_Sample", dt: float) -> bool:
+        body, (q, qd, tau, friction, signals) = self._body, sample
         at, speed = np.array(q), np.array(qd)
-        momentum = (body.mass_matrix(at) + self._carried).dot(speed).tolist()
+        inertia = body.mass_matrix(at) + self._carried
+        momentum = inertia.dot(speed).tolist()
         bias = (body.coriolis_transpose_times_velocity(at, speed) - body.gravity_torque(at)).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)]
         before, span = self._momentum, dt + self._gap
-        keep = math.exp(-span / self._parameters.time_constant)
-        residual, model = self._residual, self._model_torque
         if before is None:
-            model, keep = [-torque for torque in bias], 0.0
+            filtered = [_Filtered(each.residual, [-torque for torque in bias], each.signals) for each in self._filtered]
         elif span <= self._parameters.time_constant:
-            take = 1.0 - keep
             rate = [(now - then) / span for now, then in zip(momentum, before, strict=True)]
-            residual = [
-                keep * r + take * (p - 0.5 * (new + old) - torque)
-                for r, p, new, old, torque in zip(residual, rate, known, self._known, tau, strict=True)
+            model = [p - 0.5 * (new + old) for p, new, old in zip(rate, bias, self._bias, strict=True)]
+            external = [
+                p - 0.5 * (new + old) - torque
+                for p, new, old, torque in zip(rate, known, self._known, tau, strict=True)
             ]
-            model = [
-                keep * m + take * (p - 0.5 * (new + old))
-                for m, p, new, old in zip(model, rate, bias, self._bias, strict=True)
+            filtered = [
+                each.after(external, model, math.exp(-span / time))
+                for each, time in zip(self._filtered, self._times, strict=True)
             ]
-        # else the torques in so long a gap are unknown: continue from here
-        if not math.isfinite(sum(momentum) + sum(known) + sum(residual) + sum(model)):
+        else:  # the torques in so long a gap are unknown: continue from here
+            filtered = self._filtered
+        if not math.isfinite(sum(momentum) + sum(known) + sum(filtered[0].residual) + sum(filtered[0].model)):
             self._gap += dt
             return False
-        if not self._link_side:  # strain gauges lie behind the friction
-            take = 1.0 - keep
-            self._sliding = [keep * a + take * b for a, b in zip(self._sliding, sliding, strict=True)]
-            self._resting = [keep * a + take * b for a, b in zip(self._resting, resting, strict=True)]
+        if signals is not None:  # strain gauges lie behind the friction
+            row = np.array(signals)
+            for i, time in enumerate(self._times):
+                keep = 0.0 if before is None else math.exp(-span / time)
+                filtered[i] = filtered[i]._replace(signals=keep * filtered[i].signals + (1.0 - keep) * row)
         if self._load is not None:
+            keep = 0.0 if before is None else math.exp(-span / self._parameters.time_constant)
             self._load.observe(q, qd, span, keep)
-        self.q, self._residual, self._model_torque = q, residual, model
+        self.q, self._filtered, self._inertia = q, filtered, inertia
         self._momentum, self._known, self._bias, self._gap = momentum, known, bias, 0.0
         if self._cycle:
-            self._ring[self._filled % self._cycle] = residual + self._sliding + self._resting
+            row = self._ring[self._filled % self._cycle]
+            row[: self._n], row[self._n :] = filtered[0].residual, filtered[0].signals
             self._filled += 1
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
-        self._age += span
-        settled = self._age > SETTLED * self._parameters.time_constant and self._filled >= 2 * self._cycle
+        self.age += span
+        settled = self.age > SETTLED * self._parameters.time_constant and self._filled >= 2 * self._cycle
         self.is_ready = self.is_ready or (before is not None and settled)
         return True
 
-    def torques(self) -> tuple[list[float], NDArray[np.float64]]:
+    def torques(self) -> tuple[list[float], Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2.
 
-        S = M^-T diag(sd_motor^2) M^-1 + diag(sd_joint^2) + diag((u tau_model)^2) + (u_load tau_load)(...)^T:
-        friction at the motors, mapped like torques (A.5); friction at the joints, or strain gauges; the
-        mass uncertainty u of the model torque; the payload.
+        With joint sensors S = diag(sd^2) + diag((u tau_model)^2) + (u_load tau_load)(...)^T: strain gauges, the mass
+        uncertainty u of the model torque, the payload.  From the motors see `ModelErrors`.
         """
-        n, residual, sliding, resting = self._n, self._residual, self._sliding, self._resting
-        if self._cycle and self._filled:
-            mean = self._ring[: self._filled].mean(axis=0).tolist()
-            residual, sliding, resting = mean[:n], mean[n : 3 * n], mean[3 * n :]
-            # a shaft that slips in both directions within a cycle stops at both limits of its stiction
-            resting = [share * share for share in resting]
-        uncertainty = self._parameters.mass_uncertainty
-        if self._link_side:
-            joint = [self._parameters.joint_torque_sd**2] * n
-        else:
-            joint = self._joint_friction.variance(sliding[n:], resting[n:])
-        total = [
-            variance + (uncertainty * torque) ** 2 for variance, torque in zip(joint, self._model_torque, strict=True)
-        ]
-        covariance: NDArray[np.float64] = np.diag(total)
         if not self._link_side:
-            motor = self._motor_friction.variance(sliding[:n], resting[:n])
-            covariance += (self._motor_from_joint.T * motor) @ self._motor_from_joint
-        load = self._load
+            self._expect()
+            self._seen = self._observation()
+            torques, covariance = self._errors.corrected(self._seen)
+            return torques.tolist(), covariance
+        (residual, model, _), uncertainty, load = self._filtered[0], self._parameters.mass_uncertainty, self._load
+        covariance = np.diag([self._parameters.joint_torque_sd**2 + (uncertainty * torque) ** 2 for torque in model])
         if load is None:
             return list(residual), covariance
         residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
         sized = np.array(load.torque) * load.sd
         return residual, covariance + np.outer(sized, sized)
 
+    def fast_torques(self) -> tuple[list[float], Array] | None:
+        """The same with `detection_time`, for a faster detection; None where there is none."""
+        if len(self._times) == 1:
+            return None
+        torques, covariance = self._errors.corrected(self._observation(1))
+        return torques.tolist(), covariance
+
+    def follow(self, statistic: float, in_contact: bool) -> None:
+        """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
+        if self._seen is not None and self.is_ready:
+            self._errors.follow(self._seen, statistic, in_contact, self.age - self._followed)
+            self._followed = self.age
+
+    @property
+    def model_errors(self) -> dict[str, float]:
+        """The errors of the model that are tracked, by name: per torque of the model, the payload in kg."""
+        return {} if self._link_side else self._errors.by_name
+
+    @property
+    def warning(self) -> str:
+        """Which part of the model is off, '' for none."""
+        beyond = [] if self._link_side else self._errors.beyond
+        return f"the model is off: {beyond[0]}; see /diagnostics, run 'wam identify'" if beyond else ""
+
+    def _expect(self) -> None:
+        """Let the friction know how certain the velocities are."""
+        sd = self._velocity.sd
+        self._motors.expect(sd)
+        self._joints.expect(np.sqrt(self._squared @ np.square(sd)).tolist())
+
+    def _observation(self, which: int = 0) -> Observation:
+        """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
+        n, given, filtered = self._n, self._parameters, self._filtered[which]
+        residual, model, signals = np.array(filtered.residual), filtered.model, filtered.signals
+        if self._cycle and self._filled:
+            mean = self._ring[: self._filled].mean(axis=0)
+            residual, signals = mean[:n], mean[n:]
+        sliding, moving, resting, shape = signals[: 8 * n].reshape(4, 2 * n)
+        if self._cycle:
+            # a shaft that slips in both directions within a cycle stops at both limits of its stiction
+            resting, shape = resting * resting, np.minimum(shape, np.abs(sliding))
+        load = self._load
+        effects = np.zeros((n, 6 * n + 1))
+        levels = 0.5 * self._levels
+        effects[:, : 2 * n] = self._through * (-levels * (moving + sliding))
+        effects[:, 2 * n : 4 * n] = self._through * (levels * (moving - sliding))
+        effects[range(n), range(4 * n, 5 * n)] = model
+        effects[:, 5 * n : 6 * n] = self._through[:, :n] * -signals[8 * n :]
+        if load is not None:
+            residual = residual - load.mass * np.array(load.torque)
+            effects[:, -1] = load.torque
+        variance = (given.rest_uncertainty * self._statics * resting) ** 2
+        variance += (given.shape_uncertainty * self._statics * shape) ** 2
+        effort = self._map.motor_torques(model)
+        # a faster filter averages less of what is noise
+        less = self._times[0] / self._times[which]
+        variance[:n] += less * (given.motor_torque_sd**2 + (given.motor_torque_fraction * np.array(effort)) ** 2)
+        rest = (self._through * variance) @ self._through.T
+        speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
+        noise = self._inertia @ speed
+        return Observation(residual, effects, rest + noise @ noise.T, less * moving[:n])
+
     def identify_payload(self) -> str:
         """Identify the payload from the present external torques; '' or why that is not possible."""
-        if self._load is None:
+        if self._load is None or not self._is_payload_declared:
             return "no payload is declared; set observer.payload to the smallest and the largest mass"
         if not self.is_ready:
             return "too few samples yet"
@@ -264,120 +319,27 @@ class MomentumObserver:
         return self._load.identify_payload(torques, covariance)
 
 
-class _Torques(NamedTuple):
-    """One sample on the joint side: state, torque, friction; each (n,).
+class _Filtered(NamedTuple):
+    """Residual and torque of the model, (n,), N m, and the signals of the shafts through the observer's filter."""
 
-    `sliding` is the signed fraction of Coulomb friction that acts, `resting` how far each shaft is at rest, 0..1;
-    motors, then joints, (2 n,).
-    """
+    residual: list[float]
+    model: list[float]
+    signals: Array
+
+    def after(self, external: list[float], model: list[float], keep: float) -> "_Filtered":
+        """The residual and the model's torque one period later."""
+        take = 1.0 - keep
+        return self._replace(
+            residual=[keep * r + take * new for r, new in zip(self.residual, external, strict=True)],
+            model=[keep * m + take * new for m, new in zip(self.model, model, strict=True)],
+        )
+
+
+class _Sample(NamedTuple):
+    """One sample on the joint side: state, torque, friction, each (n,); `signals` of the shafts, to be filtered."""
 
     q: list[float]
     qd: list[float]
     tau: list[float]
     friction: list[float]
-    sliding: list[float]
-    resting: list[float]
-
-
-class _Friction:
-    """Nominal friction of shafts as a function of their velocities, and its variance.
-
-    f = k (F_d (s + (1 - |s|) h) + b v), s = v / v_rest within -1..1, h the sign of the last full motion, which decays:
-    the friction on a shaft that has just stopped still acts as it did, that on a shaft long at rest is unknown.
-    Variance (u_moving k F_d s)^2 + (u_rest k F_s d)^2 + sd_torque^2, d = 1 - s^2 the fraction at rest, k the
-    friction scale.
-    """
-
-    def __init__(
-        self,
-        shafts: Motors | Joints,
-        parameters: ObserverParameters,
-        rest_velocity: float,
-        torque_sd: float,
-    ) -> None:
-        scale = parameters.friction_scale
-        levels = zip(shafts.static_friction, shafts.dynamic_friction, shafts.viscous_friction, strict=True)
-        self._levels = [(scale * f_dynamic, scale * b) for _, f_dynamic, b in levels]
-        self._moving = [(parameters.moving_uncertainty * scale * f) ** 2 for f in shafts.dynamic_friction]
-        self._rest = [(parameters.rest_uncertainty * scale * f) ** 2 for f in shafts.static_friction]
-        self._rest_velocity, self._torque_variance = rest_velocity, torque_sd**2
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the motion."""
-        self._held = [0.0] * len(self._levels)
-
-    def of(self, velocity: Sequence[float], keep: float) -> tuple[list[float], list[float], list[float]]:
-        """Friction torques, N m, signed fraction of Coulomb friction and fraction at rest, each (n,).
-
-        `velocity` (n,), rad/s; `keep` is the decay of the memory in one period.
-        """
-        friction, sliding, resting, held = [], [], [], self._held
-        for i, ((coulomb, viscous), v) in enumerate(zip(self._levels, velocity, strict=True)):
-            share = min(1.0, max(-1.0, v / self._rest_velocity))
-            held[i] = share if share * share == 1.0 else keep * held[i]
-            friction.append(coulomb * (share + (1.0 - abs(share)) * held[i]) + viscous * v)
-            sliding.append(share)
-            resting.append(1.0 - share * share)
-        return friction, sliding, resting
-
-    def variance(self, sliding: Sequence[float], resting: Sequence[float]) -> list[float]:
-        """Variance, (n,), N^2 m^2, of friction at these mean fractions."""
-        return [
-            moving * share * share + rest * stuck * stuck + self._torque_variance
-            for moving, rest, share, stuck in zip(self._moving, self._rest, sliding, resting, strict=True)
-        ]
-
-
-class _Load:
-    """Joint torques per kilogram at the tool, through the filter of the observer; and the mass estimated there."""
-
-    def __init__(self, arm: Arm, payload: tuple[float, ...]) -> None:
-        n = len(arm.links.names)
-        centre = (*arm.links.centre[:-3], *arm.tool)
-        masses, none = (NO_MASS,) * (n - 1) + (1.0,), (0.0,) * (3 * n)
-        links = dataclasses.replace(arm.links, mass=masses, centre=centre, inertia=none, product=none)
-        self._body = RigidBody(dataclasses.replace(arm, links=links, payload=0.0))
-        low, high = payload
-        # the arm without payload is the rule; sd of a uniform distribution, about the smallest mass
-        self.mass, self.sd = low, (high - low) / math.sqrt(3.0)
-        self._payload = payload
-        self.torque: list[float] = [0.0] * n
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the motion, not the mass."""
-        self._before: list[float] | None = None
-        self._bias: list[float] = []
-        self._span, self._keep, self._count = 0.0, 1.0, 0
-        self.torque = [0.0] * len(self.torque)
-
-    def observe(self, q: list[float], qd: list[float], span: float, keep: float) -> None:
-        """Follow one sample of the joints, (n,) rad and rad/s."""
-        self._span, self._keep, self._count = self._span + span, self._keep * keep, self._count + 1
-        if self._before is not None and self._count < LOAD_DIVISOR:
-            return
-        span, keep, body = self._span, self._keep, self._body
-        self._span, self._keep, self._count = 0.0, 1.0, 0
-        momentum = (body.mass_matrix(q) @ np.array(qd)).tolist()
-        bias = (body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)).tolist()
-        if self._before is None:
-            self._bias, keep = bias, 0.0
-        # as an external torque: that of the motors on the load, with the opposite sign
-        terms = zip(self.torque, momentum, self._before or momentum, bias, self._bias, strict=True)
-        self.torque = [keep * t + (1.0 - keep) * (0.5 * (b + a) - (p - o) / span) for t, p, o, b, a in terms]
-        self._before, self._bias = momentum, bias
-
-    def identify_payload(self, torques: list[float], covariance: NDArray[np.float64]) -> str:
-        """Correct the mass to explain torques, (n,), N m, with covariance (n, n); '' or why that is not possible."""
-        unit = np.array(self.torque)
-        # the covariance includes the prior, one sd of the declared range
-        gain = self.sd**2 * np.linalg.solve(covariance, unit)
-        mass = self.mass + float(gain @ np.array(torques))
-        low, high = self._payload
-        margin = 0.1 * (high - low)
-        if not low - margin <= mass <= high + margin:
-            return f"the external torques mean a payload of {mass:.3g} kg; declared: {low:g} to {high:g} kg"
-        self.mass = min(max(mass, low), high)
-        self.sd *= math.sqrt(max(0.0, 1.0 - float(gain @ unit)))
-        return ""
+    signals: list[float] | None

@@ -20,6 +20,16 @@ from wam_experiments.contact_benchmark.moves import MoveGenerator
 FRICTION, MASS, STIFFNESS = 0.10, 0.02, 0.10
 PAYLOAD = 0.05  # kg, unmodelled, in free motion only
 
+# what the estimator states of an arm that was identified to this range, as standard deviations
+IDENTIFIED = {
+    "contact_estimator:observer.moving_uncertainty": 0.06,
+    "contact_estimator:observer.mass_uncertainty": 0.012,
+    "contact_estimator:observer.asymmetry_uncertainty": 0.0,
+    "contact_estimator:observer.load_uncertainty": 0.0,
+    "contact_estimator:observer.payload_uncertainty": 0.0,
+    "contact_estimator:observer.motor_noise": 0.05,
+}
+
 RELEASE = 0.05  # s, to release the brakes
 SETTLE = 0.3  # s, before the first move
 HOLD = 0.32  # s of contact in motion
@@ -105,7 +115,7 @@ class ScenarioGenerator:
         self._configuration, self._seed = configuration, seed
         self._arm: Arm = configuration.shared.arm
         self._moves, self._body = MoveGenerator(self._arm), RigidBody(self._arm)
-        self._base = base_values(configuration, joint_sensors)
+        self._base = base_values(configuration, joint_sensors) | IDENTIFIED
 
     def contacts(self, count: int) -> list[BenchmarkScenario]:
         """Scenarios with `count` contacts in motion, two per scenario."""

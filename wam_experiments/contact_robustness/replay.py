@@ -121,7 +121,7 @@ def replay(configuration: Configuration, name: str, recording: DriveRecording, s
     configured = configuration.with_values({**base_values(configuration, False), **dict(recording.degradation.model)})
     shared, own = configured.shared, configured.node("contact_estimator", ContactEstimatorParameters)
     period, outer = seconds(shared.timing.period_ns), shared.timing.outer_divisor
-    estimator = ContactEstimator(shared.model_arm, shared.timing, own)
+    estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
     rows: list[_Row] = []
     singles = [t for t in recording.touches if t.kind in ("outer", "inner") and np.linalg.norm(t.force) >= 9.0]
     trials: dict[int, tuple[ContactEstimator, ContactEstimator]] = {}
@@ -132,14 +132,15 @@ def replay(configuration: Configuration, name: str, recording: DriveRecording, s
         for number, touch in enumerate(singles):
             if touch.begin + START_AFTER <= time < touch.begin + START_AFTER + START_WITHIN:
                 if number not in trials:
-                    trials[number] = copy.deepcopy(estimator), ContactEstimator(shared.model_arm, shared.timing, own)
+                    cold = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
+                    trials[number] = copy.deepcopy(estimator), cold
                     trials[number][0].reset()
                 for trial in trials[number]:
                     trial.observe(state, None, dt)
                 if i % outer == 0:
-                    warm, cold = (trial.estimate().in_contact for trial in trials[number])
+                    now = [trial.estimate().in_contact for trial in trials[number]]
                     before = started.get(number, (False, False))
-                    started[number] = before[0] or warm, before[1] or cold
+                    started[number] = before[0] or now[0], before[1] or now[1]
         if i % outer == 0:
             rows.append(_Row(time, i, estimator.estimate()))
     return _scored(name, recording, rows, list(started.values()), dict(_lengths(configured)))

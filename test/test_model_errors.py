@@ -1,0 +1,142 @@
+"""The errors of the model: learned without contact, frozen in contact, their covariance that of the errors."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from arms import CONFIGURATION, WAM
+
+from wam_control.contact_estimator import ContactEstimatorParameters
+from wam_control.model_errors import GATE, HINDSIGHT, LEARN_EVERY, ModelErrors, Observation
+from wam_control.model_prior import INFLATED, ModelPrior, model_prior
+from wam_control.momentum_observer import MomentumObserver
+from wam_description.signals import State
+
+TRUE = np.array([0.3, -0.2, 0.1])
+SD = 0.25
+QUIET = 1.0  # a detection statistic without contact
+
+
+def errors(drift: float = 0.0, noise: float = 0.0) -> ModelErrors:
+    variance = np.full(3, SD**2)
+    prior = ModelPrior(("a", "b", "c"), np.zeros(3), np.diag(variance), variance, np.full(3, 0.2))
+    return ModelErrors(prior, drift, np.diag([30.0, 20.0]), np.full(2, noise**2))
+
+
+def seen(random: np.random.Generator, external: tuple[float, float] = (0.0, 0.0)) -> Observation:
+    """One moment of some motion, its residual with the true errors, an external torque and noise of 0.05 N m."""
+    effects = random.uniform(-1.0, 1.0, (2, 3))
+    residual = effects @ TRUE + external + 0.05 * random.standard_normal(2)
+    return Observation(residual, effects, 0.05**2 * np.eye(2), np.ones(2))
+
+
+def follow(
+    tracked: ModelErrors, count: int, *, in_contact: bool = False, statistic: float = QUIET, seed: int = 1
+) -> None:
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        tracked.follow(seen(random), statistic, in_contact, LEARN_EVERY)
+
+
+def test_free_motion_shows_the_errors_and_the_covariance_is_theirs() -> None:
+    scores = []
+    for seed in range(20):
+        tracked = errors()
+        follow(tracked, 60, seed=seed)
+        scores.append((tracked.errors - TRUE) / np.sqrt(tracked.covariance.diagonal()))
+    assert np.abs(tracked.errors - TRUE).max() < 0.1
+    # observations count for a quarter because they are taken as correlated; these are not
+    assert 0.3 < np.std(scores) < 1.0
+    torques, covariance = tracked.corrected(seen(np.random.default_rng(9)))
+    assert np.abs(torques).max() < 4.0 * np.sqrt(covariance.diagonal().max())
+
+
+def test_nothing_is_learned_in_contact_beyond_the_gate_or_shortly_after_a_contact() -> None:
+    for given in ({"in_contact": True}, {"statistic": GATE + 1.0}):
+        tracked = errors()
+        follow(tracked, 100, **given)
+        assert not tracked.errors.any()
+    tracked = errors()
+    follow(tracked, 100, in_contact=True)
+    follow(tracked, 20)
+    assert not tracked.errors.any(), "a quarter of a second after a second of contact"
+    follow(tracked, 60)
+    assert tracked.errors.any()
+
+
+def test_what_was_seen_shortly_before_a_contact_is_not_learned() -> None:
+    tracked, random = errors(), np.random.default_rng(2)
+    for _ in range(round(HINDSIGHT / LEARN_EVERY)):
+        tracked.follow(seen(random, (1.0, 1.0)), QUIET, False, LEARN_EVERY)  # a force that is not yet detected
+    tracked.follow(seen(random, (1.0, 1.0)), 30.0, True, LEARN_EVERY)
+    assert not tracked.errors.any()
+
+
+def test_in_contact_the_errors_become_less_certain_but_never_less_than_before_any_motion() -> None:
+    tracked = errors(drift=0.5)
+    follow(tracked, 200)
+    before = tracked.covariance.diagonal().copy()
+    follow(tracked, 50, in_contact=True)
+    assert np.all(tracked.covariance.diagonal() > 1.5 * before)
+    follow(tracked, 5000, in_contact=True)
+    assert tracked.covariance.diagonal() == pytest.approx([SD**2] * 3)
+    assert np.linalg.eigvalsh(tracked.covariance).min() > 0.0
+
+
+def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
+    tracked, random = errors(), np.random.default_rng(3)
+    effects = np.zeros((2, 3))
+    for _ in range(400):
+        residual = np.array([30.0 * 0.01 * random.standard_normal(), 0.0])
+        tracked.follow(Observation(residual, effects, 1e-4 * np.eye(2), np.ones(2)), QUIET, False, LEARN_EVERY)
+    assert np.sqrt(tracked.noise[0]) == pytest.approx(0.01, rel=0.3)
+    assert tracked.noise[1] == 0.0
+    _, covariance = tracked.corrected(Observation(np.zeros(2), effects, 1e-4 * np.eye(2), np.ones(2)))
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.3, rel=0.3)
+
+
+def test_only_an_error_that_is_certainly_large_is_named() -> None:
+    tracked = errors()
+    tracked.errors[:] = 0.3, -0.4, 0.1
+    assert tracked.beyond == []
+    tracked.covariance *= 1e-4
+    assert tracked.beyond == ["b", "a"]
+
+
+def test_errors_of_parameters_without_uncertainty_stay_zero() -> None:
+    """A covariance of zero must not become a division by zero, which would silence the detection."""
+    given = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
+    none = dict.fromkeys(("asymmetry_uncertainty", "load_uncertainty", "payload_uncertainty", "motor_noise"), 0.0)
+    observer = MomentumObserver(
+        WAM, dataclasses.replace(given, **none, moving_uncertainty=0.0, mass_uncertainty=0.0), False
+    )
+    for _ in range(100):
+        assert observer.observe(State([0.0, 35.0, 0.0, 10.0], [3.0, -2.0, 4.0, 1.0], [0.2] * 4), 1e-3)
+        observer.follow(QUIET, False)
+    assert np.all(np.isfinite(observer.torques()[1]))
+    assert set(observer.model_errors.values()) == {0.0}
+
+
+def test_an_identified_model_gives_each_direction_its_friction_and_its_covariance() -> None:
+    given = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
+    names = [f"motors.coulomb_{way}.motor{j}" for way in ("positive", "negative") for j in (1, 2, 3, 4)]
+    sd = np.linspace(0.001, 0.002, 8)
+    shared = CONFIGURATION.with_values(
+        {
+            "model.source": "bag",
+            "model.motors.coulomb_positive": [0.05, 0.03, 0.03, 0.03],
+            "model.motors.coulomb_negative": [0.04, 0.03, 0.03, 0.03],
+            "model.covariance.parameters": names,
+            "model.covariance.values": np.diag(sd**2).ravel().tolist(),
+        }
+    ).shared
+    prior = model_prior(shared.model_arm, given, 0.1, shared.model)
+    by_name = dict(zip(prior.names, prior.errors, strict=True))
+    assert by_name["friction of motor1 in positive motion"] == pytest.approx(0.05 / 0.045 - 1.0)
+    assert by_name["friction of motor1 in negative motion"] == pytest.approx(0.04 / 0.045 - 1.0)
+    assert by_name["friction of motor2 in negative motion"] == pytest.approx(0.0, abs=1e-12)
+    first = prior.names.index("friction of motor1 in positive motion")
+    assert np.sqrt(prior.covariance[first, first]) == pytest.approx(np.hypot(INFLATED * 0.001 / 0.045, 0.02))
+    wide = model_prior(WAM, given, 0.1, CONFIGURATION.shared.model)
+    assert wide.covariance[first, first] > 10.0 * prior.covariance[first, first]
+    assert np.array_equal(wide.limit, prior.limit), "friction may drift from what was identified"

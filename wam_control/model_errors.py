@@ -1,0 +1,126 @@
+"""Errors of the estimator's model, tracked by a Kalman filter in free motion.
+
+The residual of the momentum observer is r = tau_ext + H x + e: H the torques of the model's errors of size one through
+the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
+r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.
+"""
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.model_prior import ModelPrior
+
+Array = NDArray[np.float64]
+
+LEARN_EVERY = 0.01  # s
+HINDSIGHT = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
+CORRELATED = 4.0  # of R: the rest is the same in so many samples
+GATE = 12.0  # of the detection statistic, above which nothing is learned
+HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after it nothing is learned
+NOISE_TIME = 1.0  # s, in which the noise of the motors is followed
+LEAST = 1e-30  # variance: avoids a division by zero for errors that are none
+SURE = 2.0  # sd of an error that it must have beyond what is tolerable
+
+
+class Observation(NamedTuple):
+    """What the observer knows of one moment.
+
+    Attributes
+    ----------
+    residual : (n,), N m.
+    effects : (n, k), N m, H.
+    rest : (n, n), N^2 m^2, R without the noise of the motors that is followed here.
+    moving : (n,), fraction to which each motor moves; more for a filter that averages less of the noise.
+    """
+
+    residual: Array
+    effects: Array
+    rest: Array
+    moving: Array
+
+
+class ModelErrors:
+    """Kalman filter of the errors of the model.
+
+    Parameters
+    ----------
+    prior : of the errors, before any motion.
+    drift : sd of the errors' random walk per largest sd, 1/sqrt(s).
+    through : (n, n), joint torques per motor torque.
+    noise : (n,), N^2 m^2, variance of the motors' torque that is assumed at the start.
+    """
+
+    def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array) -> None:
+        self._prior = prior
+        self._walk = drift**2 * np.diag(prior.limit)
+        self._through, self._to_motors = through, np.linalg.inv(through)
+        self.errors, self.covariance = prior.errors.copy(), prior.covariance.copy()
+        self.noise = noise.copy()
+        self._waiting: deque[Observation] = deque()
+        self._since = self._contact = self._hold = 0.0
+
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The errors by name."""
+        return dict(zip(self._prior.names, self.errors.tolist(), strict=True))
+
+    @property
+    def beyond(self) -> list[str]:
+        """Names of the errors that are certainly larger than tolerable, the largest first."""
+        excess = np.abs(self.errors) - SURE * np.sqrt(self.covariance.diagonal())
+        ratio = excess / self._prior.tolerable
+        return [self._prior.names[i] for i in np.argsort(-ratio) if ratio[i] > 1.0]
+
+    def reset(self) -> None:
+        """Forget the samples that wait, not the errors."""
+        self._waiting.clear()
+        self._since = self._contact = self._hold = 0.0
+
+    def corrected(self, seen: Observation) -> tuple[Array, Array]:
+        """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
+        effects = seen.effects
+        noise = (self._through * (self.noise * seen.moving)) @ self._through.T
+        return seen.residual - effects @ self.errors, effects @ self.covariance @ effects.T + seen.rest + noise
+
+    def follow(self, seen: Observation, statistic: float, in_contact: bool, span: float) -> None:
+        """Learn from what was observed, `span` seconds after the time before; not in contact, and with hindsight."""
+        if in_contact:
+            self._contact += span
+            self._hold = min(HOLD_OFF * self._contact, LONGEST_HOLD_OFF)
+            self._waiting.clear()
+        elif self._hold > 0.0:
+            self._hold, self._contact = self._hold - span, 0.0
+        self._since += span
+        if self._since < LEARN_EVERY:
+            return
+        self._grow(self._since)
+        if not in_contact and self._hold <= 0.0:
+            self._contact = 0.0
+            self._waiting.append(seen)
+            if len(self._waiting) > HINDSIGHT / LEARN_EVERY and statistic < GATE:
+                self._learn(self._waiting.popleft(), self._since)
+        self._since = 0.0
+
+    def _grow(self, span: float) -> None:
+        covariance = self.covariance
+        covariance += span * self._walk
+        scale = np.sqrt(np.minimum(1.0, self._prior.limit / np.maximum(covariance.diagonal(), LEAST)))
+        covariance *= scale
+        covariance *= scale[:, None]
+
+    def _learn(self, seen: Observation, span: float) -> None:
+        innovation, covariance = self.corrected(seen)
+        rate = span / NOISE_TIME
+        at_motors = self._to_motors @ innovation
+        known = np.einsum("ij,jk,ik->i", self._to_motors, covariance, self._to_motors) - self.noise * seen.moving
+        found = np.maximum(0.0, at_motors * at_motors - known)
+        self.noise += rate * seen.moving * (found - self.noise)
+        gain_torques = self.covariance @ seen.effects.T
+        coloured = covariance + (CORRELATED - 1.0) * (covariance - seen.effects @ gain_torques)
+        gain = np.linalg.solve(coloured, gain_torques.T).T
+        self.errors += gain @ innovation
+        self.covariance -= gain @ gain_torques.T
+        self.covariance = 0.5 * (self.covariance + self.covariance.T)

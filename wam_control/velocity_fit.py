@@ -1,0 +1,116 @@
+"""Velocities of shafts fitted to their angles, over as few samples as the steps of the encoder allow."""
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_description.signals import State
+
+Array = NDArray[np.float64]
+HALF_WINDOWS = (0, 1, 2, 4)  # samples on each side of the fitted one
+LONGEST = 0.0081  # s, of a window: motion is nearly uniform in it
+VELOCITY_SD = 0.04  # rad/s, above which the next longer window is taken, while there is one
+THIRD = 1.25 / math.sqrt(20.0)  # sd of an angle per mean size of its third difference, of variance 1 + 9 + 9 + 1
+UP, DOWN = 5e-3, 2.5e-3  # per sample, how fast that mean is followed
+LARGEST = 1.0  # rad, of a third difference; more is a false reading
+UNIFORM = 0.01  # relative difference of two periods that count as equal
+
+
+class FittedState(NamedTuple):
+    """State in the middle of the window, `dt` seconds after the one before."""
+
+    state: State
+    dt: float
+
+
+class VelocityFit:
+    """Least-squares slope of the angle over the samples of a window, which ends with the newest sample.
+
+    A velocity that is the difference of two counts has the error of both; that of a rotor that swings on its cables is
+    not that of the link.  Both show in the third difference of the angle, which smooth motion hardly changes.  The
+    window is the shortest that makes the velocity certain enough and never becomes shorter.  A window of one sample
+    passes states as they are.
+
+    Attributes
+    ----------
+    sd : rad/s, standard deviation of the velocity of each shaft.
+    delay : s, of the fitted state.
+    """
+
+    def __init__(self, n: int, rest_velocity: float) -> None:
+        self._third, self._rest = [0.0] * n, rest_velocity
+        self._choice = 0
+        self._kept: tuple[int, float, Array] = (0, 0.0, np.zeros((2, 1)))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the samples, not the error of the angles."""
+        self._samples: deque[tuple[float, State]] = deque(maxlen=2 * HALF_WINDOWS[-1] + 1)
+        self._time, self._middle = 0.0, math.nan
+        self.sd, self.delay = [0.0] * len(self._third), 0.0
+
+    def take(self, state: State, dt: float) -> FittedState | None:
+        """Take a sample `dt` seconds after the last; None while the window fills or grows."""
+        samples = self._samples
+        self._time += dt
+        samples.append((self._time, state))
+        self._follow(dt)
+        half = HALF_WINDOWS[self._choice]
+        if half == 0:
+            return FittedState(state, dt)
+        if len(samples) <= 2 * half:
+            return None
+        window = list(samples)[-2 * half - 1 :]
+        first = window[0][0]
+        if abs(self._time - first - 2.0 * half * dt) <= UNIFORM * dt:
+            middle, weights = self._time - half * dt, self._uniform(half, dt)
+        else:  # a sample was lost
+            times = np.array([time for time, _ in window])
+            middle = float(times.mean())
+            weights = _weights(times - middle)
+        before = self._middle
+        if middle <= before:
+            return None
+        self._middle, self.delay = middle, self._time - middle
+        angle, slope = (weights @ [each.position for _, each in window]).tolist()
+        return FittedState(State(angle, slope, window[half][1].effort), dt if math.isnan(before) else middle - before)
+
+    def _uniform(self, half: int, dt: float) -> Array:
+        if self._kept[:2] != (half, dt):
+            self._kept = half, dt, _weights(np.array([dt * k for k in range(-half, half + 1)]))
+        return self._kept[2]
+
+    def _follow(self, dt: float) -> None:
+        """Follow the error of the angles, and take a longer window where it calls for one."""
+        samples = self._samples
+        if len(samples) > 3 and abs(self._time - samples[-4][0] - 3.0 * dt) < UNIFORM * dt:
+            (_, a), (_, b), (_, c), (_, d) = samples[-4], samples[-3], samples[-2], samples[-1]
+            for i, mean in enumerate(self._third):
+                moved = d.position[i] - a.position[i]
+                if abs(moved) > 3.0 * dt * self._rest:
+                    size = abs(moved + 3.0 * (b.position[i] - c.position[i]))
+                    if not size < LARGEST:
+                        continue
+                    self._third[i] += (UP if size > mean else DOWN) * (size - mean)
+        self.sd = self._velocity_sd(dt)
+        longer = self._choice + 1
+        if longer < len(HALF_WINDOWS) and max(self.sd) > VELOCITY_SD and 2 * HALF_WINDOWS[longer] * dt < LONGEST:
+            if self._choice == 0:
+                self._middle = self._time
+            self._choice = longer
+            self.sd = self._velocity_sd(dt)
+
+    def _velocity_sd(self, dt: float) -> list[float]:
+        half = HALF_WINDOWS[self._choice]
+        # half a window and more: sum of the squared distances from the middle; none: a difference of two
+        squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
+        scale = THIRD / (math.sqrt(squares) * dt)
+        return [scale * mean for mean in self._third]
+
+
+def _weights(times: Array) -> Array:
+    """Weights, (2, w), of the angles at times, (w,), s from their middle: for their mean and for their slope."""
+    return np.stack((np.full(len(times), 1.0 / len(times)), times / (times @ times)))
