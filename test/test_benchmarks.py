@@ -32,7 +32,7 @@ ROWS = {
         "map, against the scalar bisection",
     ],
 }
-RATIO = re.compile(r"(\d+\.\d*) \(\d+\.\d*\.\.\d+\.\d*\)")
+RATIO = re.compile(r"(\d\S*) \(\d\S*?\.\.\d\S*\)")
 
 
 def test_every_benchmark_is_looked_at() -> None:
@@ -52,8 +52,8 @@ def test_benchmark_prints_a_ratio_in_every_row(script: str, domain_id: int) -> N
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    machine, _, *rows = done.stdout.splitlines()
-    assert "cores" in machine
+    machine, table = done.stdout.index(" cores, "), done.stdout  # a live page says where it is before
+    _, _, *rows = table[machine:].splitlines()
     assert [re.split(r"\s{2,}", row)[0] for row in rows] == ROWS[script]
     for row in rows:
         found = RATIO.search(row)

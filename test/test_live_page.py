@@ -253,7 +253,7 @@ def test_a_scenario_is_played_into_a_running_stack_and_a_wrong_one_is_refused(
         {"name": "move", "seconds": 1.0, "posture": [0.1, -0.7, 0.0, 0.6]},
     ]
     script.write_text(json.dumps({"steps": steps}))
-    with running(domain_id) as (composition, shown):
+    with running(domain_id, 0.3) as (composition, shown):
         spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
         shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
         panel = shown.page.panel

@@ -367,6 +367,11 @@ def test_a_node_takes_an_installed_configuration_by_its_name(tmp_path):
         taken = [named_file("testbed", before, files) for before in ("--params-file", "-r")]
         assert Configuration.load(taken[0]).sections == Configuration.load(packaged("testbed")).sections
         assert taken[1] == "testbed"
+        overlay = tmp_path / "mine.yaml"
+        overlay.write_text("base: testbed\n/**/force_loop:\n  ros__parameters: {force_limit: 7.0}\n")
+        whole = Configuration.load(named_file(str(overlay), "--params-file", files))
+        assert whole.sections["force_loop"]["force_limit"] == 7.0
+        assert whole.sections["/**"] == Configuration.load(packaged("testbed")).sections["/**"]
         with pytest.raises(ParameterError, match="no configuration 'nosuch' comes with wam_stack"):
             named_file("nosuch", "--params-file", files)
 

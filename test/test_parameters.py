@@ -21,6 +21,7 @@ from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build, copy_of, fields, parameter, require, values
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, declaration, reaction
+from wam_ros.bring_up import parameter_file
 from wam_ros.node import AdaptedNode, make_node
 
 ROOT = Path(__file__).parents[1]
@@ -139,8 +140,9 @@ def test_every_section_of_every_configuration_builds_the_class_of_its_node(path:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("name", [name for name in NODES if name != "recorder"])
 def test_every_node_starts_with_its_section_of_every_configuration(path: Path, name: str, ros: Any) -> None:
-    node = make(ros, name, path)
     configuration = Configuration.load(path)
+    with parameter_file(configuration) as file:  # ROS does not know overlays
+        node = make(ros, name, file)
     for key, value in {**configuration.sections["/**"], **configuration.sections[name]}.items():
         there = node.get_parameter(key).value
         assert there == value if isinstance(value, str) else pytest.approx(value) == there

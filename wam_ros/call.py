@@ -62,7 +62,7 @@ class CalledStack:
         """Ask a node and wait for its answer."""
         service, kind, message = service_request(request)
         client = self.node.create_client(kind, service)
-        name = client.srv_name
+        name = self.node.resolve_service_name(service)
         if not client.wait_for_service(PATIENCE):
             return Reply(False, f"no service {name} within {PATIENCE:g} s; {START}")
         attempts = SET_ATTEMPTS if isinstance(request, SetParameters) else ATTEMPTS

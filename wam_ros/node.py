@@ -1,6 +1,7 @@
 """The adapter that makes a ROS node from a declared one (`wam_description.wiring`)."""
 
 import importlib
+import re
 import sys
 import time
 from collections import deque
@@ -17,7 +18,7 @@ from rclpy.node import Node
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-from wam_description.configuration import Configuration, packaged
+from wam_description.configuration import BASE, Configuration, packaged
 from wam_description.interface import Feed, Interface, declared
 from wam_description.parameters import ParameterError
 from wam_description.signals import Level, NodeStatus
@@ -342,10 +343,19 @@ def main() -> None:
 
 
 def named_file(given: str, before: str, files: ExitStack) -> str:
-    """An argument of the command line; after --params-file the file of an installed configuration for its name."""
-    if before != "--params-file" or Path(given).exists() or given.endswith((".yaml", ".yml")):
+    """An argument of the command line; after --params-file a whole file for a configuration's name or an overlay."""
+    if before != "--params-file":
         return given
-    text = Configuration.load(packaged(given)).text
+    path = Path(given)
+    if path.exists() or path.suffix in (".yaml", ".yml"):
+        if not (
+            path.is_file()
+            and re.search(rf"^{BASE}\s*:", path.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
+        ):
+            return given  # what ROS can read, or complains about
+    else:
+        path = packaged(given)
+    text = Configuration.load(path).text
     file = Path(files.enter_context(TemporaryDirectory(prefix="wam_stack_")), "parameters.yaml")
     file.write_text(text, encoding="utf-8")
     return str(file)
