@@ -96,11 +96,13 @@ class MomentumObserver:
         self._load: ToolLoad | None = None
         if self._is_payload_declared or (parameters.payload_uncertainty > 0.0 and not use_joint_sensors):
             self._load = ToolLoad(arm, parameters.payload)
-        self._half_levels = 0.5 * np.array([*self._motors.dynamic, *self._joints.dynamic])
+        half_levels = 0.5 * np.array([*self._motors.dynamic, *self._joints.dynamic])
         statics = np.array([*self._motors.static, *self._joints.static])
         self._rest_sd, self._shape_sd = parameters.rest_uncertainty * statics, parameters.shape_uncertainty * statics
         self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
-        self._through_errors = np.hstack((self._through, self._through, np.eye(n), inverse.T))
+        # the same of the errors of the model, and their sizes
+        self._through_errors = np.hstack((-self._through, self._through, np.eye(n), -inverse.T))
+        self._sizes = np.concatenate((half_levels, half_levels, np.ones(2 * n)))
         payload_sd = 0.0
         if self._load is not None:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
@@ -295,22 +297,22 @@ class MomentumObserver:
         if self._cycle:
             # a shaft that slips in both directions within a cycle stops at both limits of its stiction
             resting, shape = resting * resting, np.minimum(shape, np.abs(sliding))
-        load, levels = self._load, self._half_levels
+        load = self._load
         effects = np.zeros((n, 6 * n + 1))
-        sizes = np.concatenate((-levels * (moving + sliding), levels * (moving - sliding), model, -signals[8 * n :]))
+        sizes = self._sizes * np.concatenate((moving + sliding, moving - sliding, model, signals[8 * n :]))
         np.multiply(self._through_errors, sizes, out=effects[:, :-1])
         if load is not None:
-            residual = residual - load.mass * np.array(load.torque)
             effects[:, -1] = load.torque
+            residual -= load.mass * effects[:, -1]
         variance = np.square(self._rest_sd * resting) + np.square(self._shape_sd * shape)
-        effort = self._map.motor_torques(model.tolist())
         # a faster filter averages less of what is noise
-        less = self._times[0] / self._times[which]
-        variance[:n] += less * (given.motor_torque_sd**2 + (given.motor_torque_fraction * np.array(effort)) ** 2)
+        less, least = self._times[0] / self._times[which], given.motor_torque_sd**2
+        sds = [given.motor_torque_fraction * torque for torque in self._map.motor_torques(model.tolist())]
+        variance[:n] += [less * (least + sd * sd) for sd in sds]
         rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
-        noise = self._inertia.dot(speed)
-        return Observation(residual, effects, rest + noise.dot(noise.T), less * moving[:n])
+        momentum = self._inertia.dot(speed)
+        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n])
 
     def identify_payload(self) -> str:
         """Identify the payload from the present external torques; '' or why that is not possible."""
