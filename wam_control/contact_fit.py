@@ -203,7 +203,8 @@ class ContactFit:
             mine[0] += weight
             mine[1] += weight * x
             mine[2] += weight * (x * x + width * width / 12.0)
-            mine[3] += weight * is_along
+            if is_along:
+                mine[3] += weight
         total, passed = sum(weights), 0.0
         enough = SET * total
         inside = [[math.inf, -math.inf] for _ in self._ends]

@@ -184,8 +184,9 @@ class ContactInference:
         """
         rows = np.empty((len(self._covers), 7, len(torques)))
         rows[:, 0] = torques
+        at = np.array(q)
         for i, cover in enumerate(self._covers):
-            np.matmul(cover.wrenches, self._body.cover_jacobian(q, cover.name), out=rows[i, 1:])
+            np.matmul(cover.wrenches, self._body.cover_jacobian(at, cover.name), out=rows[i, 1:])
         fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1))
         ambiguity = (
             self._ambiguity(q, fits)

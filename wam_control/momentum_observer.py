@@ -4,6 +4,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -95,9 +96,13 @@ class MomentumObserver:
         self._load: ToolLoad | None = None
         if self._is_payload_declared or (parameters.payload_uncertainty > 0.0 and not use_joint_sensors):
             self._load = ToolLoad(arm, parameters.payload)
-        self._levels = np.array([*self._motors.dynamic, *self._joints.dynamic])
-        self._statics = np.array([*self._motors.static, *self._joints.static])
+        half_levels = 0.5 * np.array([*self._motors.dynamic, *self._joints.dynamic])
+        statics = np.array([*self._motors.static, *self._joints.static])
+        self._rest_sd, self._shape_sd = parameters.rest_uncertainty * statics, parameters.shape_uncertainty * statics
         self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
+        # the same of the errors of the model, and their sizes
+        self._through_errors = np.hstack((-self._through, self._through, np.eye(n), -inverse.T))
+        self._sizes = np.concatenate((half_levels, half_levels, np.ones(2 * n)))
         payload_sd = 0.0
         if self._load is not None:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
@@ -110,7 +115,9 @@ class MomentumObserver:
         """Forget all samples."""
         n = self._n
         self.q: list[float] = [0.0] * n
-        self._filtered = [_Filtered([0.0] * n, [0.0] * n, np.zeros(9 * n)) for _ in self._times]
+        # a row for each filter: residual and torque of the model, (n,), N m, and the signals of the shafts
+        self._filtered = np.zeros((len(self._times), 2 * n if self._link_side else 11 * n))
+        self._decay = _Decay(0.0, self._filtered, self._filtered)
         self._ring = np.zeros((max(1, self._cycle), 10 * n))
         self._filled = 0
         if self._load is not None:
@@ -151,7 +158,7 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._link_side:
-            return self._update(_Sample(position, velocity, effort, [0.0] * n, None), dt)
+            return self._update(_Sample(position, velocity, effort, [0.0] * n, []), dt)
         if not any(effort) and max(map(abs, velocity)) < self._parameters.motor_rest_velocity:
             # at rest without current, brakes or stiction hold: motor torques carry no information
             self.reset()
@@ -189,37 +196,38 @@ class MomentumObserver:
         bias = (body.coriolis_transpose_times_velocity(at, speed) - body.gravity_torque(at)).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)]
         before, span = self._momentum, dt + self._gap
-        if before is None:
-            filtered = [_Filtered(each.residual, [-torque for torque in bias], each.signals) for each in self._filtered]
-        elif span <= self._parameters.time_constant:
+        n, filtered = self._n, self._filtered
+        external = model = [0.0] * n
+        if before is not None:
             rate = [(now - then) / span for now, then in zip(momentum, before, strict=True)]
             model = [p - 0.5 * (new + old) for p, new, old in zip(rate, bias, self._bias, strict=True)]
             external = [
                 p - 0.5 * (new + old) - torque
                 for p, new, old, torque in zip(rate, known, self._known, tau, strict=True)
             ]
-            filtered = [
-                each.after(external, model, math.exp(-span / time))
-                for each, time in zip(self._filtered, self._times, strict=True)
-            ]
-        else:  # the torques in so long a gap are unknown: continue from here
-            filtered = self._filtered
-        if not math.isfinite(sum(momentum) + sum(known) + sum(filtered[0].residual) + sum(filtered[0].model)):
+        if not math.isfinite(sum(momentum) + sum(known) + sum(external) + sum(model)):
             self._gap += dt
             return False
-        if signals is not None:  # strain gauges lie behind the friction
-            row = np.array(signals)
-            for i, time in enumerate(self._times):
-                keep = 0.0 if before is None else math.exp(-span / time)
-                filtered[i] = filtered[i]._replace(signals=keep * filtered[i].signals + (1.0 - keep) * row)
+        row = np.array([*external, *model, *signals])
+        if before is None:
+            row[n : 2 * n] = [-torque for torque in bias]
+            filtered[:] = row
+        else:
+            if span != self._decay.span:
+                self._decay = _Decay.over(span, self._times)
+            # the torques in a long gap are unknown: they continue from here
+            begin = 0 if span <= self._parameters.time_constant else 2 * n
+            part = filtered[:, begin:]
+            part *= self._decay.keep
+            part += self._decay.take * row[begin:]
         if self._load is not None:
-            keep = 0.0 if before is None else math.exp(-span / self._parameters.time_constant)
+            keep = 0.0 if before is None else float(self._decay.keep[0, 0])
             self._load.observe(q, qd, span, keep)
-        self.q, self._filtered, self._inertia = q, filtered, inertia
+        self.q, self._inertia = q, inertia
         self._momentum, self._known, self._bias, self._gap = momentum, known, bias, 0.0
         if self._cycle:
-            row = self._ring[self._filled % self._cycle]
-            row[: self._n], row[self._n :] = filtered[0].residual, filtered[0].signals
+            kept = self._ring[self._filled % self._cycle]
+            kept[:n], kept[n:] = filtered[0, :n], filtered[0, 2 * n :]
             self._filled += 1
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
@@ -239,10 +247,11 @@ class MomentumObserver:
             self._seen = self._observation()
             torques, covariance = self._errors.corrected(self._seen)
             return torques.tolist(), covariance
-        (residual, model, _), uncertainty, load = self._filtered[0], self._parameters.mass_uncertainty, self._load
+        filtered, uncertainty, load = self._filtered[0].tolist(), self._parameters.mass_uncertainty, self._load
+        residual, model = filtered[: self._n], filtered[self._n :]
         covariance = np.diag([self._parameters.joint_torque_sd**2 + (uncertainty * torque) ** 2 for torque in model])
         if load is None:
-            return list(residual), covariance
+            return residual, covariance
         residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
         sized = np.array(load.torque) * load.sd
         return residual, covariance + np.outer(sized, sized)
@@ -275,12 +284,12 @@ class MomentumObserver:
         """Let the friction know how certain the velocities are."""
         sd = self._velocity.sd
         self._motors.expect(sd)
-        self._joints.expect(np.sqrt(self._squared @ np.square(sd)).tolist())
+        self._joints.expect(np.sqrt(self._squared.dot(np.square(sd))).tolist())
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
         n, given, filtered = self._n, self._parameters, self._filtered[which]
-        residual, model, signals = np.array(filtered.residual), filtered.model, filtered.signals
+        residual, model, signals = filtered[:n].copy(), filtered[n : 2 * n], filtered[2 * n :]
         if self._cycle and self._filled:
             mean = self._ring[: self._filled].mean(axis=0)
             residual, signals = mean[:n], mean[n:]
@@ -290,24 +299,20 @@ class MomentumObserver:
             resting, shape = resting * resting, np.minimum(shape, np.abs(sliding))
         load = self._load
         effects = np.zeros((n, 6 * n + 1))
-        levels = 0.5 * self._levels
-        effects[:, : 2 * n] = self._through * (-levels * (moving + sliding))
-        effects[:, 2 * n : 4 * n] = self._through * (levels * (moving - sliding))
-        effects[range(n), range(4 * n, 5 * n)] = model
-        effects[:, 5 * n : 6 * n] = self._through[:, :n] * -signals[8 * n :]
+        sizes = self._sizes * np.concatenate((moving + sliding, moving - sliding, model, signals[8 * n :]))
+        np.multiply(self._through_errors, sizes, out=effects[:, :-1])
         if load is not None:
-            residual = residual - load.mass * np.array(load.torque)
             effects[:, -1] = load.torque
-        variance = (given.rest_uncertainty * self._statics * resting) ** 2
-        variance += (given.shape_uncertainty * self._statics * shape) ** 2
-        effort = self._map.motor_torques(model)
+            residual -= load.mass * effects[:, -1]
+        variance = np.square(self._rest_sd * resting) + np.square(self._shape_sd * shape)
         # a faster filter averages less of what is noise
-        less = self._times[0] / self._times[which]
-        variance[:n] += less * (given.motor_torque_sd**2 + (given.motor_torque_fraction * np.array(effort)) ** 2)
-        rest = (self._through * variance) @ self._through.T
+        less, least = self._times[0] / self._times[which], given.motor_torque_sd**2
+        sds = [given.motor_torque_fraction * torque for torque in self._map.motor_torques(model.tolist())]
+        variance[:n] += [less * (least + sd * sd) for sd in sds]
+        rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
-        noise = self._inertia @ speed
-        return Observation(residual, effects, rest + noise @ noise.T, less * moving[:n])
+        momentum = self._inertia.dot(speed)
+        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n])
 
     def identify_payload(self) -> str:
         """Identify the payload from the present external torques; '' or why that is not possible."""
@@ -319,27 +324,25 @@ class MomentumObserver:
         return self._load.identify_payload(torques, covariance)
 
 
-class _Filtered(NamedTuple):
-    """Residual and torque of the model, (n,), N m, and the signals of the shafts through the observer's filter."""
+class _Decay(NamedTuple):
+    """Of each filter, (times, 1), over a period of `span` seconds: what it keeps, and what it takes of a sample."""
 
-    residual: list[float]
-    model: list[float]
-    signals: Array
+    span: float
+    keep: Array
+    take: Array
 
-    def after(self, external: list[float], model: list[float], keep: float) -> "_Filtered":
-        """The residual and the model's torque one period later."""
-        take = 1.0 - keep
-        return self._replace(
-            residual=[keep * r + take * new for r, new in zip(self.residual, external, strict=True)],
-            model=[keep * m + take * new for m, new in zip(self.model, model, strict=True)],
-        )
+    @classmethod
+    def over(cls, span: float, times: Sequence[float]) -> "_Decay":
+        """The decay of filters with these time constants, s."""
+        keep = np.array([[math.exp(-span / time)] for time in times])
+        return cls(span, keep, 1.0 - keep)
 
 
 class _Sample(NamedTuple):
-    """One sample on the joint side: state, torque, friction, each (n,); `signals` of the shafts, to be filtered."""
+    """One sample on the joint side: state, torque, friction, each (n,); `signals` of the shafts if any."""
 
     q: list[float]
     qd: list[float]
     tau: list[float]
     friction: list[float]
-    signals: list[float] | None
+    signals: list[float]

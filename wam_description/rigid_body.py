@@ -1,5 +1,6 @@
 """Kinematics and dynamics of the links as rigid bodies, by pinocchio, from the arm's parameters."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -41,6 +42,11 @@ class RigidBody:
     ------
     ValueError
         if `mass_scale` has not one factor per link or a factor is not above zero.
+
+    Attributes
+    ----------
+    covers : names of all.
+    moving : names of the covers whose origin moves: that of the elbow, and of a wrist.
     """
 
     def __init__(self, arm: Arm, mass_scale: Sequence[float] | None = None) -> None:
@@ -51,7 +57,7 @@ class RigidBody:
         self._tool = self._model.getFrameId("tool")
         self._frame = {name: self._model.getFrameId(name) for name in self.covers}
         self._joint = {name: self._model.frames[frame].parentJoint for name, frame in self._frame.items()}
-        self._moving = tuple(name for name in self.covers if self.moves(name, (0.0, 0.0, 0.0)))
+        self.moving = tuple(name for name in self.covers if self.moves(name, (0.0, 0.0, 0.0)))
 
     def cover_pose(self, q: ArrayLike, cover: str) -> Pose:
         """Frame of a cover in base coordinates."""
@@ -93,8 +99,8 @@ class RigidBody:
         return any(float(np.abs(self.point_jacobian(q, cover, p)).max()) >= SMALL for q in poses)
 
     def start_velocities(self, q: ArrayLike, qd: ArrayLike) -> dict[str, Array]:
-        """Velocity, (3,), m/s, of the origin of every cover whose origin moves: of the elbow, and of a wrist."""
-        return {name: self.point_jacobian(q, name, (0.0, 0.0, 0.0)) @ _vector(qd) for name in self._moving}
+        """Velocity, (3,), m/s, of the origin of every cover in `moving`."""
+        return {name: self.point_jacobian(q, name, (0.0, 0.0, 0.0)) @ _vector(qd) for name in self.moving}
 
     def cover_jacobian(self, q: ArrayLike, cover: str) -> Array:
         """Motion of a cover per joint velocity, in the cover's frame.
@@ -118,12 +124,13 @@ class RigidBody:
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         return _columns(pin.computeFrameJacobian(self._model, self._data, _vector(q), self._tool, aligned))[:3]
 
-    def elbow_and_tip_velocity(self, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
-        """Velocities of the origins of the last cover and of the tool, (3,) each, m/s, in base coordinates."""
+    def start_and_tool_speeds(self, q: ArrayLike, qd: ArrayLike) -> list[float]:
+        """Speeds, m/s, of the origins of the covers in `moving`, then of the tool's, from one pass along the chain."""
         pin.forwardKinematics(self._model, self._data, _vector(q), _vector(qd))
-        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        elbow = pin.getFrameVelocity(self._model, self._data, self._frame[self.covers[-1]], aligned)
-        return elbow.linear, pin.getFrameVelocity(self._model, self._data, self._tool, aligned).linear
+        local = pin.ReferenceFrame.LOCAL  # the size is the same in every frame
+        frames = (*(self._frame[name] for name in self.moving), self._tool)
+        velocities = (pin.getFrameVelocity(self._model, self._data, frame, local).linear for frame in frames)
+        return [math.hypot(*velocity.tolist()) for velocity in velocities]
 
     def hand_jacobian(self, q: ArrayLike) -> Array:
         """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in frame 5 (A.7 corrected)."""

@@ -278,12 +278,12 @@ class Synchroniser:
 
     def _has_missed(self, stamp: int) -> bool:
         """Whether an input of this step can no longer come, as a later one is there: the node began too late for it."""
-        return any(
-            kept and 0 < cause < max(kept) and cause not in kept
-            for group in self._groups
-            for cause in (self._cause(group, stamp),)
-            for _, kept in group.members
-        )
+        for group in self._groups:
+            cause = self._cause(group, stamp)
+            for _, kept in group.members:
+                if kept and cause not in kept and 0 < cause < max(kept):
+                    return True
+        return False
 
     def _step(self, stamp: int, taken: Mapping[str, tuple[int, Any] | None]) -> Inputs:
         """The inputs of a step that is complete, with the time since the one before."""
@@ -331,16 +331,14 @@ class Synchroniser:
         Where it waits, `_lacks` is where that input will be, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
-        taken: dict[str, tuple[int, Any] | None] = {}
-        for topic, newest in self._newest.items():
-            taken[topic] = newest.taken(stamp)
-        for group in self._groups:
-            cause = self._cause(group, stamp)
+        taken: dict[str, tuple[int, Any] | None] = {topic: each.taken(stamp) for topic, each in self._newest.items()}
+        causes = [self._cause(group, stamp) for group in self._groups]
+        for group, cause in zip(self._groups, causes, strict=True):
             for topic, kept in group.members:
                 if cause in kept:
                     taken[topic] = (cause, kept[cause])
                 elif cause:
-                    self._lacks = kept, cause, min(self._cause(one, stamp) for one in self._groups)
+                    self._lacks = kept, cause, min(causes)
                     return None
         for group in self._groups:
             for topic, kept in group.members:

@@ -56,7 +56,7 @@ class Amplifier:
         self.continuous = [t / k for t, k in zip(motors.continuous_torque, motors.torque_constant, strict=True)]
         self.heat = [0.0] * len(self.peak)
         self._parameters = parameters
-        self._is_noisy = any(parameters.current_noise)
+        self._is_noisy, self._is_rippled = any(parameters.current_noise), any(parameters.torque_ripple)
         self._random = random
 
     def reset(self) -> None:
@@ -65,18 +65,19 @@ class Amplifier:
 
     def step(self, currents: Sequence[float], dt: float) -> list[float]:
         """Actual currents over `dt` seconds, A, (n,), for the commanded currents, A, (n,)."""
-        parameters = self._parameters
+        parameters, continuous, heat = self._parameters, self.continuous, self.heat
         noise = self._random.standard_normal(len(self.peak)).tolist() if self._is_noisy else None
         actual = []
         for i, current in enumerate(currents):
-            limit = self.continuous[i] if self.heat[i] >= 1.0 else self.peak[i]
+            limit = continuous[i] if heat[i] >= 1.0 else self.peak[i]
             if abs(current) < parameters.deadband[i]:
                 current = 0.0  # noqa: PLW2901
             if noise and current:
                 current += parameters.current_noise[i] * noise[i]  # noqa: PLW2901
-            actual.append(min(max(current, -limit), limit))
-            ratio = actual[i] / self.continuous[i]
-            self.heat[i] += (ratio * ratio - self.heat[i]) * dt / parameters.thermal_time
+            limited = min(max(current, -limit), limit)
+            actual.append(limited)
+            ratio = limited / continuous[i]
+            heat[i] += (ratio * ratio - heat[i]) * dt / parameters.thermal_time
         return actual
 
     def nominal_torque(self, currents: Sequence[float]) -> list[float]:
@@ -86,6 +87,8 @@ class Amplifier:
     def torque(self, currents: Sequence[float], theta: Sequence[float]) -> list[float]:
         """Torque on the rotors at the angles theta, rad, with the ripple of the commutation, N m, (n,)."""
         torque = [k * i for k, i in zip(self._true_constant, currents, strict=True)]
+        if not self._is_rippled:
+            return torque
         for i, (ripple, cycles) in enumerate(
             zip(self._parameters.torque_ripple, self._parameters.ripple_cycles, strict=True)
         ):

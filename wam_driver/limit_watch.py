@@ -1,6 +1,5 @@
 """What the driver watches: each quantity, its limit, and the warning near it."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -55,26 +54,31 @@ class LimitWatch:
         self._peak = [torque / k for torque, k in zip(motors.peak_torque, motors.torque_constant, strict=True)]
         self._middle = [0.5 * (low + high) for low, high in zip(joints.lower, joints.upper, strict=True)]
         self._half = [0.5 * (high - low) for low, high in zip(joints.lower, joints.upper, strict=True)]
-        self._travel = self._half
-        zero = [0.0] * len(joints.names)
-        self._starts = list(self._body.start_velocities(zero, zero))
-        self._speeds = [*[elbow_speed_limit] * len(self._starts), tip_speed_limit, *joints.speed_limit]
+        starts = self._body.moving
+        self._speeds = [*[elbow_speed_limit] * len(starts), tip_speed_limit, *joints.speed_limit]
         self._strengths = [circuit.breaking_strength for circuit in arm.circuits]
         self._of_cables = [(f"cable tension of {name}", "N") for name in motors.names]
         self._quantities = [
-            *((f"speed of the start of {cover}", "m/s") for cover in self._starts),
+            *((f"speed of the start of {cover}", "m/s") for cover in starts),
             ("speed of the tip", "m/s"),
             *((f"speed of {name}", "rad/s") for name in joints.names),
             *((f"travel of {name} from the middle of its range", "rad") for name in joints.names),
             *((f"current of {name}", "A") for name in motors.names),
             *self._of_cables,
         ]
+        self._limits = self._with_travel(self._half)
+
+    def _with_travel(self, travel: Sequence[float]) -> list[float]:
+        """The limits of all quantities, with those of the travel, (n,), rad."""
+        return [*self._speeds, *travel, *self._peak, *self._strengths]
 
     def begin(self, theta: Sequence[float]) -> None:
         """The brakes are released at the motor angles theta, (n,), rad: an arm beyond a stop may come back."""
         q = self._map.joint_positions(theta)
         there = [abs(angle - middle) for angle, middle in zip(q, self._middle, strict=True)]
-        self._travel = [half if at <= half else at + LEEWAY for at, half in zip(there, self._half, strict=True)]
+        self._limits = self._with_travel(
+            [half if at <= half else at + LEEWAY for at, half in zip(there, self._half, strict=True)]
+        )
 
     def watched(
         self, theta: Sequence[float], thetad: Sequence[float], currents: Sequence[float], tensions: Sequence[float]
@@ -88,16 +92,14 @@ class LimitWatch:
         tensions : largest of each cable since the last check, N, (n,).
         """
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
-        starts = self._body.start_velocities(q, qd)
         values = [
-            *(math.hypot(*starts[cover]) for cover in self._starts),
-            math.hypot(*(self._body.tool_jacobian(q) @ qd)),
+            *self._body.start_and_tool_speeds(q, qd),
             *map(abs, qd),
             *[abs(angle - middle) for angle, middle in zip(q, self._middle, strict=True)],
             *map(abs, currents),
             *tensions,
         ]
-        return _near(self._quantities, values, [*self._speeds, *self._travel, *self._peak, *self._strengths])
+        return _near(self._quantities, values, self._limits)
 
     def tensions(self, tensions: Sequence[float]) -> list[WatchedLimit]:
         """The cables whose tension, (n,), N, is near their breaking strength, also while the brakes stop the arm."""
