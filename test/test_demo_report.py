@@ -460,7 +460,7 @@ def test_drawn_picture_is_written_and_the_same_every_time(tmp_path, recwarn):
         save(tmp_path / name, summary, recorded, gl=())
     picture = (tmp_path / "a.png").read_bytes()
     width, height = struct.unpack(">II", picture[16:24])
-    assert (width, height) == (2000, 860)
+    assert (width, height) == (1800, 800)
     assert len(picture) > 50_000
     assert picture == (tmp_path / "b.png").read_bytes()
     assert not recwarn.list
