@@ -93,7 +93,6 @@ def cycling(tmp_path_factory: pytest.TempPathFactory, domain_of_module: int) -> 
             "recorder:directory": str(folder),
             "recorder:name": "bag",
             "force_loop:force_gain": [8e-3],
-            "force_loop:sensing.force_sd_limit": 20.0,  # friction hides the force; the cycle is wanted
             **STICTION,
         }
     )
