@@ -89,17 +89,19 @@ class ForceHold:
     ) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
 
-        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface.  At a position that is
-        not known, slower: what is touched has to be identified before the force is too large.
+        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, unless friction would
+        move the arm in jerks.  At a position that is not known, slower: what is touched has to be identified before the
+        force is too large.
         """
         if not parameters.limits.impact:
             return math.inf
         stiffness = parameters.guard.contact_stiffness
         yielding = 1.0 / stiffness + axis.compliance
         is_known = point.is_pinned or point.is_certain
-        if self.is_touching:
-            return desired * yielding / ((LATE if is_known else IDENTIFIED) * axis.speed_fraction)
         slowest = CREEP / parameters.limits.settling_time
+        if self.is_touching:
+            whole = desired * yielding / axis.speed_fraction
+            return max(whole / LATE, slowest) if is_known else whole / IDENTIFIED
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
         return fastest if is_known else min(fastest, max(desired * yielding / DETECTED, slowest))
 
