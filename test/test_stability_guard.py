@@ -365,7 +365,7 @@ FAST = Timing("lockstep", 1e-4, 1, 10, 0, 10, 0, 5.0, 0.0, 0)
 
 def rod(schedule: str) -> ForceLoop:
     """The joint-torque loop of one joint behind a firm servo, at 1 kHz, tuned for a contact at the tip."""
-    own = TESTBED.node("force_loop", ForceLoopParameters)
+    own = replace(TESTBED.node("force_loop", ForceLoopParameters), contact_source="estimated")
     guard = replace(
         own.guard, mode="refuse", contact_stiffness=1500.0, stability_fraction=1.0, feedback_lag=0.0,
     )  # fmt: skip

@@ -19,7 +19,7 @@ CONFLICT = 0.1  # s, after which another contact counts
 DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
 DETECTED = 0.08  # s, until a touch is detected there
-LATE = 0.1  # s, the same as IDENTIFIED where the position is known and the measured force is late
+LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -89,19 +89,19 @@ class ForceHold:
     ) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
 
-        At a position that is not known, slower: what is touched has to be identified before the force is too large;
-        and where the measured force is late, as it is estimated from the motors.
+        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, unless friction would
+        move the arm in jerks.  At a position that is not known, slower: what is touched has to be identified before the
+        force is too large.
         """
         if not parameters.limits.impact:
             return math.inf
         stiffness = parameters.guard.contact_stiffness
         yielding = 1.0 / stiffness + axis.compliance
         is_known = point.is_pinned or point.is_certain
-        if self.is_touching:
-            is_late = parameters.feedback == "contact_estimate"  # it is the mean over a cycle of the dither
-            rise = LATE if is_known and is_late else IDENTIFIED
-            return desired * yielding / (rise * axis.speed_fraction) if is_late or not is_known else math.inf
         slowest = CREEP / parameters.limits.settling_time
+        if self.is_touching:
+            whole = desired * yielding / axis.speed_fraction
+            return max(whole / LATE, slowest) if is_known else whole / IDENTIFIED
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
         return fastest if is_known else min(fastest, max(desired * yielding / DETECTED, slowest))
 
