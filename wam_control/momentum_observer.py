@@ -115,9 +115,10 @@ class MomentumObserver:
         """Forget all samples."""
         n = self._n
         self.q: list[float] = [0.0] * n
-        # a row for each filter: residual and torque of the model, (n,), N m, and the signals of the shafts
-        self._filtered = np.zeros((len(self._times), 2 * n if self._link_side else 11 * n))
-        self._decay = _Decay(0.0, self._filtered, self._filtered)
+        # of each filter the residual and the torque of the model, (2 n,), N m, and the signals of the shafts, (9 n,)
+        self._torques = [[0.0] * (2 * n) for _ in self._times]
+        self._signals = np.zeros((len(self._times), 9 * n))
+        self._decay = _Decay.over(math.inf, self._times)
         self._ring = np.zeros((max(1, self._cycle), 10 * n))
         self._filled = 0
         if self._load is not None:
@@ -196,7 +197,7 @@ class MomentumObserver:
         bias = (body.coriolis_transpose_times_velocity(at, speed) - body.gravity_torque(at)).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)]
         before, span = self._momentum, dt + self._gap
-        n, filtered = self._n, self._filtered
+        n, torques = self._n, self._torques
         external = model = [0.0] * n
         if before is not None:
             rate = [(now - then) / span for now, then in zip(momentum, before, strict=True)]
@@ -208,26 +209,28 @@ class MomentumObserver:
         if not math.isfinite(sum(momentum) + sum(known) + sum(external) + sum(model)):
             self._gap += dt
             return False
-        row = np.array([*external, *model, *signals])
+        if span != self._decay.span:
+            self._decay = _Decay.over(span, self._times)
         if before is None:
-            row[n : 2 * n] = [-torque for torque in bias]
-            filtered[:] = row
-        else:
-            if span != self._decay.span:
-                self._decay = _Decay.over(span, self._times)
-            # the torques in a long gap are unknown: they continue from here
-            begin = 0 if span <= self._parameters.time_constant else 2 * n
-            part = filtered[:, begin:]
-            part *= self._decay.keep
-            part += self._decay.take * row[begin:]
+            torques = [[0.0] * n + [-torque for torque in bias] for _ in self._times]
+            self._signals[:] = signals or 0.0
+        elif span <= self._parameters.time_constant:  # the torques in so long a gap are unknown: continue from here
+            present = external + model
+            torques = [
+                [keep * old + take * new for old, new in zip(each, present, strict=True)]
+                for each, keep, take in zip(torques, self._decay.keep, self._decay.take, strict=True)
+            ]
+        if before is not None and signals:  # strain gauges lie behind the friction
+            self._signals *= self._decay.keeps
+            self._signals += self._decay.takes * np.array(signals)
         if self._load is not None:
-            keep = 0.0 if before is None else float(self._decay.keep[0, 0])
+            keep = 0.0 if before is None else self._decay.keep[0]
             self._load.observe(q, qd, span, keep)
-        self.q, self._inertia = q, inertia
+        self.q, self._torques, self._inertia = q, torques, inertia
         self._momentum, self._known, self._bias, self._gap = momentum, known, bias, 0.0
         if self._cycle:
             kept = self._ring[self._filled % self._cycle]
-            kept[:n], kept[n:] = filtered[0, :n], filtered[0, 2 * n :]
+            kept[:n], kept[n:] = torques[0][:n], self._signals[0]
             self._filled += 1
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
@@ -247,8 +250,8 @@ class MomentumObserver:
             self._seen = self._observation()
             torques, covariance = self._errors.corrected(self._seen)
             return torques.tolist(), covariance
-        filtered, uncertainty, load = self._filtered[0].tolist(), self._parameters.mass_uncertainty, self._load
-        residual, model = filtered[: self._n], filtered[self._n :]
+        uncertainty, load = self._parameters.mass_uncertainty, self._load
+        residual, model = self._torques[0][: self._n], self._torques[0][self._n :]
         covariance = np.diag([self._parameters.joint_torque_sd**2 + (uncertainty * torque) ** 2 for torque in model])
         if load is None:
             return residual, covariance
@@ -288,8 +291,8 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        n, given, filtered = self._n, self._parameters, self._filtered[which]
-        residual, model, signals = filtered[:n].copy(), filtered[n : 2 * n], filtered[2 * n :]
+        n, given, torques = self._n, self._parameters, self._torques[which]
+        residual, model, signals = np.array(torques[:n]), torques[n:], self._signals[which]
         if self._cycle and self._filled:
             mean = self._ring[: self._filled].mean(axis=0)
             residual, signals = mean[:n], mean[n:]
@@ -307,7 +310,7 @@ class MomentumObserver:
         variance = np.square(self._rest_sd * resting) + np.square(self._shape_sd * shape)
         # a faster filter averages less of what is noise
         less, least = self._times[0] / self._times[which], given.motor_torque_sd**2
-        sds = [given.motor_torque_fraction * torque for torque in self._map.motor_torques(model.tolist())]
+        sds = [given.motor_torque_fraction * torque for torque in self._map.motor_torques(model)]
         variance[:n] += [less * (least + sd * sd) for sd in sds]
         rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
@@ -325,17 +328,20 @@ class MomentumObserver:
 
 
 class _Decay(NamedTuple):
-    """Of each filter, (times, 1), over a period of `span` seconds: what it keeps, and what it takes of a sample."""
+    """Of each filter, over a period of `span` seconds, what it keeps and what it takes of a sample; as columns, too."""
 
     span: float
-    keep: Array
-    take: Array
+    keep: list[float]
+    take: list[float]
+    keeps: Array
+    takes: Array
 
     @classmethod
     def over(cls, span: float, times: Sequence[float]) -> "_Decay":
         """The decay of filters with these time constants, s."""
-        keep = np.array([[math.exp(-span / time)] for time in times])
-        return cls(span, keep, 1.0 - keep)
+        keep = [math.exp(-span / time) for time in times]
+        take = [1.0 - each for each in keep]
+        return cls(span, keep, take, np.array(keep)[:, None], np.array(take)[:, None])
 
 
 class _Sample(NamedTuple):
