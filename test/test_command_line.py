@@ -1,9 +1,11 @@
 """The command line: what it says to words it does not know, and how one number is changed."""
 
+import argparse
 import importlib
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -177,6 +179,23 @@ def test_each_shell_has_its_script(shell: str, capsys: pytest.CaptureFixture[str
     assert (code, err) == (0, "")
     assert "wam" in out
     assert "_ARGCOMPLETE" in out
+
+
+def requests_of(parser: argparse.ArgumentParser, *before: str) -> Iterator[tuple[str, ...]]:
+    """The words of every command below a parser."""
+    for action in parser._actions:
+        for name, below in action.choices.items() if isinstance(action, argparse._SubParsersAction) else ():
+            yield (*before, name)
+            yield from requests_of(below, *before, name)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_and_each_of_its_requests_has_a_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    module = importlib.import_module(f"wam_cli.commands.{command}")
+    module.arguments(parser := argparse.ArgumentParser())
+    for words in [(command,), *requests_of(parser, command)]:
+        code, out, err = said(capsys, *words, "--help")
+        assert (code, err, out.startswith(f"usage: wam {' '.join(words)} ")) == (0, "", True), words
 
 
 def test_the_help_fits_a_narrow_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -55,7 +55,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     heard.add_argument("--count", type=int, metavar="N", help="end after so many; default: Ctrl-C")
     push = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
     push.add_argument("cover", help="link that is pushed, for example outer_link")
-    push.add_argument("force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), help="N, in the frame of the link")
+    push.add_argument("force", type=float, nargs=3, metavar="N", help="x, y and z, in the frame of the link")
     push.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")
     push.add_argument("--seconds", type=float, default=1.0, help="of the arm's time; default: %(default)g")
 
