@@ -10,15 +10,16 @@ from typing import Any, Final
 
 import yaml
 
-from wam_cli.commands import namespace
+from wam_cli.commands import at_least, namespace
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part
-from wam_description.signals import BASE, Wrench
+from wam_description.signals import BASE, NodeStatus, Wrench
 from wam_description.topics import BY_NAME, TABLE
 from wam_description.wiring import Call, SetParameters
+from wam_driver.safety import Mode
 from wam_live.hold import HeldTopic
-from wam_ros.call import CalledStack, Reply
+from wam_ros.call import SILENCE, CalledStack, Reply
 from wam_ros.header import stamp_of
 from wam_ros.messages import read_table
 
@@ -137,7 +138,48 @@ def plain(message: Any, topic: str = "") -> Any:
 
 
 def _push(given: argparse.Namespace, stack: CalledStack) -> int:
-    shared = build_part(Shared, stack.parameters("driver"))
+    push, at, shared = _wrench(given, stack.parameters("driver"))
+    statuses = stack.statuses()
+    hold = HeldTopic(stack.node, "sim/disturbance", shared)
+    begin = stamp = 0
+    try:
+        for message in stack.messages("joint_states", SILENCE):
+            driver = statuses["driver"]
+            if driver.mode != Mode.ENABLED.value:
+                told = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
+                raise ValueError(f"{told}: the arm is {_state(driver)}")
+            stamp = stamp_of(message)
+            begin = begin or stamp
+            if stamp - begin > given.seconds * 1e9:
+                break
+            if refusal := hold.send(stamp, push):
+                raise ValueError(f"not pushed: {refusal}")
+    except TimeoutError as error:
+        told = "the push ended" if begin else "not pushed"
+        raise ValueError(f"{told}: the arm is paused, or its time stands still ({error}); wam call resume") from error
+    finally:
+        if hold.is_on:
+            hold.send(stamp, Wrench(BASE, ZERO, ZERO))
+            hold.end()
+    newtons = math.hypot(*push.force)
+    print(f"pushed {given.cover} with {newtons:g} N at {at:.2f} m for {(stamp - begin) / 1e9:.2f} s")
+    return 0
+
+
+def _state(driver: NodeStatus) -> str:
+    """Why the arm does not move, and what to do."""
+    if driver.fault:
+        return f"in fault ({driver.fault}); wam call reset_fault, then wam call enable"
+    return f"{driver.mode}; wam call enable"
+
+
+def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrench, float, Shared]:
+    """What is to be sent, the place, m, and the shared parameters among those of the driver."""
+    at_least("--seconds", given.seconds, 0.0)
+    for what, value in (("the force", math.hypot(*given.force)), ("--seconds", given.seconds)):
+        if not math.isfinite(value):
+            raise ValueError(f"{what} is {value:g}; it must be finite")
+    shared = build_part(Shared, driver)
     covers = shared.arm.covers
     if given.cover not in covers.names:
         raise ValueError(f"no link '{given.cover}'; push one of {', '.join(covers.names)}")
@@ -148,19 +190,10 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
         raise ValueError(f"--at is {at:g} m; {given.cover} is from {low:g} to {high:g} m")
     x, y, z = given.force
     push = Wrench(given.cover, (x, y, z), (0.0, -at * z, at * y))
-    hold = HeldTopic(stack.node, "sim/disturbance", shared)
-    begin = stamp = 0
-    try:
-        for message in stack.messages("joint_states"):
-            stamp = stamp_of(message)
-            begin = begin or stamp
-            if stamp - begin > given.seconds * 1e9:
-                break
-            if refusal := hold.send(stamp, push):
-                raise ValueError(f"not pushed: {refusal}")
-    finally:
-        if hold.is_on:
-            hold.send(stamp, Wrench(BASE, ZERO, ZERO))
-            hold.end()
-    print(f"pushed {given.cover} with {math.hypot(x, y, z):g} N at {at:.2f} m for {(stamp - begin) / 1e9:.2f} s")
-    return 0
+    for what, vector, unit in (("force", push.force, "N"), ("torque", push.torque, "N m")):
+        name = f"disturbance_{what}_limit"
+        if math.hypot(*vector) > driver.get(name, math.inf):  # a driver of one's own need not have one
+            raise ValueError(
+                f"the {what} is {math.hypot(*vector):.4g} {unit}; allowed: up to {name}, {driver[name]:g} {unit}"
+            )
+    return push, at, shared
