@@ -89,6 +89,14 @@ def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
     assert "started" not in out
 
 
+@pytest.mark.parametrize("command", ["demo", "up --live", "live", "view bag"])
+@pytest.mark.parametrize("port", ["99999", "0", "-1", "web"])
+def test_a_port_that_does_not_exist_is_refused(command: str, port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = said(capsys, *command.split(), f"--port={port}")
+    assert (code, out) == (2, "")
+    assert f"argument --port: '{port}' is no port; allowed: 1 to 65535" in err
+
+
 def test_an_extra_that_is_missing_is_named_in_one_sentence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
