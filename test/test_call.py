@@ -46,6 +46,8 @@ def test_a_live_parameter_is_read_changed_and_refused(stack: None) -> None:
     assert (code, out) == (1, "")
     assert "posture_gain" in err
     assert called("get", "force_loop:posture_gain")[1] == "1.25\n"
+    wrong = "wam call: force_loop:force_gain is 'abc'; it must be a number\n"
+    assert called("set", "force_loop:force_gain=abc") == (1, "", wrong)
     code, out, err = called("get", "force_loop:posture_gian")
     assert (code, out) == (1, "")
     assert "did you mean 'posture_gain'?" in err
@@ -57,6 +59,16 @@ def test_a_push_reaches_the_arm_and_a_wrong_one_is_refused(stack: None) -> None:
     assert (code, out.startswith("pushed outer_link with 12 N at 0.30 m")) == (0, True)
     assert "push one of inner_link, outer_link" in called("push", "hand", "0", "0", "1")[2]
     assert "--at is 2 m" in called("push", "outer_link", "0", "0", "1", "--at", "2")[2]
+
+
+def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: None) -> None:
+    for words in [("get", "nosuch"), ("set", "nosuch:gain=1"), ("echo", "nosuch")]:
+        code, out, err = called(*words)
+        assert (code, out) == (1, "")
+        assert "start the stack" not in err
+        there = set(err.partition("; there are ")[2].strip().split(", "))
+        assert ({"joint_states", "status"} if words[0] == "echo" else {"driver", "force_loop"}) <= there
+        assert "wam_call" not in there
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import importlib
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
@@ -26,6 +26,7 @@ SILENCE: Final = 2.0  # s, after which a topic that comes in every period of the
 ATTEMPTS: Final = 20
 SET_ATTEMPTS: Final = 3  # the guard of the force loop takes its time over new gains
 WAITING: Final = 100  # messages that may wait for a slow terminal
+DISCOVERY: Final = 2.0  # s, after which no more of a stack comes
 START: Final = "start the stack with 'wam up'"
 
 
@@ -84,7 +85,7 @@ class CalledStack:
         Raises
         ------
         NoAnswerError
-            where it does not answer.
+            where it does not answer, or there is no such node.
         """
         asked = RemoteParameters(self.node, [node])
 
@@ -92,7 +93,12 @@ class CalledStack:
             asked.ask()
             return not asked.missing
 
-        self._wait(is_answered, f"no node '{node}' answers")
+        def nodes() -> list[str]:
+            own = self.node.get_namespace()
+            found = {name for name, where in self.node.get_node_names_and_namespaces() if where == own}
+            return [] if node in found else sorted(found - {self.node.get_name()})
+
+        self._wait(is_answered, f"no node '{node}' answers", nodes)
         return asked.found[node]
 
     def statuses(self) -> dict[str, NodeStatus]:
@@ -130,12 +136,17 @@ class CalledStack:
         TimeoutError
             where no message came for so long.
         """
-        name = self.node.resolve_topic_name(topic)
+        name, own = self.node.resolve_topic_name(topic), f"{self.node.get_namespace()}/"
 
         def kinds() -> list[str]:
             return dict(self.node.get_topic_names_and_types()).get(name, [])
 
-        self._wait(kinds, f"no topic {name}")
+        def topics() -> list[str]:
+            return [
+                found.removeprefix(own) for found, _ in self.node.get_topic_names_and_types() if found.startswith(own)
+            ]
+
+        self._wait(kinds, f"no topic {name}", topics)
         package, _, kind = kinds()[0].split("/")
         row = BY_NAME.get(topic)
         profile = QoSProfile(depth=WAITING, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -161,9 +172,15 @@ class CalledStack:
         finally:
             self.node.destroy_subscription(subscription)
 
-    def _wait(self, condition: Callable[[], Any], failure: str) -> None:
-        end = time.monotonic() + PATIENCE
+    def _wait(self, condition: Callable[[], Any], failure: str, others: Callable[[], Sequence[str]] = tuple) -> None:
+        """Wait for a condition; not as long where others than what is asked for are there, and no more come."""
+        begin = since = time.monotonic()
+        there: Sequence[str] = ()
         while not condition():
-            if time.monotonic() > end:
+            now, before, there = time.monotonic(), there, others()
+            since = now if there != before else since
+            if there and now - since > DISCOVERY:
+                raise NoAnswerError(f"{failure}; there are {', '.join(there)}")
+            if now - begin > PATIENCE:
                 raise NoAnswerError(f"{failure} within {PATIENCE:g} s; {START}")
             self._connection.executor.spin_once(timeout_sec=0.05)

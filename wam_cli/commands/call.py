@@ -34,6 +34,7 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "step": ("pause, and let one period pass", (Call("driver", "pause", True), Call("driver", "step"))),
     "resume": ("let the time go on", (Call("driver", "pause", False),)),
 }
+KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 ZERO: Final = (0.0, 0.0, 0.0)
 
 
@@ -97,14 +98,20 @@ def _set(given: argparse.Namespace, stack: CalledStack) -> int:
     like = values[name]
     if hasattr(like, "__len__") and not isinstance(like, str):
         value = [value] * len(like) if not isinstance(value, list) else value
-        value = [_like(one, like[0]) if len(like) else one for one in value]
-    reply = stack.request(SetParameters(node, {name: _like(value, like)}))
-    return _told([reply._replace(message=reply.message or f"{node}:{name}={value}")])
+        new: Any = [_like(one, like[0], key) if len(like) else one for one in value]
+    else:
+        new = _like(value, like, key)
+    reply = stack.request(SetParameters(node, {name: new}))
+    return _told([reply._replace(message=reply.message or f"{key}={value}")])
 
 
-def _like(value: Any, like: Any) -> Any:
-    """A whole number where a parameter has none is one with a point."""
-    return float(value) if isinstance(like, float) and type(value) is int else value
+def _like(value: Any, like: Any, name: str) -> Any:
+    """A value of the kind that a parameter has; a whole number where that has none is one with a point."""
+    if isinstance(like, float) and type(value) is int:
+        return float(value)
+    if type(value) is not type(like):
+        raise ValueError(f"{name} is '{value}'; it must be {KINDS[type(like)]}")
+    return value
 
 
 def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
