@@ -85,6 +85,12 @@ def test_a_push_that_is_no_number_or_too_great_is_refused(words: tuple[str, ...]
     assert message in err
 
 
+def test_the_tare_is_that_of_the_force_loop(stack: None) -> None:
+    assert "let the force loop count the present external torques as zero" in " ".join(called("--help")[1].split())
+    told = "the present external torques now count as zero in the force loop\n"
+    assert called("tare") == (0, told, "")
+
+
 def test_an_arm_that_cannot_be_pushed_is_told_with_what_to_do(stack: None) -> None:
     def push(*words: str) -> tuple[int, str, str]:
         return called("push", "outer_link", "0", "12", "0", *words)

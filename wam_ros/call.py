@@ -173,7 +173,7 @@ class CalledStack:
             self.node.destroy_subscription(subscription)
 
     def _wait(self, condition: Callable[[], Any], failure: str, others: Callable[[], Sequence[str]] = tuple) -> None:
-        """Wait for a condition; not as long where others than what is asked for are there, and no more come."""
+        """Wait for a condition; not as long where others are there instead, and no more come."""
         begin = since = time.monotonic()
         there: Sequence[str] = ()
         while not condition():

@@ -29,7 +29,7 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "estop": ("stop at once and latch a fault", (Call("driver", "estop"),)),
     "reset_fault": ("forget the latched fault", (Call("driver", "reset_fault"),)),
     "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
-    "tare": ("count the present external torques as payload", (Call("force_loop", "tare"),)),
+    "tare": ("let the force loop count the present external torques as zero", (Call("force_loop", "tare"),)),
     "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
     "step": ("pause, and let one period pass", (Call("driver", "pause", True), Call("driver", "step"))),
     "resume": ("let the time go on", (Call("driver", "pause", False),)),
@@ -163,7 +163,7 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
                 raise ValueError(f"not pushed: {refusal}")
     except TimeoutError as error:
         told = "the push ended" if begin else "not pushed"
-        raise ValueError(f"{told}: the arm is paused, or its time stands still ({error}); wam call resume") from error
+        raise ValueError(f"{told}: the arm is paused, or its time does not go on ({error}); wam call resume") from error
     finally:
         if hold.is_on:
             hold.send(stamp, Wrench(BASE, ZERO, ZERO))
