@@ -30,6 +30,15 @@ def called(*words: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
+def wait_for_push() -> None:
+    """Return when the simulated arm is pushed."""
+    lines = subprocess.Popen([*WAM, "call", "echo", "sim/contact/wrench"], stdout=subprocess.PIPE, text=True)
+    assert lines.stdout is not None
+    next(line for line in lines.stdout if "y: 1.0" in line)
+    lines.terminate()
+    lines.wait(LONG)
+
+
 def test_a_live_parameter_is_read_changed_and_refused(stack: None) -> None:
     assert called("set", "force_loop:posture_gain=1.25")[0] == 0
     assert called("get", "force_loop:posture_gain") == (0, "1.25\n", "")
@@ -37,6 +46,8 @@ def test_a_live_parameter_is_read_changed_and_refused(stack: None) -> None:
     assert (code, out) == (1, "")
     assert "posture_gain" in err
     assert called("get", "force_loop:posture_gain")[1] == "1.25\n"
+    wrong = "wam call: force_loop:force_gain is 'abc'; it must be a number\n"
+    assert called("set", "force_loop:force_gain=abc") == (1, "", wrong)
     code, out, err = called("get", "force_loop:posture_gian")
     assert (code, out) == (1, "")
     assert "did you mean 'posture_gain'?" in err
@@ -48,6 +59,66 @@ def test_a_push_reaches_the_arm_and_a_wrong_one_is_refused(stack: None) -> None:
     assert (code, out.startswith("pushed outer_link with 12 N at 0.30 m")) == (0, True)
     assert "push one of inner_link, outer_link" in called("push", "hand", "0", "0", "1")[2]
     assert "--at is 2 m" in called("push", "outer_link", "0", "0", "1", "--at", "2")[2]
+
+
+def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: None) -> None:
+    for words in [("get", "nosuch"), ("set", "nosuch:gain=1"), ("echo", "nosuch")]:
+        code, out, err = called(*words)
+        assert (code, out) == (1, "")
+        assert "start the stack" not in err
+        there = set(err.partition("; there are ")[2].strip().split(", "))
+        assert ({"joint_states", "status"} if words[0] == "echo" else {"driver", "force_loop"}) <= there
+        assert "wam_call" not in there
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("nan", "0", "0"), "the force is nan; it must be finite"),
+        (("0", "0", "1e6"), "the force is 1e+06 N; allowed: up to disturbance_force_limit, 500 N"),
+        (("0", "0", "1", "--seconds", "inf"), "--seconds is inf; it must be finite"),
+    ],
+)
+def test_a_push_that_is_no_number_or_too_great_is_refused(words: tuple[str, ...], message: str, stack: None) -> None:
+    code, out, err = called("push", "outer_link", *words)
+    assert (code, out) == (1, "")
+    assert message in err
+
+
+def test_the_tare_is_that_of_the_force_loop(stack: None) -> None:
+    assert "let the force loop count the present external torques as zero" in " ".join(called("--help")[1].split())
+    told = "the present external torques now count as zero in the force loop\n"
+    assert called("tare") == (0, told, "")
+
+
+def test_an_arm_that_cannot_be_pushed_is_told_with_what_to_do(stack: None) -> None:
+    def push(*words: str) -> tuple[int, str, str]:
+        return called("push", "outer_link", "0", "12", "0", *words)
+
+    assert called("disable")[0] == 0
+    assert push() == (1, "", "wam call: not pushed: the arm is braked; wam call enable\n")
+    assert called("enable")[0] == 0
+    assert called("pause")[0] == 0
+    code, out, err = push()
+    assert (code, out) == (1, "")
+    assert "the arm is paused" in err
+    assert err.endswith("wam call resume\n")
+    assert called("resume")[0] == 0
+    long = subprocess.Popen(
+        [*WAM, "call", "push", "outer_link", "0", "1", "0", "--seconds", "1e6"], stderr=subprocess.PIPE, text=True
+    )
+    wait_for_push()
+    assert called("estop")[0] == 0
+    assert long.stderr is not None
+    err = long.stderr.read()
+    assert long.wait(LONG) == 1
+    assert "the push ended after" in err
+    assert "the arm is in fault (emergency stop" in err
+    code, out, err = push()
+    assert (code, out) == (1, "")
+    assert "not pushed: the arm is in fault (" in err
+    assert "wam call reset_fault" in err
+    assert [called(word)[0] for word in ("reset_fault", "reset", "enable")] == [0, 0, 0]
 
 
 def test_messages_are_printed_and_the_time_is_stopped(stack: None) -> None:

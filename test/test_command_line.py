@@ -1,9 +1,11 @@
 """The command line: what it says to words it does not know, and how one number is changed."""
 
+import argparse
 import importlib
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +87,14 @@ def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(
     assert code == 1
     assert "nosuch" in err
     assert "started" not in out
+
+
+@pytest.mark.parametrize("command", ["demo", "up --live", "live", "view bag"])
+@pytest.mark.parametrize("port", ["99999", "0", "-1", "web"])
+def test_a_port_that_does_not_exist_is_refused(command: str, port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = said(capsys, *command.split(), f"--port={port}")
+    assert (code, out) == (2, "")
+    assert f"argument --port: '{port}' is no port; allowed: 1 to 65535" in err
 
 
 def test_an_extra_that_is_missing_is_named_in_one_sentence(
@@ -177,6 +187,23 @@ def test_each_shell_has_its_script(shell: str, capsys: pytest.CaptureFixture[str
     assert (code, err) == (0, "")
     assert "wam" in out
     assert "_ARGCOMPLETE" in out
+
+
+def requests_of(parser: argparse.ArgumentParser, *before: str) -> Iterator[tuple[str, ...]]:
+    """The words of every command below a parser."""
+    for action in parser._actions:
+        for name, below in action.choices.items() if isinstance(action, argparse._SubParsersAction) else ():
+            yield (*before, name)
+            yield from requests_of(below, *before, name)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_and_each_of_its_requests_has_a_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    module = importlib.import_module(f"wam_cli.commands.{command}")
+    module.arguments(parser := argparse.ArgumentParser())
+    for words in [(command,), *requests_of(parser, command)]:
+        code, out, err = said(capsys, *words, "--help")
+        assert (code, err, out.startswith(f"usage: wam {' '.join(words)} ")) == (0, "", True), words
 
 
 def test_the_help_fits_a_narrow_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

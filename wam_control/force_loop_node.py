@@ -166,4 +166,4 @@ class ForceLoopNode:
     def tare(self) -> Answer:
         """Take the present external torques as zero."""
         reason = self._loop.tare()
-        return Answer(not reason, reason or "the present external torques now count as zero")
+        return Answer(not reason, reason or "the present external torques now count as zero in the force loop")

@@ -14,7 +14,7 @@ from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_theory.cable import efficiency, stage_loss, tensions
-from wam_theory.requisites import Measures, Requisite, scorecard
+from wam_theory.requisites import TOLERANCE, Measures, Requisite, scorecard
 from wam_theory.stiction import stiction_cycle_force
 
 Array = NDArray[np.float64]
@@ -156,7 +156,10 @@ def table(rows: tuple[Requisite, ...]) -> str:
     lines = []
     for row in rows:
         required = f"{row.sense} {row.required:.3g}" if row.sense else "no number"
+        is_short = (row.value < row.required) == (row.sense == "at least")
         met = {True: "yes", False: "no", None: ""}[row.met]
+        if row.met and is_short and f"{row.value:.3g}" != f"{row.required:.3g}":
+            met = f"yes, within {TOLERANCE:.0%}"
         value = f"{row.value:.3g} {row.unit}".strip()
         lines.append((row.requisite, row.measure, value, required, row.source, met))
     return markdown(("requisite", "measure", "value", "thesis", "source", "met"), lines)

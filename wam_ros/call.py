@@ -1,26 +1,32 @@
 """A running stack as a shell sees it, without the `ros2` command: requests, parameters, messages."""
 
 import importlib
+import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from wam_description.topics import BY_NAME
+from wam_description.signals import NodeStatus
+from wam_description.topics import BY_NAME, STATUS
 from wam_description.wiring import Call, SetParameters
+from wam_ros.messages import read_status
 from wam_ros.qos import qos
 from wam_ros.remote_parameters import RemoteParameters
 from wam_ros.requests import answer_of, refusal_of, service_request
 from wam_ros.run import Connection
 
 PATIENCE: Final = 10.0  # s
+SILENCE: Final = 2.0  # s, after which a topic that comes in every period of the arm has stopped
 ATTEMPTS: Final = 20
 SET_ATTEMPTS: Final = 3  # the guard of the force loop takes its time over new gains
 WAITING: Final = 100  # messages that may wait for a slow terminal
+DISCOVERY: Final = 2.0  # s, after which no more of a stack comes
 START: Final = "start the stack with 'wam up'"
 
 
@@ -79,7 +85,7 @@ class CalledStack:
         Raises
         ------
         NoAnswerError
-            where it does not answer.
+            where it does not answer, or there is no such node.
         """
         asked = RemoteParameters(self.node, [node])
 
@@ -87,27 +93,60 @@ class CalledStack:
             asked.ask()
             return not asked.missing
 
-        self._wait(is_answered, f"no node '{node}' answers")
+        def nodes() -> list[str]:
+            own = self.node.get_namespace()
+            found = {name for name, where in self.node.get_node_names_and_namespaces() if where == own}
+            return [] if node in found else sorted(found - {self.node.get_name()})
+
+        self._wait(is_answered, f"no node '{node}' answers", nodes)
         return asked.found[node]
 
-    def messages(self, topic: str) -> Iterator[Any]:
+    def statuses(self) -> dict[str, NodeStatus]:
+        """The newest status of each node by its name; kept up to date while messages are awaited.
+
+        Raises
+        ------
+        NoAnswerError
+            where the driver sends none.
+        """
+        found: dict[str, NodeStatus] = {}
+
+        def take(message: DiagnosticStatus) -> None:
+            status = read_status(message)
+            found[status.node] = status
+
+        profile = qos(BY_NAME[STATUS])
+        profile.depth = WAITING
+        self.node.create_subscription(DiagnosticStatus, STATUS, take, profile)
+        self._wait(lambda: "driver" in found, "no status of the driver")
+        return found
+
+    def messages(self, topic: str, silence: float = math.inf) -> Iterator[Any]:
         """Messages of a topic as they come, without end; a run is not delayed by it.
 
         Parameters
         ----------
         topic : name in the namespace of the arm, or a full one.
+        silence : s, in which a message must come.
 
         Raises
         ------
         NoAnswerError
             where there is no such topic.
+        TimeoutError
+            where no message came for so long.
         """
-        name = self.node.resolve_topic_name(topic)
+        name, own = self.node.resolve_topic_name(topic), f"{self.node.get_namespace()}/"
 
         def kinds() -> list[str]:
             return dict(self.node.get_topic_names_and_types()).get(name, [])
 
-        self._wait(kinds, f"no topic {name}")
+        def topics() -> list[str]:
+            return [
+                found.removeprefix(own) for found, _ in self.node.get_topic_names_and_types() if found.startswith(own)
+            ]
+
+        self._wait(kinds, f"no topic {name}", topics)
         package, _, kind = kinds()[0].split("/")
         row = BY_NAME.get(topic)
         profile = QoSProfile(depth=WAITING, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -120,17 +159,28 @@ class CalledStack:
         subscription = self.node.create_subscription(
             getattr(importlib.import_module(f"{package}.msg"), kind), name, taken.append, profile
         )
+        last = time.monotonic()
         try:
             while True:
                 self._connection.executor.spin_once(timeout_sec=0.1)
-                yield from taken
-                taken.clear()
+                if taken:
+                    yield from taken
+                    taken.clear()
+                    last = time.monotonic()
+                elif time.monotonic() - last > silence:
+                    raise TimeoutError(f"no {topic} for {silence:g} s")
         finally:
             self.node.destroy_subscription(subscription)
 
-    def _wait(self, condition: Callable[[], Any], failure: str) -> None:
-        end = time.monotonic() + PATIENCE
+    def _wait(self, condition: Callable[[], Any], failure: str, others: Callable[[], Sequence[str]] = tuple) -> None:
+        """Wait for a condition; not as long where others are there instead, and no more come."""
+        begin = since = time.monotonic()
+        there: Sequence[str] = ()
         while not condition():
-            if time.monotonic() > end:
+            now, before, there = time.monotonic(), there, others()
+            since = now if there != before else since
+            if there and now - since > DISCOVERY:
+                raise NoAnswerError(f"{failure}; there are {', '.join(there)}")
+            if now - begin > PATIENCE:
                 raise NoAnswerError(f"{failure} within {PATIENCE:g} s; {START}")
             self._connection.executor.spin_once(timeout_sec=0.05)

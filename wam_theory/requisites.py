@@ -2,13 +2,15 @@
 
 import math
 from dataclasses import dataclass, fields
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wam_theory.arguments import Array, above_zero, zero_or_more
 from wam_theory.resonance import force_resonances, hard_contact_bandwidth
+
+TOLERANCE: Final = 0.01  # of a required value that is printed with two digits
 
 
 def impact_force(speed: ArrayLike, inertia: ArrayLike, contact_stiffness: ArrayLike) -> Array:
@@ -138,7 +140,7 @@ class Measures:
 class Requisite(NamedTuple):
     """One row of the scorecard; `required` is NaN and `met` None if the thesis has no number.
 
-    The thesis prints two digits: a value within 1 % of the required one meets it.
+    The thesis prints two digits: a value within `TOLERANCE` of the required one meets it.
     """
 
     requisite: str
@@ -205,7 +207,9 @@ def _row(
     required: float = math.nan,
     source: str = "",
 ) -> Requisite:
-    met = {"at least": value >= 0.99 * required, "at most": value <= 1.01 * required}.get(sense)
+    met = {"at least": value >= (1.0 - TOLERANCE) * required, "at most": value <= (1.0 + TOLERANCE) * required}.get(
+        sense
+    )
     return Requisite(requisite, measure, value, unit, sense, required, source, met)
 
 

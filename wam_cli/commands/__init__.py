@@ -22,6 +22,7 @@ from wam_sim.pieces import default_folder
 from wam_sim.progress import Progress
 
 BASE_CONFIGURATION = "wam"
+LAST_PORT = 65535
 
 
 def namespace(text: str) -> str:
@@ -38,6 +39,19 @@ def namespace(text: str) -> str:
             f"'{text}' is no namespace; give words of letters, digits and '_' that begin with no digit, joined by '/'"
         )
     return inner
+
+
+def port(text: str) -> int:
+    """A port of this machine, as an option takes it.
+
+    Raises
+    ------
+    ArgumentTypeError
+        where there is none of that number.
+    """
+    if not text.isdecimal() or not 1 <= int(text) <= LAST_PORT:
+        raise argparse.ArgumentTypeError(f"'{text}' is no port; allowed: 1 to {LAST_PORT}")
+    return int(text)
 
 
 def take_configuration(parser: argparse.ArgumentParser) -> None:
@@ -104,7 +118,7 @@ def runs_apart(configuration: Configuration, given: argparse.Namespace) -> bool:
 
 def take_port(parser: argparse.ArgumentParser) -> None:
     """Give a command the option --port."""
-    parser.add_argument("--port", type=int, default=PORT, help="of the page on this machine; default: %(default)s")
+    parser.add_argument("--port", type=port, default=PORT, help="of the page on this machine; default: %(default)s")
 
 
 def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:

@@ -10,15 +10,16 @@ from typing import Any, Final
 
 import yaml
 
-from wam_cli.commands import namespace
+from wam_cli.commands import at_least, namespace
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part
-from wam_description.signals import BASE, Wrench
+from wam_description.signals import BASE, NodeStatus, Wrench
 from wam_description.topics import BY_NAME, TABLE
 from wam_description.wiring import Call, SetParameters
+from wam_driver.safety import Mode
 from wam_live.hold import HeldTopic
-from wam_ros.call import CalledStack, Reply
+from wam_ros.call import SILENCE, CalledStack, Reply
 from wam_ros.header import stamp_of
 from wam_ros.messages import read_table
 
@@ -28,11 +29,12 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "estop": ("stop at once and latch a fault", (Call("driver", "estop"),)),
     "reset_fault": ("forget the latched fault", (Call("driver", "reset_fault"),)),
     "reset": ("put the simulated arm back to its start", (Call("driver", "reset"),)),
-    "tare": ("count the present external torques as payload", (Call("force_loop", "tare"),)),
+    "tare": ("let the force loop count the present external torques as zero", (Call("force_loop", "tare"),)),
     "pause": ("stop the time of the simulated arm", (Call("driver", "pause", True),)),
     "step": ("pause, and let one period pass", (Call("driver", "pause", True), Call("driver", "step"))),
     "resume": ("let the time go on", (Call("driver", "pause", False),)),
 }
+KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 ZERO: Final = (0.0, 0.0, 0.0)
 
 
@@ -55,7 +57,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     heard.add_argument("--count", type=int, metavar="N", help="end after so many; default: Ctrl-C")
     push = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
     push.add_argument("cover", help="link that is pushed, for example outer_link")
-    push.add_argument("force", type=float, nargs=3, metavar=("FX", "FY", "FZ"), help="N, in the frame of the link")
+    push.add_argument("force", type=float, nargs=3, metavar="N", help="x, y and z, in the frame of the link")
     push.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")
     push.add_argument("--seconds", type=float, default=1.0, help="of the arm's time; default: %(default)g")
 
@@ -96,14 +98,20 @@ def _set(given: argparse.Namespace, stack: CalledStack) -> int:
     like = values[name]
     if hasattr(like, "__len__") and not isinstance(like, str):
         value = [value] * len(like) if not isinstance(value, list) else value
-        value = [_like(one, like[0]) if len(like) else one for one in value]
-    reply = stack.request(SetParameters(node, {name: _like(value, like)}))
-    return _told([reply._replace(message=reply.message or f"{node}:{name}={value}")])
+        new: Any = [_like(one, like[0], key) if len(like) else one for one in value]
+    else:
+        new = _like(value, like, key)
+    reply = stack.request(SetParameters(node, {name: new}))
+    return _told([reply._replace(message=reply.message or f"{key}={value}")])
 
 
-def _like(value: Any, like: Any) -> Any:
-    """A whole number where a parameter has none is one with a point."""
-    return float(value) if isinstance(like, float) and type(value) is int else value
+def _like(value: Any, like: Any, name: str) -> Any:
+    """A value of the kind that a parameter has; a whole number where that has none is one with a point."""
+    if isinstance(like, float) and type(value) is int:
+        return float(value)
+    if type(value) is not type(like):
+        raise ValueError(f"{name} is '{value}'; it must be {KINDS[type(like)]}")
+    return value
 
 
 def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
@@ -137,7 +145,48 @@ def plain(message: Any, topic: str = "") -> Any:
 
 
 def _push(given: argparse.Namespace, stack: CalledStack) -> int:
-    shared = build_part(Shared, stack.parameters("driver"))
+    push, at, shared = _wrench(given, stack.parameters("driver"))
+    statuses = stack.statuses()
+    hold = HeldTopic(stack.node, "sim/disturbance", shared)
+    begin = stamp = 0
+    try:
+        for message in stack.messages("joint_states", SILENCE):
+            driver = statuses["driver"]
+            if driver.mode != Mode.ENABLED.value:
+                told = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
+                raise ValueError(f"{told}: the arm is {_state(driver)}")
+            stamp = stamp_of(message)
+            begin = begin or stamp
+            if stamp - begin > given.seconds * 1e9:
+                break
+            if refusal := hold.send(stamp, push):
+                raise ValueError(f"not pushed: {refusal}")
+    except TimeoutError as error:
+        told = "the push ended" if begin else "not pushed"
+        raise ValueError(f"{told}: the arm is paused, or its time does not go on ({error}); wam call resume") from error
+    finally:
+        if hold.is_on:
+            hold.send(stamp, Wrench(BASE, ZERO, ZERO))
+            hold.end()
+    newtons = math.hypot(*push.force)
+    print(f"pushed {given.cover} with {newtons:g} N at {at:.2f} m for {(stamp - begin) / 1e9:.2f} s")
+    return 0
+
+
+def _state(driver: NodeStatus) -> str:
+    """Why the arm does not move, and what to do."""
+    if driver.fault:
+        return f"in fault ({driver.fault}); wam call reset_fault, then wam call enable"
+    return f"{driver.mode}; wam call enable"
+
+
+def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrench, float, Shared]:
+    """What is to be sent, the place, m, and the shared parameters among those of the driver."""
+    at_least("--seconds", given.seconds, 0.0)
+    for what, value in (("the force", math.hypot(*given.force)), ("--seconds", given.seconds)):
+        if not math.isfinite(value):
+            raise ValueError(f"{what} is {value:g}; it must be finite")
+    shared = build_part(Shared, driver)
     covers = shared.arm.covers
     if given.cover not in covers.names:
         raise ValueError(f"no link '{given.cover}'; push one of {', '.join(covers.names)}")
@@ -148,19 +197,10 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
         raise ValueError(f"--at is {at:g} m; {given.cover} is from {low:g} to {high:g} m")
     x, y, z = given.force
     push = Wrench(given.cover, (x, y, z), (0.0, -at * z, at * y))
-    hold = HeldTopic(stack.node, "sim/disturbance", shared)
-    begin = stamp = 0
-    try:
-        for message in stack.messages("joint_states"):
-            stamp = stamp_of(message)
-            begin = begin or stamp
-            if stamp - begin > given.seconds * 1e9:
-                break
-            if refusal := hold.send(stamp, push):
-                raise ValueError(f"not pushed: {refusal}")
-    finally:
-        if hold.is_on:
-            hold.send(stamp, Wrench(BASE, ZERO, ZERO))
-            hold.end()
-    print(f"pushed {given.cover} with {math.hypot(x, y, z):g} N at {at:.2f} m for {(stamp - begin) / 1e9:.2f} s")
-    return 0
+    for what, vector, unit in (("force", push.force, "N"), ("torque", push.torque, "N m")):
+        name = f"disturbance_{what}_limit"
+        if math.hypot(*vector) > driver.get(name, math.inf):  # a driver of one's own need not have one
+            raise ValueError(
+                f"the {what} is {math.hypot(*vector):.4g} {unit}; allowed: up to {name}, {driver[name]:g} {unit}"
+            )
+    return push, at, shared
