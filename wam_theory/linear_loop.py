@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from wam_theory.arguments import Array, above_zero, zero_or_more
 from wam_theory.zero_order_hold import zero_order_hold
 
-
 FAST = 1e-3  # rad per sample at the margin: below, the polynomials of the held loop cancel
 SHORT = 0.5  # rad of delay at the margin: up to it the first crossing has the smallest gain
 
