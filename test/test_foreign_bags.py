@@ -366,6 +366,11 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
     assert {name.partition(":")[0] for name in numbers} == {"elbow_joint", "/ur/joint_states"}
     with pytest.raises(ValueError, match=r"no topic /nothing; its topics: /ft/wrench, /ur/joint_states"):
         found((small, TopicMap(topics=("/nothing",))))
+    with pytest.raises(ValueError, match=r"no joint zzz; its joints: elbow_joint, shoulder_lift_joint"):
+        found((small, TopicMap(joints=("elbow_joint", "zzz"))))
+    for topic in ("/ur/joint_states", "/ft/wrench"):
+        with pytest.raises(ValueError, match=rf"{topic} is of type .*; its stamp is 'header.stamp', not 'time'"):
+            found((small, topic_map([topic], [], [], ["stamp=time"], [])))
 
 
 @pytest.mark.parametrize(
@@ -375,6 +380,9 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
         (([], [], [], ["effort"], []), "--map is 'effort'"),
         (([], [], [], [], ["effort=lbf"]), "'lbf' is neither a number nor one of rad"),
         (([], [], [], [], ["stamp=s"]), "--unit is 'stamp=s'"),
+        (([], [], [], [], ["effort=deg"]), "'deg' is no unit of effort; it may be a factor or N, "),
+        (([], [], [], [], ["position=deg", "position=rad"]), "--unit position is given twice"),
+        (([], [], [], ["effort=a", "effort=b"], []), "--map effort is given twice, as 'a' and as 'b'"),
     ],
 )
 def test_an_option_that_says_nothing_is_refused(options: Any, message: str) -> None:
