@@ -327,6 +327,25 @@ def test_nothing_is_found_in_a_quiet_bag(make: Any, tmp_path: Path) -> None:
     assert all(any(f == pytest.approx(known, rel=CLOSE) for known in THERE.get(make.__name__, ())) for f in lines)
 
 
+@pytest.mark.parametrize("noise", [0.0, 2e-3, 5e-3])
+def test_a_joint_that_turns_back_does_not_stick_and_one_that_hunts_does(noise: float, tmp_path: Path) -> None:
+    time = times(24.0)
+    w = 4.0 * np.pi
+    swing = np.column_stack([0.005 * np.sin(w * time), 0.005 * w * np.cos(w * time)])
+    phase = (time / 2.0) % 1.0  # rest, a quick step, rest, a quick step back
+    hunt = 0.01 * (np.clip((phase - 0.4) / 0.1, 0.0, 1.0) - np.clip((phase - 0.9) / 0.1, 0.0, 1.0))
+    both = np.column_stack([swing[:, 0], hunt])
+    speed = np.column_stack([swing[:, 1], np.gradient(hunt, time)]) + noise * chance(40).normal(size=both.shape)
+    sent = joints("/joint_states", time, ["swings", "hunts"], position=both, velocity=speed)
+    asked = np.column_stack(2 * [0.05 * np.sin(np.pi * time)])
+    sent += joints("/cmd/joints", time, ["swings", "hunts"], position=asked)
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    (stick_slip,) = (section for section in analysis.sections if section.key == "stick_slip")
+    assert [one.partition(":")[0] for one in stick_slip.verdict] == ["hunts"]
+    assert numbers["swings: slips"] == 1.0
+    assert numbers["hunts: slips"] == pytest.approx(24.0, abs=1.0)
+
+
 # ways in
 
 

@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 
 from wam_analysis.foreign.sources import Piece, Source, pieces
 from wam_analysis.measures.friction import Friction, identify_friction
-from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases
 
 Numbers = NDArray[np.float64]
 
 REST = 0.002  # rad/s or m/s; a slower joint is at rest, unless the noise is larger
 NOISY = 6.0  # standard deviations of the noise of a velocity: likewise
 BRIEFEST = 0.01  # s; a shorter stick or slip is chatter
+BRIEF = 0.5  # of a slip: a joint whose rests are shorter turns back, and does not stick
+TURNS = 0.8  # of the slips of such a joint go against the one before
 WINDOW = 0.03  # s over which friction is averaged
 FEWEST_SAMPLES = 6  # in that window
 BETTER = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
@@ -28,7 +30,7 @@ class Sticking(NamedTuple):
     Attributes
     ----------
     stuck : fraction of the time at rest.
-    slips, reversals : motions between, and those against the one before.
+    slips, reversals : motions between, and those against the one before; a motion back and forth is one.
     commanded : fraction of the rest in which it was commanded to move; NaN without a command.
     """
 
@@ -48,6 +50,9 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
         period = float(piece.time[1] - piece.time[0])
         phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(BRIEFEST / period)))
         total += len(piece.time)
+        if _only_turns(phases):
+            slips += 1
+            continue
         still += round(phases.stuck * len(piece.time))
         slips, reversals = slips + len(phases.slips), reversals + phases.reversals
         if command is not None:
@@ -56,6 +61,15 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
     if not total:
         return None
     return Sticking(still / total, slips, reversals, disobeyed / still if command is not None and still else math.nan)
+
+
+def _only_turns(phases: Phases) -> bool:
+    """Whether it is one motion back and forth, which is slow for a moment where it turns."""
+    between = phases.sticks[1:-1]
+    if len(phases.slips) < 4 or not len(between) or phases.reversals < TURNS * (len(phases.slips) - 1):
+        return False
+    rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, phases.slips))
+    return rest < BRIEF * motion
 
 
 def _rest(piece: Piece) -> float:
