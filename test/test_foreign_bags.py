@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign_bags import MOTORS, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
+from foreign_bags import MOTORS, ORIGIN, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
 
 from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.page import page
@@ -344,6 +344,35 @@ def test_a_joint_that_turns_back_does_not_stick_and_one_that_hunts_does(noise: f
     assert [one.partition(":")[0] for one in stick_slip.verdict] == ["hunts"]
     assert numbers["swings: slips"] == 1.0
     assert numbers["hunts: slips"] == pytest.approx(24.0, abs=1.0)
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, ""), (180.0 / math.pi, "57.3"), (-1.0, "-1"), (0.5, "0.5")])
+def test_a_velocity_that_is_not_the_rate_of_the_position_gives_no_friction(
+    factor: float, said: str, tmp_path: Path
+) -> None:
+    time = times(20.0)
+    q, v, a = swung(time, 41)
+    fields = {"position": q, "velocity": factor * v, "effort": loaded(q, v, a, 0.0, 42)}
+    sent = joints("/joint_states", time, ["a"], **{name: value[:, np.newaxis] for name, value in fields.items()})
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    (section,) = (one for one in analysis.sections if one.key == "friction")
+    assert ("a: dry friction" in numbers) is (not said)
+    doubt = f"a: the recorded velocity is {said} times the rate of the position"
+    assert any(one.startswith(doubt) for one in section.verdict) is bool(said)
+
+
+def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:
+    time = times(8.0)
+    position = at_rest(time, ["a", "b"], 43)
+    position[:, 1] = math.nan
+    sent = joints("/joint_states", time, ["a", "b"], position=position, velocity=0.0 * position)
+    sent[0] = sent[0]._replace(stamp=-ORIGIN / 1e9)
+    sent += wrenches("/wrench", time, np.full((len(time), 3), math.nan))
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    assert numbers["/joint_states: missed periods"] == 0.0
+    happened = " ".join(analysis.sections[0].sentences + analysis.sections[1].sentences)
+    assert "/joint_states: b without a value that is a number." in happened
+    assert f"/wrench: {len(time)} forces, none of which is a number." in happened
 
 
 # ways in

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.foreign.sources import Piece, Source, pieces
+from wam_analysis.foreign.sources import FEWEST, Piece, Source, differentiated, pieces
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases
 
@@ -21,6 +21,7 @@ WINDOW = 0.03  # s over which friction is averaged
 FEWEST_SAMPLES = 6  # in that window
 BETTER = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
 SURE = 0.25  # of a number; with a larger standard error it is not identifiable
+AGREE = 0.2  # by which a recorded velocity may differ from the rate of the position
 BELOW_ZERO = 3.0  # standard errors: a fit in which one number is so negative holds more than friction
 
 
@@ -84,14 +85,36 @@ def _commanded_speed(command: Source, time: Numbers) -> Numbers:
     return np.interp(time, command.time, np.gradient(command.values["position"], command.time))
 
 
+def velocity_factor(source: Source) -> float:
+    """Recorded velocity over the rate of the position, where that moves; NaN where the two agree or it does not move.
+
+    It is 0 where the velocity is zero, and below zero where its sign is swapped.
+    """
+    if not {"position", "velocity"} <= source.values.keys():
+        return math.nan
+    rates, speeds = [], []
+    for piece in pieces(source):
+        rate, sd = differentiated(piece.time, piece.values["position"])
+        moves = np.abs(rate) > max(REST, NOISY * sd)
+        rates.append(rate[moves])
+        speeds.append(piece.values["velocity"][moves])
+    rate, speed = (np.concatenate(parts) if parts else np.zeros(0) for parts in (rates, speeds))
+    if len(rate) < FEWEST:
+        return math.nan
+    factor = float(rate @ speed / (rate @ rate))
+    return math.nan if abs(factor - 1.0) <= AGREE else factor
+
+
 def friction(source: Source) -> Friction | None:
     """Friction and inertia of a joint that its weight may load; None without effort, velocity or an answer.
+
+    Nor is there one where the recorded velocity is not the rate of the position.
 
     The load is that of a weight on the joint itself, over its angle, a sin q + b cos q + c, where this explains the
     effort better than a constant: in a motion of one frequency, inertia and weight are the same.
     """
     some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
-    if not some:
+    if not some or math.isfinite(velocity_factor(source)):
         return None
     period = float(some[0].time[1] - some[0].time[0])
     window = max(WINDOW, FEWEST_SAMPLES * period)
