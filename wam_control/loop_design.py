@@ -106,5 +106,5 @@ def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay
     except ArithmeticError:
         worst = max((name for name in given if 0.0 < given[name] < math.inf), key=lambda n: abs(math.log(given[n])))
         raise ValueError(
-            f"{worst} is {given[worst]:g}; beside the other numbers it is too far off to compute"
+            f"{worst} is {given[worst]:g}; compared with the other numbers it is too far off to compute"
         ) from None

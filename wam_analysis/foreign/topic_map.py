@@ -65,7 +65,7 @@ def topic_map(
     ValueError
         which says what is allowed.
     """
-    found = {}
+    found: dict[str, str] = {}
     for option in fields:
         quantity, _, field = option.partition("=")
         if quantity not in MAPPED or not field:
@@ -73,7 +73,7 @@ def topic_map(
         if quantity in found:
             raise ValueError(f"--map {quantity} is given twice, as '{found[quantity]}' and as '{field}'")
         found[quantity] = field
-    factors = {}
+    factors: dict[str, tuple[float, str]] = {}
     for option in units:
         quantity, _, unit = option.partition("=")
         if quantity not in QUANTITIES:
