@@ -142,6 +142,12 @@ def test_a_plant_that_cannot_be_assessed_is_refused(
         loop_design(replace(NODE, **changed), IntegralLoop(0.01), rate, delay)
 
 
+def test_numbers_that_overflow_together_are_refused_by_the_one_that_is_farthest_off() -> None:
+    node = FrictionNode(1e-9, 1e-9, 1e12, 1e12, 1e-9, 1e-9)
+    with pytest.raises(ValueError, match=r"transmission_stiffness is 1e\+12; compared with the other numbers"):
+        loop_design(node, IntegralLoop(1e-9), 1.0)
+
+
 @pytest.mark.slow
 def test_the_command_prints_the_verdict_and_draws_the_map(tmp_path: Path) -> None:
     words = "guard --inertia .1 --damping 10 --transmission 2000 --contact 1000 --friction .5 --stiction .5 --gain .15"
