@@ -102,6 +102,34 @@ def test_sampled_margin_has_a_pole_on_the_circle_at_its_frequency() -> None:
     assert np.abs(poles).max() == pytest.approx(1.0, abs=1e-5)
 
 
+@pytest.mark.parametrize("delay", [0, 1, 50])
+@pytest.mark.parametrize("zeta", [1e-3, 0.05, 1.0, 30.0])
+def test_sampled_margin_tends_to_the_continuous_one_at_every_rate(zeta: float, delay: int) -> None:
+    j, ktr, kc = 0.1, 1000.0, 1000.0
+    w = math.sqrt((ktr + kc) / j)
+    b = 2.0 * zeta * j * w
+    routh = float(linear_loop.routh_gain(j, b, ktr, kc))
+    margins = []
+    for rate in np.geomspace(10.0, 1e12, 45) * w:
+        lag = w * (delay + 0.5) / rate
+        if (1.0 + 2.0 * zeta) * lag < 0.1:
+            margins.append(linear_loop.sampled_margin(j, b, ktr, kc, 1.0 / rate, delay).gain)
+            assert margins[-1] == pytest.approx(routh, rel=(1.0 + 2.0 * zeta) * lag + 1e-12)
+    assert len(margins) > 30
+
+
+@pytest.mark.parametrize("delay", [0, 3])
+@pytest.mark.parametrize("zeta", [0.01, 1.0, 30.0])
+def test_sampled_margin_has_no_step_where_the_fast_form_begins(
+    zeta: float, delay: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = (1.0, 2.0 * zeta, 0.3, 0.7, 2e-3, delay)
+    monkeypatch.setattr(linear_loop, "FAST", 1.0)
+    fast = linear_loop.sampled_margin(*values)
+    monkeypatch.setattr(linear_loop, "FAST", 0.0)
+    assert fast == pytest.approx(linear_loop.sampled_margin(*values), rel=1e-6)
+
+
 @pytest.mark.parametrize("delay", [0, 5, 24, 40, 80])
 def test_sampled_margin_is_where_an_eigenvalue_leaves_the_circle_also_after_a_long_delay(delay: int) -> None:
     period = 0.002

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign_bags import MOTORS, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
+from foreign_bags import MOTORS, ORIGIN, Sent, by_json, by_mcap_ros2, by_rosbags, joints, wrenches
 
 from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.page import page
@@ -327,6 +327,54 @@ def test_nothing_is_found_in_a_quiet_bag(make: Any, tmp_path: Path) -> None:
     assert all(any(f == pytest.approx(known, rel=CLOSE) for known in THERE.get(make.__name__, ())) for f in lines)
 
 
+@pytest.mark.parametrize("noise", [0.0, 2e-3, 5e-3])
+def test_a_joint_that_turns_back_does_not_stick_and_one_that_hunts_does(noise: float, tmp_path: Path) -> None:
+    time = times(24.0)
+    w = 4.0 * np.pi
+    swing = np.column_stack([0.005 * np.sin(w * time), 0.005 * w * np.cos(w * time)])
+    phase = (time / 2.0) % 1.0  # rest, a quick step, rest, a quick step back
+    hunt = 0.01 * (np.clip((phase - 0.4) / 0.1, 0.0, 1.0) - np.clip((phase - 0.9) / 0.1, 0.0, 1.0))
+    both = np.column_stack([swing[:, 0], hunt])
+    speed = np.column_stack([swing[:, 1], np.gradient(hunt, time)]) + noise * chance(40).normal(size=both.shape)
+    sent = joints("/joint_states", time, ["swings", "hunts"], position=both, velocity=speed)
+    asked = np.column_stack(2 * [0.05 * np.sin(np.pi * time)])
+    sent += joints("/cmd/joints", time, ["swings", "hunts"], position=asked)
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    (stick_slip,) = (section for section in analysis.sections if section.key == "stick_slip")
+    assert [one.partition(":")[0] for one in stick_slip.verdict] == ["hunts"]
+    assert numbers["swings: slips"] == 1.0
+    assert numbers["hunts: slips"] == pytest.approx(24.0, abs=1.0)
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, ""), (180.0 / math.pi, "57.3"), (-1.0, "-1"), (0.5, "0.5")])
+def test_a_velocity_that_is_not_the_rate_of_the_position_gives_no_friction(
+    factor: float, said: str, tmp_path: Path
+) -> None:
+    time = times(20.0)
+    q, v, a = swung(time, 41)
+    fields = {"position": q, "velocity": factor * v, "effort": loaded(q, v, a, 0.0, 42)}
+    sent = joints("/joint_states", time, ["a"], **{name: value[:, np.newaxis] for name, value in fields.items()})
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    (section,) = (one for one in analysis.sections if one.key == "friction")
+    assert ("a: dry friction" in numbers) is (not said)
+    doubt = f"a: the recorded velocity is {said} times the rate of the position"
+    assert any(one.startswith(doubt) for one in section.verdict) is bool(said)
+
+
+def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:
+    time = times(8.0)
+    position = at_rest(time, ["a", "b"], 43)
+    position[:, 1] = math.nan
+    sent = joints("/joint_states", time, ["a", "b"], position=position, velocity=0.0 * position)
+    sent[0] = sent[0]._replace(stamp=-ORIGIN / 1e9)
+    sent += wrenches("/wrench", time, np.full((len(time), 3), math.nan))
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    assert numbers["/joint_states: missed periods"] == 0.0
+    happened = " ".join(analysis.sections[0].sentences + analysis.sections[1].sentences)
+    assert "/joint_states: b without a value that is a number." in happened
+    assert f"/wrench: {len(time)} forces, none of which is a number." in happened
+
+
 # ways in
 
 
@@ -366,6 +414,11 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
     assert {name.partition(":")[0] for name in numbers} == {"elbow_joint", "/ur/joint_states"}
     with pytest.raises(ValueError, match=r"no topic /nothing; its topics: /ft/wrench, /ur/joint_states"):
         found((small, TopicMap(topics=("/nothing",))))
+    with pytest.raises(ValueError, match=r"no joint zzz; its joints: elbow_joint, shoulder_lift_joint"):
+        found((small, TopicMap(joints=("elbow_joint", "zzz"))))
+    for topic in ("/ur/joint_states", "/ft/wrench"):
+        with pytest.raises(ValueError, match=rf"{topic} is of type .*; its stamp is 'header.stamp', not 'time'"):
+            found((small, topic_map([topic], [], [], ["stamp=time"], [])))
 
 
 @pytest.mark.parametrize(
@@ -375,6 +428,9 @@ def test_only_what_is_named_is_analysed(small: Path) -> None:
         (([], [], [], ["effort"], []), "--map is 'effort'"),
         (([], [], [], [], ["effort=lbf"]), "'lbf' is neither a number nor one of rad"),
         (([], [], [], [], ["stamp=s"]), "--unit is 'stamp=s'"),
+        (([], [], [], [], ["effort=deg"]), "'deg' is no unit of effort; it may be a factor or N, "),
+        (([], [], [], [], ["position=deg", "position=rad"]), "--unit position is given twice"),
+        (([], [], [], ["effort=a", "effort=b"], []), "--map effort is given twice, as 'a' and as 'b'"),
     ],
 )
 def test_an_option_that_says_nothing_is_refused(options: Any, message: str) -> None:

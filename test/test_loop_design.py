@@ -110,6 +110,14 @@ def test_in_domain_iii_no_error_is_safe_and_a_direct_simulation_never_rests() ->
     assert largest_late_motion(NODE, loop, 5.0, 1.0) > 0.01
 
 
+def test_a_loop_that_is_sampled_fast_has_the_domain_of_the_continuous_one() -> None:
+    node, loop = FrictionNode(0.1, 0.1, 1000.0, 1000.0, 1.0, 1.0), IntegralLoop(0.01)
+    found = [loop_design(node, loop, rate).verdict for rate in (0.0, 1e3, 2e3, 1e7, 1e10)]
+    assert {one.domain for one in found} == {Domain.II}
+    assert [one.stable_error for one in found] == pytest.approx([found[0].stable_error] * 5)
+    assert [one.margin for one in found] == pytest.approx([2e-3] * 5, rel=1e-2)
+
+
 def test_a_delay_is_rounded_up_to_whole_periods() -> None:
     assert loop_design(NODE, of_margin(0.5), RATE, 0.002).loop.delay_samples == 1
     assert loop_design(NODE, of_margin(0.5), RATE, 0.0021).loop.delay_samples == 2
@@ -122,6 +130,9 @@ def test_a_delay_is_rounded_up_to_whole_periods() -> None:
         ({}, 0.0, 0.01, "give the rate of the samples"),
         ({}, -1.0, 0.0, "rate is -1; it must be 0 or more"),
         ({}, 1000.0, 1.0, "allowed: 50 periods"),
+        ({"inertia": 1e300}, 500.0, 0.0, r"inertia is 1e\+300; it must be between 1e-12 and 1e\+12"),
+        ({"contact_stiffness": 1e-20}, 0.0, 0.0, "contact_stiffness is 1e-20; it must be between"),
+        ({}, 1e15, 0.0, r"rate is 1e\+15; it must be between"),
     ],
 )
 def test_a_plant_that_cannot_be_assessed_is_refused(
@@ -129,6 +140,12 @@ def test_a_plant_that_cannot_be_assessed_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=text):
         loop_design(replace(NODE, **changed), IntegralLoop(0.01), rate, delay)
+
+
+def test_numbers_that_overflow_together_are_refused_by_the_one_that_is_farthest_off() -> None:
+    node = FrictionNode(1e-9, 1e-9, 1e12, 1e12, 1e-9, 1e-9)
+    with pytest.raises(ValueError, match=r"transmission_stiffness is 1e\+12; compared with the other numbers"):
+        loop_design(node, IntegralLoop(1e-9), 1.0)
 
 
 @pytest.mark.slow

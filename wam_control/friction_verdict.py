@@ -18,6 +18,9 @@ STEPS = (0.3, 0.8, 1.0, 1.5, 3.0, 10.0, 50.0)  # of F_des, in saturations, which
 CANDIDATES = (100.0, 50.0, 25.0, 12.0, 6.0, 4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)  # saturations, in F_static
 SURE = 0.7  # accepted fraction of the largest saturation found good: between the candidates tried, worse ones may be
 EVENTS = 4000  # of the exact integrator, after which a response counts as not settled
+CONTINUOUS = (
+    0.1  # rad of the node's own frequency per sample: a faster loop without delay is examined as a continuous one
+)
 CYCLE_EXCESS = 1.5  # largest cycle that counts as the stiction cycle, in sizes of (5.8)
 
 
@@ -61,10 +64,11 @@ class FrictionVerdict(NamedTuple):
     saturated_cycle: float
 
 
-def friction_verdict(node: FrictionNode, loop: IntegralLoop) -> FrictionVerdict:
+def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = EVENTS) -> FrictionVerdict:
     """Verdict on a node under a loop, with its contact and every softer one.
 
-    The saturation of the loop counts for `saturated_cycle` only.
+    The saturation of the loop counts for `saturated_cycle` only.  A response that has not settled after `events`
+    of the integrator, samples among them, counts as bad.
     """
     nodes = [replace(node, contact_stiffness=part * node.contact_stiffness) for part in SOFTER]
     margins = [linear_margin(each, loop) for each in nodes]
@@ -72,7 +76,10 @@ def friction_verdict(node: FrictionNode, loop: IntegralLoop) -> FrictionVerdict:
     if loop.gain <= min(margins):
         return FrictionVerdict(Domain.I, min(margins), math.inf, cycle, _saturated_cycle(node, loop))
     beyond = [each for each, margin in zip(nodes, margins, strict=True) if loop.gain > margin]
-    error = min(stable_error(each, loop) for each in beyond)
+    frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
+    if not loop.delay_samples and frequency * loop.sample_period < CONTINUOUS:
+        loop = replace(loop, sample_period=0.0)
+    error = min(stable_error(each, loop, events) for each in beyond)
     return FrictionVerdict(Domain.II if error else Domain.III, min(margins), error, cycle, 0.0)
 
 
@@ -98,7 +105,7 @@ def stiction_cycle(node: FrictionNode, gain: float) -> PredictedCycle:
     return PredictedCycle(size, period, float(deadband_against_stiction(size)))
 
 
-def stable_error(node: FrictionNode, loop: IntegralLoop) -> float:
+def stable_error(node: FrictionNode, loop: IntegralLoop, events: int = EVENTS) -> float:
     """Largest saturation of F_error with which every response ends at rest or in the stiction cycle; 0 for none.
 
     Do not use the largest stable step as the saturation limit: after a larger step the loop oscillates
@@ -110,7 +117,7 @@ def stable_error(node: FrictionNode, loop: IntegralLoop) -> float:
     cycle = CYCLE_EXCESS * stiction_cycle(node, loop.gain).peak_to_peak
     for part in CANDIDATES:
         limit = part * node.static_friction
-        if limit > loop.deadband / SURE and _comes_to_rest(node, replace(loop, error_limit=limit), cycle):
+        if limit > loop.deadband / SURE and _comes_to_rest(node, replace(loop, error_limit=limit), cycle, events):
             return SURE * limit
     return 0.0
 
@@ -131,9 +138,9 @@ def _responses(node: FrictionNode, loop: IntegralLoop) -> list[tuple[float, tupl
     return [*tries, (0.0, (0.0, thrown, 0.0)), (limit, (0.0, -thrown, 0.0))]
 
 
-def _comes_to_rest(node: FrictionNode, loop: IntegralLoop, cycle: float) -> bool:
+def _comes_to_rest(node: FrictionNode, loop: IntegralLoop, cycle: float, events: int) -> bool:
     for force, start in _responses(node, loop):
-        found = assess(node, loop, force, start, max_events=EVENTS)
+        found = assess(node, loop, force, start, max_events=events)
         is_stiction = found.verdict is Verdict.LIMIT_CYCLE and found.peak_to_peak <= cycle
         if found.verdict is not Verdict.SETTLED and not is_stiction:
             return False

@@ -1,14 +1,18 @@
 """Chapter 5 for a force loop of your own: one inertia with friction between transmission and contact."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import NamedTuple
+
+import numpy as np
 
 from wam_control.friction_verdict import Domain, FrictionVerdict, friction_verdict
 from wam_theory.linear_loop import damping_ratio, gain_ratio
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
 LONGEST = 50  # periods of delay
+EVENTS = 40_000  # of a response: a fast loop has many samples before it rests, and here there is time
+ABSURD = 1e12  # a number of the loop above it, or below its inverse but not 0, is a slip of the pen
 
 
 class LoopDesign(NamedTuple):
@@ -58,7 +62,7 @@ class LoopDesign(NamedTuple):
 MEANING = {
     Domain.I: "stable for every error",
     Domain.II: "friction stabilises it for small errors",
-    Domain.III: "diverges for every error",
+    Domain.III: "no error was found for which every response comes to rest",
 }
 
 
@@ -75,13 +79,18 @@ def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay
     Raises
     ------
     ValueError
-        where the damping is 0, a rate or delay is below 0, the delay has no rate or more than `LONGEST` periods.
+        where the damping is 0, a rate or delay is below 0, the delay has no rate or more than `LONGEST` periods, or
+        a number is `ABSURD`.
     """
     if not node.damping > 0.0:
         raise ValueError(f"damping is {node.damping:g}; without damping no gain is stable, give one above 0")
     for name, value in (("rate", rate), ("delay", delay)):
         if not 0.0 <= value < math.inf:
             raise ValueError(f"{name} is {value:g}; it must be 0 or more")
+    given = {f.name: getattr(one, f.name) for one in (node, loop) for f in fields(one)} | {"rate": rate, "delay": delay}
+    for name, value in given.items():
+        if 0.0 < abs(value) < 1.0 / ABSURD or ABSURD < abs(value) < math.inf:
+            raise ValueError(f"{name} is {value:g}; it must be between {1.0 / ABSURD:g} and {ABSURD:g}")
     if delay and not rate:
         raise ValueError(f"delay is {delay:g} s and rate is 0; give the rate of the samples, Hz")
     samples = math.ceil(delay * rate - 1e-9)
@@ -91,4 +100,11 @@ def loop_design(node: FrictionNode, loop: IntegralLoop, rate: float = 0.0, delay
     plant = node.inertia, node.damping, node.transmission_stiffness, node.contact_stiffness
     zeta = float(damping_ratio(*plant))
     gamma = float(gain_ratio(loop.gain, *plant))
-    return LoopDesign(node, sampled, gamma, zeta, friction_verdict(node, sampled))
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            return LoopDesign(node, sampled, gamma, zeta, friction_verdict(node, sampled, EVENTS))
+    except ArithmeticError:
+        worst = max((name for name in given if 0.0 < given[name] < math.inf), key=lambda n: abs(math.log(given[n])))
+        raise ValueError(
+            f"{worst} is {given[worst]:g}; compared with the other numbers it is too far off to compute"
+        ) from None

@@ -16,6 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from wam_theory.arguments import Array, above_zero, zero_or_more
 from wam_theory.zero_order_hold import zero_order_hold
 
+FAST = 1e-3  # rad per sample at the margin: below, the polynomials of the held loop cancel
+SHORT = 0.5  # rad of delay at the margin: up to it the first crossing has the smallest gain
+
 
 class SampledMargin(NamedTuple):
     """Smallest gain at which a sampled loop oscillates, and its frequency, rad/s."""
@@ -201,7 +204,8 @@ def sampled_margin(
     earlier.  With P(z) z^d + g Q(z) the characteristic polynomial of the exactly discretised loop,
     the loop oscillates where Q/(P z^d) is real and negative on the unit circle; its imaginary part is
     sin(theta) times a polynomial in cos(theta), whose roots are all candidates apart from theta = pi.
-    It is kept as a Chebyshev series: in powers of the cosine the roots of a long delay are lost.
+    It is kept as a Chebyshev series: in powers of the cosine the roots of a long delay are lost.  Where the
+    loop is `FAST`, the angle vanishes in rounding, and the margin is that of `_fast_margin`.
 
     Parameters
     ----------
@@ -223,6 +227,9 @@ def sampled_margin(
     )
     if delay_samples < 0 or int(delay_samples) != delay_samples:
         raise ValueError(f"delay_samples is {delay_samples}; it must be a whole number, zero or more")
+    fast = _fast_margin(j, b, ktr, kc, period, int(delay_samples))
+    if fast.frequency * period < FAST and fast.frequency * period * (delay_samples + 0.5) < SHORT:
+        return fast
     p, q = _held_loop(j, b, ktr, kc, period)
     p = np.concatenate([np.zeros(int(delay_samples)), p])
     condition = np.zeros(1)
@@ -239,6 +246,21 @@ def sampled_margin(
         if 0.0 < gain < best.gain:
             best = SampledMargin(gain, theta / period)
     return best
+
+
+def _fast_margin(j: float, b: float, ktr: float, kc: float, period: float, delay_samples: int) -> SampledMargin:
+    """Margin of the continuous loop behind the lag of hold and delay, without the aliases of the samples.
+
+    With the lag D = (delay_samples + 1/2) T and sinc the size of the hold, the loop oscillates where
+    J w^2 + b w tan(w D) = k_tr + k_c and G_I k_tr k_c sinc(w T/2) cos(w D) = b w^2.
+    """
+    lag = (delay_samples + 0.5) * period
+    low, high = 0.0, min(math.sqrt((ktr + kc) / j), 0.5 * math.pi / lag)
+    while low < (middle := 0.5 * (low + high)) < high:
+        rises = j * middle * middle + b * middle * math.tan(middle * lag) < ktr + kc
+        low, high = (middle, high) if rises else (low, middle)
+    size = float(np.sinc(0.5 * high * period / math.pi)) * math.cos(high * lag)
+    return SampledMargin(b / ktr * (high * high / kc) / size, high)
 
 
 def _held_loop(j: float, b: float, ktr: float, kc: float, period: float) -> tuple[Array, Array]:

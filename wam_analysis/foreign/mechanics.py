@@ -6,19 +6,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.foreign.sources import Piece, Source, pieces
+from wam_analysis.foreign.sources import FEWEST, Piece, Source, differentiated, pieces
 from wam_analysis.measures.friction import Friction, identify_friction
-from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases
 
 Numbers = NDArray[np.float64]
 
 REST = 0.002  # rad/s or m/s; a slower joint is at rest, unless the noise is larger
 NOISY = 6.0  # standard deviations of the noise of a velocity: likewise
 BRIEFEST = 0.01  # s; a shorter stick or slip is chatter
+BRIEF = 0.5  # of a slip: a joint whose rests are shorter turns back, and does not stick
+TURNS = 0.8  # of the slips of such a joint go against the one before
 WINDOW = 0.03  # s over which friction is averaged
 FEWEST_SAMPLES = 6  # in that window
 BETTER = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
 SURE = 0.25  # of a number; with a larger standard error it is not identifiable
+AGREE = 0.2  # by which a recorded velocity may differ from the rate of the position
 BELOW_ZERO = 3.0  # standard errors: a fit in which one number is so negative holds more than friction
 
 
@@ -28,7 +31,7 @@ class Sticking(NamedTuple):
     Attributes
     ----------
     stuck : fraction of the time at rest.
-    slips, reversals : motions between, and those against the one before.
+    slips, reversals : motions between, and those against the one before; a motion back and forth is one.
     commanded : fraction of the rest in which it was commanded to move; NaN without a command.
     """
 
@@ -48,6 +51,9 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
         period = float(piece.time[1] - piece.time[0])
         phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(BRIEFEST / period)))
         total += len(piece.time)
+        if _only_turns(phases):
+            slips += 1
+            continue
         still += round(phases.stuck * len(piece.time))
         slips, reversals = slips + len(phases.slips), reversals + phases.reversals
         if command is not None:
@@ -56,6 +62,15 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
     if not total:
         return None
     return Sticking(still / total, slips, reversals, disobeyed / still if command is not None and still else math.nan)
+
+
+def _only_turns(phases: Phases) -> bool:
+    """Whether it is one motion back and forth, which is slow for a moment where it turns."""
+    between = phases.sticks[1:-1]
+    if len(phases.slips) < 4 or not len(between) or phases.reversals < TURNS * (len(phases.slips) - 1):
+        return False
+    rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, phases.slips))
+    return rest < BRIEF * motion
 
 
 def _rest(piece: Piece) -> float:
@@ -70,14 +85,36 @@ def _commanded_speed(command: Source, time: Numbers) -> Numbers:
     return np.interp(time, command.time, np.gradient(command.values["position"], command.time))
 
 
+def velocity_factor(source: Source) -> float:
+    """Recorded velocity over the rate of the position, where that moves; NaN where the two agree or it does not move.
+
+    It is 0 where the velocity is zero, and below zero where its sign is swapped.
+    """
+    if not {"position", "velocity"} <= source.values.keys():
+        return math.nan
+    rates, speeds = [], []
+    for piece in pieces(source):
+        rate, sd = differentiated(piece.time, piece.values["position"])
+        moves = np.abs(rate) > max(REST, NOISY * sd)
+        rates.append(rate[moves])
+        speeds.append(piece.values["velocity"][moves])
+    rate, speed = (np.concatenate(parts) if parts else np.zeros(0) for parts in (rates, speeds))
+    if len(rate) < FEWEST:
+        return math.nan
+    factor = float(rate @ speed / (rate @ rate))
+    return math.nan if abs(factor - 1.0) <= AGREE else factor
+
+
 def friction(source: Source) -> Friction | None:
     """Friction and inertia of a joint that its weight may load; None without effort, velocity or an answer.
+
+    Nor is there one where the recorded velocity is not the rate of the position.
 
     The load is that of a weight on the joint itself, over its angle, a sin q + b cos q + c, where this explains the
     effort better than a constant: in a motion of one frequency, inertia and weight are the same.
     """
     some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
-    if not some:
+    if not some or math.isfinite(velocity_factor(source)):
         return None
     period = float(some[0].time[1] - some[0].time[0])
     window = max(WINDOW, FEWEST_SAMPLES * period)

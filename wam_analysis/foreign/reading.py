@@ -42,7 +42,7 @@ def foreign_bag(path: Path, given: TopicMap) -> Bag:
     BagError
         if it cannot be read, or needs rosbags, which is not installed.
     ValueError
-        if a topic or field of the map is not there.
+        if a topic, joint or field of the map is not there.
     """
     if needs_rosbags(path):
         bag = _of(path, _by_rosbags(path), given)
@@ -58,6 +58,9 @@ def foreign_bag(path: Path, given: TopicMap) -> Bag:
     topics: dict[str, Any] = {}
     for name, columns in bag.topics.items():
         topics |= dict(_mapped(name, bag.types[name], columns, given))
+    joints = sorted({joint for one in topics.values() if isinstance(one, JointColumns) for joint in one.names})
+    if unknown := [name for name in given.joints if name not in joints]:
+        raise ValueError(f"{path} has no joint {unknown[0]}; its joints: {', '.join(joints) or 'none'}")
     types = {name: JOINTS if isinstance(one, JointColumns) else WRENCH for name, one in topics.items()}
     return bag._replace(topics=topics, types=types)
 
@@ -161,6 +164,8 @@ def _of(path: Path, messages: Any, given: TopicMap) -> Bag:
 
 def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tuple[str, JointColumns | WrenchColumns]]:
     """The columns of a topic by name, scaled; those of a controller's state are two: feedback and reference."""
+    if isinstance(columns, (JointColumns, WrenchColumns)):
+        _refuse_other_fields(topic, kind, given)
     if isinstance(columns, JointColumns):
         named = [given.fields.get(q, q) for q in IN_JOINTS]
         if bad := next((field for field in named if field not in IN_JOINTS), ""):
@@ -186,6 +191,14 @@ def _mapped(topic: str, kind: str, columns: Any, given: TopicMap) -> Iterable[tu
             yield f"{topic} wrench" if has_joints else topic, _wrench(topic, columns, known, given)
 
 
+def _refuse_other_fields(topic: str, kind: str, given: TopicMap) -> None:
+    """Refuse a map of what a known type has in one place only; position, velocity and effort may be exchanged."""
+    fields = {"stamp": "header.stamp"} | (JOINT_FIELDS if kind == JOINTS else WRENCH_FIELDS)
+    for quantity, field in fields.items():
+        if quantity not in IN_JOINTS and given.fields.get(quantity, field) != field:
+            raise ValueError(f"{topic} is of type {kind}; its {quantity} is '{field}', not '{given.fields[quantity]}'")
+
+
 def _at(topic: str, message: Any, path: str) -> Any:
     """What a path names in a message; of a list the path goes into each of its elements."""
     value = message
@@ -203,7 +216,10 @@ def _times(topic: str, columns: Messages, fields: Mapping[str, str]) -> NDArray[
     path = fields.get("stamp", "header.stamp")
     if "stamp" not in fields and not hasattr(columns.messages[0], "header"):
         return columns.log_time_ns
-    return np.array([_nanoseconds(_at(topic, message, path)) for message in columns.messages], np.int64)
+    try:
+        return np.array([_nanoseconds(_at(topic, message, path)) for message in columns.messages], np.int64)
+    except (TypeError, OverflowError):
+        raise ValueError(f"{topic}: the field '{path}' has no times") from None
 
 
 def _nanoseconds(stamp: Any) -> int:

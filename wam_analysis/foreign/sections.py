@@ -3,10 +3,12 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, LIMIT_CYCLE, FoundCycle, cycles, lines
 from wam_analysis.foreign.forces import ForceStep, force_steps
-from wam_analysis.foreign.mechanics import friction, is_sure, sticking
+from wam_analysis.foreign.mechanics import friction, is_sure, sticking, velocity_factor
 from wam_analysis.foreign.sources import Source, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.loop_timing import stamp_timing
@@ -53,9 +55,15 @@ def _happened(bag: Bag, commands: Sequence[Source], given: TopicMap) -> Section:
     for name, columns in sorted(bag.topics.items()):
         if isinstance(columns, JointColumns) and len(columns.stamp_ns):
             sentences.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")
+            numbers = np.hstack([columns.position, columns.velocity, columns.effort])
+            known = [np.isfinite(numbers[:, i :: len(columns.names)]).any() for i in range(len(columns.names))]
+            if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
+                sentences.append(f"{name}: {', '.join(none)} without a value that is a number.")
         elif isinstance(columns, WrenchColumns) and len(columns.stamp_ns):
-            largest = float((columns.force**2).sum(axis=1).max()) ** 0.5
-            sentences.append(f"{name}: {len(columns.stamp_ns)} forces, up to {shown(largest, 'N')}.")
+            sizes = np.sqrt((columns.force**2).sum(axis=1))
+            sizes = sizes[np.isfinite(sizes)]
+            what = f"up to {shown(float(sizes.max()), 'N')}" if len(sizes) else "none of which is a number"
+            sentences.append(f"{name}: {len(columns.stamp_ns)} forces, {what}.")
     others = sum(count for name, count in bag.counts.items() if name not in bag.topics and count)
     if others:
         sentences.append(f"{others} messages of other topics were not analysed; --topic and --map name their fields.")
@@ -173,8 +181,14 @@ def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section
 
 
 def _friction(states: Sequence[Source]) -> Section:
-    sentences, findings = [], []
+    sentences, findings, doubts = [], [], []
     for one in states:
+        factor = velocity_factor(one)
+        if math.isfinite(factor):
+            doubts.append(
+                f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the two is "
+                f"of another unit or sign, so that neither friction nor inertia is given."
+            )
         found = friction(one) if one.is_joint else None
         if found is None:
             continue
@@ -192,9 +206,11 @@ def _friction(states: Sequence[Source]) -> Section:
         sentences.append(f"{one.label}: {told}.")
     if sentences:
         assumed = "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone:"
-        return Section("friction", "Friction", (assumed, *sentences), tuple(findings), (), tuple(sentences))
+        return Section(
+            "friction", "Friction", (assumed, *sentences, *doubts), tuple(findings), (), (*sentences, *doubts)
+        )
     why = "The friction of the joints cannot be identified: no effort in this bag that friction and inertia explain."
-    return Section("friction", "Friction", (why,), ())
+    return Section("friction", "Friction", (why, *doubts), (), (), tuple(doubts))
 
 
 # timing

@@ -18,6 +18,7 @@ FEWEST = 20  # messages of a source, and of a piece of it
 FILLED = 5.5  # periods of the longest gap that is filled by interpolation
 IRREGULAR = 0.01  # of a period: stamps that differ more are put on a constant rate
 RESET = 1_000_000_000  # ns by which a stamp goes back where a clock was reset
+AWAY = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
 PRECISE = 0.01  # of the largest speed: noise of a velocity that is made from positions
 WIDEST = 0.03  # s about each sample that such a velocity is taken from
 COMMAND = re.compile(r"(^|[/_ ])(command|commands|cmd|desired|reference|ref|target|setpoint|goal)($|[/_ ])")
@@ -85,7 +86,13 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
 
 
 def _rising(stamps: Times, received: Times) -> Times:
-    """The stamps, or the times of reception where the stamps are of a clock that was reset or never set."""
+    """The stamps, or the times of reception where the stamps are of a clock that was reset or never set.
+
+    A few that are years away from their reception, such as 0, are replaced by it.
+    """
+    away = np.abs(stamps - received) > AWAY
+    if 2 * int(np.sum(away)) < len(stamps):
+        stamps = np.where(away, received, stamps)
     steps = np.diff(stamps)
     return received if np.any(steps < -RESET) or not np.any(steps) else stamps
 

@@ -5,6 +5,9 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 QUANTITIES = {"position": "rad", "velocity": "rad/s", "effort": "N m", "force": "N", "torque": "N m"}  # unit of ROS
+SHOWN = {q: (unit,) for q, unit in QUANTITIES.items()} | {
+    "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N", "A"),
+}  # fmt: skip
 MAPPED = (*QUANTITIES, "name", "stamp")
 UNITS = {  # as given: factor, unit that is shown
     "rad": (1.0, "rad"), "deg": (math.pi / 180.0, "rad"), "turn": (2.0 * math.pi, "rad"),
@@ -62,23 +65,30 @@ def topic_map(
     ValueError
         which says what is allowed.
     """
-    found = {}
+    found: dict[str, str] = {}
     for option in fields:
         quantity, _, field = option.partition("=")
         if quantity not in MAPPED or not field:
             raise ValueError(f"--map is '{option}'; write QUANTITY=FIELD, with a quantity of {', '.join(MAPPED)}")
+        if quantity in found:
+            raise ValueError(f"--map {quantity} is given twice, as '{found[quantity]}' and as '{field}'")
         found[quantity] = field
-    factors = {}
+    factors: dict[str, tuple[float, str]] = {}
     for option in units:
         quantity, _, unit = option.partition("=")
         if quantity not in QUANTITIES:
             raise ValueError(f"--unit is '{option}'; write QUANTITY=UNIT, with a quantity of {', '.join(QUANTITIES)}")
+        if quantity in factors:
+            raise ValueError(f"--unit {quantity} is given twice; the second is '{unit}'")
         factors[quantity] = _unit(quantity, unit)
     return TopicMap(tuple(topics), tuple(joints), tuple(commands), found, factors)
 
 
 def _unit(quantity: str, text: str) -> tuple[float, str]:
     if text in UNITS:
+        if UNITS[text][1] not in SHOWN[quantity]:
+            fitting = ", ".join(name for name, (_, unit) in UNITS.items() if unit in SHOWN[quantity])
+            raise ValueError(f"--unit {quantity}: '{text}' is no unit of {quantity}; it may be a factor or {fitting}")
         return UNITS[text]
     try:
         factor = float(text)
