@@ -56,7 +56,14 @@ def _series(path: Path, without: tuple[str, ...]) -> dict[str, list[_Message]]:
         found[topic] = []
         for time, data in zip(series.log_time_ns.tolist(), series.data, strict=True):
             found.setdefault(topic + _node(series, data), []).append(_Message(series, time, data))
-    return found
+    return {name: _from_start(messages) if " from " in name else messages for name, messages in found.items()}
+
+
+def _from_start(messages: list[_Message]) -> list[_Message]:
+    """Without what a node said before time began and said otherwise later: a recorder may come too late for it."""
+    begin = messages[0].log_time
+    at_begin = sum(message.log_time == begin for message in messages)
+    return messages[at_begin - 1 :]
 
 
 def _node(series: Raw, data: bytes) -> str:

@@ -95,7 +95,7 @@ def page(text: str, command: str, before: str = "") -> str:
     if before:
         tables = before[before.index("## Detection") :].split("## Method")[0].rstrip()
         parts.append(
-            "# The estimator before, on the same recordings\n\n"
+            "## The estimator before, on the same recordings\n\n"
             + tables.replace("\n## ", "\n### ").replace("## D", "### D", 1)
         )
     return "\n\n".join([*parts, METHOD])
