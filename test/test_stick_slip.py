@@ -337,6 +337,16 @@ def test_early_verdicts_are_those_of_long_runs() -> None:
     assert seen == {Verdict.DIVERGED, Verdict.SETTLED, Verdict.LIMIT_CYCLE}
 
 
+def test_standstills_ever_nearer_to_the_target_are_rest_and_not_a_cycle_of_rounded_samples() -> None:
+    node = FrictionNode(1.0, 1.2882191346522565, 0.8398435082087737, 0.41877963987125794, 1.0, 1.0)
+    loop = IntegralLoop(0.5140619411273989, 3.749510458586118, sample_period=0.793266855126162, delay_samples=2)
+    start = (0.0, 47.26389283360043, 0.0)
+    errors = [abs(e.contact_force) for e in simulate(node, loop, 0.0, 1e9, start).events if e.kind is Kind.STICK]
+    assert len(errors) >= 5
+    assert all(late < 0.01 * early for early, late in pairwise(errors))
+    assert assess(node, loop, 0.0, start).verdict is Verdict.SETTLED
+
+
 def test_a_response_that_outgrows_friction_is_given_up_early() -> None:
     early = assess(unit_node(), IntegralLoop(1.5), 40.0)
     assert early.verdict is Verdict.DIVERGED

@@ -75,8 +75,9 @@ def assess(
 
     Settled: the node rests or creeps to its target; or, with Coulomb friction only, a slip from stick to
     stick reduced the error, after which the response repeats on a smaller scale ((5.17): exact, because a
-    slip from breakaway is proportional to its error); or eight successive standstills lie within 1e-7 of
-    the step.  Limit cycle: up to twelve standstills repeat in force and time to `tolerance`.  Diverged:
+    slip from breakaway is proportional to its error); or it sticks within 1e-9 of the step and the friction
+    from its target, from where the next slip is so late that its samples are lost in rounding; or eight
+    successive standstills lie within 1e-7 of the step.  Limit cycle: up to twelve standstills repeat in force and time to `tolerance`.  Diverged:
     above 1e4 times the step and the friction, or, in a loop without limit, deadband or hold, once friction
     can no longer stop the growing modes.
 
@@ -115,7 +116,7 @@ def assess(
         elif kind is Kind.STICK or kind is Kind.REVERSE:
             creeping, crept_from = 0, math.nan
             turns.append((t, model.contact_force(x)))
-            if kind is Kind.STICK and error < slipping <= model.self_similar:
+            if kind is Kind.STICK and (error < slipping <= model.self_similar or error < 1e-9 * scale):
                 return Outcome(Verdict.SETTLED, math.nan, math.nan, t, count)
             if kind is Kind.REVERSE and runaway < _INF and _runs_away(model, phase, runaway):
                 return Outcome(Verdict.DIVERGED, math.nan, math.nan, t, count)

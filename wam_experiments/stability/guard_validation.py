@@ -173,8 +173,8 @@ class ValidationTable(NamedTuple):
                     lines.append(f"{domain:<10} {verdict:<8} {row[0]:6d} {row[1]:7d} {row[2]:9d}")
         total = sum(self.counts.values())
         lines.append(
-            f"{total} sets: {self.accepted_and_diverged} accepted but diverging, "
-            f"{self.refused_and_stable} refused but coming to rest"
+            f"{total} sets: {self.accepted_and_diverged} accepted that diverge, "
+            f"{self.refused_and_stable} refused that come to rest"
         )
         return "\n".join(lines)
 
