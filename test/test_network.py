@@ -116,7 +116,7 @@ def test_ros_is_limited_to_this_machine_whatever_the_shell_has_set() -> None:
     environment = {**WIDE_OPEN, "ROS_DISCOVERY_SERVER": "192.0.2.77:11811", "ROS_DOMAIN_ID": "5"}
     limit_to_this_machine(environment)
     assert environment == {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",
         "FASTRTPS_DEFAULT_PROFILES_FILE": str(PROFILE),
         "SKIP_DEFAULT_XML_FILE": "1",
         "ROS_DOMAIN_ID": "5",
