@@ -48,9 +48,8 @@ def limit_to_this_machine(environment: MutableMapping[str, str] = os.environ) ->
     for name in WIDER:
         environment.pop(name, None)
     if environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") != "OFF":
-        environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = (
-            "SYSTEM_DEFAULT"  # the profile decides; LOCALHOST adds shared memory
-        )
+        # the profile decides: with LOCALHOST the middleware adds shared memory to it
+        environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "SYSTEM_DEFAULT"
     environment["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(PROFILE)
     environment["SKIP_DEFAULT_XML_FILE"] = "1"  # FastDDS would read a profile in the working directory, too
 

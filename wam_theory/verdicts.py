@@ -73,13 +73,13 @@ def assess(
 ) -> Outcome:
     """Verdict on a step response.
 
-    Settled: the node rests or creeps to its target; or, with Coulomb friction only, a slip from stick to
-    stick reduced the error, after which the response repeats on a smaller scale ((5.17): exact, because a
-    slip from breakaway is proportional to its error); or it sticks within 1e-9 of the step and the friction
-    from its target, from where the next slip is so late that its samples are lost in rounding; or eight
-    successive standstills lie within 1e-7 of the step.  Limit cycle: up to twelve standstills repeat in force and time to `tolerance`.  Diverged:
-    above 1e4 times the step and the friction, or, in a loop without limit, deadband or hold, once friction
-    can no longer stop the growing modes.
+    Settled: the node rests or creeps to its target; or, with Coulomb friction only, a slip from stick to stick
+    reduced the error, after which the response repeats on a smaller scale ((5.17): exact, because a slip from
+    breakaway is proportional to its error); or it sticks within 1e-9 of the step and the friction from its target,
+    from where the next slip is so late that its samples are lost in rounding; or eight successive standstills lie
+    within 1e-7 of the step. Limit cycle: up to twelve standstills repeat in force and time to `tolerance`.
+    Diverged: above 1e4 times the step and the friction, or, in a loop without limit, deadband or hold, once
+    friction can no longer stop the growing modes.
 
     Parameters
     ----------
