@@ -375,6 +375,27 @@ def test_a_stamp_of_zero_and_values_that_are_no_numbers(tmp_path: Path) -> None:
     assert f"/wrench: {len(time)} forces, none of which is a number." in happened
 
 
+@pytest.mark.parametrize("late", [0.0007, 0.002])
+def test_two_publishers_of_the_same_joints_are_said_and_make_no_cycle(late: float, tmp_path: Path) -> None:
+    time = times(10.0)
+    sent = joints("/joint_states", time, ["a", "b"], position=at_rest(time, ["a", "b"], 44))
+    other = at_rest(time, ["a", "b"], 45) + np.array([0.3, 0.0])
+    sent += joints("/joint_states", time + late, ["a", "b"], position=other)
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    assert "two publishers take turns; the topic is not analysed (a)" in " ".join(analysis.sections[0].sentences)
+    assert not numbers
+
+
+def test_a_command_that_is_sent_only_when_it_changes_is_one(tmp_path: Path) -> None:
+    time = times(20.0)
+    force = np.zeros((len(time), 3))
+    force[:, 2] = np.where(time < 5.0, 1.0, 19.0) + 0.02 * chance(46).normal(size=len(time))
+    asked = wrenches("/force_command", np.array([0.5, 5.0]), np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 20.0]]))
+    _, numbers = found((by_mcap_ros2(tmp_path / "bag", asked + wrenches("/ft", time, force)), TopicMap()))
+    steady = next(value for name, value in numbers.items() if "steady state" in name)
+    assert steady == pytest.approx(19.0, rel=CLOSE)
+
+
 # ways in
 
 

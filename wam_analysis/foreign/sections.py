@@ -9,7 +9,7 @@ from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, LIMIT_CYCLE, FoundCycle, cycles, lines
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import friction, is_sure, sticking, velocity_factor
-from wam_analysis.foreign.sources import Source, sources
+from wam_analysis.foreign.sources import FEWEST, Source, alternates, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.loop_timing import stamp_timing
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
@@ -21,10 +21,12 @@ TURNING = 5.0  # % of the time at rest that a motion back and forth has where it
 def foreign_sections(bag: Bag, given: TopicMap) -> tuple[Section, ...]:
     """Sections in the order of those of a bag of this stack."""
     found = sources(bag, given)
+    mixed = [one for one in found if not one.is_command and alternates(one)]
+    found = [one for one in found if one.topic not in {other.topic for other in mixed}]
     states = [one for one in found if not one.is_command]
     commands = [one for one in found if one.is_command]
     return (
-        _happened(bag, commands, given),
+        _happened(bag, commands, mixed, given),
         _forces(states, commands),
         _cycles(states, commands),
         _stick_slip(states, commands),
@@ -45,7 +47,7 @@ def _share_frame(one: Source, other: Source) -> bool:
     return one.frame == other.frame or not one.frame or not other.frame
 
 
-def _happened(bag: Bag, commands: Sequence[Source], given: TopicMap) -> Section:
+def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], given: TopicMap) -> Section:
     what = (
         "Analysed as that of another robot, as the options say."
         if given.is_given
@@ -70,7 +72,12 @@ def _happened(bag: Bag, commands: Sequence[Source], given: TopicMap) -> Section:
     if commands:
         topics = ", ".join(dict.fromkeys(one.topic for one in commands))
         sentences.append(f"Taken as commands: {topics}.")
-    return Section("happened", "What happened", tuple(sentences), ())
+    verdict = [
+        f"{topic}: values jump to and fro from message to message, as where two publishers take turns; "
+        f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
+        for topic in dict.fromkeys(one.topic for one in mixed)
+    ]
+    return Section("happened", "What happened", (*sentences, *verdict), (), (), tuple(verdict))
 
 
 # forces
@@ -161,7 +168,9 @@ def _spectrum(states: Sequence[Source]) -> Section:
 def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section:
     sentences, findings, verdict = [], [], []
     for one in states:
-        found = sticking(one, _command_of(one, commands)) if one.is_joint else None
+        command = _command_of(one, commands)
+        is_speed = command is not None and len(command.time) >= FEWEST  # not a position that is sent once and held
+        found = sticking(one, command if is_speed else None) if one.is_joint else None
         if found is None:
             continue
         findings += [
@@ -219,6 +228,8 @@ def _friction(states: Sequence[Source]) -> Section:
 def _timing(found: Sequence[Source]) -> Section:
     clocks: dict[tuple[str, str, int, float], list[Source]] = {}
     for one in found:
+        if len(one.time) < FEWEST:
+            continue
         clocks.setdefault((one.topic, one.frame, len(one.time), float(one.time[0])), []).append(one)
     sentences, findings, verdict = [], [], []
     topics = [key[0] for key in clocks]

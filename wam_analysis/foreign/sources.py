@@ -14,9 +14,11 @@ from wam_bag.bag import Bag, JointColumns, WrenchColumns
 Numbers = NDArray[np.float64]
 Times = NDArray[np.int64]
 
-FEWEST = 20  # messages of a source, and of a piece of it
+FEWEST = 20  # messages of what was measured, and of a piece of it; a command may be sent once and hold
+ALTERNATES = 5.0  # times the change over two messages: the change over one, where two publishers take turns
 FILLED = 5.5  # periods of the longest gap that is filled by interpolation
 IRREGULAR = 0.01  # of a period: stamps that differ more are put on a constant rate
+LOUD = 1e3  # roundings of a number: smaller changes are none
 RESET = 1_000_000_000  # ns by which a stamp goes back where a clock was reset
 AWAY = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
 PRECISE = 0.01  # of the largest speed: noise of a velocity that is made from positions
@@ -69,11 +71,12 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
     enough = {
         topic: (columns, _rising(columns.stamp_ns, columns.log_time_ns))
         for topic, columns in sorted(bag.topics.items())
-        if isinstance(columns, (JointColumns, WrenchColumns)) and len(columns.stamp_ns) >= FEWEST
+        if isinstance(columns, (JointColumns, WrenchColumns))
+        and len(columns.stamp_ns) >= (1 if _is_command(topic, given) else FEWEST)
     }
     origin = min((int(stamps.min()) for _, stamps in enough.values()), default=0)
     for topic, (columns, stamps) in enough.items():
-        is_command = topic in given.commands or bool(COMMAND.search(topic))
+        is_command = _is_command(topic, given)
         frames = np.asarray(columns.frames, dtype=str)
         time, received = (stamps - origin) / 1e9, (columns.log_time_ns - origin) / 1e9
         for frame in dict.fromkeys(frames.tolist()):
@@ -83,6 +86,22 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
                 if (whole := _whole(one, rows)) is not None:
                     found.append(whole)
     return _labelled(found)
+
+
+def _is_command(topic: str, given: TopicMap) -> bool:
+    return topic in given.commands or bool(COMMAND.search(topic))
+
+
+def alternates(source: Source) -> bool:
+    """Whether a quantity jumps to and fro from message to message, as where two publishers share a topic.
+
+    No motion does: it would have to be faster than 0.47 of the rate of the messages.
+    """
+    for values in source.values.values():
+        once, twice = (float(np.median(np.abs(values[n:] - values[:-n]))) for n in (1, 2))
+        if once > ALTERNATES * twice and once > LOUD * np.finfo(float).eps * float(np.max(np.abs(values))):
+            return True
+    return False
 
 
 def _rising(stamps: Times, received: Times) -> Times:
@@ -124,7 +143,7 @@ def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
         return None
     rows = np.flatnonzero(np.logical_and.reduce([known[q] for q in kept]))
     rows = rows[np.unique(one.time[rows], return_index=True)[1]]
-    if len(rows) < FEWEST:
+    if len(rows) < (1 if one.is_command else FEWEST):
         return None
     values = {q: v[rows].astype(np.float64) for q, v in kept.items()}
     return one._replace(time=one.time[rows], received=one.received[rows], values=values)
