@@ -9,6 +9,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any, TextIO
 
 from wam_bag.printable import printable
@@ -96,9 +97,29 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _complete() -> None:
     """Answer a shell that asks how a line may go on, and end."""
     import argcomplete
+    from argcomplete.completers import SuppressCompleter
 
     line = os.environ.get("COMP_LINE", "")
-    argcomplete.autocomplete(_parser(_command(line.split()[1:])))
+    parser = _parser(_command(line.split()[1:]))
+    _offer_files(parser)
+    argcomplete.autocomplete(parser, default_completer=SuppressCompleter())
+
+
+def _offer_files(parser: argparse.ArgumentParser) -> None:
+    """Offer files where a file is asked for, and the names of what is installed; nothing for a name or a number."""
+    from argcomplete.completers import FilesCompleter
+
+    from wam_description.configuration import packaged_names
+
+    files = FilesCompleter()
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                _offer_files(below)
+        elif action.dest == "config":
+            action.completer = lambda prefix, **_: [*packaged_names(), *files(prefix)]  # type: ignore[attr-defined]
+        elif action.type is Path or action.metavar == "FILE" or action.dest in ("scenario", "task"):
+            action.completer = files  # type: ignore[attr-defined]
 
 
 class _Printable:

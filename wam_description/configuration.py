@@ -180,17 +180,26 @@ def packaged(name: str, kind: str = "configuration") -> Path:
     ParameterError
         if there is none of this name; the message lists those that exist.
     """
-    wanted = kind == "scenario"
-    folders = [folder for folder in dict.fromkeys(_folders()) if folder.is_dir()]
+    folders = _present_folders()
     for folder in folders:
         if (folder / f"{name}.yaml").is_file():
             return folder / f"{name}.yaml"
-    found = sorted({path.stem for folder in folders for path in folder.glob("*.yaml") if _is_scenario(path) == wanted})
     raise ParameterError(
-        f"no {kind} '{name}' comes with wam_stack; there are: {', '.join(found) or 'none'} "
+        f"no {kind} '{name}' comes with wam_stack; there are: {', '.join(packaged_names(kind)) or 'none'} "
         f"(looked in {', '.join(map(str, folders)) or 'share/wam_stack/config of every prefix'}); "
         f"give the path of a file of your own"
     )
+
+
+def packaged_names(kind: str = "configuration") -> list[str]:
+    """Names of the configurations, or of the scenarios, that come with the package."""
+    wanted = kind == "scenario"
+    files = (path for folder in _present_folders() for path in folder.glob("*.yaml"))
+    return sorted({path.stem for path in files if _is_scenario(path) == wanted})
+
+
+def _present_folders() -> list[Path]:
+    return [folder for folder in dict.fromkeys(_folders()) if folder.is_dir()]
 
 
 def _is_scenario(path: Path) -> bool:
