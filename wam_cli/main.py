@@ -106,7 +106,7 @@ def _complete() -> None:
 
 
 def _offer_files(parser: argparse.ArgumentParser) -> None:
-    """Offer files where a file is asked for, and the names of what is installed; nothing for a name or a number."""
+    """Offer files where a file is wanted, and the names of what is installed; nothing for a name or a number."""
     from argcomplete.completers import FilesCompleter
 
     from wam_description.configuration import packaged_names

@@ -73,7 +73,7 @@ def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], giv
         topics = ", ".join(dict.fromkeys(one.topic for one in commands))
         sentences.append(f"Taken as commands: {topics}.")
     verdict = [
-        f"{topic}: values jump to and fro from message to message, as where two publishers take turns; "
+        f"{topic}: values jump back and forth from message to message, as where two publishers take turns; "
         f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
         for topic in dict.fromkeys(one.topic for one in mixed)
     ]

@@ -93,7 +93,7 @@ def _is_command(topic: str, given: TopicMap) -> bool:
 
 
 def alternates(source: Source) -> bool:
-    """Whether a quantity jumps to and fro from message to message, as where two publishers share a topic.
+    """Whether a quantity jumps back and forth from message to message, as where two publishers share a topic.
 
     No motion does: it would have to be faster than 0.47 of the rate of the messages.
     """
