@@ -132,7 +132,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
         yield pool
     except BaseException:
         ours.close()
-        # Python before 3.12 keeps this end open, and then waits for ever until somebody reads what is on its way
+        # Python before 3.12 keeps this end open, and then waits indefinitely until somebody reads what is on its way
         pool._call_queue._reader.close()  # type: ignore[attr-defined]
         raise
     finally:
