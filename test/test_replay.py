@@ -1,10 +1,14 @@
 """Recorded inputs through the same machines: bit for bit, and the first difference where there is one."""
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
 
 from wam_bag.bag import BagError, raw, read
 from wam_bag.bag_writer import BagWriter
@@ -13,6 +17,9 @@ from wam_cli import main as cli
 from wam_cli.commands.replay import reasons, told
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
+from wam_description.status import CHANGES
+from wam_ros.header import stamp_of
+from wam_sim.recording import recorded_run
 from wam_sim.replay import REPLAYED, Compared, Replay, replay
 
 STEPS = {
@@ -36,6 +43,7 @@ QOS = {
 
 
 RECORDED: list[Path] = []
+Changes = Iterable[tuple[int, str, dict[str, Any]]]  # not before, ns; node, parameters
 
 
 @pytest.fixture
@@ -46,7 +54,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory, domain_id: int) -> Path:
     return RECORDED[0]
 
 
-def recorded(folder: Path, domain_id: int, **values: object) -> Path:
+def recorded(folder: Path, domain_id: int, changes: Changes = (), **values: object) -> Path:
     from wam_ros.bring_up import Composition
 
     script = folder / "script.yaml"
@@ -64,10 +72,33 @@ def recorded(folder: Path, domain_id: int, **values: object) -> Path:
         }
     )
     with Composition(configuration, domain_id=domain_id) as composition:
-        scenario = composition.nodes["scenario"]
+        scenario: Any = composition.nodes["scenario"]
+        waiting = list(changes)
+
+        def change(message: JointState) -> None:
+            if waiting and stamp_of(message) > waiting[0][0]:
+                _, node, given = waiting.pop(0)
+                parameters = [Parameter(name, value=value) for name, value in given.items()]
+                assert all(found.successful for found in composition.nodes[node].set_parameters(parameters))
+
+        scenario.create_subscription(JointState, "joint_states", change, 10)
         composition.spin(lambda: scenario.done)
         assert scenario.failure == ""
     return folder / "bag"
+
+
+def without_messages(bag: Path, to: Path, topic: str, word: bytes) -> Path:
+    """The same bag without the messages of a topic that hold a word."""
+    contents = read(bag)
+    with BagWriter(to) as writer:
+        for name, messages in raw(bag).items():
+            writer.add_topic(name, messages.type, QOS)
+            for k, (time, data) in enumerate(zip(messages.log_time_ns.tolist(), messages.data, strict=True)):
+                if name != topic or word not in data:
+                    writer.write(name, data, time, time, k)
+        writer.attach("parameters.yaml", "application/yaml", contents.attachments["parameters.yaml"])
+        writer.metadata("recording", contents.metadata["recording"])
+    return to
 
 
 def changed(
@@ -99,6 +130,28 @@ def test_a_lockstep_recording_replays_bit_for_bit(bag: Path, node: str) -> None:
     assert counts <= {501, 101, 11}  # inner, outer, display rate
     assert counts
     assert done.is_same
+
+
+def test_gains_that_were_changed_at_any_time_replay_with_their_change(tmp_path: Path, domain_id: int) -> None:
+    changes = [
+        (100_000_000, "force_loop", {"posture_gain": 3.3, "blend_time": 1e-5, "schedule": "position"}),
+        (200_000_000, "velocity_loop", {"servo.integral_gain": [1.5, 1.5, 1.5, 0.7]}),  # the force loop follows
+        (300_000_000, "force_loop", {"posture_gain": 2.9, "schedule": "off"}),
+    ]
+    bag = recorded(tmp_path, domain_id, changes)
+    for node in ("force_loop", "velocity_loop"):
+        done = replay(bag, node)
+        assert [topic for topic in done.topics if not topic.is_same] == []
+        assert done.lost == ()
+    run = recorded_run(read(bag))
+    first, second, third, softer = run.changes("force_loop")
+    assert [value for _, value in sorted(first.settings.items())] == [1e-5, 3.3, "position"]
+    assert softer.settings == {"force_loop:posture_gain": 4.0}
+    assert third.settings == {"force_loop:posture_gain": 2.9, "force_loop:schedule": "off"}
+    assert second.settings == {"force_loop:servo.integral_gain": [1.5, 1.5, 1.5, 0.7]}
+    assert 0 < first.after < second.after < third.after
+    silent = without_messages(bag, tmp_path / "silent", "/wam/status", CHANGES.encode())
+    assert not replay(silent, "force_loop").is_same, "as it was before the nodes reported what they took"
 
 
 def test_an_arm_without_joint_sensors_replays_too(tmp_path: Path, domain_id: int) -> None:

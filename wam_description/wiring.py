@@ -134,6 +134,12 @@ class Declaration(NamedTuple):
     ros_node: str
 
     @property
+    def shared_group(self) -> str:
+        """The group of shared parameters that the node takes while it runs, '' where there is none."""
+        followed: Followed | None = getattr(self.node, "follows", None)
+        return getattr(self.node, "owns", None) or (followed.group if followed else "")
+
+    @property
     def parameter_class(self) -> Any:
         """The class of the node's own parameters; imported now where it is given as 'module:Class'."""
         kind = self.node.parameters

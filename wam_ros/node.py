@@ -5,7 +5,7 @@ import re
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from itertools import pairwise
@@ -59,6 +59,7 @@ class AdaptedNode(TolerantNode):
         owned: str | None = getattr(declaration.node, "owns", None)
         shared, own = declare(self, declaration.parameter_class, f"{owned}." if owned else None)
         self.node = declaration.make(shared, own)
+        self._worked = 0  # stamp of the last step, ns
         self._declaration, self._outputs = declaration, frozenset(declaration.outputs)
         self._is_realtime = shared.timing.mode == "realtime"
         if self._is_realtime and getattr(self.node, "high_priority", False):
@@ -66,11 +67,13 @@ class AdaptedNode(TolerantNode):
         live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
         if owned:
             live.append((getattr(shared, owned), self.node.retune, f"{owned}."))
-        follow_together(self, live)
+        follow_together(self, live, self._report_change)
         followed: Followed | None = getattr(self.node, "follows", None)
         if followed:
             group = getattr(shared, followed.group)
-            follow_other(self, followed.node, group, self.node.retune, f"{followed.group}.", self._warn)
+            follow_other(
+                self, followed.node, group, self.node.retune, f"{followed.group}.", self._warn, self._report_change
+            )
         interface = Interface(shared, started_by_hand=declaration)
         self._ports = Ports(self, declaration, shared, interface)
         self._waiting: deque[Callable[[], None]] = deque()  # what follows a request that is under way
@@ -199,6 +202,7 @@ class AdaptedNode(TolerantNode):
 
     def _work(self, inputs: Inputs, work: Callable[[Inputs], Outputs]) -> None:
         began = time.monotonic()
+        self._worked = inputs.stamp
         outputs = work(inputs)
         if (taken := time.monotonic() - began) > SLOW_STEP:
             self.get_logger().warning(
@@ -234,6 +238,9 @@ class AdaptedNode(TolerantNode):
             self.get_logger().error(status.message)
         elif status.step:
             self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
+
+    def _report_change(self, values: Mapping[str, Any]) -> None:
+        self._ports.report_change(self._worked, values)
 
     def _warn(self, reason: str) -> None:
         """Report that the node works with parameters of another one that it does not accept."""

@@ -94,12 +94,15 @@ def follow(node: Node, own: T, take: Any, prefix: str = "") -> None:
     follow_together(node, [(own, take, prefix)])
 
 
-def follow_together(node: Node, parts: Sequence[tuple[Any, Any, str]]) -> None:
+def follow_together(
+    node: Node, parts: Sequence[tuple[Any, Any, str]], report: Callable[[Mapping[str, Any]], None] = lambda values: None
+) -> None:
     """Let live parameters of several parts change as one set: where one part refuses, all of them keep their values.
 
     Parameters
     ----------
     parts : own, take and prefix of each part, as `follow` takes them.
+    report : called with the values that have been taken, by name.
     """
     present = [own for own, _, _ in parts]
 
@@ -115,12 +118,22 @@ def follow_together(node: Node, parts: Sequence[tuple[Any, Any, str]]) -> None:
                     present[i] = before[i]
                     take(before[i])
             return SetParametersResult(successful=False, reason=str(error))
+        if present != before:
+            report(given)
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(changed)
 
 
-def follow_other(node: Node, other: str, group: T, take: Any, prefix: str, refuse: Callable[[str], None]) -> None:
+def follow_other(
+    node: Node,
+    other: str,
+    group: T,
+    take: Any,
+    prefix: str,
+    refuse: Callable[[str], None],
+    report: Callable[[Mapping[str, Any]], None] = lambda values: None,
+) -> None:
     """Take the live changes of shared parameters at another node of the same namespace.
 
     Parameters
@@ -130,6 +143,7 @@ def follow_other(node: Node, other: str, group: T, take: Any, prefix: str, refus
     take : called with the new parameter object; it may raise ParameterError, though the other node uses it.
     prefix : what the names of these parameters begin with.
     refuse : called with the reason where `take` does not accept what the other node uses.
+    report : called with the values that have been taken, by name.
     """
     state = {"group": group}
 
@@ -145,6 +159,8 @@ def follow_other(node: Node, other: str, group: T, take: Any, prefix: str, refus
             take(present)
         except ParameterError as error:
             refuse(f"{other} uses {prefix}* that are not accepted here: {error}")
+        else:
+            report({name: value for name, value in given.items() if name.startswith(prefix)})
 
     node.create_subscription(ParameterEvent, "/parameter_events", changed, qos_profile_parameter_events)
 

@@ -16,7 +16,7 @@ from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.interface import Interface
 from wam_description.signals import Level, NodeStatus
-from wam_description.status import AWAITED, diagnosed_name, guidance
+from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance
 from wam_description.topics import STATUS, Topic
 from wam_description.wiring import Declaration
 from wam_ros.claims import Claims
@@ -82,6 +82,8 @@ class Ports:
         self.session = 0
         self._name = declaration.name
         self._refusals_reported = 0
+        self._changed_after, self._change_number = -1, 0
+        self._changed: dict[str, str] = {}
         self._status = self._plain = WAITING
         self.takes_problem: Callable[[str], None] | None = None  # where the node itself has to brake
         self._wanted: NodeStatus | None = None
@@ -219,6 +221,18 @@ class Ports:
     def problem(self) -> str:
         """The first problem that there is, '' where there is none."""
         return next(filter(None, self.problems.values()), "")
+
+    def report_change(self, stamp: int, values: Mapping[str, Any]) -> None:
+        """Publish live parameters that the node has taken after its step of a stamp, ns: a replay needs both.
+
+        What was taken after one step is reported together, so that only the last message is needed.
+        """
+        if stamp != self._changed_after:
+            self._changed_after, self._changed = stamp, {CHANGES: str(self._change_number + 1)}
+            self._change_number += 1
+        self._changed |= {f"{self._name}:{name}": str(_listed(value)) for name, value in values.items()}
+        status = self._status._replace(stamp=stamp, facts={**self._status.facts, **self._changed})
+        self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
 
     def follow(self, session: int, awaited: Collection[str]) -> None:
         """Say that this node follows another session of the driver, and which topics it lacks for its next step."""
@@ -361,3 +375,7 @@ class Ports:
         status = NodeStatus(level, text, name, fault=self._status.fault, facts=facts)
         message = diagnostic_status(status._replace(connected=self.ready), self.shared.arm.name)
         self._send(DIAGNOSTICS, DiagnosticArray(header=header(self._last_report), status=[message]))
+
+
+def _listed(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -1,5 +1,6 @@
 """Contents of a bag as a run: arm, parameters, steps, faults, status and mode; the one reader of all these."""
 
+import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
@@ -9,7 +10,7 @@ from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_description.parameter_history import present_name
 from wam_description.signals import NodeStatus
-from wam_description.status import parse
+from wam_description.status import CHANGES, parse
 from wam_description.topics import TOPICS
 from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
 
@@ -23,6 +24,14 @@ class RecordedStep(NamedTuple):
     begin: int
     end: int
     settings: Mapping[str, Any]
+
+
+class RecordedChange(NamedTuple):
+    """Live parameters that a node took after its step of a stamp, ns; `number` counts these changes from 1."""
+
+    after: int
+    settings: Mapping[str, Any]
+    number: int
 
 
 class RecordedFault(NamedTuple):
@@ -61,6 +70,16 @@ class RecordedRun(NamedTuple):
 
     def __repr__(self) -> str:
         return f"RecordedRun({self.bag!r}, {self.namespace!r}, {len(self.steps)} steps, {self.outcome!r}, {self.mode})"
+
+    def changes(self, node: str) -> list[RecordedChange]:
+        """Live parameters that a node took while it ran, by 'node:parameter', as it reported them itself."""
+        found: list[RecordedChange] = []
+        for status in self.statuses:
+            if status.node == node and (number := status.facts.get(CHANGES, "")).isdecimal():
+                if found and found[-1].number == int(number[:9]):  # the same, and more
+                    found.pop()
+                found.append(RecordedChange(status.stamp, _settings(status), int(number[:9])))
+        return found
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""
@@ -171,6 +190,11 @@ def _settings(status: NodeStatus) -> dict[str, Any]:
 
 def _value(text: str) -> Any:
     try:
-        return untrusted_yaml(text)
+        return json.loads(text)  # YAML takes 1e-05 for a word
+    except (ValueError, RecursionError):
+        pass
+    try:
+        found = untrusted_yaml(text)
     except ValueError:
         return text
+    return text if isinstance(found, bool) and text not in ("True", "False") else found  # 'off' is a word

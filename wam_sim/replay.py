@@ -10,6 +10,7 @@ Topics of numbers are compared; in_contact and markers follow from the same esti
 import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -73,6 +74,14 @@ class Compared(NamedTuple):
     def is_same(self) -> bool:
         """Whether there is no difference at all."""
         return not (self.only_recorded or self.only_replayed or self.different)
+
+
+class Change(NamedTuple):
+    """Parameters that a node takes after its step of a stamp, ns, and by which of its methods."""
+
+    after: int
+    method: str
+    parameters: Any
 
 
 class Gap(NamedTuple):
@@ -140,7 +149,7 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
     values = (
         configuration.sections.get(declaration.name, {}) if configuration else run.parameters.nodes[declaration.name]
     )
-    changes = _changes(run, declaration, values)
+    changes, lost_changes = _changes(run, shared, declaration, values)
     published = _run(bag, namespace, shared, declaration, own, changes)
     names = _names(shared)
     compared = []
@@ -152,7 +161,7 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
     mode = shared.timing.mode if run.mode == "unknown" else run.mode
     gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(bag.first_ns)
-    return Replay(declaration.name, mode, tuple(compared), gaps, tuple(lost))
+    return Replay(declaration.name, mode, tuple(compared), gaps, (*lost, *lost_changes))
 
 
 def _gaps(topic: str, columns: Columns | None) -> list[Gap]:
@@ -179,15 +188,27 @@ def _parameters(run: RecordedRun, declaration: Declaration, configuration: Confi
         raise BagError(f"{error}; give a configuration with --config") from None
 
 
-def _changes(run: RecordedRun, declaration: Declaration, values: Mapping[str, Any]) -> list[tuple[int, Any]]:
-    """The node's parameter objects after each step of the scenario that set some of them, by stamp, ns."""
+def _changes(
+    run: RecordedRun, shared: Shared, declaration: Declaration, values: Mapping[str, Any]
+) -> tuple[list[Change], tuple[str, ...]]:
+    """What the node took while it ran, as it reported it or as a scenario set it, and what is lost of that."""
     prefix, present, found = f"{declaration.name}:", dict(values), []
-    for step in (*run.steps, *([run.unfinished] if run.unfinished else [])):
-        mine = {key.removeprefix(prefix): value for key, value in step.settings.items() if key.startswith(prefix)}
-        if mine:
-            present |= mine
-            found.append((step.begin, build_part(declaration.parameter_class, present)))
-    return found
+    reported = run.changes(declaration.name)
+    steps = () if reported else (*run.steps, *([run.unfinished] if run.unfinished else []))
+    given = [(one.after, one.settings) for one in reported] + [(step.begin - 1, step.settings) for step in steps]
+    group = declaration.shared_group
+    for after, settings in given:
+        mine = {key.removeprefix(prefix): value for key, value in settings.items() if key.startswith(prefix)}
+        if not mine:
+            continue
+        present |= mine
+        if any(not group or not name.startswith(f"{group}.") for name in mine):
+            found.append(Change(after, "tune", build_part(declaration.parameter_class, present)))
+        if group and any(name.startswith(f"{group}.") for name in mine):
+            found.append(Change(after, "retune", build_part(type(getattr(shared, group)), present, f"{group}.")))
+    numbers = [one.number for one in reported]
+    lost = sum(max(b - a - 1, 0) for a, b in pairwise(numbers))
+    return found, ((f"{lost} changes of parameters of {declaration.name} are not in the bag",) if lost else ())
 
 
 def _run(
@@ -196,7 +217,7 @@ def _run(
     shared: Shared,
     declaration: Declaration,
     own: Any,
-    changes: list[tuple[int, Any]],
+    changes: list[Change],
 ) -> dict[str, list[TopicValue]]:
     interface, node = Interface(shared, started_by_hand=declaration), declaration.make(shared, own)
     for item in (item for reaction in declaration.reactions for item in reaction.inputs):
@@ -209,14 +230,15 @@ def _run(
     published: dict[str, list[TopicValue]] = {}
     rows = [interface.topics[topic] for topic in feeds]
     for topic, stamp, value in _messages(bag, namespace, rows, shared):
-        while changes and changes[0][0] <= stamp:
-            node.tune(changes.pop(0)[1])
         for put, taken, work in feeds[topic]:
             try:
                 complete = put(topic, stamp, taken(value) if taken else value)
             except OutOfTime:  # as the node did, which went on
                 continue
             for inputs in complete:
+                while changes and changes[0].after < inputs.stamp:
+                    change = changes.pop(0)
+                    getattr(node, change.method)(change.parameters)
                 for name, output in work(inputs).items():
                     if name in interface.topics and interface.topics[name].is_numbers:
                         published.setdefault(name, []).append(flat(interface.topics[name], inputs.stamp, output))
