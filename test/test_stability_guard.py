@@ -12,7 +12,7 @@ from arms import LEVER, changed, one_joint
 
 from wam_control.contact_position import anywhere_sd, position_is_certain
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
-from wam_control.friction_verdict import Domain, friction_verdict, linear_margin, stable_error
+from wam_control.friction_verdict import Domain, friction_verdict, linear_margin, stable_errors
 from wam_control.guard_watch import Watch
 from wam_control.scenario import ScenarioStep
 from wam_control.stability_guard import GuardedContact, GuardedTask, StabilityGuard
@@ -90,7 +90,7 @@ def test_a_loop_that_saturates_at_the_largest_stable_step_shakes_after_a_larger_
     assert assess(node, at_the_step, 0.9 * largest_step).verdict is Verdict.SETTLED
     shakes = [assess(node, at_the_step, part * largest_step) for part in (1.5, 2.0, 3.0, 5.0, 10.0)]
     assert max(shake.peak_to_peak for shake in shakes if shake.verdict is Verdict.LIMIT_CYCLE) > 2.0 * largest_step
-    accepted = replace(at_the_step, error_limit=stable_error(node, IntegralLoop(1.5)))
+    accepted = replace(at_the_step, error_limit=stable_errors(node, IntegralLoop(1.5)).stable)
     for part in (1.5, 2.0, 3.0, 5.0, 10.0):
         assert assess(node, accepted, part * largest_step).verdict is Verdict.SETTLED
 

@@ -52,6 +52,8 @@ class FrictionVerdict(NamedTuple):
     domain : of figure 5.8.
     margin : largest gain that is linearly stable with every contact stiffness.
     stable_error : largest saturation that is accepted; infinite in domain I, 0 in domain III.
+    undecided_error : largest saturation for which no response was found that does not come to rest, though not all
+        were followed to their end; `stable_error` where every response was decided, else above it.
     cycle : stiction limit cycle of small errors.
     saturated_cycle : peak to peak of the largest limit cycle of F_c found in domain I with the saturation of the loop,
         N or N m: near the margin of a delayed loop friction keeps up one above the saturation.
@@ -60,6 +62,7 @@ class FrictionVerdict(NamedTuple):
     domain: Domain
     margin: float
     stable_error: float
+    undecided_error: float
     cycle: PredictedCycle
     saturated_cycle: float
 
@@ -67,20 +70,22 @@ class FrictionVerdict(NamedTuple):
 def friction_verdict(node: FrictionNode, loop: IntegralLoop, events: int = EVENTS) -> FrictionVerdict:
     """Verdict on a node under a loop, with its contact and every softer one.
 
-    The saturation of the loop counts for `saturated_cycle` only.  A response that has not settled after `events`
-    of the integrator, samples among them, counts as bad.
+    The saturation of the loop counts for `saturated_cycle` only.  A response that has neither settled nor failed
+    after `events` of the integrator, samples among them, is undecided, and its saturation is not accepted.
     """
     nodes = [replace(node, contact_stiffness=part * node.contact_stiffness) for part in SOFTER]
     margins = [linear_margin(each, loop) for each in nodes]
     cycle = stiction_cycle(node, loop.gain)
     if loop.gain <= min(margins):
-        return FrictionVerdict(Domain.I, min(margins), math.inf, cycle, _saturated_cycle(node, loop))
+        return FrictionVerdict(Domain.I, min(margins), math.inf, math.inf, cycle, _saturated_cycle(node, loop))
     beyond = [each for each, margin in zip(nodes, margins, strict=True) if loop.gain > margin]
     frequency = math.sqrt((node.transmission_stiffness + node.contact_stiffness) / node.inertia)
     if not loop.delay_samples and frequency * loop.sample_period < CONTINUOUS:
         loop = replace(loop, sample_period=0.0)
-    error = min(stable_error(each, loop, events) for each in beyond)
-    return FrictionVerdict(Domain.II if error else Domain.III, min(margins), error, cycle, 0.0)
+    errors = [stable_errors(each, loop, events) for each in beyond]
+    error, undecided = min(each.stable for each in errors), min(each.undecided for each in errors)
+    domain = Domain.II if error else Domain.BEYOND if undecided else Domain.III
+    return FrictionVerdict(domain, min(margins), error, undecided, cycle, 0.0)
 
 
 def linear_margin(node: FrictionNode, loop: IntegralLoop) -> float:
@@ -105,21 +110,34 @@ def stiction_cycle(node: FrictionNode, gain: float) -> PredictedCycle:
     return PredictedCycle(size, period, float(deadband_against_stiction(size)))
 
 
-def stable_error(node: FrictionNode, loop: IntegralLoop, events: int = EVENTS) -> float:
-    """Largest saturation of F_error with which every response ends at rest or in the stiction cycle; 0 for none.
+class StableErrors(NamedTuple):
+    """Largest saturations of F_error, 0 for none: with which every response rests, and with which that is not refuted."""
+
+    stable: float
+    undecided: float
+
+
+def stable_errors(node: FrictionNode, loop: IntegralLoop, events: int = EVENTS) -> StableErrors:
+    """Largest saturation of F_error with which every response ends at rest or in the stiction cycle.
 
     Do not use the largest stable step as the saturation limit: after a larger step the loop oscillates
     indefinitely, by several times that limit.  So each candidate is tried with steps up to 50 times as
     large, and with the node thrown at the contact.
     """
     if not node.static_friction:
-        return 0.0
+        return StableErrors(0.0, 0.0)
+    undecided = 0.0
     cycle = CYCLE_EXCESS * stiction_cycle(node, loop.gain).peak_to_peak
     for part in CANDIDATES:
         limit = part * node.static_friction
-        if limit > loop.deadband / SURE and _comes_to_rest(node, replace(loop, error_limit=limit), cycle, events):
-            return SURE * limit
-    return 0.0
+        if limit <= loop.deadband / SURE:
+            break
+        comes_to_rest = _comes_to_rest(node, replace(loop, error_limit=limit), cycle, events)
+        if comes_to_rest is not False:
+            undecided = undecided or SURE * limit
+        if comes_to_rest:
+            return StableErrors(SURE * limit, undecided)
+    return StableErrors(0.0, undecided)
 
 
 def _saturated_cycle(node: FrictionNode, loop: IntegralLoop) -> float:
@@ -138,10 +156,11 @@ def _responses(node: FrictionNode, loop: IntegralLoop) -> list[tuple[float, tupl
     return [*tries, (0.0, (0.0, thrown, 0.0)), (limit, (0.0, -thrown, 0.0))]
 
 
-def _comes_to_rest(node: FrictionNode, loop: IntegralLoop, cycle: float, events: int) -> bool:
+def _comes_to_rest(node: FrictionNode, loop: IntegralLoop, cycle: float, events: int) -> bool | None:
+    """Whether every response does; None where the first that does not is one that is undecided."""
     for force, start in _responses(node, loop):
         found = assess(node, loop, force, start, max_events=events)
         is_stiction = found.verdict is Verdict.LIMIT_CYCLE and found.peak_to_peak <= cycle
         if found.verdict is not Verdict.SETTLED and not is_stiction:
-            return False
+            return None if found.verdict is Verdict.UNDECIDED else False
     return True

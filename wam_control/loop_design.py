@@ -44,6 +44,7 @@ class LoopDesign(NamedTuple):
         if cycle.peak_to_peak:
             stiction = f"{cycle.peak_to_peak:.4g} peak to peak every {cycle.period:.3g} s, without a deadband of "
             stiction += f"{cycle.deadband:.3g}"
+        undecided = verdict.undecided_error
         lines = [
             f"domain {verdict.domain}: {MEANING[verdict.domain]}",
             f"margin: the gain is {part:.3g} of the largest linearly stable one, {verdict.margin:.4g}",
@@ -51,17 +52,24 @@ class LoopDesign(NamedTuple):
             f"limit cycle of stiction: {stiction}",
             f"figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
         ]
+        if undecided > verdict.stable_error:
+            lines.append(
+                f"undecided: up to {undecided:.4g} no response was found that does not come to rest, but not all were "
+                f"followed to their end ({EVENTS} events)"
+            )
         if verdict.saturated_cycle:
             lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g} peak to peak")
         if not self.is_safe:
             saturate = f", or saturate the error at {verdict.stable_error:.3g}" if verdict.stable_error else ""
-            lines.append(f"not safe: lower the gain to {verdict.margin:.3g}{saturate}")
+            finding = "not shown to be safe" if self.loop.error_limit <= undecided else "not safe"
+            lines.append(f"{finding}: lower the gain to {verdict.margin:.3g}{saturate}")
         return "\n".join(lines)
 
 
 MEANING = {
     Domain.I: "stable for every error",
     Domain.II: "friction stabilises it for small errors",
+    Domain.BEYOND: "II or III, undecided: no error was shown to be safe, and not all were shown to be unsafe",
     Domain.III: "no error was found for which every response comes to rest",
 }
 
