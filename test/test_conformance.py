@@ -103,6 +103,17 @@ def test_an_attempt_that_the_machine_held_up_does_not_count(
 
 
 @pytest.mark.slow
+def test_the_current_that_holds_a_heavy_arm_up_is_not_taken_for_one_that_was_refused(
+    ros: RosWorld, tmp_path: Path
+) -> None:
+    configuration = driver_alone(Configuration.load(packaged("barrett-wam7")))
+    bench = Bench(ros, tmp_path, configuration, lambda **given: make_node("driver", **given))
+    found = [bench.conformance(PATIENT).row(key) for key in ("refusals", "answers")]
+    assert [row.text for row in found if row.verdict != OK] == []
+    assert max(map(abs, bench.probe.carrying)) > 0.6, "A, in motor 4"
+
+
+@pytest.mark.slow
 def test_the_skeleton_keeps_the_contract_in_150_lines(
     ros: RosWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -111,7 +111,7 @@ def stiction_cycle(node: FrictionNode, gain: float) -> PredictedCycle:
 
 
 class StableErrors(NamedTuple):
-    """Largest saturations of F_error, 0 for none: with which every response rests, and with which that is not refuted."""
+    """Largest saturations of F_error, 0 for none: with which all responses rest, and with which that is not refuted."""
 
     stable: float
     undecided: float

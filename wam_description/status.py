@@ -6,6 +6,7 @@ from wam_description.signals import Level, NodeStatus
 
 REAL_TIME_FACTOR, BEHIND, SLIPS = "real-time factor", "behind [ms]", "slips"
 AWAITED = "waits for"  # fact: topics that a node lacks for its next step, separated by blanks
+PAUSED = "time"  # fact of the driver while the arm's time is stopped: "paused"
 CHANGES = "parameter changes"  # fact: how often live parameters were taken, with those that were taken last
 WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 

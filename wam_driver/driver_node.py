@@ -11,6 +11,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from wam_description.interface import Interface, declared
 from wam_description.signals import BASE, Answer, Level, NodeStatus, Point, State, Wrench
+from wam_description.status import PAUSED
 from wam_description.urdf import urdf
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.lockstep import WATCH, Lockstep
@@ -42,7 +43,7 @@ class DriverNode(TolerantNode):
         self._directory = own.post_mortem_directory
         self._motors = list(shared.arm.motors.names)
         self._frames = (BASE, *shared.arm.covers.names)
-        self._reported = ("", False, 0, 0)
+        self._reported = ("", False, 0, 0, False)
         self._connected = self._started = False
         self._answered = 0  # newest state, ns, that a command has answered
         self._mode = self.driver.safety.mode
@@ -220,7 +221,7 @@ class DriverNode(TolerantNode):
             self._session.since = self.driver.stamp + self._timing.period_ns
         problem = self._ports.problem
         message = f"{safety.mode.value}: {safety.fault or problem or '; '.join(warnings)}".removesuffix(": ")
-        reported = (message, self._connected, self._session.number, self._session.since)
+        reported = (message, self._connected, self._session.number, self._session.since, self.time.is_paused)
         if reported == self._reported:
             return
         is_new_fault = bool(safety.fault) and message != self._reported[0]
@@ -238,6 +239,7 @@ class DriverNode(TolerantNode):
                 session=self._session.number,
                 since=self._session.since,
                 stamp=self.driver.stamp,
+                facts={PAUSED: "paused"} if self.time.is_paused else {},
             )
         )
         if is_new_fault:

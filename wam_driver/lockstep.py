@@ -59,7 +59,7 @@ class Lockstep:
         self._currents: tuple[int, list[float]] = (0, [])
         self._push_stamp = 0
         self._is_played = "sim/disturbance" in senders
-        self._started = self._paused = False
+        self._started = self.is_paused = False
         self._patience = timing.timeout
         self._roll_call = timing.timeout - min(ROLL_CALL, 0.5 * timing.timeout)
         self._is_called = False
@@ -94,7 +94,7 @@ class Lockstep:
 
     def go_on(self) -> None:
         """Advance by a period if all is there and it is due."""
-        if not self._started or self._paused or self.missing:
+        if not self._started or self.is_paused or self.missing:
             return
         if self.pacer.is_due(self._driver.stamp + self._timing.period_ns):
             self._patience = self._timing.timeout
@@ -112,7 +112,7 @@ class Lockstep:
         now = self._now()
         self._waited += min(now - self._looked, LONGEST_LOOK)
         self._looked = now
-        if not self._started or self._paused or not (missing := self.missing):
+        if not self._started or self.is_paused or not (missing := self.missing):
             return
         if self._waited >= self._roll_call and not self._is_called:
             self._is_called = True
@@ -156,14 +156,14 @@ class Lockstep:
 
     def pause(self, on: bool) -> None:
         """Stop the time, or let it go on."""
-        self._paused = on
+        self.is_paused = on
         self._waited = 0.0
         self.pacer.restart()
         self.go_on()
 
     def step(self) -> Answer:
         """Advance a paused arm by one period."""
-        if not self._paused:
+        if not self.is_paused:
             return Answer(False, "refused: the driver is running; call pause first")
         if missing := self.missing:
             return Answer(False, f"refused: still waiting for {' and '.join(missing)}")

@@ -34,7 +34,7 @@ class Realtime:
         self._latencies: list[float] = []
         self._published: deque[tuple[int, float]] = deque(maxlen=100)
         self._done = self._missed = 0
-        self._paused = False
+        self.is_paused = False
         self.command_came = -math.inf
 
     def start(self) -> None:
@@ -64,7 +64,7 @@ class Realtime:
         if due <= 0:
             return
         self._done += due
-        if self._paused:
+        if self.is_paused:
             return
         self._missed += due - 1
         age = now - self._progress
@@ -93,12 +93,12 @@ class Realtime:
 
     def pause(self, on: bool) -> None:
         """Stop the time, or let it go on."""
-        self._paused = on
+        self.is_paused = on
         self._progress = self._now()
 
     def step(self) -> Answer:
         """Advance a paused arm by one period."""
-        if not self._paused:
+        if not self.is_paused:
             return Answer(False, "refused: the driver is running; call pause first")
         self._driver.advance(0.0)
         self._send()

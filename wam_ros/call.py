@@ -121,13 +121,16 @@ class CalledStack:
         self._wait(lambda: "driver" in found, "no status of the driver")
         return found
 
-    def messages(self, topic: str, silence: float = math.inf) -> Iterator[Any]:
+    def messages(
+        self, topic: str, silence: float = math.inf, check: Callable[[], object] = lambda: None
+    ) -> Iterator[Any]:
         """Messages of a topic as they come, without end; a run is not delayed by it.
 
         Parameters
         ----------
         topic : name in the namespace of the arm, or a full one.
         silence : s, in which a message must come.
+        check : called while none comes; it may raise what is to end the waiting.
 
         Raises
         ------
@@ -169,6 +172,8 @@ class CalledStack:
                     last = time.monotonic()
                 elif time.monotonic() - last > silence:
                     raise TimeoutError(f"no {topic} for {silence:g} s")
+                else:
+                    check()
         finally:
             self.node.destroy_subscription(subscription)
 

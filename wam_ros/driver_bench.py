@@ -123,9 +123,14 @@ class DriverBench:
                 )
         return ""
 
+    def bad(self) -> list[float]:
+        """Currents that may not flow, A: of the other sign than those that hold the arm up, so that each is told."""
+        pairs = zip(self.contract.peak, self.probe.carrying, strict=True)
+        return [-math.copysign(BAD * peak, carrying) for peak, carrying in pairs]
+
     def bears(self, messages: dict[str, Callable[[int], object]]) -> str:
         """What is wrong with how bad commands after good ones are taken."""
-        probe = self.probe
+        probe, bad = self.probe, self.bad()
         for what, make in messages.items():
             self.enable()
             probe.after = [make] * 5
@@ -135,7 +140,7 @@ class DriverBench:
                 if not all(map(math.isfinite, state.message.effort)):
                     return f"{what}: the effort is no longer finite"
                 for i, flow in enumerate(self.flow(state)):
-                    if flow > 0.7 * BAD * self.contract.peak[i]:
+                    if flow * bad[i] > 0.7 * bad[i] ** 2:
                         return f"{what}: its {flow:.3g} A reached {self.contract.motors[i]}"
             if probe.status.mode != "enabled":
                 return f"{what}: the driver does not stay enabled: {probe.status.message}"

@@ -56,6 +56,7 @@ class DriverProbe(Node):
     answered : stamp of the newest state that was answered, ns.
     is_answering : whether states are answered.
     after : messages that are sent after the next answers, made from the stamp of the state.
+    carrying : currents that hold the arm up, A.
     wanted : makes the answer from stamp and currents; None for the proper one.
     longest_pause : s, in which this node itself did not run.
     """
@@ -65,11 +66,11 @@ class DriverProbe(Node):
         self._shared, self._current, self._spin = shared, current, spin
         self._motors = list(shared.arm.motors.names)
         self._body, self._map = RigidBody(shared.arm), TransmissionMap.of(shared.arm)
-        self._carrying = [0.0] * len(self._motors)
+        self.carrying = [0.0] * len(self._motors)
         self.arrived: dict[str, deque[Arrived]] = {}
         self.statuses: deque[tuple[float, NodeStatus]] = deque(maxlen=KEPT)
         self.diagnostics: set[str] = set()
-        self.commanded = list(self._carrying)
+        self.commanded = list(self.carrying)
         self.answered = 0
         self.longest_pause = 0.0
         self.is_answering = True
@@ -123,8 +124,8 @@ class DriverProbe(Node):
             q = self._map.joint_positions(list(state.position))
             torque = self._map.motor_torques(self._body.gravity_torque(q).tolist())
             constant = self._shared.arm.motors.torque_constant
-            self._carrying = [t / k for t, k in zip(torque, constant, strict=True)]
-        self.commanded = list(self._carrying)
+            self.carrying = [t / k for t, k in zip(torque, constant, strict=True)]
+        self.commanded = list(self.carrying)
         self.commanded[0] += self._current if tick // SWING % 2 else -self._current
         self.send(self.wanted(stamp, self.commanded) if self.wanted else self.command(stamp, self.commanded))
         self.answered = stamp

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from wam_description.driver_contract import SENT, STATUS_AGE, TAKEN
 from wam_description.signals import State
-from wam_ros.driver_bench import BAD, SETTLE, DriverBench, Untested
+from wam_ros.driver_bench import SETTLE, DriverBench, Untested
 from wam_ros.messages import joint_state
 
 LOOK = 0.4  # s of watching
@@ -159,7 +159,7 @@ def _names(bench: DriverBench) -> str:
 
 def _refusals(bench: DriverBench) -> str:
     names = list(bench.contract.motors)
-    bad = [BAD * peak for peak in bench.contract.peak]
+    bad = bench.bad()
 
     def made(names: list[str], values: list[float]) -> Callable[[int], object]:
         return lambda stamp: joint_state(stamp, names, State([], [], values))
@@ -178,7 +178,7 @@ def _refusals(bench: DriverBench) -> str:
 
 def _answers(bench: DriverBench) -> str:
     names = list(bench.contract.motors)
-    bad = State([], [], [BAD * peak for peak in bench.contract.peak])
+    bad = State([], [], bench.bad())
     return bench.bears(
         {
             "no stamp": lambda _: joint_state(0, names, bad),

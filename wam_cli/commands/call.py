@@ -5,6 +5,7 @@ import difflib
 import math
 import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import islice
 from typing import Any, Final
 
@@ -15,6 +16,7 @@ from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part
 from wam_description.signals import BASE, NodeStatus, Wrench
+from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME, TABLE
 from wam_description.wiring import Call, SetParameters
 from wam_driver.safety import Mode
@@ -150,7 +152,8 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
     hold = HeldTopic(stack.node, "sim/disturbance", shared)
     begin = stamp = 0
     try:
-        for message in stack.messages("joint_states", SILENCE):
+        paused = partial(_raise_if_paused, statuses)
+        for message in stack.messages("joint_states", SILENCE, paused):
             driver = statuses["driver"]
             if driver.mode != Mode.ENABLED.value:
                 told = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
@@ -163,7 +166,7 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
                 raise ValueError(f"not pushed: {refusal}")
     except TimeoutError as error:
         told = "the push ended" if begin else "not pushed"
-        raise ValueError(f"{told}: the arm is paused, or its time does not go on ({error}); wam call resume") from error
+        raise ValueError(f"{told}: {error}; wam call resume") from error
     finally:
         if hold.is_on:
             hold.send(stamp, Wrench(BASE, ZERO, ZERO))
@@ -171,6 +174,11 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
     newtons = math.hypot(*push.force)
     print(f"pushed {given.cover} with {newtons:g} N at {at:.2f} m for {(stamp - begin) / 1e9:.2f} s")
     return 0
+
+
+def _raise_if_paused(statuses: Mapping[str, NodeStatus]) -> None:
+    if PAUSED in statuses["driver"].facts:
+        raise TimeoutError("the arm is paused")
 
 
 def _state(driver: NodeStatus) -> str:
