@@ -173,6 +173,8 @@ def _updated(own: T, given: Mapping[str, Any], prefix: str, take: Any) -> T:
     if not update:
         return own
     new = build(type(own), {**known, **update})
+    if new == own:  # a request that is sent again, as its answer was late, costs nothing
+        return own
     take(new)
     return new
 

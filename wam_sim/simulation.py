@@ -201,6 +201,8 @@ class Simulation:
     def _tune(self, request: SetParameters) -> None:
         """Give a node new live parameters; where it refuses them, nothing has changed."""
         values = {**self._settings[request.node], **request.values}
+        if values == self._settings[request.node]:
+            return
         if request.node == "driver":
             self.driver.set_added_friction(build(DriverParameters, values).effects.added_coulomb_friction)
         else:
