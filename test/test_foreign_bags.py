@@ -396,6 +396,87 @@ def test_a_command_that_is_sent_only_when_it_changes_is_one(tmp_path: Path) -> N
     assert steady == pytest.approx(19.0, rel=CLOSE)
 
 
+def quiet(path: Path) -> Analysis:
+    return analyse(path, lambda doing: None, TopicMap())
+
+
+def cycling(time: Any, frequency: float, size: float, joints: int = 2, noise: float = 1e-5) -> Any:
+    """Positions of joints at rest, the first of which has a cycle, (n, joints)."""
+    position = np.random.default_rng(7).normal(0.0, noise, (len(time), joints))
+    position[:, 0] += 0.5 * size * np.sin(2.0 * np.pi * frequency * time)
+    return position
+
+
+def section(analysis: Analysis, key: str) -> tuple[str, ...]:
+    return next(one for one in analysis.sections if one.key == key).sentences
+
+
+@pytest.mark.parametrize(
+    ("commands", "origin"), [(("left", "right"), "it was not commanded"), (("left",), "is not in")]
+)
+def test_of_two_robots_neither_has_the_command_of_the_other(commands: str, origin: str, tmp_path: Path) -> None:
+    time, names = np.arange(0.0, 10.0, 0.01), ["joint1", "joint2"]
+    left, right, rest = cycling(time, 2.0, 0.1), cycling(time, 2.0, 0.02), np.zeros((len(time), 2))
+    sent = joints("/left/joint_states", time, names, position=left)
+    sent += joints("/right/joint_states", time, names, position=right)
+    for side, values in (("left", left), ("right", rest)):
+        if side in commands:
+            sent += joints(f"/{side}/joint_command", time, names, position=values)
+    one, two = section(quiet(by_rosbags(tmp_path / "bag", sent)), "stability")
+    assert one.endswith("as it was commanded.")
+    assert two.startswith("/right")
+    assert origin in two
+
+
+@pytest.mark.parametrize("jump", [100.0, -5.0])
+def test_a_clock_that_is_set_makes_no_gap(jump: float, tmp_path: Path) -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    sent = joints("/joint_states", time, ["a", "b"], position=cycling(time, 2.2, 0.02))
+    moved = [one._replace(stamp=one.stamp + jump * (one.stamp > 10.0)) for one in sent]
+    found = quiet(by_rosbags(tmp_path / "bag", moved))
+    told = " ".join(sentence for one in found.sections for sentence in one.sentences)
+    assert "a repeats at 2.2 Hz, 0.02 rad peak to peak, from 0.0 to 20.0 s" in told
+    assert "times of reception are used" in told
+    assert "periods without a message" not in told
+
+
+@pytest.mark.parametrize(("rate", "frequency"), [(10.0, 0.8), (100.0, 2.7)])
+def test_a_slow_recording_of_a_motion_back_and_forth_shows_no_rest(
+    rate: float, frequency: float, tmp_path: Path
+) -> None:
+    time = np.arange(0.0, 60.0, 1.0 / rate)
+    bag = by_mcap_ros2(
+        tmp_path / "bag", joints("/s", time, ["a", "b"], position=cycling(time, frequency, 0.05, 2, 1e-4))
+    )
+    assert section(quiet(bag), "stick_slip") == ("a: at rest for 0 % of the time, slipped once.", "b: never moved.")
+
+
+def test_a_rest_before_and_after_a_motion_back_and_forth_is_one(tmp_path: Path) -> None:
+    time = np.arange(0.0, 100.0, 0.02)
+    position = cycling(time, 1.7, 0.02, 1) * ((time > 40.0) & (time < 60.0))[:, None]
+    bag = by_mcap_ros2(tmp_path / "bag", joints("/s", time, ["a"], position=position))
+    assert section(quiet(bag), "stick_slip") == ("a: at rest for 80 % of the time, slipped once.",)
+
+
+def test_a_motion_within_the_steps_of_an_encoder_and_degrees_are_said(tmp_path: Path) -> None:
+    time = np.arange(0.0, 30.0, 0.01)
+    position = np.column_stack([np.round(300.0 * np.sin(0.2 * time)) * 1e-3, np.full(len(time), -60.0)])
+    found = quiet(by_rosbags(tmp_path / "bag", joints("/s", time, ["coarse", "still"], position=position)))
+    assert section(found, "stick_slip")[0] == "coarse: moved by 0.6 rad, more slowly than the noise of its velocity."
+    assert "give --unit position=deg" in " ".join(section(found, "happened"))
+
+
+def test_a_command_in_another_frame_is_named(tmp_path: Path) -> None:
+    time = np.arange(0.0, 6.0, 0.004)
+    force = np.zeros((len(time), 3))
+    force[time > 3.0, 2] = 10.0
+    sent = wrenches("/ft/wrench", time, force, "tool0") + wrenches("/force_command", time, force, "base")
+    found = quiet(by_rosbags(tmp_path / "bag", sent))
+    assert section(found, "force") == (
+        "/ft/wrench, in the frame tool0, is not compared with the command /force_command, in the frame base.",
+    )
+
+
 # ways in
 
 

@@ -124,7 +124,7 @@ class DriverBench:
         return ""
 
     def bad(self) -> list[float]:
-        """Currents that may not flow, A: of the other sign than those that hold the arm up, so that each is told."""
+        """Currents that may not flow, A: of the other sign than those that hold the arm up, so that the two differ."""
         pairs = zip(self.contract.peak, self.probe.carrying, strict=True)
         return [-math.copysign(BAD * peak, carrying) for peak, carrying in pairs]
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.foreign.sources import FEWEST, Piece, Source, differentiated, pieces
+from wam_analysis.foreign.sources import FEWEST, Piece, Source, differentiated, pieces, resolution
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases
 
@@ -14,9 +14,10 @@ Numbers = NDArray[np.float64]
 
 REST = 0.002  # rad/s or m/s; a slower joint is at rest, unless the noise is larger
 NOISY = 6.0  # standard deviations of the noise of a velocity: likewise
+FAR = 20.0  # resolutions of a position, or seconds at the speed `REST`: who moves so far has moved
 BRIEFEST = 0.01  # s; a shorter stick or slip is chatter
 BRIEF = 0.5  # of a slip: a joint whose rests are shorter turns back, and does not stick
-TURNS = 0.8  # of the slips of such a joint go against the one before
+TURNS = 0.8  # of the rests of such a joint have motion to the other side behind them
 WINDOW = 0.03  # s over which friction is averaged
 FEWEST_SAMPLES = 6  # in that window
 BETTER = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
@@ -51,8 +52,10 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
         period = float(piece.time[1] - piece.time[0])
         phases = stick_slip_phases(piece.values["velocity"], rest, max(1, round(BRIEFEST / period)))
         total += len(piece.time)
-        if _only_turns(phases):
+        if _only_turns(phases, piece.values["velocity"]):
             slips += 1
+            lengths = np.diff(phases.sticks, axis=1)
+            still += int(np.sum(lengths[lengths > BRIEF * np.median(np.diff(phases.slips, axis=1))]))
             continue
         still += round(phases.stuck * len(piece.time))
         slips, reversals = slips + len(phases.slips), reversals + phases.reversals
@@ -64,13 +67,26 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
     return Sticking(still / total, slips, reversals, disobeyed / still if command is not None and still else math.nan)
 
 
-def _only_turns(phases: Phases) -> bool:
+def hidden_motion(source: Source) -> float:
+    """How far a joint went that the noise of its velocity shows at rest, rad or m; 0 where it did not move."""
+    position = source.values.get("position", np.zeros(1))
+    distance = float(np.ptp(position))
+    return distance if distance > FAR * max(resolution(position), REST) else 0.0
+
+
+def _only_turns(phases: Phases, velocity: Numbers) -> bool:
     """Whether it is one motion back and forth, which is slow for a moment where it turns."""
     between = phases.sticks[1:-1]
-    if len(phases.slips) < 4 or not len(between) or phases.reversals < TURNS * (len(phases.slips) - 1):
+    if len(phases.slips) < 4 or not len(between) or np.mean(_turns(between, velocity)) < TURNS:
         return False
     rest, motion = (float(np.median(np.diff(rows, axis=1))) for rows in (between, phases.slips))
     return rest < BRIEF * motion
+
+
+def _turns(sticks: NDArray[np.int64], velocity: Numbers) -> NDArray[np.bool_]:
+    """Whether the motion after each rest goes against the one before it; not all turns of a motion are rests."""
+    opposed: NDArray[np.bool_] = velocity[sticks[:, 0] - 1] * velocity[sticks[:, 1]] < 0.0
+    return opposed
 
 
 def _rest(piece: Piece) -> float:

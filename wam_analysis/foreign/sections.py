@@ -8,13 +8,14 @@ import numpy as np
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, LIMIT_CYCLE, FoundCycle, cycles, lines
 from wam_analysis.foreign.forces import ForceStep, force_steps
-from wam_analysis.foreign.mechanics import friction, is_sure, sticking, velocity_factor
-from wam_analysis.foreign.sources import FEWEST, Source, alternates, sources
+from wam_analysis.foreign.mechanics import friction, hidden_motion, is_sure, sticking, velocity_factor
+from wam_analysis.foreign.sources import FEWEST, Source, alternates, rising, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.loop_timing import stamp_timing
 from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 DISOBEYED = 0.5  # of the time at rest, in which a joint was commanded to move: it sticks
+TURNS = 4.0 * math.pi  # rad; few joints turn so far, and most that are recorded in degrees do
 TURNING = 5.0  # % of the time at rest that a motion back and forth has where it turns
 
 
@@ -36,11 +37,39 @@ def foreign_sections(bag: Bag, given: TopicMap) -> tuple[Section, ...]:
     )
 
 
-def _command_of(source: Source, commands: Sequence[Source]) -> Source | None:
-    """The command of a joint by its name; of a wrench the one in its frame, or with none."""
-    if source.is_joint:
-        return next((one for one in commands if one.name == source.name), None)
-    return next((one for one in commands if not one.is_joint and _share_frame(source, one)), None)
+def _command_of(source: Source, commands: Sequence[Source], states: Sequence[Source]) -> Source | None:
+    """The command of a joint by its name, of a wrench in its frame or with none; of several that in the same namespace.
+
+    Of two robots whose topics differ in one part of the name, as /left/joint_states and /right/joint_states, neither
+    has the command of the other.
+    """
+    own = [
+        one
+        for one in commands
+        if one.name == source.name
+        and (source.is_joint or _share_frame(source, one))
+        and not any(_is_of(one, other, source) for other in states if other.name == source.name)
+    ]
+    return max(own, key=lambda one: _shared(_path(one), _path(source)), default=None)
+
+
+def _path(source: Source) -> list[str]:
+    return source.topic.strip("/").split("/")
+
+
+def _shared(one: Sequence[str], other: Sequence[str]) -> int:
+    """How many parts two names have in common from the beginning."""
+    apart = (k for k, (a, b) in enumerate(zip(one, other, strict=False)) if a != b)
+    return next(apart, min(len(one), len(other)))
+
+
+def _is_of(command: Source, one: Source, other: Source) -> bool:
+    """Whether the topic of a command has that part of the name of the first topic by which the second differs."""
+    mine, theirs = _path(one), _path(other)
+    apart = [k for k, (a, b) in enumerate(zip(mine, theirs, strict=False)) if a != b]
+    if len(mine) != len(theirs) or len(apart) != 1 or apart[0] == len(mine) - 1:
+        return False
+    return _path(command)[apart[0] : apart[0] + 1] == [mine[apart[0]]]
 
 
 def _share_frame(one: Source, other: Source) -> bool:
@@ -57,6 +86,16 @@ def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], giv
     for name, columns in sorted(bag.topics.items()):
         if isinstance(columns, JointColumns) and len(columns.stamp_ns):
             sentences.append(f"{name}: {len(columns.stamp_ns)} messages of the joints {', '.join(columns.names)}.")
+            if len(columns.stamp_ns) > 1 and not np.array_equal(
+                rising(columns.stamp_ns, columns.log_time_ns), columns.stamp_ns
+            ):
+                sentences.append(f"{name}: stamps of a clock that was set or never set; times of reception are used.")
+            angles = columns.position[np.isfinite(columns.position)]
+            if len(angles) and not given.units.get("position") and float(np.max(np.abs(angles))) > TURNS:
+                sentences.append(
+                    f"{name}: positions up to {shown(float(np.max(np.abs(angles))), 'rad')}, taken as radians; if they "
+                    "are degrees, give --unit position=deg."
+                )
             numbers = np.hstack([columns.position, columns.velocity, columns.effort])
             known = [np.isfinite(numbers[:, i :: len(columns.names)]).any() for i in range(len(columns.names))]
             if none := [joint for joint, there in zip(columns.names, known, strict=True) if not there]:
@@ -86,9 +125,16 @@ def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], giv
 def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
     steps: list[ForceStep] = []
     for one in states:
-        command = None if one.is_joint else _command_of(one, commands)
+        command = None if one.is_joint else _command_of(one, commands, states)
         steps += [] if command is None else force_steps(one, command)
-    sentences, findings = [], []
+    sentences, findings, doubts = [], [], []
+    for one in (one for one in states if not one.is_joint and _command_of(one, commands, states) is None):
+        doubts += [
+            f"{one.label}, in the frame {one.frame}, is not compared with the command {other.topic}, in the frame "
+            f"{other.frame}."
+            for other in commands
+            if not other.is_joint and not _share_frame(one, other)
+        ]
     for step in steps:
         name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
         response = step.response
@@ -108,8 +154,9 @@ def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
         worst = max(steps, key=lambda step: abs(step.response.final - step.commanded))
         error = shown(abs(worst.response.final - worst.commanded), "N")
         verdict = f"{len(steps)} force steps; the largest steady error is {error} of {shown(worst.commanded, 'N')}."
-        return Section("force", "Force", tuple(sentences), tuple(findings), (), (verdict,))
-    return Section("force", "Force", ("No step of a commanded force was recorded.",), ())
+        return Section("force", "Force", (*sentences, *doubts), tuple(findings), (), (verdict, *doubts))
+    told = tuple(doubts) or ("No step of a commanded force was recorded.",)
+    return Section("force", "Force", told, (), (), tuple(doubts))
 
 
 def _settled(seconds: float) -> str:
@@ -120,7 +167,7 @@ def _settled(seconds: float) -> str:
 
 
 def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
-    found = [cycle for one in states for cycle in cycles(one, _command_of(one, commands))]
+    found = [cycle for one in states for cycle in cycles(one, _command_of(one, commands, states))]
     sentences, findings, verdict = [], [], []
     taken: set[str] = set()
     for one in found:
@@ -168,10 +215,14 @@ def _spectrum(states: Sequence[Source]) -> Section:
 def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section:
     sentences, findings, verdict = [], [], []
     for one in states:
-        command = _command_of(one, commands)
+        command = _command_of(one, commands, states)
         is_speed = command is not None and len(command.time) >= FEWEST  # not a position that is sent once and held
         found = sticking(one, command if is_speed else None) if one.is_joint else None
         if found is None:
+            continue
+        if not found.slips and (distance := hidden_motion(one)):
+            far = shown(distance, one.units["position"])
+            sentences.append(f"{one.label}: moved by {far}, more slowly than the noise of its velocity.")
             continue
         findings += [
             Finding(f"{one.label}: at rest", "%", 100.0 * found.stuck),

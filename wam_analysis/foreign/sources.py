@@ -19,6 +19,7 @@ ALTERNATES = 5.0  # times the change over two messages: the change over one, whe
 FILLED = 5.5  # periods of the longest gap that is filled by interpolation
 IRREGULAR = 0.01  # of a period: stamps that differ more are put on a constant rate
 LOUD = 1e3  # roundings of a number: smaller changes are none
+PACE = 0.2  # by which the median period of the receptions may differ from that of the stamps
 RESET = 1_000_000_000  # ns by which a stamp goes back where a clock was reset
 AWAY = 31_536_000_000_000_000  # ns, a year: a stamp so far from its reception is no time, if most are near
 PRECISE = 0.01  # of the largest speed: noise of a velocity that is made from positions
@@ -69,7 +70,7 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
     """The joints and wrenches of a bag, each once for each topic and frame."""
     found: list[Source] = []
     enough = {
-        topic: (columns, _rising(columns.stamp_ns, columns.log_time_ns))
+        topic: (columns, rising(columns.stamp_ns, columns.log_time_ns))
         for topic, columns in sorted(bag.topics.items())
         if isinstance(columns, (JointColumns, WrenchColumns))
         and len(columns.stamp_ns) >= (1 if _is_command(topic, given) else FEWEST)
@@ -104,16 +105,20 @@ def alternates(source: Source) -> bool:
     return False
 
 
-def _rising(stamps: Times, received: Times) -> Times:
-    """The stamps, or the times of reception where the stamps are of a clock that was reset or never set.
+def rising(stamps: Times, received: Times) -> Times:
+    """The stamps, or the times of reception where the stamps are of a clock that was set, reset or never set.
 
-    A few that are years away from their reception, such as 0, are replaced by it.
+    A clock was set forward where the stamps jump and the receptions, which keep the same period, do not.  A few stamps
+    that are years away from their reception, such as 0, are replaced by it.
     """
     away = np.abs(stamps - received) > AWAY
     if 2 * int(np.sum(away)) < len(stamps):
         stamps = np.where(away, received, stamps)
     steps = np.diff(stamps)
-    return received if np.any(steps < -RESET) or not np.any(steps) else stamps
+    arrivals = np.diff(received)
+    keeps_pace = len(steps) > 0 and abs(np.median(arrivals) - np.median(steps)) <= PACE * np.median(steps)
+    was_set = bool(keeps_pace and np.any(steps - arrivals > RESET))
+    return received if was_set or np.any(steps < -RESET) or not np.any(steps) else stamps
 
 
 def _parts(
@@ -198,7 +203,10 @@ def resolution(value: Numbers) -> float:
     quantum = float(np.min(steps))
     counts = steps / quantum
     is_rounded = bool(np.all(np.abs(counts - np.rint(counts)) < 0.05)) and float(np.median(counts)) < 1e3
-    return max(float(noise(value)), quantum / math.sqrt(12.0) if is_rounded else 0.0)
+    sd = float(noise(value))
+    if len(value) > FEWEST:  # of fourth differences: with few samples in a period the second ones are of the motion
+        sd = min(sd, float(noise(np.diff(value, n=2))) * math.sqrt(6.0 / 70.0))
+    return max(sd, quantum / math.sqrt(12.0) if is_rounded else 0.0)
 
 
 def differentiated(time: Numbers, position: Numbers) -> tuple[Numbers, float]:
