@@ -25,7 +25,6 @@ from wam_description.urdf import urdf
 from wam_ros.run import NAMESPACE, PARENT
 
 CONFIGURED = "configured"
-ACTION = "wam_control.trajectory_action_node:TrajectoryAction"
 SWITCH = ["true", "false"]
 ARGUMENTS = {  # name: default, description, allowed values
     "config": ("wam", "name of an installed configuration (wam, testbed), or path of a YAML file", None),
@@ -59,7 +58,6 @@ ARGUMENTS = {  # name: default, description, allowed values
         ["auto", *SWITCH],
     ),
     "frame_prefix": ("", "put before every frame of /tf; the frames in the arm's own messages have none", None),
-    "trajectory_action": ("false", "the action FollowJointTrajectory; needs control_msgs", SWITCH),
     "rviz": ("false", "RViz with the arm, contacts and forces", SWITCH),
     "use_sim_time": ("true", "robot_state_publisher and RViz take the arm's /clock", SWITCH),
 }
@@ -78,25 +76,22 @@ def start_nodes(context: LaunchContext) -> list[Any]:
     ends: dict[str, Any] = {"additional_env": {PARENT: str(os.getpid())}, "output": "screen"}
     ends["on_exit"] = Shutdown(reason="a node of the arm has ended")
     viewers = [*transforms(configuration, given, namespace, ends), *rviz(given, namespace, Path(folder.name))]
-    if given["trajectory_action"] == "true":
-        viewers.append(node(ACTION, given, namespace, parameters, ends))
     if configuration.shared.timing.mode == "lockstep" and given["processes"] == "false":
         command = [sys.executable, "-m", "wam_cli.main", "up", "--config", str(parameters), "--namespace", namespace]
         return [ExecuteProcess(cmd=[*command, "--log-level", given["log_level"]], **ends), *viewers]
-    return [*(node(entry, given, namespace, parameters, ends) for entry in configuration.shared.nodes), *viewers]
-
-
-def node(entry: str, given: dict[str, str], namespace: str, parameters: Path, ends: dict[str, Any]) -> Node:
-    """One node as a process; its entry is as in the parameter `nodes`."""
-    return Node(
-        package="wam_stack",
-        executable="node" if ":" in entry else entry,
-        arguments=[entry] if ":" in entry else [],
-        ros_arguments=["--log-level", given["log_level"]],
-        namespace=namespace,
-        parameters=[str(parameters)],
-        **ends,
-    )
+    nodes = [
+        Node(
+            package="wam_stack",
+            executable="node" if ":" in entry else entry,
+            arguments=[entry] if ":" in entry else [],
+            ros_arguments=["--log-level", given["log_level"]],
+            namespace=namespace,
+            parameters=[str(parameters)],
+            **ends,
+        )
+        for entry in configuration.shared.nodes
+    ]
+    return [*nodes, *viewers]
 
 
 def chosen(given: dict[str, str]) -> Configuration:

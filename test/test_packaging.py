@@ -26,7 +26,6 @@ from packaging.utils import canonicalize_name
 
 from wam_cli.commands import up
 from wam_description.configuration import Configuration, packaged
-from wam_description.interface import declared as declaration_of
 from wam_description.nodes import NODES as TABLE
 from wam_description.parameters import ParameterError
 from wam_description.topics import BY_NAME
@@ -258,7 +257,7 @@ def launch_file(prefix, monkeypatch):
 CHOSEN = {
     "config": "wam", "overrides": "", "namespace": "left", "mode": "lockstep", "processes": "true", "scenario": "",
     "record": "true", "bag": "", "log_level": "info", "tf": "false", "frame_prefix": "", "rviz": "false",
-    "use_sim_time": "true", "trajectory_action": "false",
+    "use_sim_time": "true",
 }  # fmt: skip
 
 
@@ -283,8 +282,6 @@ def test_launch_file_starts_an_executable_for_every_node_of_the_configuration(pr
 def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):
     _, start = launch_file
     (whole,) = start({**CHOSEN, "processes": "false"})
-    _, action = start({**CHOSEN, "processes": "false", "trajectory_action": "true"})
-    assert declaration_of(action.arguments[0]).ros_node, "the node of the action is started by its name"
     assert whole.cmd[1:4] == ["-m", "wam_cli.main", "up"]
     options = argparse.ArgumentParser()
     up.arguments(options)

@@ -54,8 +54,3 @@ class TrajectoryPlayer:
             self._time = 0.0
         self._time += dt
         return self._motion.at(self._time)
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the present trajectory has been played to its end."""
-        return self._motion is not None and self._time >= self._motion.duration
