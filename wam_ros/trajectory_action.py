@@ -1,7 +1,7 @@
 """The action FollowJointTrajectory of a running stack, for MoveIt and other planners, where control_msgs is installed.
 
-A node next to the stack, as a program of the user's would be: it streams the trajectory of a goal on `joint_trajectory`,
-which the force loop plays, and compares the arm with it.
+A node next to the stack, as a program of the user's would be: it streams the trajectory of a goal on
+`joint_trajectory`, which the force loop plays, and compares the arm with it.
 """
 
 import time
