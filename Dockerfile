@@ -1,9 +1,9 @@
 # The stack with ROS as wheels, and a browser for the tests of the live page.  docs/install.md shows how to use it.
-FROM python:3.12-slim-bookworm
+FROM debian:bookworm-slim
 
 RUN apt-get update \
     && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
-        chromium git libegl1 libgl1 libosmesa6 make procps \
+        chromium git libegl1 libgl1 libgomp1 libosmesa6 make procps python3 python3-venv \
     && rm -rf /var/lib/apt/lists/*
 
 # a user of its own: Chromium and the tests of permissions want no root

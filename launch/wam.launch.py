@@ -7,6 +7,7 @@ with the launch, however it ends, and the launch ends with the first of them.
 """
 
 import atexit
+import importlib.util
 import os
 import sys
 import tempfile
@@ -59,6 +60,11 @@ ARGUMENTS = {  # name: default, description, allowed values
     ),
     "frame_prefix": ("", "put before every frame of /tf; the frames in the arm's own messages have none", None),
     "rviz": ("false", "RViz with the arm, contacts and forces", SWITCH),
+    "trajectory_action": (
+        "auto",
+        "the action FollowJointTrajectory, for MoveIt; auto: where control_msgs is installed",
+        ["auto", *SWITCH],
+    ),
     "use_sim_time": ("true", "robot_state_publisher and RViz take the arm's /clock", SWITCH),
 }
 
@@ -75,7 +81,11 @@ def start_nodes(context: LaunchContext) -> list[Any]:
     # what is started ends with this process, even where a signal ends it before it can stop its children
     ends: dict[str, Any] = {"additional_env": {PARENT: str(os.getpid())}, "output": "screen"}
     ends["on_exit"] = Shutdown(reason="a node of the arm has ended")
-    viewers = [*transforms(configuration, given, namespace, ends), *rviz(given, namespace, Path(folder.name))]
+    viewers = [
+        *transforms(configuration, given, namespace, ends),
+        *rviz(given, namespace, Path(folder.name)),
+        *action(given, namespace, ends),
+    ]
     if configuration.shared.timing.mode == "lockstep" and given["processes"] == "false":
         command = [sys.executable, "-m", "wam_cli.main", "up", "--config", str(parameters), "--namespace", namespace]
         return [ExecuteProcess(cmd=[*command, "--log-level", given["log_level"]], **ends), *viewers]
@@ -171,6 +181,14 @@ def rviz(given: dict[str, str], namespace: str, folder: Path) -> list[Any]:
             output="screen",
         )
     ]
+
+
+def action(given: dict[str, str], namespace: str, ends: dict[str, Any]) -> list[Any]:
+    """The server of the action FollowJointTrajectory."""
+    wanted = given["trajectory_action"]
+    if wanted == "false" or (wanted == "auto" and importlib.util.find_spec("control_msgs") is None):
+        return []
+    return [ExecuteProcess(cmd=[sys.executable, "-m", "wam_cli.main", "follow", "--namespace", namespace], **ends)]
 
 
 def generate_launch_description() -> LaunchDescription:

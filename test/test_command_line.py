@@ -97,6 +97,20 @@ def test_a_port_that_does_not_exist_is_refused(command: str, port: str, capsys: 
     assert f"argument --port: '{port}' is no port; allowed: 1 to 65535" in err
 
 
+def test_a_library_of_the_system_that_is_missing_is_named_with_its_package(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(name: str) -> None:
+        raise ImportError("libgomp.so.1: cannot open shared object file: No such file or directory")
+
+    monkeypatch.setattr("wam_cli.main.importlib.import_module", fail)
+    with pytest.raises(SystemExit) as end:
+        main(["demo"])
+    assert str(end.value).startswith("wam demo: libgomp.so.1: cannot open shared object file")
+    assert str(end.value).endswith("apt install libgomp1")
+    assert not capsys.readouterr().out
+
+
 def test_an_extra_that_is_missing_is_named_in_one_sentence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

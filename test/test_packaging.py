@@ -257,7 +257,7 @@ def launch_file(prefix, monkeypatch):
 CHOSEN = {
     "config": "wam", "overrides": "", "namespace": "left", "mode": "lockstep", "processes": "true", "scenario": "",
     "record": "true", "bag": "", "log_level": "info", "tf": "false", "frame_prefix": "", "rviz": "false",
-    "use_sim_time": "true",
+    "trajectory_action": "false", "use_sim_time": "true",
 }  # fmt: skip
 
 
@@ -293,13 +293,23 @@ def test_launch_file_starts_one_process_that_ends_with_the_launch(launch_file):
     assert whole.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
 
 
+def test_launch_serves_the_trajectory_action_where_its_type_is(launch_file, monkeypatch):
+    _, start = launch_file
+    (*_, server) = start({**CHOSEN, "processes": "false", "trajectory_action": "true"})
+    assert server.cmd[1:] == ["-m", "wam_cli.main", "follow", "--namespace", "left"]
+    assert server.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
+    for spec, processes in ((None, 1), (SimpleNamespace(), 2)):
+        monkeypatch.setattr(importlib.util, "find_spec", lambda name, spec=spec: spec)
+        assert len(start({**CHOSEN, "processes": "false", "trajectory_action": "auto"})) == processes
+
+
 def test_every_launch_argument_has_a_description_and_a_default_that_is_allowed(launch_file):
     declared, start = launch_file
     for argument in declared.values():
         assert len(argument.description) > 20
         assert argument.choices is None or argument.default_value in argument.choices
     defaults = {name: argument.default_value for name, argument in declared.items()}
-    whole, note = start(defaults)
+    whole, note = start({**defaults, "trajectory_action": "false"})
     assert note.msg.startswith("no /tf: install robot_state_publisher")
     file = Path(whole.cmd[whole.cmd.index("--config") + 1])
     assert file.read_text() == packaged("wam").read_text()

@@ -27,6 +27,7 @@ COMMANDS = {
     "analyse": "analyse a recording and compare it with theory (text, HTML, JSON)",
     "identify": "identify the controllers' model (friction, gravity, inertia) from a recording of free motion",
     "live": "show a running stack in the browser: watch it, push it, press its buttons",
+    "follow": "serve the action FollowJointTrajectory of a running stack, for MoveIt and other planners",
     "view": "show a recording in the browser or in the Rerun viewer, or save it as a Rerun file",
     "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
     "experiment": "run an experiment of the thesis, record it and print predicted against measured",
@@ -43,6 +44,8 @@ COMMANDS = {
     "completion": "print what makes a shell complete commands and options: bash, zsh or fish",
 }
 
+# libraries of the system that wheels need and a small container has not, and their packages in Debian
+LIBRARIES = {"libgomp.so.1": "libgomp1"}
 COMPLETING = "_ARGCOMPLETE"  # set by a shell that asks how a line may go on
 ALIASES = {"analyze": "analyse"}
 # the extras of setup.py, and the modules that come with them
@@ -165,6 +168,8 @@ def _command(words: list[str]) -> Any:
         return importlib.import_module(f"wam_cli.commands.{words[0]}")
     except ModuleNotFoundError as error:
         sys.exit(_missing(words[0], error))
+    except ImportError as error:
+        sys.exit(_without_library(words[0], error))
 
 
 def _check_name(parser: argparse.ArgumentParser, words: list[str]) -> None:
@@ -185,6 +190,15 @@ def _missing(command: str, error: ModuleNotFoundError) -> int:
     needs = f"it needs '{module}', which is not installed; install it with: pip install 'wam_stack[{extra}]'"
     sys.stderr.write(f"wam {command}: {needs}\n")
     return 1
+
+
+def _without_library(command: str, error: ImportError) -> str:
+    """Say which library of the system is missing, as in a container with little in it."""
+    library, _, is_missing = str(error).partition(": cannot open shared object file")
+    if not is_missing:
+        raise error
+    package = LIBRARIES.get(library, "the package of the system that has it")
+    return f"wam {command}: {error}; install it with: apt install {package}"
 
 
 def _version() -> str:

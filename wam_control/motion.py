@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 from wam_description.arm import Arm, MotionParameters
 from wam_description.parameters import require
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import PosturePath, Triple
+from wam_description.signals import PathPoint, PosturePath, Triple
 
 Array = NDArray[np.float64]
 NODES = 200  # of a line, between which the joint angles are interpolated
 STEEPEST = 15.0  # rad/m, of a joint on a line
 EXACT = 1e-10  # m, of the nodes of a line
 ROUNDING = 1e-9
+THERE = 0.02  # rad, between the arm and the first point of a trajectory, if that is at 0 s
 
 
 class Moving(NamedTuple):
@@ -78,7 +79,8 @@ class PostureMotion:
     """Through postures, in the given times or, without times, as fast as the limits allow with a stop at each.
 
     With times each part is a polynomial of degree five between the positions and velocities of its ends, without
-    acceleration there; a posture without velocities is one at which the arm stops.
+    acceleration there; a posture without velocities is one at which the arm stops.  A first point at 0 s, as planners
+    send it, has to be where the arm is.
 
     Parameters
     ----------
@@ -97,11 +99,14 @@ class PostureMotion:
         self._joints, self._limits = arm.joints, limits
         points = trajectory.points
         require(len(points) > 0, "the trajectory has no points; give at least one")
+        if len(points) > 1 and points[0].time == 0.0 and any(point.time for point in points):
+            self._require_there(start, points[0])
+            points = points[1:]
         postures = [list(start), *(list(point.position) for point in points)]
         times = [point.time for point in points]
         for posture in postures[1:]:
             self._require_inside(posture)
-        self._parts = self._timed(postures, trajectory) if any(times) else self._fast(postures)
+        self._parts = self._timed(postures, points) if any(times) else self._fast(postures)
         self.duration = sum(part.duration for part in self._parts)
 
     def at(self, time: float) -> Moving:
@@ -117,11 +122,11 @@ class PostureMotion:
     def _fast(self, postures: Sequence[list[float]]) -> list["_Part"]:
         return [_Straight(a, b, self._limits) for a, b in pairwise(postures)]
 
-    def _timed(self, postures: Sequence[list[float]], trajectory: PosturePath) -> list["_Part"]:
+    def _timed(self, postures: Sequence[list[float]], points: Sequence[PathPoint]) -> list["_Part"]:
         parts: list[_Part] = []
         rest = [0.0] * len(postures[0])
         before, rate = 0.0, rest
-        for a, b, point in zip(postures, postures[1:], trajectory.points, strict=False):
+        for a, b, point in zip(postures, postures[1:], points, strict=False):
             require(
                 point.time > before,
                 f"a point of the trajectory is at {point.time:g} s, after one at {before:g} s; the times have to rise "
@@ -136,6 +141,15 @@ class PostureMotion:
             "velocities of the last point",
         )
         return parts
+
+    def _require_there(self, start: Sequence[float], first: PathPoint) -> None:
+        for name, angle, begin in zip(self._joints.names, start, first.position, strict=True):
+            require(
+                abs(angle - begin) <= THERE,
+                f"{name} of the trajectory starts at {begin:.4g} rad and is at {angle:.4g} rad; allowed are {THERE:g} "
+                "rad between them: plan from where the arm is, or leave out the point at 0 s",
+            )
+        require(not any(first.velocity), "the trajectory starts with a velocity; allowed: 0 rad/s, the arm is at rest")
 
     def _require_inside(self, posture: Sequence[float]) -> None:
         joints = self._joints

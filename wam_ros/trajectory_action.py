@@ -1,0 +1,206 @@
+"""The action FollowJointTrajectory of a running stack, for MoveIt and other planners, where control_msgs is installed.
+
+A node next to the stack, as a program of the user's would be: it streams the trajectory of a goal on
+`joint_trajectory`, which the force loop plays, and compares the arm with it.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+import rclpy
+from control_msgs.action import FollowJointTrajectory
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from wam_control.motion import Moving
+from wam_control.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
+from wam_description.arm import Shared
+from wam_description.parameters import build_part
+from wam_description.signals import State
+from wam_description.topics import BY_NAME, STATUS
+from wam_ros.messages import Refused, message_type, read_status, read_trajectory
+from wam_ros.qos import qos
+from wam_ros.remote_parameters import RemoteParameters
+from wam_ros.run import Connection
+
+ACTION: Final = "follow_joint_trajectory"
+TOPIC: Final = "joint_trajectory"
+FEEDBACK: Final = 0.05  # s of the arm's time between two messages
+SILENCE: Final = 2.0  # s of the wall clock without a state of the arm, after which a goal ends
+
+
+class TrajectoryActionNode(Node):
+    """Serves the action in the namespace of the arm; a new goal takes the place of the present one.
+
+    Parameters
+    ----------
+    context, namespace : of ROS.
+    shared : shared parameters of the driver.
+    """
+
+    def __init__(self, context: Any, namespace: str, shared: Shared) -> None:
+        super().__init__("trajectory_action", context=context, namespace=namespace)
+        self._shared = shared
+        self._names = list(shared.arm.joints.names)
+        self._goal: _Following | None = None
+        self._last, self._stamp = time.monotonic(), 0
+        self._obstacle = "the driver has sent no status"
+        self._server = ActionServer(
+            self, FollowJointTrajectory, ACTION, self._follow, cancel_callback=lambda _: CancelResponse.ACCEPT
+        )
+        states, status = BY_NAME["joint_states"], BY_NAME[STATUS]
+        self.create_subscription(JointState, "joint_states", self._take, qos(states))
+        self.create_subscription(message_type(status), STATUS, self._take_status, qos(status))
+
+    def destroy_node(self) -> None:
+        """End the goal, leave the topic to others."""
+        self._end(GoalEnd(GoalCode.INVALID_GOAL, "the server of the action has ended"))
+        self._server.destroy()
+        super().destroy_node()
+
+    def watch(self) -> None:
+        """End a goal of an arm that says nothing more; to be called now and then."""
+        if self._goal and time.monotonic() - self._last > SILENCE:
+            self._end(GoalEnd(GoalCode.PATH_TOLERANCE_VIOLATED, f"no joint_states for {SILENCE:g} s"))
+
+    async def _follow(self, handle: Any) -> Any:
+        """Run a goal to its end."""
+        end = self._begin(handle) or await self._goal.future  # type: ignore[union-attr]
+        if handle.is_cancel_requested:
+            handle.canceled()
+        elif end.code is GoalCode.SUCCESSFUL:
+            handle.succeed()
+        else:
+            handle.abort()
+            self.get_logger().warning(f"{ACTION}: {end.reason}")
+        return FollowJointTrajectory.Result(error_code=int(end.code), error_string=end.reason)
+
+    def _begin(self, handle: Any) -> GoalEnd | None:
+        """Start a goal; why not, None where it has begun."""
+        goal = handle.request
+        if self._obstacle:
+            return GoalEnd(GoalCode.INVALID_GOAL, self._obstacle)
+        try:
+            path = read_trajectory(goal.trajectory, self._names)
+            following = TrajectoryGoal(
+                path,
+                self._shared.arm,
+                self._shared.motion,
+                self._tolerances(goal.path_tolerance),
+                self._tolerances(goal.goal_tolerance),
+                goal.goal_time_tolerance.sec + goal.goal_time_tolerance.nanosec * 1e-9,
+            )
+            _require_joints_alone(goal)
+        except Refused as refusal:
+            is_of_names = "name '" in str(refusal)
+            return GoalEnd(GoalCode.INVALID_JOINTS if is_of_names else GoalCode.INVALID_GOAL, str(refusal))
+        if Time.from_msg(goal.trajectory.header.stamp).nanoseconds > self._stamp > 0:
+            return GoalEnd(GoalCode.INVALID_GOAL, "header.stamp is in the future; send 0, the arm starts at once")
+        self._end(GoalEnd(GoalCode.INVALID_GOAL, "a newer goal took its place"))
+        if self.count_publishers(TOPIC):
+            return GoalEnd(GoalCode.INVALID_GOAL, f"another program publishes {TOPIC}; end it")
+        row = BY_NAME[TOPIC]
+        publisher = self.create_publisher(JointTrajectory, TOPIC, qos(row))
+        self._goal = _Following(handle, following, publisher, rclpy.Future(executor=self.executor))
+        self._last = time.monotonic()
+        return None
+
+    def _tolerances(self, tolerances: Sequence[Any]) -> dict[str, JointTolerance]:
+        for one in tolerances:
+            if one.name not in self._names:
+                raise Refused(f"unknown name '{one.name}' of a tolerance; allowed are {', '.join(self._names)}")
+            if one.acceleration > 0.0:
+                raise Refused(f"the tolerance of {one.name} names an acceleration, which is not measured; send 0")
+        return {one.name: JointTolerance(one.position, one.velocity) for one in tolerances}
+
+    def _take(self, message: JointState) -> None:
+        """Go on with the goal: the answer to each state of the arm."""
+        stamp, before = Time.from_msg(message.header.stamp).nanoseconds, self._stamp
+        self._stamp, self._last = stamp, time.monotonic()
+        following = self._goal
+        if following is None:
+            return
+        if following.handle.is_cancel_requested:
+            self._end(GoalEnd(GoalCode.SUCCESSFUL, "canceled; the arm stops"))
+            return
+        order = [list(message.name).index(name) for name in self._names]
+        joints = State([message.position[k] for k in order], [message.velocity[k] for k in order], [])
+        dt = (stamp - before) / 1e9 if 0 < before < stamp else 0.0
+        end = following.goal.step(joints, dt)
+        if end is not None:
+            self._end(end)
+            return
+        trajectory = following.handle.request.trajectory
+        trajectory.header.stamp = message.header.stamp
+        following.publisher.publish(trajectory)
+        if stamp - following.reported >= FEEDBACK * 1e9 and following.goal.desired:
+            following.reported = stamp
+            following.handle.publish_feedback(self._feedback(message, joints, following.goal))
+
+    def _feedback(self, message: JointState, joints: State, goal: TrajectoryGoal) -> Any:
+        desired, actual = goal.desired, Moving(joints.position, joints.velocity)
+        assert desired is not None
+        error = Moving(*([b - a for a, b in zip(*pair, strict=True)] for pair in zip(actual, desired, strict=True)))
+        points = []
+        for one in (desired, actual, error):
+            points.append(point := JointTrajectoryPoint(positions=one.position, velocities=one.velocity))
+            point.time_from_start.sec = int(goal.time)
+            point.time_from_start.nanosec = int(goal.time % 1.0 * 1e9)
+        feedback = FollowJointTrajectory.Feedback(joint_names=self._names)
+        feedback.header.stamp = message.header.stamp
+        feedback.desired, feedback.actual, feedback.error = points
+        return feedback
+
+    def _take_status(self, message: DiagnosticStatus) -> None:
+        status = read_status(message)
+        if status.node != "driver":
+            return
+        self._obstacle = "" if status.mode == "enabled" else f"the arm is {status.mode}: {status.fault or 'enable it'}"
+        if self._obstacle:
+            self._end(GoalEnd(GoalCode.PATH_TOLERANCE_VIOLATED, self._obstacle))
+
+    def _end(self, end: GoalEnd) -> None:
+        """Stop streaming, so that the arm stops, and tell the client."""
+        following, self._goal = self._goal, None
+        if following is not None:
+            self.destroy_publisher(following.publisher)
+            following.future.set_result(end)
+
+
+class _Following:
+    """A goal under way, its publisher, and the stamp of its last feedback, ns."""
+
+    def __init__(self, handle: Any, goal: TrajectoryGoal, publisher: Any, future: Any) -> None:
+        self.handle, self.goal, self.publisher, self.future = handle, goal, publisher, future
+        self.reported = 0
+
+
+def _require_joints_alone(goal: Any) -> None:
+    if goal.multi_dof_trajectory.points or goal.component_path_tolerance or goal.component_goal_tolerance:
+        raise Refused("joints of several degrees of freedom are named; this arm has none")
+
+
+def serve(namespace: str, until: Callable[[], bool], say: Callable[[str], None]) -> None:
+    """Serve the action of the stack in a namespace until a condition holds; a stack that comes later is waited for."""
+    connection = Connection()
+    try:
+        connection.add(asking := Node("trajectory_action_parameters", context=connection.context, namespace=namespace))
+        asked = RemoteParameters(asking, ["driver"])
+        while not until() and asked.missing:
+            asked.ask()
+            connection.executor.spin_once(timeout_sec=0.05)
+        if asked.missing:
+            return
+        node = TrajectoryActionNode(connection.context, namespace, build_part(Shared, asked.found["driver"]))
+        connection.add(node)
+        say(f"action {node.get_namespace().rstrip('/')}/{ACTION}")
+        while not until():
+            connection.executor.spin_once(timeout_sec=0.1)
+            node.watch()
+    finally:
+        connection.close()
