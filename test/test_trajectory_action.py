@@ -15,10 +15,10 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from wam_cli.trajectory_action import TrajectoryActionNode
 from wam_control.trajectory_goal import GoalCode
 from wam_description.configuration import Configuration, packaged
 from wam_ros.bring_up import Composition
-from wam_ros.trajectory_action import TrajectoryActionNode
 
 JOINTS = ("joint1", "joint2", "joint3", "joint4")
 REACHED = [0.1, -0.9, 0.0, 0.4]

@@ -45,6 +45,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``contact_table``                 hypotheses as rows of numbers, as the topic carries them, and back
 ``motion``                        trajectories of the joints and straight lines, limited in speed, acceleration and jerk
 ``trajectory_player``             - a trajectory that a program streams
+``trajectory_goal``               - how a goal of FollowJointTrajectory goes, and how it ends
 ``scenario``                      steps of a task, as data
 ``task_text``                     - the axes of a task in its file
 ``scenario_values``               - values of its file, refused with a reason

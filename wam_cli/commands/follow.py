@@ -18,7 +18,7 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()
     die_with_parent()
     try:
-        from wam_ros.trajectory_action import serve
+        from wam_cli.trajectory_action import serve
     except ModuleNotFoundError as error:
         if error.name != "control_msgs":
             raise
