@@ -335,7 +335,7 @@ def torque_loop_response(hertz: float, damping: float = 0.0) -> tuple[Numbers, N
         slope = loop.stiffness * (rate[0] - 14.0 * rate[1]) if torque else 0.0
         plant.step([-float(loop.proportional * torque + wound + loop.derivative * slope)])
         torques.append(torque)
-    return np.arange(len(torques)) * step, np.array(torques)
+    return step * np.arange(len(torques), dtype=np.float64), np.array(torques, dtype=np.float64)
 
 
 def backlash_in_a_torque_loop() -> PlantCurve:
