@@ -1,8 +1,8 @@
 """Integral force control on a force that is read in steps (3.2.1): what is left as the smallest controllable force.
 
 The loop drives F_c to the border between the two steps next to F_des, because on either side of it the error has
-another sign.  Without friction F_c hunts about it; with Coulomb friction the actuator limit cycle of (5.20) does not slow
-down, because the error does not fall below what is left of a step.
+another sign.  Without friction F_c hunts about it; with Coulomb friction the actuator limit cycle of (5.20) does not
+slow down, because the error does not fall below what is left of a step.
 """
 
 import numpy as np

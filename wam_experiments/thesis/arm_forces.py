@@ -51,7 +51,13 @@ def pressing(runs: Mapping[str, Recording]) -> Result:
             Comparison(f"{step.name}, true", force, true, "N", FORCE, "no error, 5.1.2"),
             Comparison(f"{step.name}, estimated", true, estimated, "N", ESTIMATE, "chapter 2"),
             Comparison(
-                f"{step.name}, peak to peak", 0.0, float(np.ptp(found.true[rest])), "N", max(CYCLE * force, SLIP), "no cycle", True
+                f"{step.name}, peak to peak",
+                0.0,
+                float(np.ptp(found.true[rest])),
+                "N",
+                max(CYCLE * force, SLIP),
+                "no cycle",
+                True,
             ),
         ]
     rows.append(_position(run, _named(run, "press")))

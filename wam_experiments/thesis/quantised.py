@@ -1,4 +1,4 @@
-"""Force feedback that is read in steps: the smallest controllable force (3.2.1) and a deadband against its cycle (5.7)."""
+"""Force feedback read in steps: the smallest controllable force (3.2.1), a deadband against its cycle (5.7)."""
 
 import math
 from collections.abc import Mapping
