@@ -563,6 +563,55 @@ def test_what_rubs_on_a_joint_adds_to_its_friction_at_once() -> None:
         assert lost / 0.1 == pytest.approx(rod / N, rel=THOUSANDTH, abs=1e-9)
 
 
+# active pretension
+
+
+@pytest.mark.parametrize("share", [0.3, 1.5])
+def test_cables_tightened_to_a_share_are_those_of_an_arm_with_that_pretension(share: float) -> None:
+    """6.5: slack, friction by tension and tensions, to the bit, also after a reset; at first with other cables."""
+    arm = damped(one_joint())
+    less = changed(arm, cables={"pretension": (share * PRETENSION,)})
+    effects = {"slack": True, "tension_friction": (1e-4,), "creep": True}
+    live, expected = plant_of(arm, **effects), plant_of(less, **effects)
+    live.set_pretension([share])
+    for _ in range(2):
+        found = []
+        for plant in (live, expected):
+            load(plant, [-60.0])
+            torque = [2.4 * PRETENSION * share * PINION]  # enough for a slack strand
+            values = []
+            for _ in range(400):
+                plant.step(torque)
+                values += [*plant.theta, *plant.q, *sum(plant.tensions, ())]
+            found.append(values)
+            plant.reset()
+            plant.brake(False)
+        np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-12)
+        assert min(found[0][3::4]) == 0.0
+
+
+def test_active_pretension_lowers_the_least_force_and_a_large_one_needs_it_back() -> None:
+    """6.5: a delicate task with a fifth of the pretension, a strong one with all of it, on one plant."""
+    arm = damped(one_joint())
+    plant, coefficient = plant_of(arm, slack=True, tension_friction=(1e-3,)), 1e-3
+    for share in (1.0, 0.2, 1.0):
+        plant.reset()
+        plant.brake(False)
+        plant.set_pretension([share])
+        friction = coefficient * 2 * PRETENSION * share
+        for torque, moves in ((0.98 * friction, False), (1.02 * friction, True)):
+            plant.reset()
+            plant.brake(False)
+            drive(plant, 0.05, [torque])
+            assert (abs(plant.theta[0]) > 1e-7) == moves
+        plant.brake(True)
+        load(plant, [-N * 3.0])  # 3 N m at the motor: half of it is the loose strand's
+        drive(plant, 2.0, [0.0])
+        slack = 2 * PRETENSION * share * PINION
+        expected = 3.0 / CABLE if slack > 3.0 else (2 * 3.0 - slack) / CABLE
+        assert abs(plant.theta[0] - N * plant.q[0]) == pytest.approx(expected, rel=2e-2)
+
+
 # all together
 
 
@@ -571,6 +620,7 @@ EVERYTHING = Effects(
     creep=True,
     slack=True,
     backlash=(0.0, 0.0, 0.0, 0.02),
+    pretension_share=(0.8,),
     tension_friction=(1e-5,) * 4,
     added_coulomb_friction=(0.05,) * 4,
 )

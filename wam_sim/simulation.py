@@ -202,7 +202,7 @@ class Simulation:
         """Give a node new live parameters; where it refuses them, nothing has changed."""
         values = {**self._settings[request.node], **request.values}
         if request.node == "driver":
-            self.driver.set_added_friction(build(DriverParameters, values).effects.added_coulomb_friction)
+            self.driver.set_effects(build(DriverParameters, values).effects)
         else:
             declaration = self._interface.declarations[request.node]
             self.nodes[request.node].tune(build(declaration.parameter_class, values))

@@ -69,8 +69,7 @@ def sampled(runs: Runs) -> Result:
     friction, k_tr = link.node.dynamic_friction, link.node.transmission_stiffness
     period = quantised_cycle_period(link.loop.gain, k_tr, friction, desired * link.lever, level * link.lever)
     rows = [
-        Comparison("friction, the motor's cycle, peak to peak", 2.0 * friction / k_tr, cycle.peak_to_peak, "rad", DELAYS,
-                   "(5.20)"),
+        Comparison("friction, cycle of the motor", 2.0 * friction / k_tr, cycle.peak_to_peak, "rad", DELAYS, "(5.20)"),
         Comparison("friction, its period, which stays", float(period), cycle.period, "s", DELAYS, "(5.3)"),
         Comparison("friction, error of F_c", 0.0, float(force[there].mean()) - desired, "N", level, "a step", True),
     ]  # fmt: skip
