@@ -14,7 +14,7 @@ from wam_theory.quantisation import hunting, quantised_cycle_period, threshold
 
 WITHIN = 0.02
 DELAYS = 0.05  # allowed of the period: the slip and two samples are neglected
-LATE = 2.0  # s at the end of a run without friction
+LATE = 1.5  # s at the end of a run without friction
 HARMONICS = 0.15  # of the describing function, which neglects them
 
 Runs = Mapping[str, Recording]
