@@ -109,7 +109,7 @@ def along_the_link(runs: Mapping[str, Recording]) -> Result:
                 Comparison(f"{label}, true", force, float(true.mean()), "N", FORCE_ALONG, "7.3"),
                 Comparison(f"{label}, peak to peak", 0.0, float(np.ptp(true)), "N", FORCE_ALONG * force, "", True),
             ]
-        panels.append(_panel(found, _named(run, "press")))
+        panels.append(_panel(found, _named(run, "press"))._replace(title=f"force near the {name} of the link"))
     return Result(rows, panels)
 
 
