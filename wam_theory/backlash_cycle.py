@@ -1,6 +1,6 @@
 """The limit cycle of a torque loop by backlash (2.2): a sensor behind a play, by describing function and exactly.
 
-A motor of inertia J and damping b turns a gear with play against a link that stands still.  The sensor reads the torque
+A motor of inertia J and damping b turns a gear with play against a link at rest.  The sensor reads the torque
 tau of the flank; the loop answers it with -(G tau + G_I integral of tau + G_D d tau/dt).  Within the play it answers
 nothing, so that the derivative, which stabilises the loop on a flank, is missing for a part of each cycle.
 """
@@ -69,7 +69,12 @@ def dead_zone_gain(amplitude: ArrayLike) -> Array:
 
 
 def predicted_cycle(loop: TorqueLoop) -> BacklashCycle:
-    """The cycle by the describing function: its gain is the critical one, omega^2 = N k (1 + G)/J."""
+    """The cycle by the describing function: its gain is the critical one, omega^2 = N k (1 + G)/J.
+
+    Parameters
+    ----------
+    loop : gear, motor and gains.
+    """
     n = loop.critical_gain
     if not 0.0 < n < 1.0:
         return NO_CYCLE
@@ -84,6 +89,10 @@ def predicted_cycle(loop: TorqueLoop) -> BacklashCycle:
 def exact_cycle(loop: TorqueLoop) -> BacklashCycle:
     """The cycle by exact motion over play and flank in turn, until a half cycle repeats itself.
 
+    Parameters
+    ----------
+    loop : gear, motor and gains.
+
     Raises
     ------
     ValueError
@@ -97,7 +106,7 @@ def exact_cycle(loop: TorqueLoop) -> BacklashCycle:
         contact, most, back, wound_then = _flank(loop, speed, wound)
         crossing, reached = _play(loop, back, wound_then)
         if math.isnan(crossing):
-            return NO_CYCLE  # it stands still within the play
+            return NO_CYCLE  # it comes to rest within the play
         change = abs(reached - speed) / speed + abs(wound_then + wound) / (abs(wound_then) + 1e-300)
         speed, wound = reached, -wound_then
         if change < TOLERANCE:

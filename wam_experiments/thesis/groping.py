@@ -1,4 +1,4 @@
-"""The experiment `wam-grope`, groping a box (7.3): where it is by the contacts of the arm, against where it stands."""
+"""The experiment `wam-grope`, groping a box (7.3): where it is by the contacts of the arm, against its true place."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from wam_description.world import World
 from wam_experiments.thesis.recording import Recording, Step
 from wam_experiments.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 
-FELT = 0.05  # s after a contact was detected, when its place is known better
+KNOWN_AFTER = 0.05  # s after a contact was detected, when its place is known better
 HEIGHT, ACROSS, ALONG = 0.01, 0.02, 0.03  # m; the place along the link is what is known worst
 
 
@@ -20,11 +20,11 @@ def groping(runs: Mapping[str, Recording]) -> Result:
     obstacles = run.part("driver", "world", World).obstacles
     centre, half = np.array(obstacles.positions[:3]), np.array(obstacles.sizes[:3])
     low, high = centre - half, centre + half
-    until = float(run.joints("joint_states").time[-1]) - FELT
-    steps = [step for step in run.steps if step.name.startswith("feel") and step.end <= until]
-    points = {step.name.removeprefix("feel the "): felt(run, step) for step in steps}
+    until = float(run.joints("joint_states").time[-1]) - KNOWN_AFTER
+    steps = [step for step in run.steps if step.name.startswith("touch") and step.end <= until]
+    points = {step.name.removeprefix("touch the "): touched(run, step) for step in steps}
     rows = [
-        Comparison(f"{side}, height", high[2], float(point[2]), "m", HEIGHT, "where the box stands", True)
+        Comparison(f"{side}, height", high[2], float(point[2]), "m", HEIGHT, "true place", True)
         for side, point in points.items()
     ]
     for side, edge in (("left edge", high[1]), ("right edge", low[1])):
@@ -38,12 +38,12 @@ def groping(runs: Mapping[str, Recording]) -> Result:
     found = np.array(list(points.values()))
     curves = [
         Curve("predicted", "box", corners[:, 0], corners[:, 1]),
-        Curve("measured", f"felt: {', '.join(points)}", found[:, 0], found[:, 1]),
+        Curve("measured", f"touched: {', '.join(points)}", found[:, 0], found[:, 1]),
     ]
     return Result(rows, [Panel("seen from above", "x [m]", "y [m]", curves)])
 
 
-def felt(run: Recording, step: Step) -> Numbers:
+def touched(run: Recording, step: Step) -> Numbers:
     """Point of the skin at which a step ended in contact, (3,), m, base frame, by joint angles and estimate.
 
     Raises
@@ -51,7 +51,7 @@ def felt(run: Recording, step: Step) -> Numbers:
     BagError
         if no contact is estimated there.
     """
-    arm, time = run.shared.arm, step.end + FELT
+    arm, time = run.shared.arm, step.end + KNOWN_AFTER
     joints, wrench = run.joints("joint_states"), run.forces("contact/wrench")
     points = run.bag.topics.get(f"{run.namespace}/contact/point")
     if not isinstance(points, PointColumns):
@@ -61,7 +61,7 @@ def felt(run: Recording, step: Step) -> Numbers:
     at = _last(wrench.time, time)
     cover, push = wrench.frames[at], wrench.force[at]
     if cover not in arm.covers.names or np.isnan(place):
-        raise BagError(f"{run.bag.path}: no contact is estimated {FELT} s after '{step.name}'")
+        raise BagError(f"{run.bag.path}: no contact is estimated {KNOWN_AFTER} s after '{step.name}'")
     i = arm.covers.names.index(cover)
     inwards = np.array([0.0, push[1], push[2]]) / np.hypot(push[1], push[2])
     axis = np.array([place, *arm.covers.aside(cover, place)])
