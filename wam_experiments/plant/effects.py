@@ -313,7 +313,7 @@ def torque_loop(hertz: float, damping: float = 0.0) -> TorqueLoop:
 
 
 def torque_loop_response(hertz: float, damping: float = 0.0) -> tuple[Numbers, Numbers]:
-    """Times, s, and torque, N m, of the testbed's motor that runs into a flank, its link standing still.
+    """Times, s, and torque, N m, of the testbed's motor that runs into a flank, its link at rest.
 
     Parameters
     ----------
