@@ -23,6 +23,7 @@ from wam_experiments.thesis import (
     cables,
     force_accuracy,
     limit_cycles,
+    quantised,
     step_response,
     testbed,
     transmission,
@@ -62,6 +63,7 @@ def test_every_experiment_has_parameters_that_exist_and_steps_that_can_be_played
 def test_the_experiments_of_chapters_four_to_six_are_there() -> None:
     needed = "testbed-5.6 stiction-limit-cycle actuator-limit-cycle step-response frequency-response"
     needed += " stiffness-allocation efficiency creep wam-press wam-slide testbed-5.6-as-described force-accuracy"
+    needed += " quantised-force active-pretension wam-along-link wam-grope"
     assert set(needed.split()) <= set(names())
 
 
@@ -565,6 +567,53 @@ def test_force_without_feedback_is_measured_as_a_play_of_its_friction(tmp_path: 
     topics["joint_sensors"] = pressed(time, np.maximum(desired - friction, 0.0))  # a deadband without memory
     rows, _ = force_accuracy.open_loop(recorded(load("force-accuracy"), 0, topics, steps, tmp_path))
     assert not rows[2].agrees
+
+
+@pytest.mark.parametrize(("stretched", "agrees"), [(1.0, True), (1.15, False)])
+def test_cycle_of_the_motor_under_a_force_in_steps_has_the_period_of_both_errors(
+    stretched: float, agrees: bool, tmp_path: Path
+) -> None:
+    """By hand: 2 F_f/k_tr at G times either error, F_f 4 N m, G 8e-3 (rad/s)/(N m), 12 bits of a turn."""
+    step, desired, k_tr, gain = 2.0 * math.pi / 4096 * STIFFNESS, 11.6 * LEVER, 14.0**2 * 8.33, 0.00669 / LEVER**2
+    low, high = desired % step, step - desired % step
+    up, down = (stretched * 2.0 * 4.0 / (k_tr * gain * error) for error in (low, high))
+    time = np.arange(0.0, 12.0, 1e-3)
+    phase = time % (up + down)
+    motor = 8.0 / k_tr * np.where(phase < up, phase / up, 1.0 - (phase - up) / down)
+    topics = {
+        "motor_states": joints(time, -14.0 * motor),
+        "sim/joint_states": joints(time, np.full(len(time), -4.5 * step / STIFFNESS)),
+        "force_command": forces(time, (0.0, -11.6, 0.0)),
+    }
+    run = recorded(load("quantised-force"), 1, topics, PRESS, tmp_path)
+    travel, period, force = quantised.sampled({"friction": run}).rows
+    assert travel.agrees
+    assert force.agrees
+    assert period.agrees == agrees
+    assert force.measured == pytest.approx(4.5 * step / LEVER - 11.6, rel=1e-3)
+
+
+def test_a_strand_that_stays_tight_under_a_low_pretension_is_not_what_is_predicted(tmp_path: Path) -> None:
+    """By hand: T_0 as configured, 2 T_0 r/5 is the torque beyond which one strand carries at half the stiffness."""
+    time = np.arange(0.0, 9.5, 1e-3)
+    desired = np.interp(time, [0.0, 1.3, 2.0, 9.0], [0.0, 4.0, 4.0, 25.0])
+    arm = Configuration.load(packaged("testbed")).shared.arm
+    t0, k = arm.cables.pretension[0], arm.circuits[0].stiffness
+    friction = 2e-4 * 2.0 * 0.2 * t0 * 14.0 / LEVER
+    force = np.maximum(desired - friction, 0.0)
+    torque, slack = force * LEVER / 14.0, 2.0 * 0.2 * t0 * 9.525e-3
+    steps = (Step("delicate", 0.0, 2.0, {}), Step("strong", 2.0, 9.5, {}))
+    for stretch, agrees in ((np.maximum(torque, 2.0 * torque - slack) / k, True), (torque / k, False)):
+        motor = -(14.0 * force * LEVER / STIFFNESS + stretch)
+        topics = {
+            "joint_sensors": pressed(time, force),
+            "motor_states": joints(time, motor, effort=-desired * LEVER / 14.0),
+            "force_command": forces(time, (0.0, -25.0, 0.0)),
+        }
+        run = recorded(load("active-pretension"), 1, topics, steps, tmp_path)
+        deadband, found = force_accuracy.active_pretension({"a_fifth_of_it": run}).rows
+        assert deadband.agrees
+        assert found.agrees == agrees
 
 
 def test_joint_angles_that_keep_their_creep_are_not_taken_as_corrected(tmp_path: Path) -> None:

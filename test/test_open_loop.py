@@ -1,7 +1,5 @@
 """Force without feedback: the play of friction, and errors over the workspace within what statics allows."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -49,7 +47,7 @@ def test_feed_forward_of_friction_and_cogging_halves_the_error() -> None:
 def test_arm_with_cogging_has_the_measured_breakaway_torque_of_its_motors() -> None:
     """Its friction, that by tension and its cogging are together the friction of config/wam.yaml."""
     measured = Configuration.load(packaged("wam")).shared.arm.motors.static_friction
-    parts = Configuration.load(Path(__file__).resolve().parents[1] / "examples" / "cogging.yaml")
+    parts = Configuration.load(packaged("thesis-effects"))
     arm, effects = parts.shared.arm, parts.node("driver", DriverParameters).effects
     tension = 2.0 * np.multiply(effects.tension_friction, arm.cables.pretension)
     together = arm.motors.static_friction + tension + np.array(effects.ripples.amplitude[:4])

@@ -389,7 +389,10 @@ def test_a_node_takes_an_installed_configuration_by_its_name(tmp_path):
 @pytest.mark.parametrize(
     ("config", "text"),
     [
-        ("nowhere", r"no configuration 'nowhere' .* there are: barrett-wam4, barrett-wam7, testbed, wam \("),
+        (
+            "nowhere",
+            r"no configuration 'nowhere' .* there are: barrett-wam4, barrett-wam7, testbed, thesis-effects, wam \(",
+        ),
         ("demo_scenario", r"demo_scenario.yaml is a scenario, no configuration; play it with 'wam up --scenario"),
         ("nowhere.yaml", r"nowhere.yaml is not a file; give the path of a ROS parameter file"),
     ],

@@ -8,15 +8,17 @@ import math
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from arms import LINK_INERTIA, NOWHERE, WAM, changed, frictionless, one_joint
 
 from wam_description.arm import Arm
-from wam_description.configuration import Configuration
+from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects, Ripples, no_effects
 from wam_description.world import NO_SPRINGS, Springs, World
 from wam_driver.plant import Plant
+from wam_theory.cable import propagated_pretension, unequal_tension
 
 STEP = 5e-4
 LB, INCH = 4.4482216152605, 0.0254
@@ -313,6 +315,66 @@ def test_every_circuit_of_the_arm_loses_what_two_equal_stages_lose(joint: int) -
     assert WAM.circuits[joint].loss_per_torque == pytest.approx(2 / (0.375 * INCH * 9500 * LB), rel=1e-5)
 
 
+def test_differential_of_three_stages_loses_less_than_four_percent_on_the_stepped_plant() -> None:
+    """7.2.2: joint 2 is turned against a load by both motors of the differential, by pounds and inches of 7.2.2."""
+    arm = frictionless(Configuration.load(packaged("thesis-effects")).shared.arm, damping=1.0)
+    arm = changed(
+        arm,
+        motors={"inertia": (1e9,) * 4},  # the rotors turn as they are told
+        joints={"start": (0.0, -2.0, 0.0, 0.0), "lower": (-9.0,) * 4, "upper": (9.0,) * 4},
+        gravity=WEIGHTLESS,
+    )
+    plant, speed, at_motor = plant_of(arm, creep=True), 0.5, 3.0  # rad/s of joint 2 without loss, N m
+    load(plant, [0.0, -2 * 30.4 * at_motor, 0.0, 0.0])
+    plant.data.qvel[:8] = (0.0, -30.4 * speed, 30.4 * speed, 0.0, 0.0, speed, 0.0, 0.0)
+    drive(plant, 1.5, [0.0] * 4)
+    q, theta = plant.q[1], plant.theta[2]
+    drive(plant, 1.0, [0.0] * 4)
+    lost = 1.0 - 30.4 * (plant.q[1] - q) / (plant.theta[2] - theta)
+    pounds = at_motor / (0.375 * INCH) / LB
+    assert lost == pytest.approx(2 * pounds / 9500 + 30.4 * pounds * 0.375 / 2.5 / 51_500, rel=0.01)
+    assert lost * 43 * IN_LB / at_motor < 0.04
+
+
+def test_pretension_reaches_the_second_stage_in_proportion_to_its_cables() -> None:
+    """7.2.2, figure 7.8: a pulley and pinion for each strand multiply the tension by their radii, E A with it."""
+    first, second = WAM.cables.stage_ea[0::2], WAM.cables.stage_ea[1::2]
+    for motor in range(4):
+        n = WAM.cables.stage_ratio[2 * motor + 1]
+        propagated = float(propagated_pretension(WAM.cables.pretension[motor], n))
+        # each half of the shaft between the stages is in balance: T_1 times the pulley is T_2 times the pinion
+        pulley, pinion = n * WAM.cables.stage_radius[2 * motor], WAM.cables.stage_radius[2 * motor + 1]
+        assert propagated * pinion == pytest.approx(WAM.cables.pretension[motor] * pulley)
+        assert propagated / second[motor] == pytest.approx(WAM.cables.pretension[motor] / first[motor], rel=1e-5)
+        # so that both stages slacken at the same torque of the motor, as the plant's one circuit does
+        assert 2 * propagated * pinion / n == pytest.approx(2 * 57.0 * LB * WAM.circuits[motor].radius, rel=1e-4)
+
+
+def test_looped_back_cable_shares_the_load_that_two_cables_of_unequal_length_do_not() -> None:
+    """7.2.2: MuJoCo's tendons on one drum; one cable over a free pulley against two cables of their own."""
+    stiffness, mismatch, tension = 4e4, 2e-3, 300.0  # N/m, m, N
+    for looped in (False, True):
+        model = mujoco.MjModel.from_xml_string(
+            f"""<mujoco><option gravity="0 0 0" timestep="1e-3"><flag contact="disable"/></option><worldbody>
+            <body><joint name="drum" type="slide" axis="1 0 0" damping="2e3"/><geom size="0.1" mass="1"/></body>
+            <body><joint name="yoke" type="hinge" axis="0 0 1" damping="2e2"/><geom size="0.1" mass="1"/></body>
+            </worldbody><tendon>
+            <fixed name="a" stiffness="{stiffness}" springlength="{-mismatch}">
+              <joint joint="drum" coef="1"/>{'<joint joint="yoke" coef="1"/>' * looped}</fixed>
+            <fixed name="b" stiffness="{stiffness}" springlength="0">
+              <joint joint="drum" coef="1"/>{'<joint joint="yoke" coef="-1"/>' * looped}</fixed>
+            </tendon></mujoco>"""
+        )
+        data = mujoco.MjData(model)
+        data.qfrc_applied[0] = 2 * tension
+        for _ in range(4000):
+            mujoco.mj_step(model, data)
+        pulls = stiffness * (data.ten_length - model.tendon_lengthspring[:, 0])
+        assert pulls.sum() == pytest.approx(2 * tension, rel=1e-3)
+        expected = 0.0 if looped else float(unequal_tension(stiffness * 0.5, 0.5, mismatch))
+        assert pulls[0] - pulls[1] == pytest.approx(expected, abs=0.1)
+
+
 # ripple and cogging
 
 
@@ -501,6 +563,55 @@ def test_what_rubs_on_a_joint_adds_to_its_friction_at_once() -> None:
         assert lost / 0.1 == pytest.approx(rod / N, rel=THOUSANDTH, abs=1e-9)
 
 
+# active pretension
+
+
+@pytest.mark.parametrize("share", [0.3, 1.5])
+def test_cables_tightened_to_a_share_are_those_of_an_arm_with_that_pretension(share: float) -> None:
+    """6.5: slack, friction by tension and tensions, to the bit, also after a reset; at first with other cables."""
+    arm = damped(one_joint())
+    less = changed(arm, cables={"pretension": (share * PRETENSION,)})
+    effects = {"slack": True, "tension_friction": (1e-4,), "creep": True}
+    live, expected = plant_of(arm, **effects), plant_of(less, **effects)
+    live.set_pretension([share])
+    for _ in range(2):
+        found = []
+        for plant in (live, expected):
+            load(plant, [-60.0])
+            torque = [2.4 * PRETENSION * share * PINION]  # enough for a slack strand
+            values = []
+            for _ in range(400):
+                plant.step(torque)
+                values += [*plant.theta, *plant.q, *sum(plant.tensions, ())]
+            found.append(values)
+            plant.reset()
+            plant.brake(False)
+        np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-12)
+        assert min(found[0][3::4]) == 0.0
+
+
+def test_active_pretension_lowers_the_least_force_and_a_large_one_needs_it_back() -> None:
+    """6.5: a delicate task with a fifth of the pretension, a strong one with all of it, on one plant."""
+    arm = damped(one_joint())
+    plant, coefficient = plant_of(arm, slack=True, tension_friction=(1e-3,)), 1e-3
+    for share in (1.0, 0.2, 1.0):
+        plant.reset()
+        plant.brake(False)
+        plant.set_pretension([share])
+        friction = coefficient * 2 * PRETENSION * share
+        for torque, moves in ((0.98 * friction, False), (1.02 * friction, True)):
+            plant.reset()
+            plant.brake(False)
+            drive(plant, 0.05, [torque])
+            assert (abs(plant.theta[0]) > 1e-7) == moves
+        plant.brake(True)
+        load(plant, [-N * 3.0])  # 3 N m at the motor: half of it is the loose strand's
+        drive(plant, 2.0, [0.0])
+        slack = 2 * PRETENSION * share * PINION
+        expected = 3.0 / CABLE if slack > 3.0 else (2 * 3.0 - slack) / CABLE
+        assert abs(plant.theta[0] - N * plant.q[0]) == pytest.approx(expected, rel=2e-2)
+
+
 # all together
 
 
@@ -509,6 +620,7 @@ EVERYTHING = Effects(
     creep=True,
     slack=True,
     backlash=(0.0, 0.0, 0.0, 0.02),
+    pretension_share=(0.8,),
     tension_friction=(1e-5,) * 4,
     added_coulomb_friction=(0.05,) * 4,
 )

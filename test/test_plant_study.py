@@ -12,6 +12,7 @@ from wam_experiments.plant.effects import (
     resonances,
     stiction_cycle,
     torque_controlled,
+    torque_loop_response,
 )
 from wam_experiments.plant.figure import RATIOS, figure
 from wam_experiments.plant.levels import LEVELS
@@ -31,6 +32,7 @@ from wam_experiments.plant.levels import LEVELS
         ("linear surface", 2e-3),  # k_c 0.2 %: the tip accelerates, which takes 0.1 % of the force
         ("hardening surface", 2e-3),
         ("backlash in the loop", 1e-2),
+        ("backlash in a torque loop", 2e-3),  # a step of the plant is a thousandth of a cycle
         ("impact", 5e-3),  # (3.1) 0.5 %
         ("actuator cycle", 1e-2),  # (5.20) 1 %, at every moment of 6 s
     ],
@@ -70,6 +72,7 @@ def test_figure_is_drawn_and_its_table_names_every_effect(tmp_path: Path) -> Non
         ("added friction, breakaway", 2e-3),  # and the link some more
         ("damping of the circuit, decay", 1e-2),  # explicit damping, h d N^2/J
         ("amplifier, time to the continuous limit", 1e-3),  # a period of 1 ms
+        ("cycle by backlash in a torque loop, peak to peak", 2e-2),  # which is half a step of delay
         ("sensor noise, 20 000 readings", 2e-2),  # 1/sqrt(2 n) is 0.5 %
     ],
 )
@@ -91,3 +94,11 @@ def test_loss_under_torque_control_is_creep_and_no_friction_of_the_torque() -> N
 def test_play_is_without_effect_while_a_force_above_the_friction_keeps_the_flank_loaded() -> None:
     travel = actuator_cycle_with_backlash(20.0).plant
     assert travel == pytest.approx(travel[0], rel=0.01)
+
+
+def test_a_velocity_feedback_ends_the_cycle_of_backlash_in_a_torque_loop() -> None:
+    """2.2, "eliminated through proper compensation": damping that also acts within the play."""
+    for damping, ends in ((1.2, True), (0.5, False)):
+        _, torque = torque_loop_response(477.0, damping)
+        late = abs(torque[-2000:]).max() / abs(torque[:2000]).max()
+        assert (late < 0.05) == ends

@@ -43,6 +43,17 @@ def test_encoder_reads_the_nearest_of_its_steps() -> None:
     np.testing.assert_array_equal(error[:, 3], 0.0)
 
 
+def test_joint_encoders_have_one_resolution_for_all_or_one_each() -> None:
+    angles = [0.24, 0.26, -0.31, 1.0]
+    assert sensors(joint_encoder_resolution=(0.1,)).joints(angles, ZERO, ZERO, DT).position == pytest.approx(
+        [0.2, 0.3, -0.3, 1.0]
+    )
+    each = sensors(joint_encoder_resolution=(0.1, 0.0, 1.0, 0.0)).joints(angles, ZERO, ZERO, DT).position
+    assert each == pytest.approx([0.2, 0.26, 0.0, 1.0])
+    with pytest.raises(ParameterError, match="joint_encoder_resolution"):
+        sensors(joint_encoder_resolution=(0.1, 0.1))
+
+
 def test_velocity_of_a_real_encoder_is_the_difference_of_two_readings() -> None:
     step = 1e-3
     read = sensors(encoder_resolution=(step,) * 4)

@@ -40,6 +40,14 @@ class Effects:
         before=(0.0,),
     )
     slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
+    pretension_share: tuple[float, ...] = parameter(
+        "active pretension (6.5): part of arm.cables.pretension to which cables are tightened, one for all or one "
+        "each; it changes at once",
+        low=0.0,
+        high=10.0,
+        live=True,
+        before=(1.0,),
+    )
     tension_friction: tuple[float, ...] = parameter(
         "friction torque of bearings and cable bending per sum of both tensions (6.5), at each motor",
         "N m/N",
@@ -54,6 +62,10 @@ class Effects:
         live=True,
     )
 
+    def tightened(self, motor: int) -> float:
+        """Part of the pretension of this motor's circuit that is set."""
+        return self.pretension_share[motor if len(self.pretension_share) > 1 else 0]
+
     def play(self, motor: int) -> float:
         """Backlash of the circuit of this motor, rad."""
         return self.backlash[motor if len(self.backlash) > 1 else 0]
@@ -66,6 +78,7 @@ def no_effects(arm: Arm) -> Effects:
         creep=False,
         backlash=(0.0,),
         slack=False,
+        pretension_share=(1.0,),
         tension_friction=(0.0,) * len(arm.motors.names),
         added_coulomb_friction=(0.0,) * len(arm.joints.names),
     )

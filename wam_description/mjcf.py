@@ -86,8 +86,9 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
         shafts = (*motors, *joints)
         require(name in shafts, f"effects.ripples.shafts names '{name}'; motors and joints: {', '.join(shafts)}")
     lengths("effects", motors, {"tension_friction": effects.tension_friction})
-    if len(effects.backlash) != 1:
-        lengths("effects", motors, {"backlash": effects.backlash})
+    for name, values in (("backlash", effects.backlash), ("pretension_share", effects.pretension_share)):
+        if len(values) != 1:
+            lengths("effects", motors, {name: values})
     lengths("effects", joints, {"added_coulomb_friction": effects.added_coulomb_friction})
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from wam_description.arm import Arm
+from wam_description.cables import Circuit
 from wam_description.effects import Effects
 
 
@@ -27,25 +28,51 @@ class CableCircuits:
         self.is_slack = False
         self._may_slacken = effects.slack
         self._friction_counts = friction_counts
-        self._circuits = arm.circuits
+        self._nominal = self._circuits = arm.circuits
         # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
         self._speed, self._pull = data.qvel[:n], data.qfrc_spring[:n]
         self._stretch_rate = data.ten_velocity[: 2 * n : 2]
         # two of each strand: it is slack between them; the tight strand comes first and pulls beyond the second, the
         # loose one beyond the first
-        self._slack_ends = memoryview(data.plastic)
+        self._slack_ends: Any = memoryview(data.plastic)
+        # with backlash the ends are those of the play
+        self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
+        self._losses = [step * circuit.loss_per_torque if effects.creep else 0.0 for circuit in arm.circuits]
+        self._prepare()
+
+    def _prepare(self) -> None:
         self._each = [
-            (
-                4 * i + 1,
-                step * circuit.loss_per_torque if effects.creep else 0.0,
-                2.0 * circuit.pretension * circuit.radius if friction_counts else math.inf,
-            )
-            for i, circuit in enumerate(arm.circuits)
+            (4 * i + 1, loss, 2.0 * circuit.pretension * circuit.radius if self._friction_counts else math.inf)
+            for i, (loss, circuit) in enumerate(zip(self._losses, self._circuits, strict=True))
         ]  # first slack end between the strands, creep of a step per speed and torque, torque that makes a strand slack
 
     def reset(self) -> None:
         """Return to power-up; the first step finds out whether a strand is slack."""
         self.is_slack = self._friction_counts
+
+    def rest(self) -> None:
+        """Give cables as they are configured the pretension that is set."""
+        self._move_ends(self._nominal, self._circuits)
+
+    def tighten(self, shares: Sequence[float]) -> tuple[Circuit, ...]:
+        """Set the pretension of each circuit (6.5), parts of the configured one, (n,); the circuits with it."""
+        before = self._circuits
+        self._circuits = tuple(
+            circuit._replace(pretension=share * circuit.pretension)
+            for circuit, share in zip(self._nominal, shares, strict=True)
+        )
+        self._move_ends(before, self._circuits)
+        self._prepare()
+        self.is_slack = self._friction_counts
+        return self._circuits
+
+    def _move_ends(self, before: Sequence[Circuit], now: Sequence[Circuit]) -> None:
+        """Move the stretch at which either strand goes slack."""
+        for i in self._strands:
+            more = now[i].slack_stretch - before[i].slack_stretch
+            if more:
+                self._slack_ends[4 * i + 1] -= more
+                self._slack_ends[4 * i + 2] += more
 
     def follow(self, direction: Sequence[int]) -> None:
         """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; look for slack strands.

@@ -101,6 +101,7 @@ class Driver:
         self._zero = [0.0] * len(arm.motors.names)
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
         self._push_end = 0  # last tick of the present push
+        self._pretension_share = parameters.effects.pretension_share
         self._tick = 1
         self._release()
         self._measure()
@@ -238,6 +239,15 @@ class Driver:
         """Set the added Coulomb friction of the joints, (n,), N m, like the Teflon rod of section 5.6."""
         lengths("effects", self._arm.joints.names, {"added_coulomb_friction": tuple(friction)})
         self.plant.set_added_friction(friction)
+
+    def set_effects(self, effects: Effects) -> None:
+        """Take the effects that can change while the arm runs: added friction, active pretension."""
+        if len(effects.pretension_share) != 1:
+            lengths("effects", self._arm.motors.names, {"pretension_share": effects.pretension_share})
+        self.set_added_friction(effects.added_coulomb_friction)
+        if effects.pretension_share != self._pretension_share:
+            self.plant.set_pretension(effects.pretension_share)
+            self._pretension_share = effects.pretension_share
 
     def enable(self, obstacle: str) -> Answer:
         """Release the brakes and discard every command received before, unless an `obstacle` is named."""

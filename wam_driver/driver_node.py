@@ -37,7 +37,7 @@ class DriverNode(TolerantNode):
         self._place = take_place(self, "driver")
         shared, own = declare(self, DriverParameters)
         self.driver = Driver(shared, own)
-        follow(self, own, lambda new: self.driver.set_added_friction(new.effects.added_coulomb_friction))
+        follow(self, own, lambda new: self.driver.set_effects(new.effects))
         self._ports = ports = Ports(self, declared("driver"), shared, Interface(shared))
         self._arm, self._timing = shared.arm, shared.timing
         self._directory = own.post_mortem_directory

@@ -14,6 +14,7 @@ from itertools import repeat
 from typing import Protocol
 
 from wam_description.arm import Arm
+from wam_description.cables import Circuit
 from wam_description.effects import Effects
 from wam_description.parameters import parameter, require
 
@@ -236,14 +237,14 @@ class DryFriction:
         self._varying = [i for i, law in enumerate(self._laws) if not law.is_steady or i in self._presliding]
         self.is_steady = not self._varying
         self._circuits = list(zip(effects.tension_friction, arm.circuits, strict=True))
-        self._from_tension = [2.0 * circuit.pretension * per_tension for per_tension, circuit in self._circuits]
+        self._added = effects.added_coulomb_friction
         self._step = step
         self._shafts = range(size)
         # velocities between which a shaft remains as it is: stuck, in positive or in negative motion
         slowest = [math.nextafter(v, math.inf) for v in [STUCK_ROTOR] * (size // 2) + [STUCK_JOINT] * (size // 2)]
         self._bounds = [((-v, v), (0.0, math.inf), (-math.inf, 0.0)) for v in slowest]
         self.direction = [0] * size
-        self.set_added(effects.added_coulomb_friction)
+        self.set_circuits(arm.circuits)
         self.reset()
 
     def reset(self) -> None:
@@ -255,8 +256,17 @@ class DryFriction:
             presliding.torque = 0.0
         self.elastic = [0.0] * len(self._shafts) if self._presliding else []
 
+    def set_circuits(self, circuits: Sequence[Circuit]) -> None:
+        """Take the pretension of each circuit, (n,), for the friction by tension (6.5)."""
+        self._circuits = [
+            (per_tension, circuit) for (per_tension, _), circuit in zip(self._circuits, circuits, strict=True)
+        ]
+        self._from_tension = [2.0 * circuit.pretension * per_tension for per_tension, circuit in self._circuits]
+        self.set_added(self._added)
+
     def set_added(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of each joint, (n,), N m, static and dynamic alike."""
+        self._added = tuple(friction)
         self._extra = [*self._from_tension, *friction]
         self._static = [law.level(0.0, 0, 0.0) + extra for law, extra in zip(self._laws, self._extra, strict=True)]
         self._dynamic = [law.level(1.0, 1, 0.0) + extra for law, extra in zip(self._laws, self._extra, strict=True)]

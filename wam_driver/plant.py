@@ -103,12 +103,15 @@ class Plant:
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
         self._rest()
         self.keep()
+        if set(effects.pretension_share) != {1.0}:
+            self.set_pretension(effects.pretension_share)
         require_fitting_step(self.model, arm, world, step)
 
     def _rest(self) -> None:
         """Put the arm at its start pose, braked, with the cables stretched so that they carry the links."""
         data, joints = self.data, self._joints
         mujoco.mj_resetData(self.model, data)
+        self._circuits.rest()
         for one in self._moving:
             one.lead(0.0)
         self._q[:] = self._start
@@ -192,6 +195,13 @@ class Plant:
     def set_added_friction(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of each joint, (n,), N m, static and dynamic alike."""
         self._friction.set_added(friction)
+        self._is_set = False
+
+    def set_pretension(self, shares: Sequence[float]) -> None:
+        """Set the pretension of each circuit now (6.5), one part of the configured one for all, or one each, (n,)."""
+        before = self._plastic.copy()
+        self._friction.set_circuits(self._circuits.tighten(list(shares) if len(shares) > 1 else [*shares] * self._n))
+        self._kept[1][:] += self._plastic - before
         self._is_set = False
 
     def step(self, torque: list[float]) -> None:

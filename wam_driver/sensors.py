@@ -21,6 +21,13 @@ class SensorParameters:
         high=1.0,
     )
     encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", low=0.0, high=1.0)
+    joint_encoder_resolution: tuple[float, ...] = parameter(
+        "resolution of the joint angle, one for all or one each; the velocity as with encoder_resolution",
+        "rad",
+        low=0.0,
+        high=1.0,
+        before=(0.0,),
+    )
     joint_encoder_noise: tuple[float, ...] = parameter(
         "standard deviation of the joint angle", "rad", low=0.0, high=1.0
     )
@@ -59,10 +66,12 @@ class Sensors:
     """Motor encoders, joint encoders and strain gauges of an arm."""
 
     def __init__(self, arm: Arm, parameters: SensorParameters, random: np.random.Generator) -> None:
-        lengths("sensors", arm.motors.names, {key: getattr(parameters, key) for key in vars(parameters)})
-        perfect = [0.0] * len(arm.joints.names)
+        given = dict(vars(parameters))
+        if len(resolution := given["joint_encoder_resolution"]) == 1:
+            given["joint_encoder_resolution"] = resolution * len(arm.joints.names)
+        lengths("sensors", arm.motors.names, given)
         self._motors = Encoders(parameters.encoder_resolution, parameters.encoder_noise, random)
-        self._joints = Encoders(perfect, parameters.joint_encoder_noise, random)
+        self._joints = Encoders(given["joint_encoder_resolution"], parameters.joint_encoder_noise, random)
         self._strain_noise = parameters.strain_noise
         self._is_strain_noisy = any(parameters.strain_noise)
         self._random = random

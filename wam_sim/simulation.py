@@ -204,7 +204,7 @@ class Simulation:
         if values == self._settings[request.node]:
             return
         if request.node == "driver":
-            self.driver.set_added_friction(build(DriverParameters, values).effects.added_coulomb_friction)
+            self.driver.set_effects(build(DriverParameters, values).effects)
         else:
             declaration = self._interface.declarations[request.node]
             self.nodes[request.node].tune(build(declaration.parameter_class, values))

@@ -114,6 +114,32 @@ def tensions(torque: ArrayLike, pretension: ArrayLike, radius: ArrayLike) -> tup
     )
 
 
+def propagated_pretension(pretension: ArrayLike, ratio: ArrayLike) -> Array:
+    """Pretension of the next stage, N, from one pulley and pinion for each strand between them: n T0 (7.2.2).
+
+    Parameters
+    ----------
+    pretension : T0 of this stage, N, zero or more.
+    ratio : n, radius of the pulley over that of the pinion on its shaft.
+    """
+    (pretension,), (ratio,) = zero_or_more(pretension=pretension), above_zero(ratio=ratio)
+    return ratio * pretension
+
+
+def unequal_tension(ea: ArrayLike, length: ArrayLike, mismatch: ArrayLike) -> Array:
+    """Difference of the tensions of two parallel cables, N, of which one is shorter: EA d/L (7.2.2).
+
+    A cable that is looped back over a free pulley has none.
+
+    Parameters
+    ----------
+    ea, length : E A, N, and free length, m, of each, above zero.
+    mismatch : d, m.
+    """
+    ea, length = above_zero(ea=ea, length=length)
+    return np.asarray(ea * np.asarray(mismatch, dtype=float) / length)
+
+
 def stage_loss(torque: ArrayLike, radius: ArrayLike, ea: ArrayLike, circuits: ArrayLike, ratio: ArrayLike) -> Array:
     """Relative loss of speed and of power of a stage, (T2 - T1)/EA of (6.4) and (6.14), for strain far below 1.
 

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.measures.limit_cycle import mean_cycle
 from wam_description.effects import Ripples
 from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.plant import Plant
@@ -26,12 +27,15 @@ from wam_experiments.plant.ideal_testbed import (
     one_step_map,
     released_plant,
 )
+from wam_theory.backlash_cycle import TorqueLoop, exact_cycle
 from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, play_torque, stage_loss
 from wam_theory.resonance import force_resonances
 from wam_theory.stick_slip import IntegralLoop, simulate
 from wam_theory.tension_element import coulomb_like_torque
 
 Numbers = NDArray[np.float64]
+CRITICAL = 0.8  # part of the stiffness at which the torque loop is marginal
+TURNS, FINE = 40, 1000  # cycles of the torque loop, and steps of each, so that it has practically no delay
 
 
 class PlantCurve(NamedTuple):
@@ -290,6 +294,61 @@ def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
     return PlantCurve(play, travel, 2.0 * friction / found[0].node.transmission_stiffness + crossed)
 
 
+def torque_loop(hertz: float, damping: float = 0.0) -> TorqueLoop:
+    """A torque loop on the testbed's motor and shaft whose cycle by backlash has about this frequency (2.2).
+
+    The critical gain is 0.8, the integral a third of the frequency.
+
+    Parameters
+    ----------
+    hertz : of the cycle by the describing function.
+    damping : of a velocity feedback, part of that which ends the cycle.
+    """
+    arm = ideal_testbed()
+    stiffness, inertia, omega = arm.circuits[0].stiffness, arm.motors.inertia[0], 2.0 * np.pi * hertz
+    proportional = omega**2 * inertia / (CRITICAL * stiffness) - 1.0
+    needed = inertia * omega / 3.0
+    integral, derivative = omega / 3.0 * (1.0 + proportional), needed / (CRITICAL * stiffness)
+    return TorqueLoop(stiffness, 0.01, inertia, damping * needed, proportional, integral, derivative)
+
+
+def torque_loop_response(hertz: float, damping: float = 0.0) -> tuple[Numbers, Numbers]:
+    """Times, s, and torque, N m, of the testbed's motor that runs into a flank, its link at rest.
+
+    Parameters
+    ----------
+    hertz, damping : of the loop as in `torque_loop`.
+    """
+    arm, loop, step = ideal_testbed(), torque_loop(hertz, damping), 1.0 / (FINE * hertz)
+    arm = replace(
+        arm,
+        motors=replace(arm.motors, viscous_friction=(loop.damping,)),
+        joints=replace(arm.joints, armature=(IMMOVABLE,)),
+    )
+    plant, torques, wound = released_plant(arm, step=step, backlash=(loop.play,)), [], 0.0
+    plant.data.qvel[0] = 2.0 * np.pi * hertz * loop.play
+    theta, rate = plant.data.qpos, plant.data.qvel  # the sensor reads the present torque, not that of the last step
+    for _ in range(TURNS * FINE):
+        angle = theta[0] - 14.0 * theta[1]
+        torque = loop.stiffness * float(np.sign(angle)) * max(abs(angle) - 0.5 * loop.play, 0.0)
+        wound += loop.integral * torque * step
+        slope = loop.stiffness * (rate[0] - 14.0 * rate[1]) if torque else 0.0
+        plant.step([-float(loop.proportional * torque + wound + loop.derivative * slope)])
+        torques.append(torque)
+    return step * np.arange(len(torques), dtype=np.float64), np.array(torques, dtype=np.float64)
+
+
+def backlash_in_a_torque_loop() -> PlantCurve:
+    """Frequency of the cycle that backlash causes in a torque loop, over that of the describing function, Hz (2.2).
+
+    The last two are those of Luh, Fisher and Paul on the first two joints of the Stanford arm.
+    """
+    wanted = np.array([60.0, 150.0, 334.0, 477.0])
+    found = [1.0 / mean_cycle(*torque_loop_response(hertz)).period for hertz in wanted.tolist()]
+    exact = [exact_cycle(torque_loop(hertz)).frequency / (2.0 * np.pi) for hertz in wanted.tolist()]
+    return PlantCurve(wanted, np.array(found), np.array(exact))
+
+
 def impact() -> PlantCurve:
     """Greatest force of a link that runs into a spring at 0.5 rad/s, over its stiffness at the tip, N/m; (3.1).
 
@@ -355,5 +414,6 @@ STUDIES: dict[str, Callable[[], PlantCurve]] = {
     "impact": impact,
     "actuator cycle": actuator_cycle,
     "backlash in the loop": actuator_cycle_with_backlash,
+    "backlash in a torque loop": backlash_in_a_torque_loop,
     "stiction cycle": stiction_cycle,
 }

@@ -25,7 +25,7 @@ def figure(file: Path) -> str:
     file : picture; its suffix is the format.
     """
     curves = {name: study() for name, study in STUDIES.items()}
-    with panels(file, 4, 3, 9.0, 10.4) as (picture, flat):
+    with panels(file, 4, 3, 9.0, 10.4) as (_, flat):
         _curve(flat[0], curves["slack"], "slack of the loose strand", "stretch [rad]", "circuit torque [N m]")
         _curve(flat[1], curves["creep"], "creep, out and back (6.19)", "travel of the motor [rad]", "creep [mrad]", 1e3)
         _curve(flat[2], curves["efficiency"], "efficiency (6.15)", "motor torque [N m]", "power out / power in")
@@ -35,10 +35,17 @@ def figure(file: Path) -> str:
         _curve(flat[6], curves["actuator cycle"], "actuator limit cycle (5.20)", "time [s]", "motor at the joint [rad]")
         _curve(flat[7], curves["impact"], "impact (3.1)", "stiffness [N/m]", "greatest force [N]")
         worst = _resonances(flat[8], flat[9])
-        handles, labels = flat[0].get_legend_handles_labels()
-        for unused in flat[len(curves) + 1 :]:
-            unused.set_axis_off()
-        picture.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.66, 0.1), fontsize=9.0)
+        _curve(
+            flat[10], curves["backlash in the loop"], "actuator cycle with backlash (2.2)", "play [rad]", "cycle [rad]"
+        )
+        _curve(
+            flat[11],
+            curves["backlash in a torque loop"],
+            "torque loop with backlash (2.2)",
+            "by describing function [Hz]",
+            "cycle [Hz]",
+        )
+        flat[0].legend(fontsize=9.0)
     return _table(curves, worst)
 
 

@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.measures.limit_cycle import mean_cycle
 from wam_description.configuration import Configuration, packaged
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
 from wam_driver.sensors import Encoders
-from wam_experiments.plant.effects import breakaway
+from wam_experiments.plant.effects import breakaway, torque_loop, torque_loop_response
 from wam_experiments.plant.ideal_testbed import (
     IMMOVABLE,
     STEP,
@@ -18,6 +19,7 @@ from wam_experiments.plant.ideal_testbed import (
     one_step_map,
     released_plant,
 )
+from wam_theory.backlash_cycle import exact_cycle
 
 
 class MeasuredLevel(NamedTuple):
@@ -74,10 +76,16 @@ def noise(sd: float = 1e-3) -> MeasuredLevel:
     return MeasuredLevel(float(np.std(readings)), sd)
 
 
+def torque_cycle(hertz: float = 477.0) -> MeasuredLevel:
+    """Torque of the cycle by backlash in a torque loop, peak to peak, N m (2.2)."""
+    return MeasuredLevel(mean_cycle(*torque_loop_response(hertz)).peak_to_peak, exact_cycle(torque_loop(hertz)).torque)
+
+
 LEVELS: dict[str, Callable[[], MeasuredLevel]] = {
     "friction by tension, breakaway": tension_friction,
     "added friction, breakaway": added_friction,
     "damping of the circuit, decay": circuit_damping,
     "amplifier, time to the continuous limit": heating,
+    "cycle by backlash in a torque loop, peak to peak": torque_cycle,
     "sensor noise, 20 000 readings": noise,
 }

@@ -17,6 +17,8 @@ testbed         section 5.6: stable gain with friction, step size, saturation an
 transmission    chapter 4: force response by chirp, position of the reducer
 cables          chapter 6: efficiency (6.15), creep (6.19) and its correction
 force_accuracy  force without feedback, 5.2; a sensor that is calibrated wrong, 2.2
-arm_forces      the arm presses, slides and is pushed
+quantised       force feedback that is read in steps, 3.2.1
+arm_forces      the arm presses, slides, is pushed, and presses near either end of a link
+groping         the arm finds a box by contacts, 7.3
 one_link        node, loop and response of a testbed with one link, for the evaluations above
 """

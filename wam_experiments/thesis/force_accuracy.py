@@ -5,13 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_experiments.thesis.one_link import OneLink, desired_force, one_link, response
-from wam_experiments.thesis.recording import Recording
+from wam_experiments.thesis.one_link import OneLink, desired_force, one_link, response, set_until
+from wam_experiments.thesis.recording import Recording, Step
 from wam_experiments.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 from wam_theory.stiction import play
 
 WITHIN = 0.02
 LATE = 0.5  # s at the end of a step, over which a settled force is averaged
+RAMP = 0.05  # N; what a ramp of 3 N/s is carried further by the link's inertia
 LEAST = 0.02  # N; the force from which contact counts
 
 
@@ -48,6 +49,37 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     each = slice(None, None, 40)
     curves = [Curve("measured", "measured", desired[each], force[each]), Curve("predicted", "", desired, expected)]
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
+
+
+def active_pretension(runs: Mapping[str, Recording]) -> Result:
+    """The experiment `active-pretension`: deadband by friction of the tension, and stretch of the cable, over it."""
+    rows, curves = [], []
+    for name, run in runs.items():
+        link, label = one_link(run), name.replace("_", " ")
+        desired, force = _fed_forward(run, link)
+        delicate, strong = run.step("delicate"), run.step("strong")
+        time, circuit = run.joints("joint_sensors").time, run.shared.arm.circuits[0]
+        coefficient = float(run.parameters.node("driver")["effects.tension_friction"][0])
+        tension = [_share(run, step) * circuit.pretension for step in (delicate, strong)]
+        friction = coefficient * 2.0 * tension[0] * link.ratio / link.lever
+        light, last = (int(np.searchsorted(time, step.end)) - 1 for step in (delicate, strong))
+        torque = force[last] * link.lever / link.ratio
+        slack = 2.0 * tension[1] * circuit.radius
+        expected = max(torque, 2.0 * torque - slack) / circuit.stiffness
+        shown = response(run, link)
+        stretch = link.ratio * (shown.motor[last] - force[last] * link.lever / link.node.contact_stiffness)
+        rows += [
+            Comparison(f"{label}, deadband", friction, desired[light] - force[light], "N", RAMP, "c (T1 + T2)", True),
+            Comparison(f"{label}, stretch under {force[last]:.0f} N", expected, stretch, "rad", WITHIN, "slack strand"),
+        ]
+        curves.append(Curve("measured", label, desired[::20], force[::20]))
+    return Result(rows, [Panel("force without feedback", "F_des [N]", "F_c [N]", curves)])
+
+
+def _share(run: Recording, step: Step) -> float:
+    """Part of the pretension in a step."""
+    found = run.parameters.with_values(set_until(run, step)).node("driver")["effects.pretension_share"]
+    return float(found[0])
 
 
 def _fed_forward(run: Recording, link: OneLink) -> tuple[Numbers, Numbers]:
