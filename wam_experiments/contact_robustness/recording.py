@@ -13,7 +13,7 @@ from wam_driver.safety import Mode
 from wam_experiments.contact_benchmark.moves import MoveGenerator
 from wam_experiments.contact_benchmark.scenarios import RELEASE, SETTLE, base_values
 from wam_experiments.contact_robustness.degradations import Degradation, drawn
-from wam_experiments.contact_robustness.touches import Touch, axis_of, touches
+from wam_experiments.contact_robustness.touches import KINDS, SECOND_KINDS, Touch, axis_of, touches
 from wam_sim.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -23,12 +23,13 @@ DRIFT_STEPS = 20  # of friction, over a recording
 
 
 class Drive(NamedTuple):
-    """What is recorded: a configuration, a degradation by name, a seed, a length in seconds."""
+    """What is recorded: a configuration, a degradation by name, a seed, seconds, whether with many second contacts."""
 
     configuration: Configuration
     degradation: str
     seed: int
     seconds: float
+    second: bool = False
 
 
 class DriveRecording(NamedTuple):
@@ -71,7 +72,7 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
         left -= move.seconds + stop
         here = move.posture
     times = np.arange(WARM_UP, drive.seconds - SPACING, SPACING) + random.uniform(0.0, 0.4)
-    return degradation, touches(arm, random, times.tolist()), steps, list(start)
+    return degradation, touches(arm, random, times.tolist(), SECOND_KINDS if drive.second else KINDS), steps, list(start)
 
 
 def record(drive: Drive) -> DriveRecording:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
-from wam_control.contact_inference import MORE
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
 from wam_description.signals import State
@@ -175,7 +174,7 @@ def _scored(
         if take
     ]
     warned = [bool(getattr(row.estimate, "warning", "")) for row, take in zip(rows, ~busy, strict=True) if take]
-    flagged = np.array([MORE in row.estimate.reason for row in rows])
+    flagged = np.array([row.estimate.contacts > 1 for row in rows])
     steady, changes, second = 0.0, 0, []
     for touch in touches:
         if touch.kind == "second":
