@@ -209,7 +209,9 @@ class ContactInference:
 
     def torques(self, hypotheses: Sequence[Hypothesis]) -> Array:
         """Joint torques of hypotheses, (hypotheses, n), N m, in the pose of the last inference."""
-        return np.array([np.array((*h.force, *h.moment)).dot(self._jacobians[self._index[h.cover]]) for h in hypotheses])
+        return np.array(
+            [np.array((*h.force, *h.moment)).dot(self._jacobians[self._index[h.cover]]) for h in hypotheses]
+        )
 
     def movements(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array]:
         """Joint torques of a hypothesis, (n,), N m, per metre of its position along the link, and (3, n) per force.

@@ -113,9 +113,7 @@ class SecondContact:
         change -= turn
         best = first.hypotheses[0]
         force, slid, sides = inference.movements(best)
-        own = np.vstack(
-            ((turned - turn) * np.sqrt(weight)[:, None], TURN * turn, SLIDE * slid, GROWTH * force)
-        )
+        own = np.vstack(((turned - turn) * np.sqrt(weight)[:, None], TURN * turn, SLIDE * slid, GROWTH * force))
         covariance = covariance + own.T.dot(own)
         covariance.flat[:: len(change) + 1] += FLOOR * FLOOR
         explained = np.linalg.solve(covariance, change)

@@ -72,7 +72,12 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
         left -= move.seconds + stop
         here = move.posture
     times = np.arange(WARM_UP, drive.seconds - SPACING, SPACING) + random.uniform(0.0, 0.4)
-    return degradation, touches(arm, random, times.tolist(), SECOND_KINDS if drive.second else KINDS), steps, list(start)
+    return (
+        degradation,
+        touches(arm, random, times.tolist(), SECOND_KINDS if drive.second else KINDS),
+        steps,
+        list(start),
+    )
 
 
 def record(drive: Drive) -> DriveRecording:
