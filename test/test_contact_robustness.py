@@ -42,5 +42,5 @@ def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_pa
     assert believing[LOADED][0].alarms > 0
     assert groups[LOADED][0].warnings > 0.5
     assert groups[COARSE][0].warnings == 0.0
-    text = page(report_text(groups), "wam evaluate robustness")
+    text = page(report_text(groups, groups), "wam evaluate robustness")
     assert all(f"| {name} | " in text for name in (COARSE, LOADED))

@@ -43,10 +43,12 @@ def run(given: argparse.Namespace) -> int:
     if given.write:
         writable_file("--write", given.write)
     before = given.before.read_text(encoding="utf-8") if given.before else ""
-    chosen = drives(configuration_of(given), given.seed, given.only, given.seconds)
+    chosen = [
+        drives(configuration_of(given), given.seed, given.only, given.seconds, second) for second in (False, True)
+    ]
     with batch_of(given) as batch:
-        groups = evaluate(chosen, *batch, recordings=given.recordings)
-    text = report_text(groups)
+        groups, second = (evaluate(drives, *batch, recordings=given.recordings) for drives in chosen)
+    text = report_text(groups, second)
     print(text)
     if given.write:
         seeds = " ".join(map(str, given.seed))

@@ -56,6 +56,13 @@ class TouchOutcome(NamedTuple):
     reason: str
 
 
+class SecondOutcome(NamedTuple):
+    """A second contact: kind of both, and s until it is reported, inf if it is not within `SECOND_WITHIN`."""
+
+    kind: str
+    latency: float
+
+
 class ReplayScore(NamedTuple):
     """One recording, scored.
 
@@ -66,8 +73,8 @@ class ReplayScore(NamedTuple):
     free_seconds, alarms : time without contact; detections that start in it.
     warnings : share of that time with a warning that the model is off.
     torque_z : rms of error over stated sd of the external torques in free motion.
-    steady_seconds, changes : time in single contacts; second contacts that are reported in it.
-    second : latency of each second contact, s, inf if it is not reported.
+    steady_seconds, changes : time with one contact; second contacts that are reported in it.
+    second : of each second contact.
     started : whether a contact in which the estimator starts is detected: (warm, cold) of each.
     failure : of the recording.
     """
@@ -80,7 +87,7 @@ class ReplayScore(NamedTuple):
     torque_z: float
     steady_seconds: float
     changes: int
-    second: list[float]
+    second: list[SecondOutcome]
     started: list[tuple[bool, bool]]
     failure: str
 
@@ -174,17 +181,19 @@ def _scored(
         if take
     ]
     warned = [bool(getattr(row.estimate, "warning", "")) for row, take in zip(rows, ~busy, strict=True) if take]
-    flagged = np.array([row.estimate.contacts > 1 for row in rows])
+    reported = np.array([row.estimate.contacts > 1 for row in rows])
+    reported[1:] &= ~reported[:-1]
     steady, changes, second = 0.0, 0, []
-    for touch in touches:
+    for i, touch in enumerate(touches):
         if touch.kind == "second":
-            within = _during(rows, touch.begin, touch.begin + SECOND_WITHIN)
-            times = [row.time - touch.begin for row, hit, on in zip(rows, within, flagged, strict=True) if hit and on]
-            second.append(times[0] if times else math.inf)
-        elif not touch.kind.startswith("second") and touch.end - touch.begin > HIT:
-            during = _during(rows, touch.begin + HIT, touch.end)
-            steady += step * int(during.sum())
-            changes += int(flagged[during].any())
+            within = _during(rows, touch.begin, touch.begin + SECOND_WITHIN) & reported
+            latency = rows[int(within.argmax())].time - touch.begin if within.any() else math.inf
+            second.append(SecondOutcome(touches[i - 1].kind, latency))
+            continue
+        followed = i + 1 < len(touches) and touches[i + 1].kind == "second"
+        during = _during(rows, touch.begin + HIT, touches[i + 1].begin if followed else touch.end)
+        steady += step * int(during.sum())
+        changes += int(reported[during].sum())
     return ReplayScore(
         degradation=name,
         outcomes=[_outcome(touch, rows, moving, lengths) for touch in touches if touch.kind != "second"],
