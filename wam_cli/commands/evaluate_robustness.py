@@ -43,12 +43,9 @@ def run(given: argparse.Namespace) -> int:
     if given.write:
         writable_file("--write", given.write)
     before = given.before.read_text(encoding="utf-8") if given.before else ""
-    chosen = [
-        drives(configuration_of(given), given.seed, given.only, given.seconds, second) for second in (False, True)
-    ]
+    chosen = drives(configuration_of(given), given.seed, given.only, given.seconds)
     with batch_of(given) as batch:
-        groups, second = (evaluate(drives, *batch, recordings=given.recordings) for drives in chosen)
-    text = report_text(groups, second)
+        text = report_text(*(evaluate(each, *batch, recordings=given.recordings) for each in chosen))
     print(text)
     if given.write:
         seeds = " ".join(map(str, given.seed))

@@ -148,6 +148,8 @@ NAMES = (
     "realistic mix",
 )
 
+IDENTIFIED = (NAMES[1], NAMES[3], NAMES[4], NAMES[6], NAMES[18])  # those of the arm that an identification finds
+
 
 def drawn(name: str, arm: Arm, random: Random) -> Degradation:
     """The degradation of this name, its size fixed, its directions drawn.

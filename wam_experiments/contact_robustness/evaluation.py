@@ -13,6 +13,8 @@ from wam_experiments.contact_robustness.rows import DETECTION, POSITION, SECOND,
 from wam_sim import pieces
 from wam_sim.batch import Report, results
 
+Groups = dict[str, list[ReplayScore]]  # scores by degradation
+
 
 class DriveTrial(NamedTuple):
     """A drive, and the folder of recordings, '' for none."""
@@ -22,9 +24,9 @@ class DriveTrial(NamedTuple):
 
 
 def drives(
-    configuration: Configuration, seeds: Sequence[int], names: Sequence[str], seconds: float, second: bool = False
-) -> list[Drive]:
-    """A drive for each degradation and seed, with many second contacts or with all kinds.
+    configuration: Configuration, seeds: Sequence[int], names: Sequence[str], seconds: float
+) -> tuple[list[Drive], list[Drive], list[Drive]]:
+    """A drive for each degradation and seed; the same with many second contacts; the same of arms identified before.
 
     Raises
     ------
@@ -34,13 +36,16 @@ def drives(
     for name in names:
         if name not in degradations.NAMES:
             raise ValueError(f"no degradation is named '{name}'; degradations: {', '.join(degradations.NAMES)}")
-    return [Drive(configuration, name, seed, seconds, second) for seed in seeds for name in names]
+    every = [Drive(configuration, name, seed, seconds) for seed in seeds for name in names]
+    identified = [drive._replace(is_identified=True) for drive in every if drive.degradation in degradations.IDENTIFIED]
+    return every, [drive._replace(second=True) for drive in every], identified
 
 
 def evaluate_trial(trial: DriveTrial) -> ReplayScore:
     """Record a drive, or read its recording from the folder, and score the estimator on it."""
     drive = trial.drive
-    name = f"{drive.degradation} {drive.seed} {drive.seconds:g} s{' second' * drive.second}.recording"
+    kind = " second" * drive.second + " identified" * drive.is_identified
+    name = f"{drive.degradation} {drive.seed} {drive.seconds:g} s{kind}.recording"
     file = Path(trial.folder) / name.replace("/", " ")
     kept = pieces.read(file) if trial.folder else None
     recording: DriveRecording = record(drive) if kept is None else kept[0]
@@ -55,7 +60,7 @@ def evaluate(
     folder: Path | None = None,
     report: Report | None = None,
     recordings: Path | None = None,
-) -> dict[str, list[ReplayScore]]:
+) -> Groups:
     """Scores by degradation.
 
     Parameters
@@ -72,9 +77,9 @@ def evaluate(
     return {name: [score for score in scores if score.degradation == name] for name in names}
 
 
-def report_text(groups: dict[str, list[ReplayScore]], second: dict[str, list[ReplayScore]]) -> str:
-    """The tables as text; `second` are the scores of the drives with many second contacts."""
-    every = [score for own in groups.values() for score in own]
+def report_text(groups: Groups, second: Groups, identified: Groups) -> str:
+    """The tables as text, of the drives as `drives` gives them."""
+    every, after = ([score for own in each.values() for score in own] for each in (groups, identified))
     failures = sorted({f"{score.degradation}: {score.failure}" for score in every if score.failure})
     parts = [
         "## Detection",
@@ -92,6 +97,12 @@ def report_text(groups: dict[str, list[ReplayScore]], second: dict[str, list[Rep
         "## Second contact",
         "",
         table(SECOND, {**second, "all": [score for own in second.values() for score in own]}),
+        "",
+        "## After an identification",
+        "",
+        table(DETECTION, {**identified, "all": after}),
+        "",
+        table(POSITION, {**identified, "all": after}),
     ]
     return "\n".join([*parts, *(f"\nEnded early: {failure}" for failure in failures)])
 
@@ -130,6 +141,8 @@ METHOD = """## Method
 * Second contact: other recordings of the same arms, two of five contacts with a second one 0.5 s later, on the same
   link or on the other, of 4 to 60 N; the others are single for 1 s, constant, sliding at 0.2 m/s, or growing to 1.5 to
   3 times their force within 50 to 400 ms. False: reported while there is one, from 0.1 s after its start.
+* After an identification: the contacts of the first table, the same arms, whose models come from `wam identify` on
+  20 s of exciting motion; torque constant, delay and noise of the mix are not in that motion.
 * Start in contact: an estimator that starts 0.1 s after the contact, with the model errors known (warm) or
   without (cold), detects it within 0.3 s; contacts of at least 9 N.
 """

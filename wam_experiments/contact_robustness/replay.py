@@ -124,7 +124,9 @@ class SignalFaults:
 
 def replay(configuration: Configuration, name: str, recording: DriveRecording, seed: int) -> ReplayScore:
     """Score the estimator of a configuration on a recording."""
-    configured = configuration.with_values({**base_values(configuration, False), **dict(recording.degradation.model)})
+    configured = configuration.with_values(
+        {**base_values(configuration, False), **dict(recording.degradation.model), **dict(recording.model)}
+    )
     shared, own = configured.shared, configured.node("contact_estimator", ContactEstimatorParameters)
     period, outer = seconds(shared.timing.period_ns), shared.timing.outer_divisor
     estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
