@@ -54,7 +54,7 @@ class ContactEstimate(NamedTuple):
     ----------
     external_torques : (n,), torques of the world on the joints, N m.
     torque_sd : (n,), their standard deviations, N m.
-    statistic : r^T S^-1 r of the external torques; the larger one where there is a second, faster estimate of them.
+    statistic : r^T S^-1 r of the external torques; that of a second, faster estimate of them where that counts more.
     in_contact : whether a contact is detected.
     contacts : number of contacts: 2 where a second one is suspected, which one contact then only seems to explain.
     link : name of the cover in contact, '' without contact.
@@ -88,6 +88,7 @@ class ContactEstimate(NamedTuple):
 
 
 NOTHING = (0.0, 0.0, 0.0)
+SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
 TOO_EARLY = "too few samples yet"
 
 
@@ -181,7 +182,8 @@ class ContactEstimator:
         statistic = detection_statistic(torques, precision)
         fast = observer.fast_torques() if statistic <= parameters.detect else None
         if fast is not None:
-            statistic = max(statistic, detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64)))
+            quick = detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64))
+            statistic = max(statistic, quick / SUDDEN)
         self._in_contact = statistic > (parameters.release if self._in_contact else parameters.detect)
         observer.follow(statistic, self._in_contact)
         if not self._in_contact:
