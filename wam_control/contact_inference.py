@@ -209,23 +209,22 @@ class ContactInference:
 
     def torques(self, hypotheses: Sequence[Hypothesis]) -> Array:
         """Joint torques of hypotheses, (hypotheses, n), N m, in the pose of the last inference."""
-        return np.array(
-            [np.array((*h.force, *h.moment)).dot(self._jacobians[self._index[h.cover]]) for h in hypotheses]
-        )
+        wrenches = np.array([[(*h.force, *h.moment)] for h in hypotheses])
+        return (wrenches @ self._jacobians[[self._index[h.cover] for h in hypotheses]])[:, 0]
 
-    def movements(self, hypothesis: Hypothesis) -> tuple[Array, Array, Array]:
-        """Joint torques of a hypothesis, (n,), N m, per metre of its position along the link, and (3, n) per force.
+    def slide(self, hypothesis: Hypothesis) -> Array:
+        """Joint torques, (n,), N m per m, of the force of a hypothesis moving along its link, in that pose."""
+        jacobian, (_, y, z) = self._jacobians[self._index[hypothesis.cover]], hypothesis.force
+        return y * jacobian[5] - z * jacobian[4]
 
-        In the pose of the last inference; a force whose position is unknown is taken at the far end.
-        """
+    def sides(self, hypothesis: Hypothesis) -> Array:
+        """Joint torques of a force where a hypothesis has it or at the far end, (3, n), N m per N."""
         i = self._index[hypothesis.cover]
-        jacobian, (_, y, z) = self._jacobians[i], hypothesis.force
         place = self._covers[i].end[0] if math.isnan(hypothesis.place) else hypothesis.place
-        sides = jacobian[:3].copy()
-        sides[1] += place * jacobian[5]
-        sides[2] -= place * jacobian[4]
-        torques = np.array((*hypothesis.force, *hypothesis.moment)).dot(jacobian)
-        return torques, y * jacobian[5] - z * jacobian[4], sides
+        sides = self._jacobians[i][:3].copy()
+        sides[1] += place * self._jacobians[i][5]
+        sides[2] -= place * self._jacobians[i][4]
+        return sides
 
     def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str) -> Hypothesis:
         start, end = cover.start, cover.end

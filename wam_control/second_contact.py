@@ -8,7 +8,6 @@ its force, it slides a little, and its torques turn with the arm.
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +30,6 @@ FRICTION = 0.1  # sd of its components across that, per change
 SLIDE = 0.02  # m, sd of its displacement
 TURN = 0.5  # sd of the torques that change because the arm turns, per such change: the force may stay in the world
 LEAST_PROBABILITY = 0.02  # of a hypothesis
-FLOOR = 0.01  # N m
 
 
 class _Moment(NamedTuple):
@@ -66,6 +64,7 @@ class SecondContact:
         self._begin = self._last = math.nan
         self._recent: deque[_Moment] = deque()
         self._steady: deque[_Moment] = deque()
+        self._sums: list[Array] = []  # of the steady moments
         self._found = 0
 
     def step(
@@ -80,6 +79,8 @@ class SecondContact:
         seen = observer.seen
         if seen is None or time - self._begin < SETTLING:
             return
+        if not self._sums:
+            self._sums = [np.zeros_like(part) for part in seen]
         if not self.is_suspected:
             self._remember(_Moment(time, seen, hypotheses, inference.torques(hypotheses)))
         if len(self._steady) < LEAST:
@@ -97,33 +98,34 @@ class SecondContact:
         recent, steady = self._recent, self._steady
         recent.append(moment)
         while moment.time - recent[0].time > YOUNGEST:
-            steady.append(recent.popleft())
+            entering = recent.popleft()
+            steady.append(entering)
+            self._sums = [total + part for total, part in zip(self._sums, entering.seen, strict=True)]
         while steady and moment.time - steady[0].time > OLDEST:
-            steady.popleft()
+            self._sums = [total - part for total, part in zip(self._sums, steady.popleft().seen, strict=True)]
 
     def _statistic(self, observer: MomentumObserver, inference: ContactInference) -> float:
         """chi^2 of the change that the first contact does not explain."""
-        steady = self._steady
-        change, covariance = observer.change(_mean([moment.seen for moment in steady]))
-        first = steady[len(steady) // 2]
+        count = len(self._steady)
+        change, covariance = observer.change(Observation(*(total / count for total in self._sums)))
+        first = self._steady[count // 2]
+        best, others = first.hypotheses[0], len(first.hypotheses)
         weights = [max(h.probability, LEAST_PROBABILITY) for h in first.hypotheses]
         weight = np.array(weights) / sum(weights)
-        turned = inference.torques(first.hypotheses) - first.torques
+        force = inference.torques(first.hypotheses)
+        turned = force - first.torques
         turn = weight.dot(turned)
         change -= turn
-        best = first.hypotheses[0]
-        force, slid, sides = inference.movements(best)
-        own = np.vstack(((turned - turn) * np.sqrt(weight)[:, None], TURN * turn, SLIDE * slid, GROWTH * force))
-        covariance = covariance + own.T.dot(own)
-        covariance.flat[:: len(change) + 1] += FLOOR * FLOOR
+        own = np.empty((others + 3, len(change)))  # of one sd each
+        own[:others] = (turned - turn) * np.sqrt(weight)[:, None]
+        own[others] = TURN * turn
+        own[others + 1] = SLIDE * inference.slide(best)
+        own[others + 2] = GROWTH * force[0]
+        covariance += own.T.dot(own)
         explained = np.linalg.solve(covariance, change)
         statistic = float(change.dot(explained))
         if statistic < RELEASED * self._threshold:
             return statistic
-        grown = GROWTH * GROWTH * abs(float(force.dot(explained)))
-        across = FRICTION * grown * math.hypot(*best.force) * sides
+        grown = GROWTH * GROWTH * abs(float(force[0].dot(explained)))
+        across = FRICTION * grown * math.hypot(*best.force) * inference.sides(best)
         return float(change.dot(np.linalg.solve(covariance + across.T.dot(across), change)))
-
-
-def _mean(seen: Sequence[Observation]) -> Observation:
-    return Observation(*(np.add.reduce(part) / len(seen) for part in zip(*seen, strict=True)))
