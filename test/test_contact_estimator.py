@@ -10,6 +10,7 @@ import pytest
 from contact_truth import motor_from_joint
 
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact_inference import SECOND
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
@@ -91,6 +92,54 @@ def test_joint_sensors_feel_the_moment_of_a_push_on_the_inner_link() -> None:
     assert "the shoulder measures only the moment" in estimate.reason
     assert estimate.moment[1] == pytest.approx(-2.4, rel=0.05)
     assert np.linalg.norm(estimate.force) <= 8.0
+
+
+TILTED = (0.0, -1.05, 0.3, 0.9)
+FIRST = ("outer_link", 0.3, (0.0, 0.0, 8.0))
+
+
+def after_steady_contact(
+    cover: str, x: float, force: tuple[float, float, float], threshold: float
+) -> list[ContactEstimate]:
+    """What joint sensors feel in the 0.25 s after another push began 0.3 s after the first."""
+    arm, found = plant(TILTED), []
+    estimator = ContactEstimator(ARM, TIMING, dataclasses.replace(SENSORS, second=threshold))
+    for tick in range(600):
+        if tick == 50:
+            push(arm, *FIRST)
+        if tick == 350:
+            push(arm, cover, x, force)
+        for _ in range(SUBSTEPS):
+            arm.step(ZERO)
+        sense(estimator, arm, ZERO)
+        if tick % OUTER == 0:
+            found.append(estimator.estimate())
+    assert not any(estimate.contacts > 1 for estimate in found[:70])
+    assert found[69].contacts == 1
+    return found[70:]
+
+
+@pytest.mark.parametrize(
+    ("cover", "x", "force"), [("outer_link", 0.1, (0.0, 6.0, 0.0)), ("inner_link", 0.3, (0.0, 6.0, 0.0))]
+)
+def test_a_second_contact_is_noticed_by_the_change_of_the_torques(
+    cover: str, x: float, force: tuple[float, float, float]
+) -> None:
+    found = after_steady_contact(cover, x, force, SENSORS.second)
+    noticed = [estimate for estimate in found if estimate.contacts == 2]
+    assert len(noticed) > 0.6 * len(found)
+    assert found[-1].contacts == 2
+    assert all(SECOND in hypothesis.reason for hypothesis in noticed[-1].hypotheses)
+    assert SECOND in noticed[-1].reason
+    assert not any(estimate.contacts > 1 for estimate in after_steady_contact(cover, x, force, 0.0))
+
+
+def test_a_contact_that_presses_harder_is_no_second_one() -> None:
+    """`push` replaces the force on a cover: at the same place there is one contact, elsewhere another torque."""
+    harder = after_steady_contact("outer_link", 0.3, (0.0, 0.0, 20.0), SENSORS.second)
+    assert {estimate.contacts for estimate in harder} == {1}
+    elsewhere = after_steady_contact("outer_link", 0.1, (0.0, 0.0, 20.0), SENSORS.second)
+    assert any(estimate.contacts == 2 for estimate in elsewhere)
 
 
 class Move(NamedTuple):

@@ -31,8 +31,8 @@ def test_a_degradation_that_does_not_exist_is_refused_with_those_that_do() -> No
 @pytest.mark.slow
 def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_payload_is_named() -> None:
     with ThreadPoolExecutor(1) as executor:
-        groups = evaluate(drives(CONFIGURATION, [901], [COARSE, LOADED], 10.0), executor)
-        believing = evaluate(drives(CONFIGURATION.with_values(BELIEVING), [901], [LOADED], 10.0), executor)
+        groups = evaluate(drives(CONFIGURATION, [901], [COARSE, LOADED], 10.0)[0], executor)
+        believing = evaluate(drives(CONFIGURATION.with_values(BELIEVING), [901], [LOADED], 10.0)[0], executor)
     for name in (COARSE, LOADED):
         (score,) = groups[name]
         assert not score.failure
@@ -42,5 +42,5 @@ def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_pa
     assert believing[LOADED][0].alarms > 0
     assert groups[LOADED][0].warnings > 0.5
     assert groups[COARSE][0].warnings == 0.0
-    text = page(report_text(groups), "wam evaluate robustness")
+    text = page(report_text(groups, groups, {}), "wam evaluate robustness")
     assert all(f"| {name} | " in text for name in (COARSE, LOADED))

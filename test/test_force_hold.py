@@ -280,6 +280,26 @@ def test_a_contact_on_another_link_is_not_controlled_through_the_jacobian_of_thi
     assert loop.reaction is not ForceReaction.OTHER_LINK
 
 
+def test_a_force_is_not_controlled_while_a_second_contact_is_suspected() -> None:
+    """At a pinned position the torques decide: those of the commanded force alone are no second contact's."""
+    one = Contact("outer_link", 0.28, (0.0, 1.0, 0.0), 0.001, 0.99)
+    other = 12.0 * lever(POSE, lateral(POSE), "inner_link", 0.4)
+    for source, more, reaction in (
+        ("estimated", 0.0, ForceReaction.SECOND_CONTACT),
+        ("pinned", 0.0, ForceReaction.NONE),
+        ("pinned", other, ForceReaction.SECOND_CONTACT),
+    ):
+        loop = force_loop(ARM, replace(QUIET, contact_source=source, contact_position=0.28))
+        pushed = BODY.gravity_torque(POSE) + 5.0 * lever(POSE, DOWNWARDS, "outer_link", 0.28)
+        command = ForceCommand("base", down(5.0))
+        for is_single in (True, False, True):
+            sensed = State(POSE, STILL, (pushed + (0.0 if is_single else more)).tolist())
+            for _ in range(60):
+                contact = one._replace(is_single=is_single)
+                loop.step(State(POSE, STILL, DRIVEN), sensed, contact, None, command, None, None, DT)
+            assert loop.reaction is (ForceReaction.NONE if is_single else reaction)
+
+
 def test_a_contact_of_which_the_link_stays_unknown_ends_the_command() -> None:
     """Pressed on, the force could be many times the commanded one."""
     vague = Contact("outer_link", 0.0, (0.0, 1.0, 0.0), 0.001, 0.55)

@@ -42,6 +42,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``tool_load``                     - torques of a mass at the tool
 ``contact_inference``             - which link is touched, where and how hard
 ``contact_fit``                   - the probability of contact positions along straight links
+``second_contact``                - whether a second contact has joined a steady first one
 ``contact_table``                 hypotheses as rows of numbers, as the topic carries them, and back
 ``motion``                        trajectories of the joints and straight lines, limited in speed, acceleration and jerk
 ``trajectory_player``             - a trajectory that a program streams

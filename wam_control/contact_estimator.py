@@ -11,9 +11,11 @@ from wam_control.contact_inference import (
     Hypothesis,
     InferenceParameters,
     detection_statistic,
+    with_second,
 )
 from wam_control.momentum_observer import MomentumObserver
 from wam_control.observer_parameters import ObserverParameters
+from wam_control.second_contact import SecondContact
 from wam_description.arm import Arm, Timing
 from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
@@ -30,6 +32,13 @@ class ContactEstimatorParameters:
     use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
     detect: float = parameter("r^T S^-1 r of the external torques above which a contact is detected", low=0.0, high=1e6)
     release: float = parameter("the same, below which the contact has ended", low=0.0, high=1e6)
+    second: float = parameter(
+        "chi^2 of a change of the torques that the contact does not explain, above which a second one is suspected; "
+        "0: never",
+        low=0.0,
+        high=1e6,
+        before=0.0,
+    )
 
     def __post_init__(self) -> None:
         require(
@@ -45,8 +54,9 @@ class ContactEstimate(NamedTuple):
     ----------
     external_torques : (n,), torques of the world on the joints, N m.
     torque_sd : (n,), their standard deviations, N m.
-    statistic : r^T S^-1 r of the external torques; the larger one where there is a second, faster estimate of them.
+    statistic : r^T S^-1 r of the external torques; that of a second, faster estimate of them where that counts more.
     in_contact : whether a contact is detected.
+    contacts : number of contacts: 2 where a second one is suspected, which one contact then only seems to explain.
     link : name of the cover in contact, '' without contact.
     place : contact position, m along the cover's x axis, NaN where it cannot be observed.
     position_sd : m, NaN with the place.
@@ -64,6 +74,7 @@ class ContactEstimate(NamedTuple):
     torque_sd: tuple[float, ...]
     statistic: float
     in_contact: bool
+    contacts: int
     link: str
     place: float
     position_sd: float
@@ -77,6 +88,7 @@ class ContactEstimate(NamedTuple):
 
 
 NOTHING = (0.0, 0.0, 0.0)
+SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
 TOO_EARLY = "too few samples yet"
 
 
@@ -114,6 +126,7 @@ class ContactEstimator:
         )
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
+        self._second = SecondContact(parameters.second)
         self._in_contact = self._is_blind = False
         self.refused = 0
 
@@ -128,6 +141,7 @@ class ContactEstimator:
     def reset(self) -> None:
         """Forget all samples."""
         self._observer.reset()
+        self._second.reset()
         self._in_contact = False
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
@@ -162,23 +176,30 @@ class ContactEstimator:
         sd = tuple(math.sqrt(variance) for variance in covariance.diagonal().tolist())
         if not observer.is_ready:
             self._in_contact = False
+            self._second.reset()
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
         precision = np.asarray(np.linalg.inv(covariance), np.float64)
         statistic = detection_statistic(torques, precision)
         fast = observer.fast_torques() if statistic <= parameters.detect else None
         if fast is not None:
-            statistic = max(statistic, detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64)))
+            quick = detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64))
+            statistic = max(statistic, quick / SUDDEN)
         self._in_contact = statistic > (parameters.release if self._in_contact else parameters.detect)
         observer.follow(statistic, self._in_contact)
         if not self._in_contact:
+            self._second.reset()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
         hypotheses = self._inference.infer(observer.q, torques, precision)
+        self._second.step(observer.age, hypotheses, observer, self._inference)
+        if self._second.is_suspected:
+            hypotheses = tuple(with_second(hypothesis) for hypothesis in hypotheses)
         best = hypotheses[0]
         return ContactEstimate(
             external_torques=torques,
             torque_sd=sd,
             statistic=statistic,
             in_contact=True,
+            contacts=1 + self._second.is_suspected,
             link=best.cover,
             place=best.place,
             position_sd=best.position_sd,
@@ -205,6 +226,7 @@ def _nothing(
         torque_sd=sd,
         statistic=statistic,
         in_contact=False,
+        contacts=0,
         link="",
         place=math.nan,
         position_sd=math.nan,

@@ -3,6 +3,7 @@
 from typing import Any
 
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact_inference import SECOND
 from wam_control.contact_table import hypothesis_table
 from wam_description.arm import Shared
 from wam_description.signals import (
@@ -70,10 +71,10 @@ class ContactEstimatorNode:
         if estimate.in_contact is not self._in_contact:
             self._in_contact = estimate.in_contact
             outputs["contact/in_contact"] = estimate.in_contact
-        if estimate.warning != self._warned:
-            self._warned = estimate.warning
-            level = Level.WARN if estimate.warning else Level.OK
-            outputs["status"] = NodeStatus(level, estimate.warning, stamp=inputs.stamp)
+        warning = SECOND if estimate.contacts > 1 else estimate.warning
+        if warning != self._warned:
+            self._warned = warning
+            outputs["status"] = NodeStatus(Level.WARN if warning else Level.OK, warning, stamp=inputs.stamp)
         return outputs
 
     def diagnostics(self) -> dict[str, float]:

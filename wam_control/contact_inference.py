@@ -37,7 +37,8 @@ STRAIGHT_LINK = "elbow straight and force out of plane: the links cannot be dist
 LINKS = "the torques do not identify the link"
 MORE = "one contact does not explain the torques"
 ALONG = "a force along the tube and one at its start cannot be distinguished"
-REASONS = (MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE, ALONG)  # as bits of a number
+SECOND = "a second contact is suspected: position and force are those of both together"
+REASONS = (MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE, ALONG, SECOND)  # as bits
 
 
 @dataclass(frozen=True)
@@ -136,6 +137,12 @@ def _elbow(covers: Sequence[_Cover]) -> _Elbow | None:
     return None
 
 
+def with_second(hypothesis: Hypothesis) -> Hypothesis:
+    """The same where a second contact is suspected."""
+    reason = f"{hypothesis.reason}; {SECOND}" if hypothesis.reason else SECOND
+    return hypothesis._replace(reason=reason, reasons=hypothesis.reasons | 2 ** REASONS.index(SECOND))
+
+
 def detection_statistic(torques: Sequence[float], precision: Array) -> float:
     """r^T S^-1 r of external torques r, (n,), N m, with the inverse of their covariance S, (n, n)."""
     r = np.array(torques)
@@ -167,6 +174,8 @@ class ContactInference:
             along_weight=parameters.along_weight,
         )
         self._elbow = _elbow(covers)
+        self._index = {cover.name: i for i, cover in enumerate(covers)}
+        self._jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
 
     def infer(self, q: Sequence[float], torques: Sequence[float], precision: Array) -> tuple[Hypothesis, ...]:
         """Explain external torques by one contact.
@@ -186,7 +195,9 @@ class ContactInference:
         rows[:, 0] = torques
         at = np.array(q)
         for i, cover in enumerate(self._covers):
-            np.matmul(cover.wrenches, self._body.cover_jacobian(at, cover.name), out=rows[i, 1:])
+            jacobian = self._body.cover_jacobian(at, cover.name)
+            self._jacobians[i] = jacobian
+            np.matmul(cover.wrenches, jacobian, out=rows[i, 1:])
         fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1))
         ambiguity = (
             self._ambiguity(q, fits)
@@ -195,6 +206,25 @@ class ContactInference:
         )
         found = [self._hypothesis(q, cover, fit, ambiguity) for cover, fit in zip(self._covers, fits, strict=True)]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
+
+    def torques(self, hypotheses: Sequence[Hypothesis]) -> Array:
+        """Joint torques of hypotheses, (hypotheses, n), N m, in the pose of the last inference."""
+        wrenches = np.array([[(*h.force, *h.moment)] for h in hypotheses])
+        return (wrenches @ self._jacobians[[self._index[h.cover] for h in hypotheses]])[:, 0]
+
+    def slide(self, hypothesis: Hypothesis) -> Array:
+        """Joint torques, (n,), N m per m, of the force of a hypothesis moving along its link, in that pose."""
+        jacobian, (_, y, z) = self._jacobians[self._index[hypothesis.cover]], hypothesis.force
+        return y * jacobian[5] - z * jacobian[4]
+
+    def sides(self, hypothesis: Hypothesis) -> Array:
+        """Joint torques of a force where a hypothesis has it or at the far end, (3, n), N m per N."""
+        i = self._index[hypothesis.cover]
+        place = self._covers[i].end[0] if math.isnan(hypothesis.place) else hypothesis.place
+        sides = self._jacobians[i][:3].copy()
+        sides[1] += place * self._jacobians[i][5]
+        sides[2] -= place * self._jacobians[i][4]
+        return sides
 
     def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str) -> Hypothesis:
         start, end = cover.start, cover.end

@@ -22,6 +22,7 @@ class ForcePoint(NamedTuple):
     is_doubtful : whether something is touched, and the position is not pinned nor the link identified.
     rejection : why the present estimate is not used, '' if it is or is not needed.
     conflict : why no force can be controlled there: something else is touched; '' if nothing is known of that.
+    is_single : False where a second contact is suspected, whose torques are not those of the force.
     """
 
     cover: str
@@ -33,6 +34,7 @@ class ForcePoint(NamedTuple):
     is_doubtful: bool
     rejection: str
     conflict: str
+    is_single: bool = True
 
 
 class ContactPosition:
@@ -67,7 +69,7 @@ class ContactPosition:
             self._last = None
             cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
             conflict = _conflict(contact, cover, parameters)
-            return ForcePoint(cover, position, 0.0, True, True, True, False, "", conflict)
+            return ForcePoint(cover, position, 0.0, True, True, True, False, "", conflict, contact.is_single)
         problem = _problem(contact, lean, parameters) if contact.cover else ""
         if not contact.cover:
             self._last = None
@@ -83,7 +85,9 @@ class ContactPosition:
         is_identified = contact.cover == cover and not contact.probability < parameters.link_probability_limit
         conflict = _conflict(contact, cover, parameters)
         is_doubtful = bool(contact.cover) and not is_identified
-        return ForcePoint(cover, position, sd, is_certain, False, is_identified, is_doubtful, problem, conflict)
+        return ForcePoint(
+            cover, position, sd, is_certain, False, is_identified, is_doubtful, problem, conflict, contact.is_single
+        )
 
 
 def anywhere_sd(covers: Covers, cover: str, position: float) -> float:
@@ -112,6 +116,8 @@ def torque_of_position(force: Triple, position: float) -> Triple:
 
 def _problem(contact: Contact, lean: float, parameters: ForceLoopParameters) -> str:
     """Why an estimated position is not certain, '' if it is; an uncertainty that is not published counts as none."""
+    if not contact.is_single:
+        return f"a second contact is suspected besides that on {contact.cover}"
     if lean > STEEPEST:
         return (
             f"the commanded force is {math.degrees(lean):.0f} deg off the normal of {contact.cover}; a contact "

@@ -47,6 +47,7 @@ class ForceReaction(IntEnum):
     CYCLE = 11  # goes on: the measured force is in a limit cycle
     SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
     TOO_SLOW = 13  # holds: the surface is so stiff for the commanded force that the arm would hardly move towards it
+    SECOND_CONTACT = 14  # holds: a second contact is suspected, whose torques are not those of the force
 
     @property
     def holds(self) -> bool:
@@ -58,6 +59,7 @@ class ForceReaction(IntEnum):
             ForceReaction.TASK_REFUSED,
             ForceReaction.SHAKEN,
             ForceReaction.TOO_SLOW,
+            ForceReaction.SECOND_CONTACT,
         )
 
 
@@ -176,6 +178,11 @@ class ForceHold:
         held = self._held(axis, point, desired, limit, parameters)
         if held[0].holds:
             return held
+        if not point.is_single and (is_strange or not point.is_pinned):
+            return ForceReaction.SECOND_CONTACT, (
+                f"a second contact is suspected besides that on {point.cover}: the torques are not those of the "
+                "commanded force alone; the arm holds its position until the second contact has gone"
+            )
         is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)

@@ -88,6 +88,16 @@ class ModelErrors:
         covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest + noise
         return seen.residual - effects.dot(self.errors), covariance
 
+    def change(self, now: Observation, then: Observation) -> tuple[Array, Array]:
+        """Change of the external torques, (n,), N m, and its covariance, (n, n): errors that stay drop out.
+
+        `then` is a mean, of which the noise of the motors is left out.
+        """
+        effects = now.effects - then.effects
+        noise = (self._through * (self.noise * now.moving)).dot(self._through.T)
+        covariance = effects.dot(self.covariance).dot(effects.T) + now.rest + then.rest + noise
+        return now.residual - then.residual - effects.dot(self.errors), covariance
+
     def follow(self, seen: Observation, statistic: float, in_contact: bool, span: float) -> None:
         """Learn from what was observed, `span` seconds after the time before; not in contact, and with hindsight."""
         if in_contact:

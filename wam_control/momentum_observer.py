@@ -61,6 +61,7 @@ class MomentumObserver:
     q : (n,), joint angles, rad.
     age : s, since the first sample.
     is_ready : whether enough samples came.
+    seen : the moment of which torques were last given; from joint sensors the effects are those of one sd.
     """
 
     def __init__(
@@ -132,7 +133,7 @@ class MomentumObserver:
         self._known: list[float] = [0.0] * n
         self._bias: list[float] = [0.0] * n
         self._gap = self.age = self._followed = 0.0
-        self._seen: Observation | None = None
+        self.seen: Observation | None = None
         self.is_ready = False
 
     def observe(self, state: State, dt: float) -> bool:
@@ -247,17 +248,30 @@ class MomentumObserver:
         """
         if not self._link_side:
             self._expect()
-            self._seen = self._observation()
-            torques, covariance = self._errors.corrected(self._seen)
+            self.seen = self._observation()
+            torques, covariance = self._errors.corrected(self.seen)
             return torques.tolist(), covariance
         uncertainty, load = self._parameters.mass_uncertainty, self._load
         residual, model = self._torques[0][: self._n], self._torques[0][self._n :]
         covariance = np.diag([self._parameters.joint_torque_sd**2 + (uncertainty * torque) ** 2 for torque in model])
-        if load is None:
-            return residual, covariance
-        residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
-        sized = np.array(load.torque) * load.sd
-        return residual, covariance + np.outer(sized, sized)
+        effects = np.diag(uncertainty * np.array(model))
+        if load is not None:
+            residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
+            sized = np.array(load.torque) * load.sd
+            covariance = covariance + np.outer(sized, sized)
+            effects = np.column_stack((effects, sized))
+        sensors = np.diag(np.full(self._n, self._parameters.joint_torque_sd**2))
+        self.seen = Observation(np.array(residual), effects, sensors, np.zeros(self._n))
+        return residual, covariance
+
+    def change(self, then: Observation) -> tuple[Array, Array]:
+        """Change of the external torques, (n,), N m, since a mean of what was `seen`, and its covariance, (n, n)."""
+        if self.seen is None:
+            raise RuntimeError("nothing has been observed")
+        if not self._link_side:
+            return self._errors.change(self.seen, then)
+        effects = self.seen.effects - then.effects
+        return self.seen.residual - then.residual, effects.dot(effects.T) + self.seen.rest + then.rest
 
     def fast_torques(self) -> tuple[list[float], Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""
@@ -268,8 +282,8 @@ class MomentumObserver:
 
     def follow(self, statistic: float, in_contact: bool) -> None:
         """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
-        if self._seen is not None and self.is_ready:
-            self._errors.follow(self._seen, statistic, in_contact, self.age - self._followed)
+        if self.seen is not None and self.is_ready and not self._link_side:
+            self._errors.follow(self.seen, statistic, in_contact, self.age - self._followed)
             self._followed = self.age
 
     @property

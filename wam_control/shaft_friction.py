@@ -9,7 +9,7 @@ from wam_description.arm import Joints, Motors
 
 SLOW = 12.0  # rest velocities: speed up to which the shape of the friction counts (Stribeck)
 # of `shape_uncertainty`, and seconds at the rest velocity: angle after a reversal over which it counts (presliding)
-REVERSAL = ((1.4, 0.6), (2.8, 0.2))
+REVERSAL = ((2.0, 0.6), (3.2, 0.2))
 LONGEST = 6.0 * max(length for _, length in REVERSAL)
 FULL = 3.0  # sd of the measured velocity that the rest velocity is at least
 

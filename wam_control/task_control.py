@@ -187,21 +187,24 @@ class TaskControl:
         conflict = ""
         if contact.cover and contact.cover not in known and contact.probability >= own.link_probability_limit:
             conflict = f"{contact.cover} is touched, and no force of the task acts on it"
+        is_single = contact.is_single or len(set(known)) > 1  # a task may press in two places
         limit = own.position_uncertainty_limit
-        if position_is_certain(contact.place, contact.position_sd, limit) and not (
-            contact.probability < own.link_probability_limit
+        if (
+            is_single
+            and position_is_certain(contact.place, contact.position_sd, limit)
+            and not (contact.probability < own.link_probability_limit)
         ):
             sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
             self._places[contact.cover] = contact.place, sd
         found = []
         for axis in task.axes:
             if axis.place is not None:
-                found.append(ForcePoint(axis.cover, axis.place, 0.0, True, True, True, False, "", conflict))
+                found.append(ForcePoint(axis.cover, axis.place, 0.0, True, True, True, False, "", conflict, is_single))
                 continue
             length = self._covers.length[self._covers.names.index(axis.cover)]
             place, sd = self._places.get(axis.cover, (length / 2.0, length / math.sqrt(12.0)))
             is_known = axis.cover in self._places
-            found.append(ForcePoint(axis.cover, place, sd, is_known, False, is_known, False, "", conflict))
+            found.append(ForcePoint(axis.cover, place, sd, is_known, False, is_known, False, "", conflict, is_single))
         return found
 
     def _contacts(self, states: Sequence[AxisState], q: Sequence[float]) -> list[GuardedContact]:

@@ -36,7 +36,6 @@ class VelocityFit:
 
     Attributes
     ----------
-    sd : rad/s, standard deviation of the velocity of each shaft.
     delay : s, of the fitted state.
     """
 
@@ -50,7 +49,12 @@ class VelocityFit:
         """Forget the samples, not the error of the angles."""
         self._samples: deque[tuple[float, State]] = deque(maxlen=2 * HALF_WINDOWS[-1] + 1)
         self._time, self._middle = 0.0, math.nan
-        self.sd, self.delay = [0.0] * len(self._third), 0.0
+        self._scale = self.delay = 0.0
+
+    @property
+    def sd(self) -> list[float]:
+        """Standard deviation of the velocity of each shaft, rad/s."""
+        return [self._scale * mean for mean in self._third]
 
     def take(self, state: State, dt: float) -> FittedState | None:
         """Take a sample `dt` seconds after the last; None while the window fills or grows."""
@@ -95,20 +99,20 @@ class VelocityFit:
                     if not size < LARGEST:
                         continue
                     self._third[i] += (UP if size > mean else DOWN) * (size - mean)
-        self.sd = self._velocity_sd(dt)
+        self._scale = self._sd_per_mean(dt)
         longer = self._choice + 1
-        if longer < len(HALF_WINDOWS) and max(self.sd) > VELOCITY_SD and 2 * HALF_WINDOWS[longer] * dt < LONGEST:
+        largest = self._scale * max(self._third)
+        if longer < len(HALF_WINDOWS) and largest > VELOCITY_SD and 2 * HALF_WINDOWS[longer] * dt < LONGEST:
             if self._choice == 0:
                 self._middle = self._time
             self._choice = longer
-            self.sd = self._velocity_sd(dt)
+            self._scale = self._sd_per_mean(dt)
 
-    def _velocity_sd(self, dt: float) -> list[float]:
+    def _sd_per_mean(self, dt: float) -> float:
         half = HALF_WINDOWS[self._choice]
         # half a window and more: sum of the squared distances from the middle; none: a difference of two
         squares = half * (half + 1) * (2 * half + 1) / 3.0 if half else 0.5
-        scale = THIRD / (math.sqrt(squares) * dt)
-        return [scale * mean for mean in self._third]
+        return THIRD / (math.sqrt(squares) * dt)
 
 
 def _weights(times: Array) -> Array:

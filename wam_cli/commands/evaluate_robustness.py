@@ -45,8 +45,7 @@ def run(given: argparse.Namespace) -> int:
     before = given.before.read_text(encoding="utf-8") if given.before else ""
     chosen = drives(configuration_of(given), given.seed, given.only, given.seconds)
     with batch_of(given) as batch:
-        groups = evaluate(chosen, *batch, recordings=given.recordings)
-    text = report_text(groups)
+        text = report_text(*(evaluate(each, *batch, recordings=given.recordings) for each in chosen))
     print(text)
     if given.write:
         seeds = " ".join(map(str, given.seed))

@@ -148,6 +148,8 @@ NAMES = (
     "realistic mix",
 )
 
+IDENTIFIED = ("friction 0.8 to 1.3", "realistic mix")  # of which arms are also identified before
+
 
 def drawn(name: str, arm: Arm, random: Random) -> Degradation:
     """The degradation of this name, its size fixed, its directions drawn.

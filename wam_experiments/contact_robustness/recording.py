@@ -6,29 +6,42 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.identification.fit import identify
+from wam_analysis.identification.overlay import estimator_values, model_values
 from wam_control.scenario import ScenarioStep
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
 from wam_driver.safety import Mode
 from wam_experiments.contact_benchmark.moves import MoveGenerator
 from wam_experiments.contact_benchmark.scenarios import RELEASE, SETTLE, base_values
-from wam_experiments.contact_robustness.degradations import Degradation, drawn
-from wam_experiments.contact_robustness.touches import Touch, axis_of, touches
+from wam_experiments.contact_robustness.degradations import Degradation, Values, drawn
+from wam_experiments.contact_robustness.touches import KINDS, SECOND_KINDS, Touch, axis_of, touches
+from wam_experiments.identification.evaluation import play
 from wam_sim.simulation import Simulation
 
 Array = NDArray[np.float64]
 WARM_UP = 6.0  # s of free motion before the first contact
 SPACING = 1.9  # s from one contact to the next
+EXCITATION = 20.0  # s of motion for an identification
 DRIFT_STEPS = 20  # of friction, over a recording
 
 
 class Drive(NamedTuple):
-    """What is recorded: a configuration, a degradation by name, a seed, a length in seconds."""
+    """What is recorded.
+
+    Attributes
+    ----------
+    configuration, degradation, seed, seconds : the arm, the degradation by name, what is drawn, the length in s.
+    second : whether with many second contacts.
+    is_identified : whether the arm's model is identified before, from a motion of its own.
+    """
 
     configuration: Configuration
     degradation: str
     seed: int
     seconds: float
+    second: bool = False
+    is_identified: bool = False
 
 
 class DriveRecording(NamedTuple):
@@ -41,6 +54,7 @@ class DriveRecording(NamedTuple):
     speed : (k,), rad/s, true, of the fastest joint.
     touches : the contacts, with times counted from the first row.
     failure : why the recording ended early, ''.
+    model : values of the configuration of the identified model.
     """
 
     degradation: Degradation
@@ -50,6 +64,7 @@ class DriveRecording(NamedTuple):
     speed: Array
     touches: tuple[Touch, ...]
     failure: str
+    model: Values = ()
 
 
 def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], list[float]]:
@@ -71,7 +86,12 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
         left -= move.seconds + stop
         here = move.posture
     times = np.arange(WARM_UP, drive.seconds - SPACING, SPACING) + random.uniform(0.0, 0.4)
-    return degradation, touches(arm, random, times.tolist()), steps, list(start)
+    return (
+        degradation,
+        touches(arm, random, times.tolist(), SECOND_KINDS if drive.second else KINDS),
+        steps,
+        list(start),
+    )
 
 
 def record(drive: Drive) -> DriveRecording:
@@ -103,7 +123,16 @@ def record(drive: Drive) -> DriveRecording:
         done = run.step() or run.driver.safety.mode is Mode.FAULT
     theta, thetad, torque, speed = (np.array([row[i] for row in rows]) for i in range(4))
     failure = run.driver.safety.fault or run.scenario.failure
-    return DriveRecording(degradation, theta, thetad, torque, speed, tuple(contacts), failure)
+    model = _identified(configured, drive.seed) if drive.is_identified else ()
+    return DriveRecording(degradation, theta, thetad, torque, speed, tuple(contacts), failure, model)
+
+
+def _identified(configured: Configuration, seed: int) -> Values:
+    """Values of the model that `wam identify` finds for a plant."""
+    samples, _ = play(configured, seed, EXCITATION)
+    found = identify(configured.shared, samples)
+    values = model_values(configured.shared, found, "an exciting motion") | estimator_values(configured)
+    return tuple(values.items())
 
 
 def _push(run: Simulation, arm: Any, contacts: Sequence[Touch], time: float) -> None:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
-from wam_control.contact_inference import MORE
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
 from wam_description.signals import State
@@ -57,6 +56,13 @@ class TouchOutcome(NamedTuple):
     reason: str
 
 
+class SecondOutcome(NamedTuple):
+    """A second contact: kind of both, and s until it is reported, inf if it is not within `SECOND_WITHIN`."""
+
+    kind: str
+    latency: float
+
+
 class ReplayScore(NamedTuple):
     """One recording, scored.
 
@@ -67,8 +73,8 @@ class ReplayScore(NamedTuple):
     free_seconds, alarms : time without contact; detections that start in it.
     warnings : share of that time with a warning that the model is off.
     torque_z : rms of error over stated sd of the external torques in free motion.
-    steady_seconds, changes : time in single contacts; second contacts that are reported in it.
-    second : latency of each second contact, s, inf if it is not reported.
+    steady_seconds, changes : time with one contact; second contacts that are reported in it.
+    second : of each second contact.
     started : whether a contact in which the estimator starts is detected: (warm, cold) of each.
     failure : of the recording.
     """
@@ -81,7 +87,7 @@ class ReplayScore(NamedTuple):
     torque_z: float
     steady_seconds: float
     changes: int
-    second: list[float]
+    second: list[SecondOutcome]
     started: list[tuple[bool, bool]]
     failure: str
 
@@ -118,7 +124,9 @@ class SignalFaults:
 
 def replay(configuration: Configuration, name: str, recording: DriveRecording, seed: int) -> ReplayScore:
     """Score the estimator of a configuration on a recording."""
-    configured = configuration.with_values({**base_values(configuration, False), **dict(recording.degradation.model)})
+    configured = configuration.with_values(
+        {**base_values(configuration, False), **dict(recording.degradation.model), **dict(recording.model)}
+    )
     shared, own = configured.shared, configured.node("contact_estimator", ContactEstimatorParameters)
     period, outer = seconds(shared.timing.period_ns), shared.timing.outer_divisor
     estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
@@ -175,17 +183,19 @@ def _scored(
         if take
     ]
     warned = [bool(getattr(row.estimate, "warning", "")) for row, take in zip(rows, ~busy, strict=True) if take]
-    flagged = np.array([MORE in row.estimate.reason for row in rows])
+    reported = np.array([row.estimate.contacts > 1 for row in rows])
+    reported[1:] &= ~reported[:-1]
     steady, changes, second = 0.0, 0, []
-    for touch in touches:
+    for i, touch in enumerate(touches):
         if touch.kind == "second":
-            within = _during(rows, touch.begin, touch.begin + SECOND_WITHIN)
-            times = [row.time - touch.begin for row, hit, on in zip(rows, within, flagged, strict=True) if hit and on]
-            second.append(times[0] if times else math.inf)
-        elif not touch.kind.startswith("second") and touch.end - touch.begin > HIT:
-            during = _during(rows, touch.begin + HIT, touch.end)
-            steady += step * int(during.sum())
-            changes += int(flagged[during].any())
+            within = _during(rows, touch.begin, touch.begin + SECOND_WITHIN) & reported
+            latency = rows[int(within.argmax())].time - touch.begin if within.any() else math.inf
+            second.append(SecondOutcome(touches[i - 1].kind, latency))
+            continue
+        followed = i + 1 < len(touches) and touches[i + 1].kind == "second"
+        during = _during(rows, touch.begin + HIT, touches[i + 1].begin if followed else touch.end)
+        steady += step * int(during.sum())
+        changes += int(reported[during].sum())
     return ReplayScore(
         degradation=name,
         outcomes=[_outcome(touch, rows, moving, lengths) for touch in touches if touch.kind != "second"],

@@ -104,12 +104,27 @@ def inner(scores: Scores) -> str:
     return percent(sum(one.latency <= 0.2 + 1e-9 or math.isnan(one.latency) for one in found), len(found))
 
 
-def seconds_contact(scores: Scores) -> str:
-    """Second contacts that are reported in time; false ones per minute of contact."""
-    times = [time for score in scores for time in score.second]
+def second(*kinds: str) -> Callable[[Scores], str]:
+    """Second contacts that are reported in time."""
+
+    def of(scores: Scores) -> str:
+        found = [one.latency for score in scores for one in score.second if not kinds or one.kind in kinds]
+        return percent(sum(time <= SECOND_WITHIN for time in found), len(found))
+
+    return of
+
+
+def second_latency(scores: Scores) -> str:
+    """Median of the time in which second contacts are reported, of those that are, ms."""
+    times = [one.latency for score in scores for one in score.second if math.isfinite(one.latency)]
+    return f"{1e3 * quantile(times, 0.5).value:.0f}" if times else "none"
+
+
+def false_changes(scores: Scores) -> str:
+    """Second contacts that are reported while there is one, per minute of it, and their number."""
     minutes = sum(score.steady_seconds for score in scores) / 60.0
-    false = f"{sum(score.changes for score in scores) / minutes:.1f}" if minutes else "none"
-    return f"{percent(sum(time <= SECOND_WITHIN for time in times), len(times))}; {false}/min"
+    changes = sum(score.changes for score in scores)
+    return f"{changes / minutes:.1f} ({changes} in {minutes:.1f} min)" if minutes else "none"
 
 
 def start(scores: Scores) -> str:
@@ -135,7 +150,13 @@ DETECTION = (
     ScoreColumn("torque error / stated sd", torque_z),
     ScoreColumn("warned, %", warned),
     ScoreColumn("start in contact, warm / cold, %", start),
-    ScoreColumn("second contact, %; false", seconds_contact),
+)
+SECOND = (
+    ScoreColumn("reported within 250 ms, %", second()),
+    ScoreColumn("on the same link", second("second on the same link")),
+    ScoreColumn("on the other link", second("second on the other link")),
+    ScoreColumn("median, ms", second_latency),
+    ScoreColumn("false per minute of one contact", false_changes),
 )
 POSITION = (
     ScoreColumn("median 5/10/20 N, cm", position(0.5)),

@@ -1,7 +1,7 @@
 """Contacts drawn wider than the estimator's prior: strong, rough, on the ends, sliding, two at once, impacts."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,21 @@ KINDS = {
     "second on the same link": 0.05,
     "second on the other link": 0.05,
 }
+# how often in the recordings for second contacts; a force that grows is no second contact
+SECOND_KINDS = {
+    "outer": 0.15,
+    "inner": 0.1,
+    "harder": 0.15,
+    "sliding": 0.08,
+    "elbow": 0.03,
+    "drag along the tube": 0.03,
+    "tip along the tube": 0.03,
+    "twist": 0.03,
+    "second on the same link": 0.2,
+    "second on the other link": 0.2,
+}
 HOLD, HOLD_OF_FIRST, IMPACT = 0.5, 1.0, 0.03  # s
+HARDER, HARDER_AFTER, HARDER_WITHIN = (1.5, 3.0), 0.4, (0.05, 0.4)  # times the force, s after the start, s
 SECOND_AFTER, SECOND_HOLD = 0.5, 0.4  # s, of the second contact after the first
 
 
@@ -46,6 +60,7 @@ class Touch(NamedTuple):
     speed : m/s, of the place.
     begin, end : s.
     friction : coefficient; tangential over normal force.
+    harder, within : factor by which the force grows, `HARDER_AFTER` the start, and s that this takes.
     """
 
     kind: str
@@ -58,11 +73,15 @@ class Touch(NamedTuple):
     begin: float
     end: float
     friction: float
+    harder: float = 1.0
+    within: float = 0.1
 
     def share(self, time: float) -> float:
         """Fraction of the force that acts at a time, s."""
         rise = min(RISE, 0.5 * (self.end - self.begin))
-        return max(0.0, min(1.0, (time - self.begin) / rise, (self.end - time) / rise))
+        grown = min(max((time - self.begin - HARDER_AFTER) / self.within, 0.0), 1.0)
+        share = max(0.0, min(1.0, (time - self.begin) / rise, (self.end - time) / rise))
+        return share * (1.0 + (self.harder - 1.0) * grown)
 
     def place_at(self, time: float) -> float:
         """Contact position, m."""
@@ -83,12 +102,16 @@ def axis_of(arm: Arm, cover: str, place: float) -> tuple[float, float, float]:
     return x, y, z
 
 
-def touches(arm: Arm, random: np.random.Generator, times: Sequence[float]) -> list[Touch]:
+def touches(
+    arm: Arm, random: np.random.Generator, times: Sequence[float], kinds: Mapping[str, float] = KINDS
+) -> list[Touch]:
     """A contact at each time, s; two where a second one is drawn."""
     found: list[Touch] = []
     for begin in times:
-        kind = str(random.choice(list(KINDS), p=np.array(list(KINDS.values())) / sum(KINDS.values())))
-        found += _drawn(arm, random, kind, begin)
+        kind = str(random.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
+        drawn = _drawn(arm, random, kind, begin)
+        lasting = kinds is SECOND_KINDS and len(drawn) == 1
+        found += [drawn[0]._replace(end=begin + HOLD_OF_FIRST)] if lasting else drawn
     return found
 
 
@@ -134,6 +157,11 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float) -> li
     if kind == "sliding":
         middle = 0.5 * _length(arm, outer)
         touch = touch._replace(speed=SLIDE if touch.place < middle else -SLIDE)
+    if kind == "harder":
+        low, high = HARDER_WITHIN
+        factor, within = float(random.uniform(*HARDER)), float(random.uniform(low, high))
+        x, y, z = touch.force
+        touch = touch._replace(force=(x / factor, y / factor, z / factor), harder=factor, within=within)
     if kind == "impact":
         touch = touch._replace(end=begin + IMPACT)
     return [touch._replace(kind=kind)]

@@ -1,0 +1,131 @@
+"""A second contact, by the change of the external torques against a steady first one.
+
+One contact has three unknowns, two have six, and an arm of four joints gives four equations: the torques of one moment
+do not tell two contacts from one.  Their change does: the errors of the model that are the same in both moments drop
+out.  What the first contact itself may change is no second one: it grows along its own torques, its friction follows
+its force, it slides a little, and its torques turn with the arm.
+"""
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.contact_inference import ContactInference, Hypothesis
+from wam_control.model_errors import Observation
+from wam_control.momentum_observer import MomentumObserver
+
+Array = NDArray[np.float64]
+
+EVERY = 0.0199  # s, a compromise with computing time
+SETTLING = 0.05  # s, of the filters of the observer, from the start of a contact
+OLDEST, YOUNGEST = 0.141, 0.059  # s, ages of the moments that are the steady contact
+LEAST = 3  # of them
+LASTING = 2  # changes in succession
+RELEASED = 1.0 / 3.0  # of the threshold, below which the second contact has gone
+GROWTH = 3.0  # sd of the change of the first contact's force, per force
+FRICTION = 0.1  # sd of its components across that, per change
+SLIDE = 0.02  # m, sd of its displacement
+TURN = 0.5  # sd of the torques that change because the arm turns, per such change: the force may stay in the world
+LEAST_PROBABILITY = 0.02  # of a hypothesis
+
+
+class _Moment(NamedTuple):
+    """The first contact as it was explained at one moment, `time` in s."""
+
+    time: float
+    seen: Observation
+    hypotheses: tuple[Hypothesis, ...]
+    torques: Array  # (hypotheses, n), N m
+
+
+class SecondContact:
+    """Watches one contact while it lasts.
+
+    Parameters
+    ----------
+    threshold : chi^2 of a change that the first contact does not explain, above which a second one is suspected;
+        0 for never.
+
+    Attributes
+    ----------
+    is_suspected : whether there seems to be a second contact.
+    """
+
+    def __init__(self, threshold: float) -> None:
+        self._threshold = threshold
+        self.reset()
+
+    def reset(self) -> None:
+        """The contact has ended."""
+        self.is_suspected = False
+        self._begin = self._last = math.nan
+        self._recent: deque[_Moment] = deque()
+        self._steady: deque[_Moment] = deque()
+        self._sums: list[Array] = []  # of the steady moments
+        self._found = 0
+
+    def step(
+        self, time: float, hypotheses: tuple[Hypothesis, ...], observer: MomentumObserver, inference: ContactInference
+    ) -> None:
+        """Take the explanation of one moment, `time` in s, by the observer's torques and pose."""
+        if not self._threshold or time - self._last < EVERY:
+            return
+        self._last = time
+        if math.isnan(self._begin):
+            self._begin = time
+        seen = observer.seen
+        if seen is None or time - self._begin < SETTLING:
+            return
+        if not self._sums:
+            self._sums = [np.zeros_like(part) for part in seen]
+        if not self.is_suspected:
+            self._remember(_Moment(time, seen, hypotheses, inference.torques(hypotheses)))
+        if len(self._steady) < LEAST:
+            return
+        statistic = self._statistic(observer, inference)
+        if self.is_suspected:
+            if statistic < RELEASED * self._threshold:
+                self.reset()
+                self._begin = time - SETTLING
+            return
+        self._found = self._found + 1 if statistic > self._threshold else 0
+        self.is_suspected = self._found >= LASTING
+
+    def _remember(self, moment: _Moment) -> None:
+        recent, steady = self._recent, self._steady
+        recent.append(moment)
+        while moment.time - recent[0].time > YOUNGEST:
+            entering = recent.popleft()
+            steady.append(entering)
+            self._sums = [total + part for total, part in zip(self._sums, entering.seen, strict=True)]
+        while steady and moment.time - steady[0].time > OLDEST:
+            self._sums = [total - part for total, part in zip(self._sums, steady.popleft().seen, strict=True)]
+
+    def _statistic(self, observer: MomentumObserver, inference: ContactInference) -> float:
+        """chi^2 of the change that the first contact does not explain."""
+        count = len(self._steady)
+        change, covariance = observer.change(Observation(*(total / count for total in self._sums)))
+        first = self._steady[count // 2]
+        best, others = first.hypotheses[0], len(first.hypotheses)
+        weights = [max(h.probability, LEAST_PROBABILITY) for h in first.hypotheses]
+        weight = np.array(weights) / sum(weights)
+        force = inference.torques(first.hypotheses)
+        turned = force - first.torques
+        turn = weight.dot(turned)
+        change -= turn
+        own = np.empty((others + 3, len(change)))  # of one sd each
+        own[:others] = (turned - turn) * np.sqrt(weight)[:, None]
+        own[others] = TURN * turn
+        own[others + 1] = SLIDE * inference.slide(best)
+        own[others + 2] = GROWTH * force[0]
+        covariance += own.T.dot(own)
+        explained = np.linalg.solve(covariance, change)
+        statistic = float(change.dot(explained))
+        if statistic < RELEASED * self._threshold:
+            return statistic
+        grown = GROWTH * GROWTH * abs(float(force[0].dot(explained)))
+        across = FRICTION * grown * math.hypot(*best.force) * inference.sides(best)
+        return float(change.dot(np.linalg.solve(covariance + across.T.dot(across), change)))
