@@ -105,6 +105,7 @@ def ask(loop: ForceLoop, world: World, force: Any, dt: float = DT, **more: Any) 
         given["posture"],
         given["torque"],
         dt,
+        external_sd=given.get("external_sd"),
     )
 
 

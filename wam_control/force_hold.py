@@ -27,7 +27,7 @@ KEPT = 1.25  # settling times, up to which a force off the tolerance is remember
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
 FINE = 4e-4  # m, way of the whole force below which jerks of friction are as large as what is left to correct
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which such a force is kept, and up to which it is
-LEFT = 0.25  # of the settling time, after which a force above the tolerance, or one that was reached and has left it, is reported
+LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
@@ -80,7 +80,9 @@ class ForceHold:
         """Another force is commanded."""
         self._shake.reset()
         self._way = self._watched = self._shaking = self._blocked = 0.0
-        self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = self._has_settled = False
+        self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
+            self._has_settled
+        ) = False
         self._other = ""
         self._travel = self._conflict = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = 0.0
@@ -117,8 +119,8 @@ class ForceHold:
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
         """Whether the arm is to keep a force, N, that is nearly the commanded one.
 
-        On a stiff surface a small error would wind up the velocity loop until friction lets go, with a jerk that changes
-        the force by more than that error.
+        On a stiff surface a small error would wind up the velocity loop until friction lets go, with a jerk that
+        changes the force by more than that error.
         """
         whole = desired * (1.0 / parameters.guard.contact_stiffness + axis.compliance)
         band = (LEAVE if self._is_kept else SETTLE) * desired
@@ -226,8 +228,8 @@ class ForceHold:
             return ""
         return (
             f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
-            f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, or the "
-            "force is detected late or on the wrong link; the arm holds its position: command more force, another "
+            f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, or "
+            "the force is detected late or on the wrong link; the arm holds its position: command more force, another "
             f"direction or place, or use joint sensors{'' if point.is_pinned else ', or pin the place'}"
         )
 
@@ -333,8 +335,8 @@ class ForceHold:
         if not self._has_touched and abs(self._missed) > lasting:
             return (
                 f"nothing is touched yet, {abs(self._missed):.2g} s after the command: the arm has moved "
-                f"{1e3 * self._travel:.2g} mm towards it; go nearer, declare a softer surface (guard.contact_stiffness), "
-                "or pin the place"
+                f"{1e3 * self._travel:.2g} mm towards it; go nearer, declare a softer surface "
+                "(guard.contact_stiffness), or pin the place"
             )
         is_late = self._missed > 0.0 and not self._has_settled
         if abs(self._missed) > (lasting if is_late else LEFT * lasting):

@@ -310,22 +310,13 @@ class ForceLoop:
             point,
             own.sensing.sd_limit(desired),
         )
-        is_watching = False
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
-        if own.feedback == "contact_estimate" and self._timing.dither_cycle:
-            frequency = 2.0 * math.pi / (self._timing.dither_cycle * self._timing.period)
-            is_watching = self._hold.watch_shaking(force_axis, moved, frequency, dt)
+        is_watching = self._is_watching(force_axis, moved, dt)
         signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
         reaction, reason = self._hold.step(force_axis, point, self._external[0], measured, desired, own, dt, signal)
         self._react(reaction, reason)
-        if self._hold.is_touching:
-            self._pressed_at = list(q)
-            self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
-        else:
-            self._position.touch_again()
-        if not contact.cover or not self._free_at:
-            self._free_at = list(q)
+        self._remember(q, moved, contact, point)
         if reaction.holds:
             self.refusals["force_command"] = reason
             if self._held_at is None:
@@ -343,15 +334,35 @@ class ForceLoop:
         if contact.cover and not point.is_identified:
             error = min(error, desired - self._largest_force(q, point, direction, desired))
         if self._hold.keeps(force_axis, measured, desired, own):
-            error = 0.0
-            if self._rate is None and max(map(abs, held)) < REST:
-                held = [0.0] * self._n  # a small posture error would wind up friction across the force, too
+            error, held = 0.0, self._at_rest(held)
         speeds = self._delay.step(scalar.velocities([error], [desired - before], dt), own.delay_samples)
         speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
         return out._replace(velocity=velocity, effort=effort)
+
+    def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
+        """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
+        cycle = self._timing.dither_cycle
+        if self.parameters.feedback != "contact_estimate" or not cycle:
+            return False
+        return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
+
+    def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint) -> None:
+        """Remember where the arm presses, how far it has slid there, and where it was free."""
+        if self._hold.is_touching:
+            self._pressed_at = list(q)
+            self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
+        else:
+            self._position.touch_again()
+        if not contact.cover or not self._free_at:
+            self._free_at = list(q)
+
+    def _at_rest(self, held: list[float]) -> list[float]:
+        """Velocities of the posture, without those of a small error: they would wind up friction across the force."""
+        is_small = self._rate is None and max(map(abs, held)) < REST
+        return [0.0] * self._n if is_small else held
 
     def _free_of(self, axis: ForceAxis) -> list[float]:
         """Where the arm was free, and `BACK` further against the force: friction would hold it in less."""
