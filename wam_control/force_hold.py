@@ -27,6 +27,7 @@ KEPT = 1.25  # settling times, up to which a force off the tolerance is remember
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
 FINE = 4e-4  # m, way of the whole force below which jerks of friction are as large as what is left to correct
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which such a force is kept, and up to which it is
+STATED = 1.6  # sd of the force that is stated at a pinned position, per error that was found: friction is mostly less
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
@@ -207,7 +208,8 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        self._uncertain = self._uncertain + dt if is_touching and axis.force_sd > known else 0.0
+        is_uncertain = axis.force_sd > (STATED if point.is_pinned else 1.0) * known
+        self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
         missed = self._not_reached(axis, measured, desired, parameters, dt)

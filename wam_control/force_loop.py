@@ -38,6 +38,7 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
+SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
@@ -361,7 +362,7 @@ class ForceLoop:
 
     def _at_rest(self, held: list[float]) -> list[float]:
         """Velocities of the posture, without those of a small error: they would wind up friction across the force."""
-        is_small = self._rate is None and max(map(abs, held)) < REST
+        is_small = self._rate is None and max(map(abs, held)) < SMALL
         return [0.0] * self._n if is_small else held
 
     def _free_of(self, axis: ForceAxis) -> list[float]:
