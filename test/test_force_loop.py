@@ -105,6 +105,7 @@ def ask(loop: ForceLoop, world: World, force: Any, dt: float = DT, **more: Any) 
         given["posture"],
         given["torque"],
         dt,
+        external_sd=given.get("external_sd"),
     )
 
 
@@ -306,7 +307,11 @@ def test_the_estimate_is_fed_back_if_it_is_chosen() -> None:
     out = ask(loop, world, down(6.0), contact=touch, external=torques)
     assert out.measured == pytest.approx(down(4.0), abs=1e-6)
     assert out.error == pytest.approx(down(2.0), abs=1e-6)
-    assert ask(loop, world, down(6.0), external=torques).error == pytest.approx(down(6.0)), "no contact is no force"
+    again = ask(loop, world, down(6.0), external=torques)
+    assert again.error == pytest.approx(down(2.0), abs=1e-6), "a force that is held stays measured below the detection"
+    fresh = force_loop(ARM, replace(OWN, feedback="contact_estimate"))
+    never = ask(fresh, world, down(6.0), external=torques)
+    assert never.error == pytest.approx(down(6.0)), "no contact is no force"
 
 
 def test_tare_acts_on_the_estimate_too() -> None:

@@ -51,6 +51,19 @@ class ContactPosition:
     def __init__(self, covers: Covers) -> None:
         self._covers = covers
         self._last: tuple[str, float, float] | None = None
+        self._slid = 0.0
+
+    def slide(self, way: float) -> None:
+        """Count a way of the pinned point along its cover, m, while it touches something.
+
+        What is touched stays where it is, so that it is touched elsewhere on the link; at the end of a cover it is the
+        end that slides.
+        """
+        self._slid += way
+
+    def touch_again(self) -> None:
+        """Nothing is touched, or a force begins: it acts where it is pinned."""
+        self._slid = 0.0
 
     def step(
         self, contact: Contact, command: ForceCommand | None, lean: float, parameters: ForceLoopParameters
@@ -69,6 +82,9 @@ class ContactPosition:
             self._last = None
             cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
             conflict = _conflict(contact, cover, parameters)
+            length = self._covers.length[self._covers.names.index(cover)]
+            if position < length - self._covers.radius[self._covers.names.index(cover)]:
+                position = min(max(position - self._slid, 0.0), length)
             return ForcePoint(cover, position, 0.0, True, True, True, False, "", conflict, contact.is_single)
         problem = _problem(contact, lean, parameters) if contact.cover else ""
         if not contact.cover:

@@ -79,6 +79,21 @@ class SensingParameters:
         live=True,
         before=1e9,
     )
+    least_signal: float = parameter(
+        "commanded force per standard deviation with which the contact estimator knows the torques, from which a force "
+        "at a pinned position is controlled with feedback contact_estimate: what is not detected is not measured",
+        low=0.0,
+        high=1e3,
+        live=True,
+        before=0.0,
+    )
+    least_signal_unpinned: float = parameter(
+        "the same where the position is estimated, so that the link has to be identified, too",
+        low=0.0,
+        high=1e3,
+        live=True,
+        before=0.0,
+    )
     apparent_mass_limit: float = parameter(
         "largest mass of the arm that the loop may see in the measured force; the motion along directions in which it "
         "is larger is slowed down; 0: no limit",
@@ -127,6 +142,10 @@ class ForceAxis(NamedTuple):
     compliance: float
     precision: Array
 
+    def signal(self, force: float, torque_sd: Sequence[float]) -> float:
+        """Size of the torques of a force, N, in standard deviations of the estimated torques (n,), N m."""
+        return force * float(np.linalg.norm(self.lever / np.array(torque_sd)))
+
     def unexplained(self, torques: Array) -> float:
         """chi^2 of torques of the world on the joints (n,), N m, that no force along the direction explains."""
         weighted = self.precision @ torques
@@ -161,6 +180,12 @@ class ForceAxes:
         """Torque on each joint per force (n,), m; arguments as those of `axis`."""
         result: Array = direction @ self._jacobian(q, cover, position, direction)[0]
         return result
+
+    def slide(self, q: Sequence[float], cover: str, position: float, moved: Array) -> float:
+        """Way of a point of a cover along the cover, m, by a motion of the joints (n,), rad."""
+        point = (position, *self._covers.aside(cover, position))
+        along = self._body.cover_pose(q, cover).rotation[:, 0]
+        return float(along @ self._body.point_jacobian(q, cover, point) @ moved)
 
     def _jacobian(self, q: Sequence[float], cover: str, position: float, direction: Array) -> tuple[Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""

@@ -18,13 +18,17 @@ UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the com
 CONFLICT = 0.1  # s, after which another contact counts
 DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
-DETECTED = 0.08  # s, until a touch is detected there
+DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
 KEPT = 1.25  # settling times, up to which a force off the tolerance is remembered
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
+FINE = 4e-4  # m, way of the whole force below which jerks of friction are as large as what is left to correct
+SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which such a force is kept, and up to which it is
+STATED = 1.6  # sd of the force that is stated at a pinned position, per error that was found: friction is mostly less
+LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
@@ -77,14 +81,21 @@ class ForceHold:
 
     def reset(self) -> None:
         """Another force is commanded."""
-        self._turns.reset()
         self._shake.reset()
         self._way = self._watched = self._shaking = self._blocked = 0.0
-        self._is_sensed = self.is_touching = False
+        self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
+            self._has_settled
+        ) = False
         self._other = ""
-        self._travel = self._conflict = self._missed = self._swings = self._assumed = self._strange = 0.0
+        self._travel = self._conflict = self._assumed = self._strange = 0.0
+        self._uncertain = self._missed = 0.0
+        self._forget_swings()
+
+    def _forget_swings(self) -> None:
+        """What the force was before something was touched says nothing of how it is held."""
+        self._swings = self._off = 0.0
         self._above = self._below = math.inf
-        self._uncertain = self._off = 0.0
+        self._turns.reset()
 
     def approach_speed(
         self, axis: ForceAxis, point: ForcePoint, desired: float, parameters: ForceLoopParameters
@@ -103,9 +114,21 @@ class ForceHold:
         slowest = CREEP / parameters.limits.settling_time
         if self.is_touching:
             whole = desired * yielding / axis.speed_fraction
-            return max(whole / LATE, slowest) if is_known else whole / IDENTIFIED
+            return max(whole / (LATE if is_known else IDENTIFIED), slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
-        return fastest if is_known else min(fastest, max(desired * yielding / DETECTED, slowest))
+        fastest = fastest if is_known else min(fastest, max(desired * yielding / DETECTED, slowest))
+        return fastest / axis.speed_fraction
+
+    def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
+        """Whether the arm is to keep a force, N, that is nearly the commanded one.
+
+        On a stiff surface a small error would wind up the velocity loop until friction lets go, with a jerk that
+        changes the force by more than that error.
+        """
+        whole = desired * (1.0 / parameters.guard.contact_stiffness + axis.compliance)
+        band = (LEAVE if self._is_kept else SETTLE) * desired
+        self._is_kept = self.is_touching and whole < FINE and abs(desired - measured) < band
+        return self._is_kept
 
     def travel(self, distance: float) -> None:
         """Count a way along the force, m."""
@@ -151,6 +174,7 @@ class ForceHold:
         desired: float,
         parameters: ForceLoopParameters,
         dt: float,
+        signal: float = math.inf,
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
@@ -162,10 +186,14 @@ class ForceHold:
         measured, desired : force along it, N.
         parameters : of the force loop.
         dt : outer period, s.
+        signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
         """
         limit = parameters.sensing.sd_limit(desired)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
         self.is_touching = measured >= TOUCH * desired
+        if self.is_touching and not self._has_touched:
+            self._has_touched = True
+            self._forget_swings()
         if self.is_touching:
             self._travel = 0.0
         # tangential forces grow with the force
@@ -175,7 +203,7 @@ class ForceHold:
         if self._conflict > CONFLICT and not self._other:
             touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
             self._other = f"{touched}; the arm goes back to where it was free until the command ends"
-        held = self._held(axis, point, desired, limit, parameters)
+        held = self._held(axis, point, desired, limit, signal, parameters)
         if held[0].holds:
             return held
         if not point.is_single and (is_strange or not point.is_pinned):
@@ -187,7 +215,8 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        self._uncertain = self._uncertain + dt if is_touching and axis.force_sd > known else 0.0
+        is_uncertain = axis.force_sd > (STATED if point.is_pinned else 1.0) * known
+        self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
         missed = self._not_reached(axis, measured, desired, parameters, dt)
@@ -197,6 +226,22 @@ class ForceHold:
             return ForceReaction.NOT_REACHED, missed
         return self._doubted(axis, point, desired, unexplained, parameters)
 
+    def _too_weak(self, point: ForcePoint, desired: float, signal: float, parameters: ForceLoopParameters) -> str:
+        """Why the contact estimator would not detect the commanded force, '' where it would or something is touched."""
+        sensing = parameters.sensing
+        name, least = ("least_signal", sensing.least_signal)
+        if not point.is_pinned:
+            name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
+        self._is_detectable = self._has_touched or signal >= (RESUME * least if self._is_detectable else least)
+        if self._is_detectable:
+            return ""
+        return (
+            f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
+            f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, or "
+            "the force is detected late or on the wrong link; the arm holds its position: command more force, another "
+            f"direction or place, or use joint sensors{'' if point.is_pinned else ', or pin the place'}"
+        )
+
     def _against(self, point: ForcePoint, is_strange: bool) -> float:
         """How fast it counts that another link is touched: `CONFLICT` is full after so many s at 1."""
         # at a pinned position the estimated link counts only where the torques are not those of the force
@@ -205,7 +250,13 @@ class ForceHold:
         return CONFLICT / DOUBTED if self.is_touching and point.is_doubtful else -FADING
 
     def _held(
-        self, axis: ForceAxis, point: ForcePoint, desired: float, limit: float, parameters: ForceLoopParameters
+        self,
+        axis: ForceAxis,
+        point: ForcePoint,
+        desired: float,
+        limit: float,
+        signal: float,
+        parameters: ForceLoopParameters,
     ) -> tuple[ForceReaction, str]:
         """Why the arm is held instead; `limit` of the standard deviation, N."""
         if self._other:
@@ -218,6 +269,8 @@ class ForceHold:
                 "direction or place"
                 f"{'' if point.is_pinned else ', or pin the place'}"
             )
+        if weak := self._too_weak(point, desired, signal, parameters):
+            return ForceReaction.NOT_SENSED, weak
         if self._travel > parameters.limits.free_travel:
             return ForceReaction.NOTHING_TOUCHED, (
                 f"the arm has moved {self._travel:.3g} m along the force and nothing is touched; allowed: "
@@ -279,6 +332,7 @@ class ForceHold:
         """Why the force counts as not reached, '' where it does not: it is off on one side, or swings."""
         error, lasting = desired - measured, parameters.limits.settling_time
         is_off = abs(error) > tolerance(desired, parameters)
+        self._has_settled = self._has_settled or (self._has_touched and not is_off)
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
@@ -287,7 +341,14 @@ class ForceHold:
         self._swings = self._swings + dt if max(self._above, self._below) < SWING * lasting else 0.0
         # within the tolerance for the lesser part of the time, or not yet for long
         self._off = min(max(self._off + (dt if is_off else -dt), 0.0), KEPT * lasting)
-        if abs(self._missed) > lasting:
+        if not self._has_touched and abs(self._missed) > lasting:
+            return (
+                f"nothing is touched yet, {abs(self._missed):.2g} s after the command: the arm has moved "
+                f"{1e3 * self._travel:.2g} mm towards it; go nearer, declare a softer surface "
+                "(guard.contact_stiffness), or pin the place"
+            )
+        is_late = self._missed > 0.0 and not self._has_settled
+        if abs(self._missed) > (lasting if is_late else LEFT * lasting):
             return (
                 f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s; the arm "
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "

@@ -38,6 +38,8 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
+SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
+BACK = 3e-3  # m, way back from another link than commanded
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
@@ -102,6 +104,7 @@ class ForceLoop:
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
         self._is_free = False
+        self._external_sd: Sequence[float] | None = None
         self._transfer = BumplessTransfer(self._n)
         self._hold = ForceHold()
         self._axes = ""
@@ -192,6 +195,7 @@ class ForceLoop:
         dt: float,
         task: TaskCommand | None = None,
         posture_rate: Sequence[float] | None = None,
+        external_sd: Sequence[float] | None = None,
     ) -> ForceOutput:
         """One outer period.
 
@@ -210,8 +214,10 @@ class ForceLoop:
         dt : outer period, s.
         task : takes the place of force and torque; where it ends, the arm stays where it is.
         posture_rate : velocity at which the commanded posture moves (n,), rad/s.
+        external_sd : standard deviations of `external` (n,), N m; None where they are not published.
         """
         own = self.parameters
+        self._external_sd = external_sd if own.feedback == "contact_estimate" else None
         if not self._joints or not any(joints.effort):
             self._reset(joints.position)
         self._joints = tuple(joints.position)
@@ -230,7 +236,7 @@ class ForceLoop:
         self.refusals, self.fallback = commands.refusals, ""
         self.reaction, self.reason = ForceReaction.NONE, ""
         self._measurement.step(own, sensors, external, dt)
-        is_touched = own.feedback != "contact_estimate" or bool(contact.cover)
+        is_touched = own.feedback != "contact_estimate" or bool(contact.cover) or self._hold.is_touching
         present = self._measurement.external if is_touched else np.zeros(self._n)
         self._external = self._filter.step(present, own.force_filter, dt)
         if task is not None:
@@ -263,6 +269,7 @@ class ForceLoop:
         What a free arm at rest measures is the error of its model.
         """
         self._hold.reset()
+        self._position.touch_again()
         self._delay.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
         self._axes = axes
@@ -304,22 +311,17 @@ class ForceLoop:
             point,
             own.sensing.sd_limit(desired),
         )
-        is_watching = False
-        if own.feedback == "contact_estimate" and self._timing.dither_cycle:
-            frequency = 2.0 * math.pi / (self._timing.dither_cycle * self._timing.period)
-            moved = np.array(q) - np.array(self._q_before or q)
-            is_watching = self._hold.watch_shaking(force_axis, moved, frequency, dt)
-            self._q_before = list(q)
-        reaction, reason = self._hold.step(force_axis, point, self._external[0], measured, desired, own, dt)
+        moved = np.array(q) - np.array(self._q_before or q)
+        self._q_before = list(q)
+        is_watching = self._is_watching(force_axis, moved, dt)
+        signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
+        reaction, reason = self._hold.step(force_axis, point, self._external[0], measured, desired, own, dt, signal)
         self._react(reaction, reason)
-        if self._hold.is_touching:
-            self._pressed_at = list(q)
-        if not contact.cover or not self._free_at:
-            self._free_at = list(q)
+        self._remember(q, moved, contact, point)
         if reaction.holds:
             self.refusals["force_command"] = reason
             if self._held_at is None:
-                self._held_at = self._free_at if reaction is ForceReaction.OTHER_LINK else list(q)
+                self._held_at = self._free_of(force_axis) if reaction is ForceReaction.OTHER_LINK else list(q)
                 self._transfer.restart()
             return out._replace(
                 velocity=[] if is_open else posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
@@ -330,12 +332,53 @@ class ForceLoop:
         effort = (force_axis.lever * desired).tolist()
         if is_open:
             return out._replace(effort=effort)
+        if contact.cover and not point.is_identified:
+            error = min(error, desired - self._largest_force(q, point, direction, desired))
+        if self._hold.keeps(force_axis, measured, desired, own):
+            error, held = 0.0, self._at_rest(held)
         speeds = self._delay.step(scalar.velocities([error], [desired - before], dt), own.delay_samples)
         speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
         return out._replace(velocity=velocity, effort=effort)
+
+    def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
+        """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
+        cycle = self._timing.dither_cycle
+        if self.parameters.feedback != "contact_estimate" or not cycle:
+            return False
+        return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
+
+    def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint) -> None:
+        """Remember where the arm presses, how far it has slid there, and where it was free."""
+        if self._hold.is_touching:
+            self._pressed_at = list(q)
+            self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
+        else:
+            self._position.touch_again()
+        if not contact.cover or not self._free_at:
+            self._free_at = list(q)
+
+    def _at_rest(self, held: list[float]) -> list[float]:
+        """Velocities of the posture, without those of a small error: they would wind up friction across the force."""
+        is_small = self._rate is None and max(map(abs, held)) < SMALL
+        return [0.0] * self._n if is_small else held
+
+    def _free_of(self, axis: ForceAxis) -> list[float]:
+        """Where the arm was free, and `BACK` further against the force: friction would hold it in less."""
+        away = axis.lever * (BACK / float(axis.lever @ axis.lever))
+        return [a - b for a, b in zip(self._free_at, away.tolist(), strict=True)]
+
+    def _largest_force(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
+        """Largest force along a direction, N, that the torques would be of in the middle of any other cover."""
+        covers, found = self._arm.covers, -math.inf
+        for cover, length in zip(covers.names, covers.length, strict=True):
+            if cover != point.cover:
+                axis = self._force_axes.axis(q, cover, 0.5 * length, 0.0, direction, desired)
+                if axis.force_sd <= self.parameters.sensing.sd_limit(desired):
+                    found = max(found, -float(axis.sense @ self._external[0]))
+        return found
 
     def _task(
         self, q: Sequence[float], contact: Contact, task: TaskCommand, posture: list[float], dt: float

@@ -41,6 +41,7 @@ class ForceLoopNode:
         Input("joint_states"),
         Input("joint_sensors", absent="hold"),
         Input("external_joint_torques", "effort", absent="brake"),
+        Input("external_joint_torques_sd", "effort"),
         Input("contact/hypotheses", absent="brake"),
         Input("force_command", age="command", absent="hold"),
         Input("joint_posture_command", "position velocity?", age="command", absent="hold"),
@@ -68,6 +69,7 @@ class ForceLoopNode:
         if self._refusal:
             command = posture = torque = None  # the arm holds its position
         external, hypotheses = inputs["external_joint_torques"], inputs["contact/hypotheses"]
+        torque_sd = inputs["external_joint_torques_sd"]
         out = self._loop.step(
             joints,
             inputs["joint_sensors"],
@@ -79,6 +81,7 @@ class ForceLoopNode:
             inputs.dt,
             task,
             posture.velocity if posture else None,
+            torque_sd.effort if torque_sd else None,
         )
         return {
             "joint_velocity_command": State([], out.velocity, []),
