@@ -19,7 +19,7 @@ from wam_control.momentum_observer import MomentumObserver
 
 Array = NDArray[np.float64]
 
-EVERY = 0.0199  # s, a compromise with computing time
+EVERY = 0.0099  # s
 SETTLING = 0.05  # s, of the filters of the observer, from the start of a contact
 OLDEST, YOUNGEST = 0.141, 0.059  # s, ages of the moments that are the steady contact
 LEAST = 3  # of them
