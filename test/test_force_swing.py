@@ -44,10 +44,10 @@ def test_a_force_that_cycles_is_reported_by_name_with_its_size() -> None:
     assert loop.reaction is ForceReaction.NONE
 
 
-def test_a_pinned_force_that_is_known_worse_than_ten_per_cent_is_reported_with_its_uncertainty() -> None:
+def test_a_pinned_force_that_is_known_badly_is_reported_with_its_uncertainty() -> None:
     loop = force_loop(ARM, PINNED)
     for _ in range(200):
-        ask(loop, World(400.0, force=1.0), down(1.0))
+        ask(loop, World(400.0, force=0.6), down(0.6))
     assert loop.reaction is ForceReaction.UNCERTAIN
     assert "the force is known to +-0.12 N" in loop.reason
     for _ in range(200):
