@@ -10,7 +10,7 @@ import pytest
 from contact_truth import motor_from_joint
 
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
-from wam_control.contact_inference import SECOND
+from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
@@ -129,9 +129,16 @@ def test_a_second_contact_is_noticed_by_the_change_of_the_torques(
     noticed = [estimate for estimate in found if estimate.contacts == 2]
     assert len(noticed) > 0.6 * len(found)
     assert found[-1].contacts == 2
-    assert all(SECOND in hypothesis.reason for hypothesis in noticed[-1].hypotheses)
-    assert SECOND in noticed[-1].reason
+    assert len({hypothesis.reasons >> REASONS.index(SECOND) for hypothesis in noticed[-1].hypotheses} & {1, 2}) == 1
+    assert SECOND in noticed[-1].reason or CERTAIN_SECOND in noticed[-1].reason
     assert not any(estimate.contacts > 1 for estimate in after_steady_contact(cover, x, force, 0.0))
+
+
+def test_a_second_contact_is_certain_where_the_change_is_large() -> None:
+    for force, share in ((6.0, 0.0), (18.0, 0.5)):
+        found = after_steady_contact("outer_link", 0.1, (0.0, force, 0.0), SENSORS.second)
+        certain = [estimate for estimate in found if CERTAIN_SECOND in estimate.reason]
+        assert len(certain) > share * len(found) if share else not certain
 
 
 def test_a_contact_that_presses_harder_is_no_second_one() -> None:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_control.contact_inference import (
+    CERTAIN_SECOND,
+    SECOND,
     ContactInference,
     Hypothesis,
     InferenceParameters,
@@ -192,7 +194,8 @@ class ContactEstimator:
         hypotheses = self._inference.infer(observer.q, torques, precision)
         self._second.step(observer.age, hypotheses, observer, self._inference)
         if self._second.is_suspected:
-            hypotheses = tuple(with_second(hypothesis) for hypothesis in hypotheses)
+            why = CERTAIN_SECOND if self._second.is_certain else SECOND
+            hypotheses = tuple(with_second(hypothesis, why) for hypothesis in hypotheses)
         best = hypotheses[0]
         return ContactEstimate(
             external_torques=torques,

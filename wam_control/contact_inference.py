@@ -38,7 +38,10 @@ LINKS = "the torques do not identify the link"
 MORE = "one contact does not explain the torques"
 ALONG = "a force along the tube and one at its start cannot be distinguished"
 SECOND = "a second contact is suspected: position and force are those of both together"
-REASONS = (MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE, ALONG, SECOND)  # as bits
+CERTAIN_SECOND = "a second contact is nearly certain: position and force are those of both together"
+REASONS = (  # as bits
+    MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE, ALONG, SECOND, CERTAIN_SECOND,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -137,10 +140,10 @@ def _elbow(covers: Sequence[_Cover]) -> _Elbow | None:
     return None
 
 
-def with_second(hypothesis: Hypothesis) -> Hypothesis:
-    """The same where a second contact is suspected."""
-    reason = f"{hypothesis.reason}; {SECOND}" if hypothesis.reason else SECOND
-    return hypothesis._replace(reason=reason, reasons=hypothesis.reasons | 2 ** REASONS.index(SECOND))
+def with_second(hypothesis: Hypothesis, why: str) -> Hypothesis:
+    """The same where a second contact is suspected, or nearly certain."""
+    reason = f"{hypothesis.reason}; {why}" if hypothesis.reason else why
+    return hypothesis._replace(reason=reason, reasons=hypothesis.reasons | 2 ** REASONS.index(why))
 
 
 def detection_statistic(torques: Sequence[float], precision: Array) -> float:

@@ -22,7 +22,7 @@ class ForcePoint(NamedTuple):
     is_doubtful : whether something is touched, and the position is not pinned nor the link identified.
     rejection : why the present estimate is not used, '' if it is or is not needed.
     conflict : why no force can be controlled there: something else is touched; '' if nothing is known of that.
-    is_single : False where a second contact is suspected, whose torques are not those of the force.
+    is_single : False where a second contact is nearly certain, whose torques are not those of the force.
     """
 
     cover: str
@@ -133,7 +133,7 @@ def torque_of_position(force: Triple, position: float) -> Triple:
 def _problem(contact: Contact, lean: float, parameters: ForceLoopParameters) -> str:
     """Why an estimated position is not certain, '' if it is; an uncertainty that is not published counts as none."""
     if not contact.is_single:
-        return f"a second contact is suspected besides that on {contact.cover}"
+        return f"a second contact is nearly certain besides that on {contact.cover}"
     if lean > STEEPEST:
         return (
             f"the commanded force is {math.degrees(lean):.0f} deg off the normal of {contact.cover}; a contact "

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from wam_control.contact_inference import REASONS, SECOND, Hypothesis
+from wam_control.contact_inference import CERTAIN_SECOND, REASONS, Hypothesis
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table, Triple
 from wam_description.topics import HYPOTHESIS_COLUMNS
 
@@ -42,7 +42,7 @@ def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
         return NO_CONTACT
     row = table.rows[0]
     x, y, z = row[_FORCE : _FORCE + 3]
-    is_single = SECOND not in reasons_of(row)
+    is_single = CERTAIN_SECOND not in reasons_of(row)
     cover = covers[int(row[_LINK])]
     return Contact(cover, row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD], is_single)
 

@@ -51,7 +51,7 @@ class ForceReaction(IntEnum):
     CYCLE = 11  # goes on: the measured force is in a limit cycle
     SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
     TOO_SLOW = 13  # holds: the surface is so stiff for the commanded force that the arm would hardly move towards it
-    SECOND_CONTACT = 14  # holds: a second contact is suspected, whose torques are not those of the force
+    SECOND_CONTACT = 14  # holds: a second contact is nearly certain, whose torques are not those of the force
 
     @property
     def holds(self) -> bool:
@@ -194,7 +194,7 @@ class ForceHold:
         if self.is_touching and not self._has_touched:
             self._has_touched = True
             self._forget_swings()
-        if self.is_touching:
+        if self.is_touching and self._travel <= parameters.limits.free_travel:
             self._travel = 0.0
         # tangential forces grow with the force
         unexplained = axis.unexplained(external) / max(1.0, measured / desired) ** 2
@@ -208,7 +208,7 @@ class ForceHold:
             return held
         if not point.is_single and (is_strange or not point.is_pinned):
             return ForceReaction.SECOND_CONTACT, (
-                f"a second contact is suspected besides that on {point.cover}: the torques are not those of the "
+                f"a second contact is nearly certain besides that on {point.cover}: the torques are not those of the "
                 "commanded force alone; the arm holds its position until the second contact has gone"
             )
         is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired

@@ -24,6 +24,9 @@ SETTLING = 0.05  # s, of the filters of the observer, from the start of a contac
 OLDEST, YOUNGEST = 0.141, 0.059  # s, ages of the moments that are the steady contact
 LEAST = 3  # of them
 LASTING = 2  # changes in succession
+CERTAIN = (
+    4.0  # times the threshold, in the time in which the steady contact is remembered: later, it has changed itself
+)
 RELEASED = 1.0 / 3.0  # of the threshold, below which the second contact has gone
 GROWTH = 3.0  # sd of the change of the first contact's force, per force
 FRICTION = 0.1  # sd of its components across that, per change
@@ -52,6 +55,7 @@ class SecondContact:
     Attributes
     ----------
     is_suspected : whether there seems to be a second contact.
+    is_certain : whether the change was so large and so sudden that force control should not go on.
     """
 
     def __init__(self, threshold: float) -> None:
@@ -60,7 +64,8 @@ class SecondContact:
 
     def reset(self) -> None:
         """The contact has ended."""
-        self.is_suspected = False
+        self.is_suspected = self.is_certain = False
+        self._since = math.nan  # s, of the suspicion
         self._begin = self._last = math.nan
         self._recent: deque[_Moment] = deque()
         self._steady: deque[_Moment] = deque()
@@ -90,9 +95,16 @@ class SecondContact:
             if statistic < RELEASED * self._threshold:
                 self.reset()
                 self._begin = time - SETTLING
+            elif time - self._since < OLDEST:
+                self.is_certain = self.is_certain or self._exceeds(CERTAIN * self._threshold, statistic)
             return
-        self._found = self._found + 1 if statistic > self._threshold else 0
-        self.is_suspected = self._found >= LASTING
+        if self._exceeds(self._threshold, statistic):
+            self.is_suspected, self._since, self._found = True, time, 0
+
+    def _exceeds(self, limit: float, statistic: float) -> bool:
+        """Whether so many changes in succession have exceeded a limit."""
+        self._found = self._found + 1 if statistic > limit else 0
+        return self._found >= LASTING
 
     def _remember(self, moment: _Moment) -> None:
         recent, steady = self._recent, self._steady
