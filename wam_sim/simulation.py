@@ -84,7 +84,7 @@ class Simulation:
         self._synchronisers.update(feed.synchroniser for found in feeds.values() for feed in found)
         if hasattr(node, "requests"):
             feeds = {t: [feed._replace(work=self._requesting(node, feed.work)) for feed in feeds[t]] for t in feeds}
-        self._bus.connect(declaration, feeds)
+        self._bus.connect(declaration, feeds, self._interface.checks(declaration))
 
     def _requesting(self, node: Any, work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
         """The step of a node together with its requests to others."""
