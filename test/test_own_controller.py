@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from wam_bag.bag import JointColumns, read
-from wam_control.scenario import load
+from wam_control.scenario import ScenarioStep, load
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.defects import UnusableOutput
@@ -243,6 +243,38 @@ def test_currents_that_are_not_finite_are_refused_by_name(configured: Configurat
     text = r"node 'velocity_loop' returned an unusable motor_current_command: effort of motor1 is nan; send finite"
     with pytest.raises(UnusableOutput, match=text):
         run.play()
+
+
+@pytest.mark.parametrize("velocity", [None, State([], [], []), State([], [0.1] * 4, [])])
+def test_torque_without_a_velocity_command_does_not_move_the_arm_and_is_warned_of_once(
+    velocity: State | None, configured: Configuration, caplog: pytest.LogCaptureFixture
+) -> None:
+    commands = {"joint_effort_command": State([], [], [3.0, 0.0, 0.0, 0.0])}
+    if velocity is not None:
+        commands["joint_velocity_command"] = velocity
+
+    class Torque(Echo):
+        name, topics = "torque", ()
+
+        @reaction(Input("joint_states", "position"), outputs=tuple(commands))
+        def step(self, inputs: Inputs) -> Outputs:
+            return commands
+
+    alone = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
+    steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("wait", 0.4)]
+    run = Simulation(alone, steps, {"torque": Torque})
+    assert run.play() == ""
+    texts = caplog.messages
+    moved = abs(run.rows["joint_states"][-1].values[0])
+    if velocity is None:
+        assert moved < 0.01
+        assert [
+            text.startswith("warning: transform: joint_effort_command has no lasting effect") for text in texts
+        ] == [True]
+        assert "empty velocity to command torque alone: State([], [], [])" in texts[0]
+    else:
+        assert moved > 0.02
+        assert texts == []
 
 
 NAN = float("nan")
