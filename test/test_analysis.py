@@ -409,7 +409,7 @@ def test_a_press_is_told_by_the_loop_as_it_is_before_the_ideal_one(cycling: Reco
     )
     assert "The theory says" not in said
     margin = cycling.finding("press: gain margin, up to 10").predicted
-    gain = cycling.finding("press: largest stable gain, with the velocity loops").predicted
+    gain = cycling.finding("press: largest stable gain, real velocity loops, sampled").predicted
     assert gain == pytest.approx(8e-3 * margin)
 
 

@@ -14,7 +14,7 @@ from wam_theory.stick_slip import FrictionNode, IntegralLoop
 LONGEST = 50  # periods of delay
 EVENTS = 40_000  # of a response: a fast loop has many samples before it rests, and here there is time
 CLOSE = 0.9  # of the margin; no plant is known better
-ASSUMED = "for a motor that follows its commanded velocity at once, any lag of its velocity loop leaves another margin"
+ASSUMED = "assumed: the motor follows its commanded velocity at once; the lag of a velocity loop leaves another margin"
 ABSURD = 1e12  # a number of the loop above it, or below its inverse but not 0, is a slip of the pen
 
 
@@ -50,10 +50,11 @@ class LoopDesign(NamedTuple):
         undecided = verdict.undecided_error
         lines = [
             f"domain {verdict.domain}: {MEANING[verdict.domain]}",
-            f"margin: the gain is {part:.3g} of the largest linearly stable one, {verdict.margin:.4g}; {ASSUMED}",
+            f"margin: the gain is {part:.3g} of the largest linearly stable one, {verdict.margin:.4g}",
             f"largest safe error: {verdict.stable_error:.4g}; the loop has {self.loop.error_limit:.4g}",
             f"limit cycle of stiction: {stiction}",
             f"figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
+            ASSUMED,
         ]
         if undecided > verdict.stable_error:
             lines.append(

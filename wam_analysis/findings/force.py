@@ -262,10 +262,14 @@ def _theory_findings(one: HeldForce, seen: set[str]) -> list[Finding]:
         Finding(f"{name}: actuator cycle at the contact, peak to peak", "mm", moved, actuator, "(5.20)"),
         Finding(f"{name}: gamma", "", math.nan, predicted.gamma, f"(5.15), {ideal}"),
         Finding(
-            f"{name}: largest stable gain, continuous", "m/s/N", math.nan, predicted.routh_gain, f"(5.15), {ideal}"
+            f"{name}: largest stable gain, ideal velocity source, continuous",
+            "m/s/N",
+            math.nan,
+            predicted.routh_gain,
+            f"(5.15), {ideal}",
         ),
         Finding(
-            f"{name}: largest stable gain, as sampled",
+            f"{name}: largest stable gain, ideal velocity source, sampled",
             "m/s/N",
             math.nan,
             predicted.sampled_gain,
@@ -282,6 +286,6 @@ def _margin_findings(name: str, found: Guarded | None) -> list[Finding]:
     note = f"domain {found.assessment.domain}; stability guard, contact of {shown(found.surface, 'N/m')}"
     sentences = [Finding(f"{name}: gain margin, up to {LARGEST:g}", "", math.nan, scale, note)]
     if scale < LARGEST:
-        label = f"{name}: largest stable gain, with the velocity loops"
+        label = f"{name}: largest stable gain, real velocity loops, sampled"
         sentences.append(Finding(label, "m/s/N", math.nan, scale * found.gain, "sampled; no friction"))
     return sentences
