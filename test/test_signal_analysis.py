@@ -266,6 +266,24 @@ def test_what_one_short_motion_cannot_tell_has_an_error_that_says_so():
     assert abs(found.viscous - 0.012) < 2.0 * found.viscous_error
 
 
+def test_three_stated_errors_hold_the_friction_under_a_disturbance_that_is_alike_for_long():
+    """A torque that wanders within some tenths of a second, as of creep or ripple; and two motions."""
+    off = []
+    for seed in range(12):
+        time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
+        kept = slice(0, 3_000)
+        wander = np.convolve(draws(100 + seed, len(time), 1.0), np.exp(-np.arange(1200) / 300.0), "same")
+        found = identify_friction(time[kept], velocity[kept], (torque + 0.003 * wander)[kept], 0.1, 0.02)
+        for value, error, truth in (
+            (found.dynamic, found.dynamic_error, 0.18),
+            (found.viscous, found.viscous_error, 0.012),
+            (found.inertia, found.inertia_error, 0.004),
+        ):
+            off.append(abs(value - truth) / error)
+    assert max(off) < 3.0, off
+    assert np.sqrt(np.mean(np.square(off))) > 0.1, "errors that hold everything say nothing"
+
+
 def test_impacts_do_not_spoil_the_friction():
     time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
     torque[np.random.default_rng(9).integers(0, len(time), 60)] += 5.0

@@ -196,7 +196,7 @@ def _friction_section(
 def _breakaway(found: Friction) -> str:
     if not math.isfinite(found.static):
         return "no breakaway"
-    return f"breakaway {_known(found.static, found.static_error if found.breakaways > 1 else math.nan, 'N m')}"
+    return f"breakaway {_known(found.static, found.static_error, 'N m')}"
 
 
 def _known(value: float, error: float, unit: str) -> str:
@@ -238,9 +238,8 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
         measured = value if identified else math.nan
         return Finding(f"{name}: {kind} friction", unit, measured, predicted, text, error if identified else math.nan)
 
-    several = found.static_error if found.breakaways > 1 else math.nan
     return [
-        one("static", "N m", found.static, several, static, f"{found.breakaways} breakaways"),
+        one("static", "N m", found.static, found.static_error, static, f"{found.breakaways} breakaways"),
         one("dynamic", "N m", found.dynamic, found.dynamic_error, dynamic),
         one("viscous", "N m s/rad", found.viscous, found.viscous_error, viscous),
     ]
