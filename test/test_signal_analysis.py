@@ -15,7 +15,7 @@ from wam_analysis.measures.response import step_response
 from wam_analysis.measures.ripple import ripple_spectrum
 from wam_analysis.measures.runs import runs, without_short
 from wam_analysis.measures.stability import StabilityVerdict, half_cycle_peaks, stability
-from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 
@@ -201,6 +201,23 @@ def test_sticks_and_slips_are_told_apart_and_chatter_is_bridged():
     assert found.slips.tolist() == [[300, 400], [600, 650]]
     assert found.directions.tolist() == [1.0, -1.0]
     assert (found.stuck, found.reversals) == (0.85, 1)
+
+
+@pytest.mark.parametrize("peak", [0.06, 0.08, 0.2])
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_a_slow_sine_turns_and_does_not_slip_and_one_with_stiction_does(peak: float, noise: float) -> None:
+    time = np.arange(20_000) / 1000.0
+    sine = peak * np.sin(2.0 * math.pi * time / 3.0)
+    stuck = np.where(time % 1.5 < 0.5, 0.0, sine)  # at rest for a third of each half
+    slips = []
+    for velocity in (sine, stuck):
+        noisy = velocity + draws(11, len(time), noise)
+        found = stick_slip_phases(noisy, rest=0.05, shortest=10)
+        assert len(found.slips) >= 12
+        slips.append(without_turns(found, noisy, 0.05))
+    assert (len(slips[0].slips), slips[0].reversals) == (1, 0)
+    assert slips[0].stuck < 0.05
+    assert len(slips[1].slips) >= 12
 
 
 def test_the_exact_staircase_of_stick_and_slip_is_found_again():
