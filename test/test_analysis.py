@@ -318,6 +318,10 @@ def test_a_press_in_a_contact_that_was_there_has_its_overshoot() -> None:
     assert not any("touched down" in sentence for sentence in section.sentences)
     (overshoot,) = [finding for finding in section.findings if finding.name.endswith(": overshoot")]
     assert overshoot.measured == pytest.approx(100.0 * 6.0 / 4.0, rel=0.05)
+    (rise,) = [finding for finding in section.findings if "rise time" in finding.name]
+    assert 0.005 <= rise.error < 0.02, "a sample at least"
+    assert rise._replace(measured=0.13, predicted=0.0418).deviates
+    assert not rise._replace(measured=0.05, predicted=0.0418).deviates
 
 
 @pytest.mark.slow
