@@ -42,8 +42,8 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         "domain": str(assessment.domain),
         "margin": _margin(assessment.scale),
         "margin here": _margin(here),
-        "margin here, assessed": f"{posture_of(watch.judged[0])}, when a force was last commanded"
-        if watch.judged
+        "margin here, assessed": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
+        if watch.assessed
         else UNKNOWN,
         "gain factor": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
         "worst": assessment.where,

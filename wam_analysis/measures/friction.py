@@ -16,7 +16,7 @@ FEWEST = 20  # samples in motion that are needed
 STILL = 0.01  # of the speed of rest: below it the shaft has not begun to move
 PRECISE = 0.01  # of the torque: noise at a breakaway after the line
 SIGMAS = 3.0  # standard errors that are meant to hold the truth
-FREEDOM = 2.0  # least degrees of freedom: with fewer, nothing could be said of an error
+FREEDOM = 2.0  # least degrees of freedom: with fewer, an error could be anything
 NEGLECTED = 2e-3  # of a number: what the averaged law neglects, where a recording without noise leaves no error
 JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
 
