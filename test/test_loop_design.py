@@ -1,6 +1,7 @@
 """A force loop of one's own: margin, domain and safe error against computations that share no code with it."""
 
 import math
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -163,6 +164,29 @@ def test_numbers_that_overflow_together_are_refused_by_the_one_that_is_farthest_
     node = FrictionNode(1e-9, 1e-9, 1e12, 1e12, 1e-9, 1e-9)
     with pytest.raises(ValueError, match=r"transmission_stiffness is 1e\+12; compared with the other numbers"):
         loop_design(node, IntegralLoop(1e-9), 1.0)
+
+
+PLANT = FrictionNode(0.1, 10.0, 2000.0, 1000.0, 0.5, 0.5)
+
+
+@pytest.mark.parametrize("part", [0.85, 0.95, 0.995, 1.005, 1.5])
+def test_a_gain_close_to_the_margin_is_warned_of_and_the_one_that_is_advised_is_not(part: float) -> None:
+    margin = loop_design(PLANT, IntegralLoop(1e-3), 500.0, 2e-3).verdict.margin
+    text = loop_design(PLANT, IntegralLoop(part * margin), 500.0, 2e-3).text()
+    assert "assumed: the motor follows its commanded velocity at once" in text
+    assert ("close to the margin" in text) == (0.9 < part <= 1.0)
+    assert ("not safe" in text) == (part > 1.0)
+    if part > 0.9:
+        advised = float(re.findall(r"lower the gain to ([\d.e-]+), 0.9 of the margin", text)[0])
+        assert 0.89 * margin < advised <= 0.9 * margin
+        assert "lower" not in loop_design(PLANT, IntegralLoop(advised), 500.0, 2e-3).text()
+
+
+def test_the_saturation_that_is_advised_is_safe() -> None:
+    margin = loop_design(PLANT, IntegralLoop(1e-3), 500.0, 2e-3).verdict.margin
+    text = loop_design(PLANT, IntegralLoop(1.3 * margin), 500.0, 2e-3).text()
+    error = float(re.findall(r"saturate the error at ([\d.e-]+)", text)[0])
+    assert loop_design(PLANT, IntegralLoop(1.3 * margin, error_limit=error), 500.0, 2e-3).is_safe
 
 
 @pytest.mark.slow

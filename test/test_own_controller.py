@@ -11,9 +11,10 @@ import pytest
 import yaml
 
 from wam_bag.bag import JointColumns, read
-from wam_control.scenario import load
+from wam_control.scenario import ScenarioStep, load
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
+from wam_description.defects import UnusableOutput
 from wam_description.interface import Interface, declared
 from wam_description.parameters import Nothing, ParameterError, build
 from wam_description.signals import Level, NodeStatus, State
@@ -239,8 +240,111 @@ def test_currents_that_are_not_finite_are_refused_by_name(configured: Configurat
     steps = load(tmp_path / "script.yaml", configured.shared.arm)
     own = {name: value for name, value in configured.sections.items() if name != "velocity_loop"}
     run = Simulation(configured._replace(sections=own), steps, {"velocity_loop": Broken})
-    with pytest.raises(ValueError, match=r"motor_current_command of 1000000 ns is .*nan.* 4 finite numbers"):
+    text = r"node 'velocity_loop' returned an unusable motor_current_command: effort of motor1 is nan; send finite"
+    with pytest.raises(UnusableOutput, match=text):
         run.play()
+
+
+@pytest.mark.parametrize("velocity", [None, State([], [], []), State([], [0.1] * 4, [])])
+def test_torque_without_a_velocity_command_does_not_move_the_arm_and_is_warned_of_once(
+    velocity: State | None, configured: Configuration, caplog: pytest.LogCaptureFixture
+) -> None:
+    commands = {"joint_effort_command": State([], [], [3.0, 0.0, 0.0, 0.0])}
+    if velocity is not None:
+        commands["joint_velocity_command"] = velocity
+
+    class Torque(Echo):
+        name, topics = "torque", ()
+
+        @reaction(Input("joint_states", "position"), outputs=tuple(commands))
+        def step(self, inputs: Inputs) -> Outputs:
+            return commands
+
+    alone = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
+    steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("wait", 0.4)]
+    run = Simulation(alone, steps, {"torque": Torque})
+    assert run.play() == ""
+    texts = caplog.messages
+    moved = abs(run.rows["joint_states"][-1].values[0])
+    if velocity is None:
+        assert moved < 0.01
+        assert [
+            text.startswith("warning: transform: joint_effort_command has no lasting effect") for text in texts
+        ] == [True]
+        assert "empty velocity to command torque alone: State([], [], [])" in texts[0]
+    else:
+        assert moved > 0.02
+        assert texts == []
+
+
+NAN = float("nan")
+
+
+class Careless(Echo):
+    """Returns in place of the force loop what the test gives it."""
+
+    name, topics, given = "careless", (), State([], [], [])
+
+    @reaction(Input("joint_states", "position"), outputs=("joint_velocity_command", "joint_effort_command"))
+    def step(self, inputs: Inputs) -> Outputs:
+        return {"joint_velocity_command": State([], [], []), "joint_effort_command": self.given}
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (State([], [], [0.0, NAN, 0.0, 0.0]), "effort of joint2 is nan; send finite numbers"),
+        (State([], [], [0.0, 0.0, 1e13, -1e13]), "effort of joint3 is 1e+13; no arm reaches that, send at most 1e+12"),
+        (State([], [], [0.0] * 3), "effort has 3 values; send 4, one for each of joint1, joint2, joint3, joint4"),
+        (State([], [], []), "effort has 0 values; send 4, one for each of joint1, joint2, joint3, joint4"),
+        (State([], [0.0] * 3, [0.0] * 4), "velocity has 3 values; send 4, one for each of joint1"),
+        ([0.0] * 4, "[0.0, 0.0, 0.0, 0.0] is no State; return one"),
+        (State([], [], ["a"] * 4), "does not hold numbers: "),  # type: ignore[list-item]
+    ],
+)
+def test_an_output_that_no_node_could_use_is_refused_by_node_topic_and_value(
+    given: Any, text: str, configured: Configuration, tmp_path: Path
+) -> None:
+    class One(Careless):
+        pass
+
+    One.given = given
+    with_own = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
+    run = Simulation(with_own, load(tmp_path / "script.yaml", configured.shared.arm), {"careless": One})
+    with pytest.raises(UnusableOutput) as refusal:
+        run.play()
+    assert str(refusal.value).startswith("node 'careless' returned an unusable joint_effort_command: ")
+    assert text in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (State([], [], [NAN] * 4), "unusable joint_effort_command: effort of joint1 is nan; send finite numbers"),
+        (State([], [], [0.0] * 3), "unusable joint_effort_command: effort has 3 values; send 4, one for each of"),
+    ],
+)
+def test_over_topics_the_fault_names_the_node_and_its_unusable_output(
+    given: State, text: str, configured: Configuration, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.bring_up import Composition
+
+    monkeypatch.setitem(sys.modules, "own_nodes", sys.modules[__name__])
+    monkeypatch.setattr(Careless, "given", given)
+    nodes = ["driver", "transform", "velocity_loop", "gravity", "own_nodes:Careless"]
+    with Composition(configured.with_values({"nodes": nodes}), domain_id=domain_id) as composition:
+        driver: Any = composition.nodes["driver"]
+        composition.spin(lambda: driver.driver.safety.fault)
+        assert driver.driver.safety.fault.startswith(f"careless: {text}")
+
+
+def test_an_array_in_the_place_of_another_argument_of_an_input_is_refused() -> None:
+    with pytest.raises(TypeError, match=r"delayed must be True or False; .*'joint_states', 'position velocity"):
+        reaction(Input("joint_states", "position", "velocity"), outputs=())  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="arrays has 'speed'; allowed: effort, "):
+        reaction(Input("joint_states", "position speed"), outputs=())
+    with pytest.raises(TypeError, match="absent has 'stop'; allowed: brake, hold, zero"):
+        reaction(Input("joint_states", absent="stop"), outputs=())
 
 
 class Requesting(Echo):

@@ -28,7 +28,7 @@ def swings(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_the_loop_of_another_robot_is_that_of_the_chosen_joint(swings: Path) -> None:
-    found = recorded_loop(swings, TopicMap(joints=("b",)))
+    found = recorded_loop(swings, TopicMap(joints=("b",))).numbers
     values = {name: one.value for name, one in found.items()}
     planted = {"friction": DRY, "damping": VISCOUS, "inertia": INERTIA, "rate": 250.0}
     assert {name: values[name] for name in planted} == pytest.approx(planted, rel=0.02)
@@ -54,7 +54,19 @@ def test_the_loop_of_a_sample_cycles_as_it_was_recorded(capsys: pytest.CaptureFi
     """(5.8) and (5.9) corrected give 2.48 N and 1.94 s for the sample that was made to cycle by stiction."""
     with pytest.raises(SystemExit):
         main(["guard", "--bag", str(SAMPLES / "stiction-limit-cycle")])
-    assert "limit cycle of stiction: 2.483 peak to peak every 1.94 s" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "limit cycle of stiction: 2.483 peak to peak every 1.94 s" in said
+    assert "the lag of a velocity loop leaves another margin" in said
+
+
+@pytest.mark.slow
+def test_the_stacks_own_guard_answers_next_to_the_ideal_velocity_source(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["guard", "--bag", str(SAMPLES / "actuator-limit-cycle")])
+    said = capsys.readouterr().out
+    ideal, _, real = said.partition("As it was recorded, with its velocity loops, which is what counts on that arm:\n")
+    assert "margin: the gain is 0.834 of the largest" in ideal
+    assert real.startswith("Stability guard (sampled loop with its velocity loops, contact of 1751 N/m): domain I")
 
 
 @pytest.mark.slow

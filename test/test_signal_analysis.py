@@ -15,7 +15,7 @@ from wam_analysis.measures.response import step_response
 from wam_analysis.measures.ripple import ripple_spectrum
 from wam_analysis.measures.runs import runs, without_short
 from wam_analysis.measures.stability import StabilityVerdict, half_cycle_peaks, stability
-from wam_analysis.measures.stick_slip_phases import stick_slip_phases
+from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
 
@@ -203,6 +203,23 @@ def test_sticks_and_slips_are_told_apart_and_chatter_is_bridged():
     assert (found.stuck, found.reversals) == (0.85, 1)
 
 
+@pytest.mark.parametrize("peak", [0.06, 0.08, 0.2])
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_a_slow_sine_turns_and_does_not_slip_and_one_with_stiction_does(peak: float, noise: float) -> None:
+    time = np.arange(20_000) / 1000.0
+    sine = peak * np.sin(2.0 * math.pi * time / 3.0)
+    stuck = np.where(time % 1.5 < 0.5, 0.0, sine)  # at rest for a third of each half
+    slips = []
+    for velocity in (sine, stuck):
+        noisy = velocity + draws(11, len(time), noise)
+        found = stick_slip_phases(noisy, rest=0.05, shortest=10)
+        assert len(found.slips) >= 12
+        slips.append(without_turns(found, noisy, 0.05))
+    assert (len(slips[0].slips), slips[0].reversals) == (1, 0)
+    assert slips[0].stuck < 0.05
+    assert len(slips[1].slips) >= 12
+
+
 def test_the_exact_staircase_of_stick_and_slip_is_found_again():
     node = FrictionNode(1.0, 1.0, 2.0, 2.0, 0.8, 1.0)
     trajectory = simulate(node, IntegralLoop(gain=0.05), force=0.5, until=400.0)
@@ -264,6 +281,24 @@ def test_what_one_short_motion_cannot_tell_has_an_error_that_says_so():
     found = identify_friction(time, velocity, torque, rest=0.05, window=0.02)
     assert abs(found.viscous - 0.012) > 0.002
     assert abs(found.viscous - 0.012) < 2.0 * found.viscous_error
+
+
+def test_three_stated_errors_hold_the_friction_under_a_disturbance_that_is_alike_for_long():
+    """A torque that wanders within some tenths of a second, as of creep or ripple; and two motions."""
+    off = []
+    for seed in range(12):
+        time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
+        kept = slice(0, 3_000)
+        wander = np.convolve(draws(100 + seed, len(time), 1.0), np.exp(-np.arange(1200) / 300.0), "same")
+        found = identify_friction(time[kept], velocity[kept], (torque + 0.003 * wander)[kept], 0.1, 0.02)
+        for value, error, truth in (
+            (found.dynamic, found.dynamic_error, 0.18),
+            (found.viscous, found.viscous_error, 0.012),
+            (found.inertia, found.inertia_error, 0.004),
+        ):
+            off.append(abs(value - truth) / error)
+    assert max(off) < 3.0, off
+    assert np.sqrt(np.mean(np.square(off))) > 0.1, "errors that hold everything say nothing"
 
 
 def test_impacts_do_not_spoil_the_friction():

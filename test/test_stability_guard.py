@@ -126,6 +126,7 @@ def test_a_set_beyond_the_margin_is_refused_with_the_numbers_and_the_old_one_sta
     for part in (
         "force_gain [0.5, 0.5, 0.5] is ",
         "times the largest linearly stable one",
+        "force along [0.343, 0, 0.939] in the base frame at 0.28 m of outer_link, posture [0, -1.8, 0, 1.45] rad",
         "domain beyond I",
         "allowed: ",
     ):
@@ -301,9 +302,13 @@ def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_bac
     own = replace(OWN, force_gain=(0.09,))
     loop = Loop(own)
     here = list(own.guard.posture)
+    assert loop.report.facts["margin here, assessed"].startswith("not assessed yet: it is while a force is commanded")
     assert follow(loop, here) == 1.0
+    assert loop.watch is not None
+    assert loop.report.facts["margin here"] == f"{loop.watch.scale:.4g}", "also where the factor stays"
     factor = follow(loop, STIFF_POSE)
     assert factor < 0.75
+    assert loop.report.facts["margin here, assessed"].startswith("posture [-0.5, -0.3, 0.3, 1.3] rad, when a force")
     assert f"gains scaled by {factor:.3g}:" in loop.report.message
     guard = StabilityGuard(ARM, SERVO, CLOCK, own.guard, own.sensing)
     task = loop_task(loop)

@@ -171,6 +171,7 @@ def test_a_callback_that_raises_is_a_bounded_fault_until_all_goes_well_again(ros
     answer = request(ros, Trigger, "clumsy/do")
     assert not answer.success
     assert "unexpected KeyError" in answer.message
+    assert f", at {__file__}:" in answer.message
 
 
 def test_a_message_that_is_handed_over_after_the_end_of_a_node_is_left_alone(ros: Any) -> None:

@@ -1,10 +1,12 @@
 """The stability guard's report on the parameters in force, as text and numbers."""
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from wam_control.guard_watch import Watch
-from wam_control.stability_guard import LARGEST, GuardAssessment
+from wam_control.stability_guard import LARGEST, GuardAssessment, posture_of
+
+UNKNOWN: Final = "not assessed yet: it is while a force is commanded; the margin is that of guard.posture"
 
 
 class Report(NamedTuple):
@@ -40,6 +42,9 @@ def report(assessment: GuardAssessment | None, watch: Watch | None, mode: str, i
         "domain": str(assessment.domain),
         "margin": _margin(assessment.scale),
         "margin here": _margin(here),
+        "margin here, assessed": f"{posture_of(watch.assessed[0])}, when a force was last commanded"
+        if watch.assessed
+        else UNKNOWN,
         "gain factor": f"{1.0 if mode == 'warn' else watch.factor:.4g}",
         "worst": assessment.where,
         f"effective stiffness [{force}/{length}]": f"{assessment.stiffness:.4g}",

@@ -102,8 +102,9 @@ class Supervision:
         watch = self.watch
         if watch is None:
             return 1.0, False
+        before = watch.assessed
         has_changed = watch.step(where, dt)
-        if has_changed:
+        if watch.assessed is not before:
             self._report()
         return 1.0 if self._parameters.guard.mode == "warn" else watch.factor, has_changed
 

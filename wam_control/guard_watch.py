@@ -35,6 +35,7 @@ class Watch:
     ----------
     factor : of the gains.
     scale : factor up to which the gains in force are linearly stable here; at first that of `found`.
+    assessed : contacts of the last assessment, none before the first; another list after each.
     """
 
     def __init__(self, guard: StabilityGuard, task: GuardedTask, found: GuardAssessment, is_scheduled: bool) -> None:
@@ -44,7 +45,7 @@ class Watch:
         self._tuned = found.scale or demanded
         # in domain II the margin is less than the fraction demands, and may stay so
         self._needed = min(self._tuned, demanded)
-        self._judged: list[GuardedContact] = []
+        self.assessed: list[GuardedContact] = []
         self._pending: list[GuardedContact] = []
         self._work: Iterator[float] | None = None
         self._least = math.inf
@@ -72,7 +73,7 @@ class Watch:
             self._least = min(self._least, next(self._work))
             return False
         except StopIteration:
-            self._work, self._judged, self.scale = None, self._pending, self._least
+            self._work, self.assessed, self.scale = None, self._pending, self._least
         before = self.factor
         allowed = self.scale / self._needed
         self.factor = min(allowed, self.scale / self._tuned) if self._is_scheduled else min(allowed, 1.0)
@@ -83,7 +84,7 @@ class Watch:
         return [part * top for part in (np.geomspace(0.01, 1.0, 12).tolist() if self._is_scheduled else PARTS)]
 
     def _is_new(self, contacts: Sequence[GuardedContact]) -> bool:
-        return len(contacts) != len(self._judged) or any(map(_is_apart, contacts, self._judged))
+        return len(contacts) != len(self.assessed) or any(map(_is_apart, contacts, self.assessed))
 
 
 def possible_contacts(guard: StabilityGuard, q: Sequence[float], cover: str, length: float) -> list[GuardedContact]:

@@ -7,11 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_control.friction_verdict import Domain, FrictionVerdict, friction_verdict
+from wam_control.stability_guard import rounded_down
 from wam_theory.linear_loop import damping_ratio, gain_ratio
 from wam_theory.stick_slip import FrictionNode, IntegralLoop
 
 LONGEST = 50  # periods of delay
 EVENTS = 40_000  # of a response: a fast loop has many samples before it rests, and here there is time
+CLOSE = 0.9  # of the margin; no plant is known better
+ASSUMED = "assumed: the motor follows its commanded velocity at once; the lag of a velocity loop leaves another margin"
 ABSURD = 1e12  # a number of the loop above it, or below its inverse but not 0, is a slip of the pen
 
 
@@ -51,6 +54,7 @@ class LoopDesign(NamedTuple):
             f"largest safe error: {verdict.stable_error:.4g}; the loop has {self.loop.error_limit:.4g}",
             f"limit cycle of stiction: {stiction}",
             f"figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
+            ASSUMED,
         ]
         if undecided > verdict.stable_error:
             lines.append(
@@ -59,10 +63,14 @@ class LoopDesign(NamedTuple):
             )
         if verdict.saturated_cycle:
             lines.append(f"limit cycle kept up by friction near the margin: {verdict.saturated_cycle:.3g} peak to peak")
+        lower = f"lower the gain to {rounded_down(CLOSE * verdict.margin):g}, {CLOSE:g} of the margin"
         if not self.is_safe:
-            saturate = f", or saturate the error at {verdict.stable_error:.3g}" if verdict.stable_error else ""
+            error = rounded_down(verdict.stable_error)
+            saturate = f", or saturate the error at {error:g}" if error else ""
             finding = "not shown to be safe" if self.loop.error_limit <= undecided else "not safe"
-            lines.append(f"{finding}: lower the gain to {verdict.margin:.3g}{saturate}")
+            lines.append(f"{finding}: {lower}{saturate}")
+        elif CLOSE < part <= 1.0:
+            lines.append(f"close to the margin: a plant a little other than the one given may be unstable; {lower}")
         return "\n".join(lines)
 
 

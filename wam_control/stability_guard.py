@@ -121,7 +121,7 @@ class GuardAssessment(NamedTuple):
     stable_error : largest saturation accepted, N or N m; infinite in domain I, 0 where none is.
     stiffness : k_tr k_c/(k_tr + k_c) at the contact or the joint, N/m or N m/rad.
     cycle : stiction limit cycle by (5.8) and (5.9).
-    where : the worst axis and contact.
+    where : the worst contact: joint or direction of the force, position and posture.
     reason : why the parameters are refused, '' if they are accepted.
     """
 
@@ -225,7 +225,8 @@ class StabilityGuard:
         name = max(cycles, key=lambda axis: cycles[axis].peak_to_peak)
         node = nodes[name]
         ktr, kc = node.transmission_stiffness, node.contact_stiffness
-        where = f"{name} at {contact.position:g} m of {contact.cover}"
+        what = name if task.is_joints else f"force along {_list(contact.direction)} in the base frame"
+        where = f"{what} at {contact.position:g} m of {contact.cover}, {posture_of(contact)}"
         domain = Domain.I if scale * self.parameters.stability_fraction >= 1.0 else Domain.BEYOND
         found = GuardAssessment(domain, scale, math.inf, float(series_stiffness(ktr, kc)), cycles[name], where, "")
         return found if domain is Domain.I else self._beyond(task, contact, found)
@@ -280,14 +281,14 @@ class StabilityGuard:
             allowed += f", or {group}_error_limit up to {rounded_down(error):g} at this gain (guard.mode limit sets it)"
         reason = (
             f"{group}_gain {_list(law.gain)} is {1.0 / max(found.scale, 1e-9):.3g} times the largest linearly stable "
-            f"one (axis {found.where}, contact up to {self.parameters.contact_stiffness:g} N/m), "
+            f"one ({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m), "
             f"of which guard.stability_fraction, {share:g}, is accepted: domain {domain}; "
             f"allowed: {allowed}; lower one of them or guard.contact_stiffness"
         )
         if not found.scale:
             reason = (
                 f"{group}_gain {_list(law.gain)} is not stable, nor is a hundredth of it "
-                f"(axis {found.where}, contact up to {self.parameters.contact_stiffness:g} N/m); lower posture_gain, "
+                f"({found.where}, contact up to {self.parameters.contact_stiffness:g} N/m); lower posture_gain, "
                 f"{group}_proportional_gain or guard.contact_stiffness"
             )
         return found._replace(reason=reason)
@@ -359,8 +360,13 @@ def rounded_up(value: float) -> float:
     return math.ceil(value / digit) * digit
 
 
+def posture_of(contact: GuardedContact) -> str:
+    """The posture of a contact in words."""
+    return f"posture {_list(contact.q)} rad"
+
+
 def _list(values: Sequence[float]) -> str:
-    return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"
+    return "[" + ", ".join(f"{0.0 if abs(value) < 1e-9 else value:.3g}" for value in values) + "]"
 
 
 def _triple(values: Array) -> tuple[float, float, float]:

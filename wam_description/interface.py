@@ -6,11 +6,13 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
+from wam_description.defects import Check, output_check
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError
+from wam_description.signals import BASE
 from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
-from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, raised
+from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, needed_arrays, raised
 
 
 @cache
@@ -62,7 +64,7 @@ class Interface:
         self, shared: Shared, replaced: dict[str, Any] | None = None, started_by_hand: Declaration | None = None
     ) -> None:
 
-        self._timing, self._ages = shared.timing, shared.ages
+        self._timing, self._ages, self._arm = shared.timing, shared.ages, shared.arm
         found = [declared(entry) for entry in shared.nodes]
         replaced = dict(replaced or {})
         self.declarations: dict[str, Declaration] = {}
@@ -115,6 +117,24 @@ class Interface:
             for one in self.declarations.values()
             for reaction in one.reactions
         )
+
+    def checks(self, declaration: Declaration) -> dict[str, Check]:
+        """What refuses an unusable output of a node of your own, by topic, where another node takes it.
+
+        The nodes of the stack are not looked at: the simulation would be slower by a twentieth.
+        """
+        found: dict[str, Check] = {}
+        if f"{declaration.node.__module__}:{declaration.node.__qualname__}" in NODES.values():
+            return found
+        for name in declaration.outputs:
+            taken = [item.arrays for one in self.declarations.values() for item in one.taken if item.topic == name]
+            taken += ["effort" for one in self.declarations.values() if name in one.listens]  # the driver, currents
+            topic = self.topics.get(name)
+            if topic is not None and topic.is_numbers and taken:
+                names = self._arm.motors.names if topic.side == "motors" else self._arm.joints.names
+                frames = (BASE, *self._arm.covers.names)
+                found[name] = output_check(declaration.name, topic, names, frames, needed_arrays(taken))
+        return found
 
     def feeds(self, declaration: Declaration, node: Any) -> dict[str, list["Feed"]]:
         """What a node does with each topic that it listens to on this arm.

@@ -69,6 +69,27 @@ class Input(NamedTuple):
     age: str = "feedback"
     absent: str = "zero"
 
+    def check(self) -> None:
+        """Refuse what is no input: an array given as `delayed`, a word that means nothing.
+
+        Raises
+        ------
+        TypeError
+            names the input and what is allowed.
+        """
+        if self.delayed not in (True, False):
+            meant = f"Input('{self.topic}', '{self.arrays} {self.delayed}')"
+            raise TypeError(f"{self}: delayed must be True or False; name several arrays in one text: {meant}")
+        allowed = {
+            "arrays": {text for name in State._fields for text in (name, f"{name}?")},
+            "age": {"feedback", "command"},
+            "absent": {"zero", "hold", "brake"},
+        }
+        for name, words in allowed.items():
+            for word in getattr(self, name).split():
+                if word not in words:
+                    raise TypeError(f"{self}: {name} has '{word}'; allowed: {', '.join(sorted(words))}")
+
 
 class Reaction(NamedTuple):
     """One kind of step: the trigger that starts it, the other inputs, the topics that it may publish."""
@@ -191,10 +212,14 @@ class Declaration(NamedTuple):
                 )
 
     @property
+    def taken(self) -> tuple[Input, ...]:
+        """Every input of its steps."""
+        return tuple(item for reaction in self.reactions for item in (reaction.trigger, *reaction.inputs))
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         """Every topic that the node listens to, without status."""
-        taken = (item.topic for reaction in self.reactions for item in (reaction.trigger, *reaction.inputs))
-        return tuple(dict.fromkeys([*self.listens, *taken]))
+        return tuple(dict.fromkeys([*self.listens, *(item.topic for item in self.taken)]))
 
 
 def raised(error: Exception) -> str:
@@ -233,6 +258,8 @@ def reaction(
     outputs : topics that the step may publish.
     thinned : whether only triggers at the start of an outer period start a step.
     """
+    for item in (trigger, *inputs):
+        item.check()
 
     def declare(method: Method) -> Method:
         method.__dict__["reaction"] = Reaction(trigger, inputs, outputs, thinned, method.__name__)

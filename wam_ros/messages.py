@@ -5,7 +5,6 @@ import struct
 from array import array
 from collections.abc import Callable, Sequence
 from functools import cache
-from math import isfinite, isinf, isnan
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -17,18 +16,17 @@ from trajectory_msgs.msg import JointTrajectory
 
 from wam_bag.printable import printable
 from wam_description.arm import Shared
+from wam_description.defects import point_defect, state_defect, table_defect, wrench_defect
 from wam_description.signals import BASE, NodeStatus, PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.status import pairs, parse
 from wam_description.topics import (
     JOINT_STATE,
     LARGEST,
-    LINK,
     POINT,
     TABLE,
     TRAJECTORY,
     WRENCH,
     Topic,
-    columns_of,
 )  # fmt: skip
 from wam_ros.header import header
 from wam_ros.markers import contact_markers
@@ -74,22 +72,16 @@ def read_joint_state(message: JointState, names: list[str], fields: str) -> Stat
     order = None
     if message.name != names:
         order = _order(list(message.name), names)
-    count = len(names)
-    wanted = fields.split()
-    arrays: list[list[float]] = []
-    for name in State._fields:
-        values = getattr(message, name).tolist()
-        if len(values) != count and (values or name in wanted):
-            raise Refused(f"{name} has {len(values)} values; send {count}, one for each of {', '.join(names)}")
-        for value, owner in zip(values, message.name, strict=False):
-            if not isfinite(value):
-                raise Refused(f"{name} of {owner} is {value}; send finite numbers")
-            if abs(value) > LARGEST[name]:
-                raise Refused(f"{name} of {owner} is {value:g}; {_allowed(LARGEST[name])}")
-        if not (name in wanted or name + "?" in wanted):
-            values = []
-        arrays.append([values[i] for i in order] if order and values else values)
-    return State(*arrays)
+    sent = State(*(getattr(message, name).tolist() for name in State._fields))
+    _require_usable(state_defect(sent, list(message.name), fields))
+    taken = fields.replace("?", "").split()
+    arrays = [values if name in taken else [] for name, values in zip(State._fields, sent, strict=True)]
+    return State(*([values[i] for i in order] if order and values else values for values in arrays))
+
+
+def _require_usable(defect: str) -> None:
+    if defect:
+        raise Refused(defect)
 
 
 def _order(found: list[str], names: list[str]) -> list[int]:
@@ -102,10 +94,6 @@ def _order(found: list[str], names: list[str]) -> list[int]:
         if name not in found:
             raise Refused(f"name '{name}' is missing; send all of {', '.join(names)}")
     return [found.index(name) for name in names]
-
-
-def _allowed(limit: float) -> str:
-    return f"no arm reaches that, send at most {limit:g}"
 
 
 def wrench_stamped(stamp: int, wrench: Wrench) -> WrenchStamped:
@@ -124,15 +112,9 @@ def read_wrench(message: WrenchStamped, frames: Sequence[str]) -> Wrench:
     Refused
         for a frame that is not one of `frames` or a number that is not finite.
     """
-    frame, force, torque = message.header.frame_id, message.wrench.force, message.wrench.torque
-    if frame not in frames:
-        raise Refused(f"frame_id is '{frame}'; allowed are {', '.join(frames)}")
-    result = Wrench(frame, (force.x, force.y, force.z), (torque.x, torque.y, torque.z))
-    if not all(isfinite(value) for value in (*result.force, *result.torque)):
-        raise Refused(f"force {result.force} N, torque {result.torque} N m; send finite numbers")
-    for name, unit, vector in (("force", "N", result.force), ("torque", "N m", result.torque)):
-        if (most := max(map(abs, vector))) > LARGEST[name]:
-            raise Refused(f"{name} has {most:g} {unit}; {_allowed(LARGEST[name])}")
+    force, torque = message.wrench.force, message.wrench.torque
+    result = Wrench(message.header.frame_id, (force.x, force.y, force.z), (torque.x, torque.y, torque.z))
+    _require_usable(wrench_defect(result, frames))
     return result
 
 
@@ -151,15 +133,10 @@ def read_point(message: PointStamped, frames: Sequence[str]) -> Point:
     Refused
         for a frame that is not one of `frames` or a coordinate that is infinite.
     """
-    frame, point = message.header.frame_id, message.point
-    if frame not in frames:
-        raise Refused(f"frame_id is '{frame}'; allowed are {', '.join(frames)}")
-    position = (float(point.x), float(point.y), float(point.z))
-    if any(isinf(value) for value in position):
-        raise Refused(f"position is {position} m; send finite numbers, or NaN where it is not known")
-    if any(abs(value) > LARGEST["point"] for value in position):
-        raise Refused(f"position is {position} m; {_allowed(LARGEST['point'])}, or NaN where it is not known")
-    return Point(frame, position)
+    point = message.point
+    result = Point(message.header.frame_id, (float(point.x), float(point.y), float(point.z)))
+    _require_usable(point_defect(result, frames))
+    return result
 
 
 def table(stamp: int, columns: Sequence[str], value: Table) -> PointCloud2:
@@ -192,8 +169,6 @@ def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[st
         for a frame that is not one of `frames`, other columns, a wrong size or a number that is infinite.
     """
     frame, step = message.header.frame_id, 8 * len(columns)
-    if frame not in frames:
-        raise Refused(f"frame_id is '{frame}'; allowed are {', '.join(frames)}")
     if message.is_bigendian or message.fields != _fields(tuple(columns)):
         given = ", ".join(field.name for field in message.fields[:40])
         raise Refused(f"fields are {given or 'none'}; send little-endian float64 fields {', '.join(columns)}")
@@ -201,18 +176,9 @@ def read_table(message: PointCloud2, columns: Sequence[str], frames: Sequence[st
     if message.point_step != step or len(data) != step * message.width * message.height:
         raise Refused(f"{len(data)} bytes of data; {message.width * message.height} rows need {step} bytes each")
     rows = tuple(struct.iter_unpack(f"<{len(columns)}d", data))
-    if any(isinf(value) for row in rows for value in row):
-        raise Refused("a number is infinite; send finite numbers, or NaN where one is not known")
-    for row in rows:
-        for (name, largest, may_be_unknown), value in zip(columns_of(tuple(columns)), row, strict=True):
-            if isnan(value) and not may_be_unknown:
-                raise Refused(f"{name} is nan; send a finite number")
-            if abs(value) > largest:
-                raise Refused(f"{name} is {value:g}; {_allowed(largest)}, or NaN where it is not known")
-    for link in (row[0] for row in rows if columns[0] == LINK):
-        if link not in range(len(frames) - 1):
-            raise Refused(f"link is {link}; send the index of one of {', '.join(frames[1:])}")
-    return Table(frame, rows)
+    result = Table(frame, rows)
+    _require_usable(table_defect(result, columns, frames))
+    return result
 
 
 def read_trajectory(message: JointTrajectory, names: list[str]) -> PosturePath:

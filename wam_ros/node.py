@@ -75,6 +75,7 @@ class AdaptedNode(TolerantNode):
                 self, followed.node, group, self.node.retune, f"{followed.group}.", self._warn, self._report_change
             )
         interface = Interface(shared, started_by_hand=declaration)
+        self._checks = interface.checks(declaration)
         self._ports = Ports(self, declaration, shared, interface)
         self._waiting: deque[Callable[[], None]] = deque()  # what follows a request that is under way
         self._asking = False
@@ -226,6 +227,8 @@ class AdaptedNode(TolerantNode):
             elif topic not in self._outputs:
                 self._declaration.require_declared(outputs)
             else:
+                if (check := self._checks.get(topic)) is not None:
+                    check(value)
                 self._ports.publish(topic, stamp, value)
         if self._ports.report_due(stamp):
             if diagnostics := getattr(self.node, "diagnostics", None):
@@ -236,6 +239,8 @@ class AdaptedNode(TolerantNode):
         self._ports.set_status(status)
         if status.level is Level.ERROR:
             self.get_logger().error(status.message)
+        elif status.level is Level.WARN:
+            self.get_logger().warning(status.message)
         elif status.step:
             self.get_logger().info(f"{stamp / SECOND:6.2f} s  {status.step}")
 

@@ -14,6 +14,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from wam_bag.printable import printable
+from wam_description.defects import UnusableOutput
+from wam_description.wiring import raised
 
 HELD: Final = 1.0  # s without a further exception, after which a fault is over
 LONGEST: Final = 300  # characters of an exception that are reported
@@ -135,13 +137,19 @@ class TolerantNode(Node):
         self._exception_time = time.monotonic()
         if self._exception_fault:
             return
-        text = printable(f"{type(error).__name__}: {error}", LONGEST)
-        self._exception_fault = f"unexpected {text}, at {what}; please report it with the log of node {self.get_name()}"
+        self._exception_fault = printable(self._described(what, error), LONGEST)
         trace = printable("".join(traceback.format_exception(error)[-8:]), 20 * LONGEST, "\n")
         self.get_logger().error(f"{self._exception_fault} ({self._exceptions} so far)\n{trace}")
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._exception_timer = super().create_timer(HELD, self._look_for_end, clock=steady)
         self.take_fault(self._exception_fault)
+
+    def _described(self, what: str, error: Exception) -> str:
+        """What a callback raised, with the line of the code, and what to do."""
+        if isinstance(error, UnusableOutput):
+            return error.what
+        text = raised(error)
+        return f"unexpected {text}, at {what}; correct it, or report it with the log of node {self.get_name()}"
 
     def _look_for_end(self) -> None:
         """Report that the fault is over, when callbacks have gone well for a while."""

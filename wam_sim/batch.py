@@ -5,6 +5,7 @@ equal bit for bit on every executor.
 """
 
 import importlib
+import logging
 import multiprocessing
 import os
 import signal
@@ -150,6 +151,7 @@ def _worker(end: Connection) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+    logging.getLogger("wam_sim").setLevel(logging.ERROR)  # nobody reads the warnings of hundreds of runs
 
 
 @contextmanager

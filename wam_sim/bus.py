@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from wam_description.defects import Check
 from wam_description.interface import Feed
 from wam_description.signals import Point, State, Table, Wrench
 from wam_description.synchroniser import Inlet, Inputs
@@ -32,7 +33,7 @@ class Bus:
 
     def __init__(self, topics: Mapping[str, Topic]) -> None:
         writes = {name: _WRITES.get(topic.type) for name, topic in topics.items()}
-        self._routes = {name: _Route(_Log(write) if write else None, []) for name, write in writes.items()}
+        self._routes = {name: _Route(_Log(write) if write else None, [], None) for name, write in writes.items()}
         self._rows: Rows = {}
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
@@ -44,13 +45,23 @@ class Bus:
 
         self._routes[topic].takers.append(_Taker(inlet, None, _nothing, {}))
 
-    def connect(self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]]) -> None:
-        """Connect the reactions of a node; when several take one topic, all work before the first publishes."""
+    def connect(
+        self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]], checks: Mapping[str, Check]
+    ) -> None:
+        """Connect the reactions of a node; when several take one topic, all work before the first publishes.
+
+        Parameters
+        ----------
+        declaration : of the node.
+        feeds : its reactions to each topic.
+        checks : what refuses an unusable output, by topic.
+        """
         outlets = _Outlets(declaration)
         for name in declaration.outputs:
-            outlets[name] = self._routes.setdefault(name, _Route(None, []))
+            route = self._routes.setdefault(name, _Route(None, [], None))
+            outlets[name] = route._replace(check=checks.get(name))
         for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
-            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(None, []))
+            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(None, [], None))
         for topic, found in feeds.items():
             reactions = [(feed.synchroniser.inlet(topic), mask(feed.arrays), feed.work) for feed in found]
             if len(reactions) > 1:
@@ -63,18 +74,21 @@ class Bus:
         self._deliver(self._routes[topic], stamp, value)
 
     def _deliver(self, route: "_Route", stamp: int, value: Any) -> None:
-        log, takers = route
+        log, takers, _ = route
         if log is not None:
             log.add(stamp, value)
         for inlet, masked, work, outlets in takers:
             for inputs in inlet(stamp, masked(value) if masked else value):
                 for name, output in work(inputs).items():
-                    self._deliver(outlets[name], inputs.stamp, output)
+                    outlet = outlets[name]
+                    if outlet.check is not None:
+                        outlet.check(output)
+                    self._deliver(outlet, inputs.stamp, output)
 
     @property
     def rows(self) -> Rows:
         """What was published on each topic of numbers so far; a JointState as position, velocity and effort."""
-        for name, (log, _) in self._routes.items():
+        for name, (log, *_) in self._routes.items():
             if log is not None and (new := log.take()):
                 self._rows.setdefault(name, []).extend(new)
         return self._rows
@@ -122,10 +136,11 @@ class _Log:
 
 
 class _Route(NamedTuple):
-    """One topic: its numbers, where it carries any, and who takes it."""
+    """One topic: its numbers, where it carries any, who takes it, and what refuses an unusable output."""
 
     log: _Log | None
     takers: list["_Taker"]
+    check: Check | None
 
 
 class _Taker(NamedTuple):

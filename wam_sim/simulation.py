@@ -4,6 +4,7 @@ The nodes are those of the configuration, connected by topics as in lockstep: wh
 topic goes through the input synchroniser of every reaction that takes it.
 """
 
+import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -16,9 +17,15 @@ from wam_description.interface import Interface
 from wam_description.parameters import ParameterError, build
 from wam_description.signals import BASE, Level, NodeStatus, Point, State, Wrench
 from wam_description.synchroniser import Inputs, Synchroniser
+from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Outputs, SetParameters
 from wam_driver.driver import Driver, DriverParameters
 from wam_sim.bus import Bus, Rows, of_node
+
+
+def _warn(node: str, status: NodeStatus) -> None:
+    if status.level is Level.WARN:
+        logging.getLogger("wam_sim").warning("warning: %s: %s", node, status.message)
 
 
 class Simulation:
@@ -84,7 +91,8 @@ class Simulation:
         self._synchronisers.update(feed.synchroniser for found in feeds.values() for feed in found)
         if hasattr(node, "requests"):
             feeds = {t: [feed._replace(work=self._requesting(node, feed.work)) for feed in feeds[t]] for t in feeds}
-        self._bus.connect(declaration, feeds)
+        self._bus.connect(declaration, feeds, self._interface.checks(declaration))
+        self.listen(STATUS, lambda _, status: _warn(name, status), name)
 
     def _requesting(self, node: Any, work: Callable[[Inputs], Outputs]) -> Callable[[Inputs], Outputs]:
         """The step of a node together with its requests to others."""

@@ -43,8 +43,10 @@ def contact_section(recording: AnalysedRun) -> Section:
         off = float(np.median(force)) if len(force) else math.nan
         findings += [
             Finding("contact on the right link", "%", right),
-            Finding("position error, median", "cm", away),
-            Finding("force error, median", "N", off),
+            Finding("position error, median", "cm", away, note="along the link, without its sign"),
+            Finding(
+                "size of the force error, median", "N", off, note="of the vector: the norm of its three components"
+            ),
         ]
         verdict.append(f"Contact: on the right link {right:.0f} % of the time{_errors(away, off)}.")
     if np.any(known):
@@ -63,5 +65,6 @@ def contact_section(recording: AnalysedRun) -> Section:
 
 
 def _errors(away: float, off: float) -> str:
-    known = [shown(value, unit) for value, unit in ((away, "cm"), (off, "N")) if math.isfinite(value)]
+    named = ((away, "cm", "of the position"), (off, "N", "of the force vector, its size"))
+    known = [f"{shown(value, unit)} {what}" for value, unit, what in named if math.isfinite(value)]
     return f"; median errors {' and '.join(known)}" if known else ""

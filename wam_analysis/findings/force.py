@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wam_analysis.findings.analysed_run import AnalysedRun
-from wam_analysis.findings.finding import Finding, Section, shown
+from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.guarded import Guarded
 from wam_analysis.findings.guarded import sentence as guard_sentence
 from wam_analysis.findings.held_force import CYCLING, HeldForce
@@ -18,6 +18,7 @@ from wam_analysis.measures.stability import StabilityVerdict
 from wam_control.stability_guard import LARGEST
 
 SURE = 0.8  # confidence from which a limit cycle is reported as one
+UNLIKE = "The prediction leaves out friction, inertia and feed-forward."
 SEEN = 0.02  # of the force; a smaller cycle is not reported
 
 
@@ -32,7 +33,9 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
         sentences.append("No constant force was commanded.")
     range_said, range_findings = _dynamic_range(held)
     verdict = _forces_verdict(held)
-    return Section("force", "Force", (*sentences, *range_said), (*findings, *range_findings), lacking, verdict)
+    flagged = [f"{text} {UNLIKE}" for text in deviations(tuple(findings))]
+    every = (*findings, *range_findings)
+    return Section("force", "Force", (*sentences, *flagged, *range_said), every, lacking, verdict)
 
 
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
@@ -123,13 +126,13 @@ def _press_findings(one: HeldForce) -> list[Finding]:
     else:
         rise, note = math.nan, ""
     if response is not None:
-        rose, over, why = response.rise, 100.0 * response.overshoot, ""
+        rose, late, over, why = response.rise, response.rise_error, 100.0 * response.overshoot, ""
         if math.isfinite(one.touched):
-            rose = over = math.nan
+            rose = late = over = math.nan
             why = f"not measured: it {_touched(one)}"
         since = "from the touch-down" if one.touched > 0.0 else ""
         found += [
-            Finding(f"{name}: rise time 10-90 %", "s", rose, rise, "; ".join(filter(None, (why, note)))),
+            Finding(f"{name}: rise time 10-90 %", "s", rose, rise, "; ".join(filter(None, (why, note))), late),
             Finding(f"{name}: settling time to 5 %", "s", response.settling, note=since),
             Finding(f"{name}: overshoot", "%", over, note=why),
         ]
@@ -262,10 +265,14 @@ def _theory_findings(one: HeldForce, seen: set[str]) -> list[Finding]:
         Finding(f"{name}: actuator cycle at the contact, peak to peak", "mm", moved, actuator, "(5.20)"),
         Finding(f"{name}: gamma", "", math.nan, predicted.gamma, f"(5.15), {ideal}"),
         Finding(
-            f"{name}: largest stable gain, continuous", "m/s/N", math.nan, predicted.routh_gain, f"(5.15), {ideal}"
+            f"{name}: largest stable gain, ideal velocity source, continuous",
+            "m/s/N",
+            math.nan,
+            predicted.routh_gain,
+            f"(5.15), {ideal}",
         ),
         Finding(
-            f"{name}: largest stable gain, as sampled",
+            f"{name}: largest stable gain, ideal velocity source, sampled",
             "m/s/N",
             math.nan,
             predicted.sampled_gain,
@@ -282,6 +289,6 @@ def _margin_findings(name: str, found: Guarded | None) -> list[Finding]:
     note = f"domain {found.assessment.domain}; stability guard, contact of {shown(found.surface, 'N/m')}"
     sentences = [Finding(f"{name}: gain margin, up to {LARGEST:g}", "", math.nan, scale, note)]
     if scale < LARGEST:
-        label = f"{name}: largest stable gain, with the velocity loops"
+        label = f"{name}: largest stable gain, real velocity loops, sampled"
         sentences.append(Finding(label, "m/s/N", math.nan, scale * found.gain, "sampled; no friction"))
     return sentences

@@ -13,7 +13,7 @@ from wam_analysis.findings.power import power_section
 from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals, transmission_signals
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
-from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases
+from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 from wam_description.arm import Arm
 from wam_description.effects import Effects
 
@@ -103,6 +103,7 @@ def _stick_section(recording: AnalysedRun) -> Section:
             if len(velocity) < 10:
                 continue
             phases = stick_slip_phases(velocity, rest, max(1, round(SHORTEST / period)))
+            phases = without_turns(phases, velocity, rest)
             findings += [
                 Finding(f"{name}: at rest", "%", 100.0 * phases.stuck, note=f"slower than {rest:g} rad/s"),
                 Finding(
@@ -120,6 +121,8 @@ def _stick_section(recording: AnalysedRun) -> Section:
 def _stick_sentence(name: str, phases: Phases) -> str:
     if not len(phases.slips):
         return f"{name}: never moved."
+    if not len(phases.sticks):
+        return f"{name}: always in motion."
     return f"{name}: at rest for {100.0 * phases.stuck:.0f} % of the time, slipped {times(len(phases.slips))}."
 
 
@@ -196,7 +199,7 @@ def _friction_section(
 def _breakaway(found: Friction) -> str:
     if not math.isfinite(found.static):
         return "no breakaway"
-    return f"breakaway {_known(found.static, found.static_error if found.breakaways > 1 else math.nan, 'N m')}"
+    return f"breakaway {_known(found.static, found.static_error, 'N m')}"
 
 
 def _known(value: float, error: float, unit: str) -> str:
@@ -238,9 +241,8 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
         measured = value if identified else math.nan
         return Finding(f"{name}: {kind} friction", unit, measured, predicted, text, error if identified else math.nan)
 
-    several = found.static_error if found.breakaways > 1 else math.nan
     return [
-        one("static", "N m", found.static, several, static, f"{found.breakaways} breakaways"),
+        one("static", "N m", found.static, found.static_error, static, f"{found.breakaways} breakaways"),
         one("dynamic", "N m", found.dynamic, found.dynamic_error, dynamic),
         one("viscous", "N m s/rad", found.viscous, found.viscous_error, viscous),
     ]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.foreign.sources import FEWEST, Piece, Source, differentiated, pieces, resolution
 from wam_analysis.measures.friction import Friction, identify_friction
-from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases
+from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
 
 Numbers = NDArray[np.float64]
 
@@ -57,6 +57,7 @@ def sticking(source: Source, command: Source | None) -> Sticking | None:
             lengths = np.diff(phases.sticks, axis=1)
             still += int(np.sum(lengths[lengths > BRIEF * np.median(np.diff(phases.slips, axis=1))]))
             continue
+        phases = without_turns(phases, piece.values["velocity"], rest)
         still += round(phases.stuck * len(piece.time))
         slips, reversals = slips + len(phases.slips), reversals + phases.reversals
         if command is not None:

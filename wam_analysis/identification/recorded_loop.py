@@ -9,6 +9,7 @@ import numpy as np
 from wam_analysis.findings.analysed_run import Hold, by_names
 from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.finding import shown
+from wam_analysis.findings.guarded import sentence
 from wam_analysis.findings.prediction import node_at
 from wam_analysis.foreign.mechanics import friction, is_sure
 from wam_analysis.foreign.reading import foreign_bag
@@ -27,8 +28,15 @@ class LoopNumber(NamedTuple):
     origin: str
 
 
-def recorded_loop(path: Path, given: TopicMap) -> dict[str, LoopNumber]:
-    """What a recording shows of a force loop, by the names of the options of `wam guard`.
+class RecordedLoop(NamedTuple):
+    """Numbers by the names of the options of `wam guard`; what the stack's own guard says of the loop, or ''."""
+
+    numbers: dict[str, LoopNumber]
+    guard: str
+
+
+def recorded_loop(path: Path, given: TopicMap) -> RecordedLoop:
+    """What a recording shows of a force loop.
 
     Of another robot it is inertia, damping, friction and rate of a joint, in N m and rad: the one that is given, else
     the only one that is identifiable.  Of this stack it is all of the loop at its largest held force, along the force,
@@ -65,9 +73,9 @@ def recorded_loop(path: Path, given: TopicMap) -> dict[str, LoopNumber]:
         values["damping"] = _identified(label, fit.viscous, fit.viscous_error)
     if is_sure(fit.inertia, fit.inertia_error):
         values["inertia"] = _identified(label, fit.inertia, fit.inertia_error)
-    if fit.breakaways > 1:
+    if fit.breakaways > 2:
         values["stiction"] = _identified(label, max(fit.static, fit.dynamic), fit.static_error)
-    return values
+    return RecordedLoop(values, "")
 
 
 def _identified(label: str, value: float, error: float) -> LoopNumber:
@@ -78,7 +86,7 @@ def _rate(joint: Source) -> LoopNumber:
     return LoopNumber(1.0 / float(np.median(np.diff(joint.time))), f"of the stamps of {joint.topic}")
 
 
-def _at_the_contact(path: Path, analysis: Analysis) -> dict[str, LoopNumber]:
+def _at_the_contact(path: Path, analysis: Analysis) -> RecordedLoop:
     """The node and the loop at the largest force that was held at a known pose against a known surface."""
     parameters = analysis.recording.parameters
     arm, loop, timing = parameters.arm, parameters.force_loop, parameters.timing
@@ -103,7 +111,7 @@ def _at_the_contact(path: Path, analysis: Analysis) -> dict[str, LoopNumber]:
     def along(values: Any) -> float:
         return float(np.broadcast_to(values, 3)[axis])
 
-    return {
+    numbers = {
         "inertia": LoopNumber(node.inertia, recorded),
         "damping": LoopNumber(node.damping, origin),
         "transmission": LoopNumber(node.transmission_stiffness, recorded),
@@ -116,6 +124,7 @@ def _at_the_contact(path: Path, analysis: Analysis) -> dict[str, LoopNumber]:
         "rate": LoopNumber(1e9 / timing.outer_period_ns, recorded),
         "delay": LoopNumber(timing.outer_delay * timing.period, recorded),
     }
+    return RecordedLoop(numbers, sentence(largest.guarded) if largest.guarded is not None else "")
 
 
 def _pose(analysis: Analysis, arm: Arm, hold: Hold) -> list[float] | None:

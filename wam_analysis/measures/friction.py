@@ -15,6 +15,9 @@ Mask = NDArray[np.bool_]
 FEWEST = 20  # samples in motion that are needed
 STILL = 0.01  # of the speed of rest: below it the shaft has not begun to move
 PRECISE = 0.01  # of the torque: noise at a breakaway after the line
+SIGMAS = 3.0  # standard errors that are meant to hold the truth
+FREEDOM = 2.0  # least degrees of freedom: with fewer, an error could be anything
+NEGLECTED = 2e-3  # of a number: what the averaged law neglects, where a recording without noise leaves no error
 JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
 
 
@@ -29,7 +32,8 @@ class Friction(NamedTuple):
     viscous : torque per velocity.
     inertia : torque per acceleration.
     offset : torque that does not change its sign.
-    static_error, dynamic_error, viscous_error, inertia_error : standard errors of the first four.
+    static_error, dynamic_error, viscous_error, inertia_error : standard errors of the first four; three of them hold
+        the truth also where there are few breakaways or motions.  NaN of fewer than three breakaways.
     breakaways : their number.
     residual : rms of the averaged torque that the fit in motion leaves.
     """
@@ -98,7 +102,10 @@ def identify_friction(
     else:
         statics = statics[:0]  # it never slid: what ended its rest was no breakaway
     static = float(np.median(statics)) if len(statics) else math.nan
-    error = 1.4826 * float(np.median(np.abs(statics - static))) / math.sqrt(len(statics)) if len(statics) else math.nan
+    error = math.nan
+    if len(statics) > 2:
+        spread = 1.4826 * float(np.median(np.abs(statics - static)))
+        error = math.hypot(_few(len(statics) - 1.0) * spread / math.sqrt(len(statics)), NEGLECTED * static)
     return Friction(
         static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics), left
     )
@@ -137,9 +144,10 @@ def _robust(
 ) -> tuple[tuple[float, ...], tuple[float, ...], float]:
     """Least squares without outliers, standard errors, rms of the rest; a column without information gives NaN.
 
-    The averages of `width` samples overlap, so the errors count one sample in `width`.  What the law leaves out, such
-    as creep of the cables, is similar within a motion and not noise: if the halves of motions, numbered by `half`,
-    differ by more than the noise explains, their difference is the error (jackknife).
+    The averages of `width` samples overlap, so the errors count at most one sample in `width`, and fewer where what is
+    left over is alike for longer.  What the law leaves out, such as creep of the cables, is similar within a motion and
+    not noise: if the halves of motions, numbered by `half`, differ by more than the noise explains, their difference is
+    the error (jackknife).
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     both = bool(np.ptp(columns[:, 0]) > 0.0)  # one direction only: dry friction and offset look the same
@@ -156,12 +164,28 @@ def _robust(
         sd = 1.4826 * float(np.median(np.abs(rest[keep] - middle)))
         keep = np.abs(rest - middle) <= max(JUMP * sd, 1e-12)
     a = columns[keep][:, used] / scale[used]
-    freedom = max(len(a) / width - len(used), 1.0)
+    alike = max(float(width), _correlation_length(rest[keep]))
+    freedom = max(len(a) / alike - len(used), FREEDOM)
     covariance = np.linalg.pinv(a.T @ a) * float(np.sum(rest[keep] ** 2)) / freedom
+    noisy = _few(freedom) * np.sqrt(np.diag(covariance))
     found, errors = np.full(len(scale), math.nan), np.full(len(scale), math.nan)
     found[used] = solution / scale[used]
-    errors[used] = np.maximum(np.sqrt(np.diag(covariance)), _disagreement(a, wanted[keep], half[keep])) / scale[used]
+    errors[used] = np.maximum(noisy, _disagreement(a, wanted[keep], half[keep])) / scale[used]
+    errors = np.hypot(errors, NEGLECTED * found)
     return tuple(found.tolist()), tuple(errors.tolist()), float(np.sqrt(np.mean(rest[keep] ** 2)))
+
+
+def _correlation_length(rest: Numbers) -> float:
+    """Samples in which a sequence says one new thing: the sum of its autocorrelation up to its first zero."""
+    rest = rest - np.mean(rest)
+    power = float(rest @ rest)
+    if not power > 0.0:
+        return 1.0
+    n = len(rest)
+    transform = np.fft.rfft(rest, 2 * n)
+    correlation = np.fft.irfft(transform * transform.conj(), 2 * n)[:n] / power
+    ends = np.flatnonzero(correlation <= 0.0)
+    return 2.0 * float(np.sum(correlation[: ends[0] if len(ends) else n])) - 1.0
 
 
 def _halves(rows: NDArray[np.intp]) -> NDArray[np.int64]:
@@ -182,8 +206,18 @@ def _disagreement(columns: Numbers, wanted: Numbers, half: NDArray[np.int64]) ->
             found.append(solution)
     if len(found) < 2:
         return np.zeros(columns.shape[1])
-    result: Numbers = np.sqrt((len(found) - 1) * np.var(found, axis=0))
+    result: Numbers = _few(len(found) - 1.0) * np.sqrt((len(found) - 1) * np.var(found, axis=0))
     return result
+
+
+def _few(freedom: float) -> float:
+    """Factor on a standard error from few values, by which three of them are exceeded as rarely as with many.
+
+    Student's t by the approximation of Wallace (1959), at most 7 % too large from three degrees of freedom on.
+    """
+    n = max(freedom, FREEDOM)
+    deviate = SIGMAS * (8.0 * n + 3.0) / (8.0 * n + 1.0)
+    return math.sqrt(n * math.expm1(deviate**2 / n)) / SIGMAS
 
 
 def _breakaways(velocity: Numbers, torque: Numbers, rest: float, window: int, allowed: Mask) -> Numbers:

@@ -26,6 +26,7 @@ class StepResponse(NamedTuple):
     overshoot : largest excess over `final` as a fraction of the step, 0 if there is none.
     peak_time : of the largest excess, s; NaN if there is none.
     ripple : half of the range in the steady end.
+    rise_error : of `rise`, s: a sample, and the ripple over the slope of the rise.
     """
 
     final: float
@@ -34,6 +35,7 @@ class StepResponse(NamedTuple):
     overshoot: float
     peak_time: float
     ripple: float
+    rise_error: float
 
 
 def step_response(time: Numbers, value: Numbers, begin: float, steady: float, band: float) -> StepResponse:
@@ -74,13 +76,16 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
         settling = math.inf  # what leaves the band in the steady end has not settled, wherever the recording stops
     else:
         settling = _between(time, np.abs(part - 1.0), int(outside[-1]), band)
+    ripple = float(np.ptp(tail)) / 2.0
+    period = float(time[-1] - time[0]) / (len(time) - 1)
     return StepResponse(
         final=final,
         rise=high - low,
         settling=settling,
         overshoot=peak,
         peak_time=at,
-        ripple=float(np.ptp(tail)) / 2.0,
+        ripple=ripple,
+        rise_error=math.hypot(period, (high - low) * ripple / (0.8 * abs(step))),
     )
 
 

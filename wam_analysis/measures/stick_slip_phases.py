@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from wam_analysis.measures.runs import runs, without_short
 
 Numbers = NDArray[np.float64]
+PASSING = 0.25  # of the speed of rest; a shaft whose median speed in a rest is above it passes through zero
 Rows = NDArray[np.int64]
 
 
@@ -57,3 +58,37 @@ def stick_slip_phases(velocity: Numbers, rest: float, shortest: int) -> Phases:
         stuck=float(np.mean(still)) if len(still) else 0.0,
         reversals=int(np.sum(directions[1:] * directions[:-1] < 0.0)),
     )
+
+
+def without_turns(phases: Phases, velocity: Numbers, rest: float) -> Phases:
+    """The phases without the rests in which a smooth motion only turns back or is slow, as a slow sine does.
+
+    Such a motion passes through the speeds of rest evenly, or does not come near zero; a shaft that sticks is at zero
+    for most of the time.
+
+    Parameters
+    ----------
+    phases : of this velocity.
+    velocity : (n,), rad/s or m/s.
+    rest : speed up to which it was counted as at rest.
+    """
+    ends = dict(zip(phases.slips[:, 1].tolist(), phases.directions.tolist(), strict=True))
+    begins = dict(zip(phases.slips[:, 0].tolist(), phases.directions.tolist(), strict=True))
+    turns = np.array(
+        [
+            a in ends
+            and b in begins
+            and np.percentile(np.abs(velocity[a:b]), 50.0 if ends[a] != begins[b] else 5.0) > PASSING * rest
+            for a, b in phases.sticks.tolist()
+        ],
+        dtype=np.bool_,
+    )
+    if not np.any(turns):
+        return phases
+    still = np.zeros(len(velocity), dtype=np.bool_)
+    for a, b in phases.sticks[~turns]:
+        still[a:b] = True
+    sticks, slips = runs(still), runs(~still)
+    first = np.array([begins[a] for a, _ in slips.tolist()])
+    last = np.array([ends[b] for _, b in slips.tolist()])
+    return Phases(sticks, slips, first, float(np.mean(still)), int(np.sum(first[1:] * last[:-1] < 0.0)))

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from wam_analysis.findings.finding import shown
-from wam_analysis.identification.recorded_loop import LoopNumber, recorded_loop
+from wam_analysis.identification.recorded_loop import LoopNumber, RecordedLoop, recorded_loop
 from wam_cli.commands import (
     at_least,
     configuration_of,
@@ -97,8 +97,10 @@ def _assess_configuration(configuration: Configuration) -> int:
 def _assess(given: argparse.Namespace) -> int:
     if given.picture:
         writable_file("--picture", given.picture)
-    known = recorded_loop(given.bag, topic_map_of(given)) if given.bag else {}
-    known |= {name: LoopNumber(value, "given") for name in NUMBERS if (value := getattr(given, name)) is not None}
+    recorded = recorded_loop(given.bag, topic_map_of(given)) if given.bag else RecordedLoop({}, "")
+    known = recorded.numbers | {
+        name: LoopNumber(value, "given") for name in NUMBERS if (value := getattr(given, name)) is not None
+    }
     if missing := [name for name in PLANT if name not in known]:
         raise ValueError(
             f"--{missing[0]} is missing, {PLANT[missing[0]]}; "
@@ -114,6 +116,8 @@ def _assess(given: argparse.Namespace) -> int:
     plant = value["inertia"], value["damping"], value["transmission"], value["contact"], value["friction"], stiction
     design = loop_design(FrictionNode(*plant), loop, value["rate"], value["delay"])
     print(design.text())
+    if recorded.guard:
+        print(f"\nAs it was recorded, with its velocity loops, which is what counts on that arm:\n{recorded.guard}")
     if given.picture:
         draw(design, given.picture)
     return int(not design.is_safe)

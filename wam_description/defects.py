@@ -1,0 +1,125 @@
+"""What makes a value of a topic unusable: wrong lengths, numbers that are not finite or that no arm reaches.
+
+Messages that come over topics and what a node returns are refused for the same reasons, in the same words.
+"""
+
+from collections.abc import Callable, Sequence
+from math import isfinite, isinf, isnan
+from typing import Any
+
+from wam_description.signals import Point, State, Table, Wrench
+from wam_description.topics import JOINT_STATE, LARGEST, LINK, POINT, TABLE, WRENCH, Topic, columns_of
+
+Check = Callable[[Any], None]  # raises UnusableOutput
+_KINDS: dict[str, Any] = {JOINT_STATE: State, WRENCH: Wrench, POINT: Point, TABLE: Table}
+
+
+class UnusableOutput(ValueError):
+    """A step returned a value that no other node could use; the text names node, topic, value and what is allowed."""
+
+    def __init__(self, node: str, topic: str, defect: str) -> None:
+        self.what = f"unusable {topic}: {defect}"
+        super().__init__(f"node '{node}' returned an {self.what}")
+
+
+def output_check(node: str, topic: Topic, names: Sequence[str], frames: Sequence[str], arrays: str) -> Check:
+    """What refuses an unusable output of a node.
+
+    Parameters
+    ----------
+    node : its name.
+    topic : row of the table of topics, of one of the types that carry numbers.
+    names : of motors or joints, in the order of the numbers of a JointState.
+    frames : that a force, a point or a table may have.
+    arrays : of a JointState, the arrays that must be filled; one with a '?' may be empty.
+    """
+    kind = _KINDS[topic.type]
+    look: Callable[[Any], str] = {
+        JOINT_STATE: lambda value: state_defect(value, names, arrays),
+        WRENCH: lambda value: wrench_defect(value, frames),
+        POINT: lambda value: point_defect(value, frames),
+        TABLE: lambda value: table_defect(value, topic.columns, frames),
+    }[topic.type]
+
+    def check(value: Any) -> None:
+        try:
+            defect = look(value) if isinstance(value, kind) else f"{value!r} is no {kind.__name__}; return one"
+        except (TypeError, ValueError) as error:
+            defect = f"{value} does not hold numbers: {error}"
+        if defect:
+            raise UnusableOutput(node, topic.name, defect)
+
+    return check
+
+
+def state_defect(state: State, owners: Sequence[str], arrays: str) -> str:
+    """What is wrong with positions, velocities and torques of motors or joints.
+
+    Parameters
+    ----------
+    state : the values.
+    owners : motors or joints in the order of the values.
+    arrays : that must be filled; one with a '?' may be empty.
+    """
+    wanted, count = arrays.split(), len(owners)
+    for name, values in zip(State._fields, state, strict=True):
+        if len(values) != count and (len(values) or name in wanted):
+            return f"{name} has {len(values)} values; send {count}, one for each of {', '.join(owners)}"
+        for value, owner in zip(values, owners, strict=False):
+            if not isfinite(value):
+                return f"{name} of {owner} is {value}; send finite numbers"
+            if abs(value) > LARGEST[name]:
+                return f"{name} of {owner} is {value:g}; {_allowed(LARGEST[name])}"
+    return ""
+
+
+def wrench_defect(wrench: Wrench, frames: Sequence[str]) -> str:
+    """What is wrong with a force and a torque in one of the frames."""
+    if wrench.frame not in frames:
+        return f"frame_id is '{wrench.frame}'; allowed are {', '.join(frames)}"
+    if [len(vector) for vector in wrench[1:]] != [3, 3]:
+        return f"force {wrench.force} N, torque {wrench.torque} N m; send three numbers for each"
+    if not all(isfinite(value) for value in (*wrench.force, *wrench.torque)):
+        return f"force {wrench.force} N, torque {wrench.torque} N m; send finite numbers"
+    for name, unit, vector in (("force", "N", wrench.force), ("torque", "N m", wrench.torque)):
+        if (most := max(map(abs, vector))) > LARGEST[name]:
+            return f"{name} has {most:g} {unit}; {_allowed(LARGEST[name])}"
+    return ""
+
+
+def point_defect(point: Point, frames: Sequence[str]) -> str:
+    """What is wrong with a position in one of the frames; NaN says that a coordinate is not known."""
+    frame, position = point
+    if frame not in frames:
+        return f"frame_id is '{frame}'; allowed are {', '.join(frames)}"
+    if [len(each) for each in point[1:]] != [3]:
+        return f"position is {position} m; send three numbers"
+    if any(isinf(value) for value in position):
+        return f"position is {position} m; send finite numbers, or NaN where it is not known"
+    if any(abs(value) > LARGEST["point"] for value in position):
+        return f"position is {position} m; {_allowed(LARGEST['point'])}, or NaN where it is not known"
+    return ""
+
+
+def table_defect(table: Table, columns: Sequence[str], frames: Sequence[str]) -> str:
+    """What is wrong with rows of numbers under these columns; NaN says of some that a number is not known."""
+    if table.frame not in frames:
+        return f"frame_id is '{table.frame}'; allowed are {', '.join(frames)}"
+    if sizes := {len(row) for row in table.rows} - {len(columns)}:
+        return f"a row has {min(sizes)} numbers; send {len(columns)}: {', '.join(columns)}"
+    if any(isinf(value) for row in table.rows for value in row):
+        return "a number is infinite; send finite numbers, or NaN where one is not known"
+    for row in table.rows:
+        for (name, largest, may_be_unknown), value in zip(columns_of(tuple(columns)), row, strict=True):
+            if isnan(value) and not may_be_unknown:
+                return f"{name} is nan; send a finite number"
+            if abs(value) > largest:
+                return f"{name} is {value:g}; {_allowed(largest)}, or NaN where it is not known"
+    for link in (row[0] for row in table.rows if columns[0] == LINK):
+        if link not in range(len(frames) - 1):
+            return f"link is {link}; send the index of one of {', '.join(frames[1:])}"
+    return ""
+
+
+def _allowed(limit: float) -> str:
+    return f"no arm reaches that, send at most {limit:g}"
