@@ -37,8 +37,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="table to write, for example sweep.csv")
     take_configuration(parser)
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--scenario", help=f"YAML file, or the name of one that is installed; default: {SCENARIO}")
-    what.add_argument("--experiment", help="of the thesis, or a whole-arm task, with its own configuration")
+    what.add_argument(
+        "--scenario", metavar="NAME", help=f"YAML file, or the name of one that is installed; default: {SCENARIO}"
+    )
+    what.add_argument(
+        "--experiment", metavar="NAME", help="of the thesis, or a whole-arm task, with its own configuration"
+    )
     parser.add_argument(
         "--vary",
         action="append",
