@@ -457,6 +457,20 @@ def test_less_than_a_turn_has_no_spectrum():
 # timing
 
 
+@pytest.mark.parametrize("lost", [0.0, 0.04, 0.3])
+@pytest.mark.parametrize("jitter", [0.0, 0.1, 0.25])
+def test_late_messages_are_not_counted_as_missing(jitter, lost):
+    draws = np.random.default_rng(9)
+    kept = np.append(draws.random(3999) >= lost, True)
+    stamp = np.rint(1e7 * (np.arange(4000) + jitter * draws.uniform(-1.0, 1.0, 4000))[kept]).astype(np.int64)
+    inner = np.diff(np.flatnonzero(kept)) - 1
+    assert stamp_timing(stamp, None).missed == inner.sum()
+
+
+def test_two_steps_of_which_neither_is_the_median_have_a_count():
+    assert stamp_timing(np.array([0, 10, 40]), None).missed >= 1
+
+
 def test_missed_periods_jitter_and_stamps_that_go_back_are_counted():
     stamp = np.delete(np.arange(1, 1001) * MS, [100, 500, 501])
     received = stamp + 200_000 + np.abs(draws(18, len(stamp), 50_000.0)).astype(np.int64)
