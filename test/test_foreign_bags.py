@@ -13,6 +13,7 @@ from foreign_bags import MOTORS, ORIGIN, Sent, by_json, by_mcap_ros2, by_rosbags
 from wam_analysis.findings.analysis import Analysis, analyse
 from wam_analysis.findings.page import page
 from wam_analysis.foreign import reading
+from wam_analysis.foreign.sources import at_times
 from wam_analysis.foreign.topic_map import TopicMap, topic_map
 from wam_bag.bag import BagError
 
@@ -326,6 +327,26 @@ def test_nothing_is_found_in_a_quiet_bag(make: Any, tmp_path: Path) -> None:
     assert sections["stability"].verdict == sections["stick_slip"].verdict == sections["force"].verdict == ()
     lines = [one.measured for one in sections["frequency"].findings if one.quantity == "frequency"]
     assert all(any(f == pytest.approx(known, rel=CLOSE) for known in THERE.get(make.__name__, ())) for f in lines)
+
+
+def test_stamps_that_jitter_cut_no_tops_off_a_fast_cycle(tmp_path: Path) -> None:
+    """Nine samples in a cycle: straight lines between them would be 5 % too low on average."""
+    time = times(20.0, 100.0)
+    time = time + 0.002 * chance(61).uniform(-1.0, 1.0, len(time))
+    position = at_rest(time, ["j"], 62) + sine(time, 11.3, 0.01)[:, np.newaxis]
+    _, measured = found(
+        (by_mcap_ros2(tmp_path / "jitter", joints("/joint_states", time, ["j"], position=position)), TopicMap())
+    )
+    assert measured["j: cycle, peak to peak"] == pytest.approx(0.01, rel=CLOSE)
+    assert measured["j, 11.3 Hz: amplitude"] == pytest.approx(0.005, rel=CLOSE)
+
+
+def test_values_between_samples_do_not_overshoot_a_step() -> None:
+    time = np.cumsum(chance(63).uniform(0.5, 1.5, 40))
+    value = (time > 20.0).astype(np.float64)
+    between = at_times(np.linspace(time[0], time[-1], 1000), time, value)
+    assert between.min() == 0.0
+    assert between.max() == 1.0
 
 
 @pytest.mark.parametrize("noise", [0.0, 2e-3, 5e-3])

@@ -12,6 +12,7 @@ import pytest
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
+from wam_experiments.thesis import definition, sweeping
 from wam_sim import batch
 from wam_sim.sweep import Axis, SweepPoint, drawn, grid, listed, points, sweep
 
@@ -104,3 +105,32 @@ def test_the_command_writes_the_table_and_the_plot(script: Path, tmp_path: Path)
     assert [float(row[GAIN]) for row in rows] == pytest.approx([0.004, 0.02])
     assert all(float(row["force_rms"]) > 0.0 for row in rows)
     assert plot.stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_an_experiment_is_swept_with_what_it_predicts_and_measures(tmp_path: Path) -> None:
+    """Cables that do not creep are measured as such, against a prediction that knows only their radii."""
+    table, plot = tmp_path / "creep.csv", tmp_path / "creep.png"
+    command = [sys.executable, "-m", "wam_cli.main", "sweep", str(table), "--experiment", "creep", "--fresh"]
+    command += ["--workers", "1", "--vary", "driver:effects.creep=true,false", "--picture", str(plot)]
+    subprocess.run(command, check=True, capture_output=True)
+    with table.open() as stream:
+        rows = list(csv.DictReader(stream))
+    creeping, rigid = ([row for row in rows if row["driver:effects.creep"] == name] for name in ("True", "False"))
+    assert [row["quantity"] for row in creeping] == [row["quantity"] for row in rigid]
+    predicted = [[float(row["predicted"]) for row in those] for those in (creeping, rigid)]
+    assert predicted[0] == pytest.approx(predicted[1])
+    assert all(row["agrees"] == "True" for row in creeping)
+    assert not any(row["agrees"] == "True" for row in rigid)
+    assert all(abs(float(row["measured"])) < 0.01 * float(row["predicted"]) for row in rigid)
+    assert plot.stat().st_size > 5000
+
+
+def test_a_refused_set_of_an_experiment_fails_alone_and_an_unknown_parameter_before_anything_runs() -> None:
+    experiment = definition.load("creep")
+    (point,) = sweeping.points(experiment, [Axis(GAIN, (-1.0,))], [(-1.0,)])
+    found = sweeping.outcome(point)
+    assert "force_gain" in found.failure
+    assert not found.rows
+    with pytest.raises(ParameterError, match="no parameter 'nothing'"):
+        sweeping.points(experiment, [Axis("force_loop:nothing", (1,))], [(1,)])

@@ -104,11 +104,18 @@ def points(
     found = []
     for values in sets:
         named = {axis.name: value for axis, value in zip(axes, values, strict=True)}
-        found.append(SweepPoint(configuration.with_values(_as_declared(configuration, named)), tuple(steps)))
+        found.append(SweepPoint(configuration.with_values(as_declared(configuration, named)), tuple(steps)))
     return found
 
 
-def _as_declared(configuration: Configuration, named: dict[str, Any]) -> dict[str, Any]:
+def as_declared(configuration: Configuration, named: dict[str, Any]) -> dict[str, Any]:
+    """Values by name, in which a number for a parameter that is a list is a list of one.
+
+    Raises
+    ------
+    ParameterError
+        where the configuration has no such parameter.
+    """
     configuration.with_values(named)  # refuses unknown names
     for name, value in named.items():
         node, _, parameter = name.rpartition(":")

@@ -68,7 +68,7 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
     steps = np.diff(stamp)
     forward = steps[steps > 0]
     period = float(np.median(forward)) if len(forward) else math.nan
-    skipped = np.rint(forward / period).astype(np.int64) - 1 if len(forward) else np.zeros(0, dtype=np.int64)
+    skipped = _skipped(forward / period) if len(forward) else np.zeros(0, dtype=np.int64)
     interval = jitter = p99 = worst = math.nan
     if received is not None:
         intervals: Numbers = np.diff(np.sort(received).astype(np.float64)) / 1e9
@@ -78,7 +78,7 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
     return StampTiming(
         messages=len(stamp),
         period=period / 1e9,
-        missed=int(np.sum(np.maximum(skipped, 0))),
+        missed=int(np.sum(skipped)),
         longest_gap=float(np.max(steps)) / 1e9,
         backwards=int(np.sum(steps <= 0)),
         interval=interval,
@@ -86,6 +86,21 @@ def stamp_timing(stamp: Times, received: Times | None) -> StampTiming:
         jitter_p99=p99,
         worst=worst,
     )
+
+
+def _skipped(steps: Numbers) -> Times:
+    """Messages that are missing in each step, (n,), periods.
+
+    A step of less than two periods is that of a late message where the steps about it are shorter by as much.
+    """
+    single = steps[np.rint(steps) == 1.0]
+    steps = (
+        steps / float(np.median(single)) if len(single) else steps
+    )  # where many are missing the median of all is longer than a period
+    skipped = np.maximum(np.rint(steps).astype(np.int64) - 1, 0)
+    around = np.convolve(np.pad(steps, 1, "edge"), np.ones(3), "valid")
+    skipped[(steps < 2.0) & (around < 3.5)] = 0
+    return skipped
 
 
 def latency(stamp: Times, received: Times, answer_stamp: Times, answer_received: Times) -> Latency:

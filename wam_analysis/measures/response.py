@@ -11,6 +11,8 @@ from wam_analysis.measures.runs import noise, smoothed
 Numbers = NDArray[np.float64]
 
 QUIET = 0.1  # part of the settling band that noise may fill after smoothing, four standard deviations of it
+LOUDEST = 0.5  # the same, where so much smoothing would make the rise longer
+SHARP = 4.0  # widths of the smoothing in a rise: it is longer by 2 % then
 TOP = 0.75  # of the overshoot; what is higher belongs to the parabola through the peak
 
 
@@ -41,8 +43,9 @@ class StepResponse(NamedTuple):
 def step_response(time: Numbers, value: Numbers, begin: float, steady: float, band: float) -> StepResponse:
     """Rise, settling and overshoot of a recorded step.
 
-    Noise is averaged over as many samples as it takes to bring it well below the band, and the peak
-    is that of a parabola through its top, so that noise does not add to the overshoot.
+    Noise is averaged over as many samples as it takes to bring it well below the band, or over fewer where
+    these would be a large part of the rise.  The peak is that of a parabola through its top, so that noise does
+    not add to the overshoot.
 
     Parameters
     ----------
@@ -65,9 +68,13 @@ def step_response(time: Numbers, value: Numbers, begin: float, steady: float, ba
     if step == 0.0 or not math.isfinite(step):
         raise ValueError(f"the signal ends at {final:g}, where it began; there is no step to evaluate")
     sd = noise(value) / abs(step)
-    width = min(math.ceil((4.0 * sd / (QUIET * band)) ** 2), max(len(value) // 50, 1))
-    part = (smoothed(value, width) - begin) / step  # 0 before, 1 at the end
-    low, high = _crossing(time, part, 0.1), _crossing(time, part, 0.9)
+    least, width = (min(math.ceil((4.0 * sd / (q * band)) ** 2), len(value) // 50 or 1) for q in (LOUDEST, QUIET))
+    while True:
+        part = (smoothed(value, width) - begin) / step  # 0 before, 1 at the end
+        low, high = _crossing(time, part, 0.1), _crossing(time, part, 0.9)
+        if width <= least or not high - low < SHARP * width * float(time[1] - time[0]):
+            break
+        width = max(width // 2, least)
     peak, at = _peak(time, (value - begin) / step, part)
     outside = np.flatnonzero(np.abs(part - 1.0) > band)
     if not len(outside):

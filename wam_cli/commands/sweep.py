@@ -1,28 +1,48 @@
-"""`wam sweep`: a scenario with many parameter sets, as a table and a plot."""
+"""`wam sweep`: a scenario or an experiment with many parameter sets, as a table and a plot."""
 
 import argparse
 import csv
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from wam_analysis.drawing import MEASURED, TRUE
-from wam_cli.commands import at_least, batch_of, configuration_of, take_batch, take_configuration, writable_file
+from wam_cli.commands import (
+    BASE_CONFIGURATION,
+    at_least,
+    batch_of,
+    configuration_of,
+    take_batch,
+    take_configuration,
+    writable_file,
+)
 from wam_control.scenario import load
 from wam_description.configuration import packaged
 from wam_experiments.figures.style import panels
+from wam_experiments.thesis import definition, sweeping
+from wam_experiments.thesis.sweeping import ExperimentOutcome
+from wam_sim.batch import results
 from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
 
 RANDOM_RUNS = 100
+SCENARIO = "demo_scenario"
+Sets = list[tuple[Any, ...]]
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("file", type=Path, help="table to write, for example sweep.csv")
     take_configuration(parser)
-    parser.add_argument("--scenario", default="demo_scenario", help="YAML file, or the name of one that is installed")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
+        "--scenario", metavar="NAME", help=f"YAML file, or the name of one that is installed; default: {SCENARIO}"
+    )
+    what.add_argument(
+        "--experiment", metavar="NAME", help="of the thesis, or a whole-arm task, with its own configuration"
+    )
     parser.add_argument(
         "--vary",
         action="append",
@@ -37,7 +57,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     kind.add_argument("--random", action="store_true", help="draw between the two values of each parameter")
     parser.add_argument("--runs", type=int, default=RANDOM_RUNS, help="of --random; default: %(default)s")
     parser.add_argument("--seed", type=int, default=1, help="of --random; default: 1")
-    parser.add_argument("--picture", type=Path, help="plot of the force error over each parameter, PNG, PDF or SVG")
+    parser.add_argument(
+        "--picture",
+        type=Path,
+        help="plot over each parameter of the force error, or of what an experiment measures, PNG, PDF or SVG",
+    )
     take_batch(parser)
 
 
@@ -48,20 +72,44 @@ def run(given: argparse.Namespace) -> int:
     writable_file("FILE", given.file)
     if given.picture:
         writable_file("--picture", given.picture)
-    configuration = configuration_of(given)
-    name: str = given.scenario
-    path = Path(name) if name.endswith((".yaml", ".yml")) else packaged(name, "scenario")
     axes: list[Axis] = given.vary
     sets = drawn(axes, given.runs, given.seed) if given.random else listed(axes) if given.list else grid(axes)
+    failed = sum((_of_experiment if given.experiment else _of_scenario)(given, axes, sets))
+    print(f"{len(sets)} sets, {failed} failed, in {given.file}")
+    return int(failed == len(sets))
+
+
+def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> list[bool]:
+    """Which sets failed; a row of the table for each."""
+    configuration = configuration_of(given)
+    name: str = given.scenario or SCENARIO
+    path = Path(name) if name.endswith((".yaml", ".yml")) else packaged(name, "scenario")
     runs = points(configuration, load(path, configuration.shared.arm), axes, sets)
     with batch_of(given) as batch:
         found = sweep(runs, *batch)
-    _write(given.file, axes, sets, found)
+    _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
     if given.picture:
         _draw(given.picture, axes, sets, found)
-    failed = sum(bool(result.failure) for result in found)
-    print(f"{len(found)} runs, {failed} failed, in {given.file}")
-    return int(failed == len(found))
+    return [bool(result.failure) for result in found]
+
+
+def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> list[bool]:
+    """Which sets failed; a row of the table for each quantity, or for the failure."""
+    if given.config != BASE_CONFIGURATION or given.values:
+        raise ValueError(
+            "an experiment has its own configuration; leave out --config and --set, and --vary its numbers"
+        )
+    runs = sweeping.points(definition.load(given.experiment), axes, sets)
+    with batch_of(given) as batch:
+        found = results(sweeping.outcome, runs, *batch)
+    rows: list[tuple[Any, ...]] = []
+    for values, one in zip(sets, found, strict=True):
+        rows += [(*values, "", c.quantity, c.predicted, c.measured, c.unit, c.agrees) for c in one.rows]
+        rows += [(*values, one.failure, *[""] * 5)] if one.failure else []
+    _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees"), rows)
+    if given.picture:
+        _draw_experiment(given.picture, axes, sets, found)
+    return [bool(one.failure) for one in found]
 
 
 def _axis(text: str) -> Axis:
@@ -84,19 +132,22 @@ def _axis(text: str) -> Axis:
     return Axis(name, tuple(parsed))
 
 
-def _write(file: Path, axes: list[Axis], sets: list[tuple[Any, ...]], found: list[SweepResult]) -> None:
+def _write(file: Path, axes: list[Axis], fields: Iterable[str], rows: Iterable[tuple[Any, ...]]) -> None:
     with file.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow([*(axis.name for axis in axes), *SweepResult._fields])
-        writer.writerows([*values, *result] for values, result in zip(sets, found, strict=True))
+        writer.writerow([*(axis.name for axis in axes), *fields])
+        writer.writerows(rows)
 
 
-def _draw(file: Path, axes: list[Axis], sets: list[tuple[Any, ...]], found: list[SweepResult]) -> None:
+def _column(sets: Sets, i: int) -> list[Any]:
+    return [row[i] if isinstance(row[i], (int, float)) else str(row[i]) for row in sets]
+
+
+def _draw(file: Path, axes: list[Axis], sets: Sets, found: list[SweepResult]) -> None:
     """One panel for each parameter; runs that failed are crosses on the axis."""
     with panels(file, 1, len(axes), 3.6 * len(axes), 3.0) as (_, shown):
         for i, (axis, part) in enumerate(zip(axes, shown, strict=True)):
-            values = [row[i] if isinstance(row[i], (int, float)) else str(row[i]) for row in sets]
-            rows = list(zip(values, found, strict=True))
+            rows = list(zip(_column(sets, i), found, strict=True))
             good = [(value, r.force_rms) for value, r in rows if not r.failure and math.isfinite(r.force_rms)]
             bad = [(value, 0.0) for value, r in rows if r.failure]
             for pairs, marker, colour, label in ((good, "o", TRUE, "held"), (bad, "x", MEASURED, "failed")):
@@ -105,3 +156,24 @@ def _draw(file: Path, axes: list[Axis], sets: list[tuple[Any, ...]], found: list
                     part.scatter(across, up, s=14, label=label, marker=marker, color=colour)
             part.set(xlabel=axis.name, ylabel="rms of the settled force error, N")
             part.legend()
+
+
+def _draw_experiment(file: Path, axes: list[Axis], sets: Sets, found: list[ExperimentOutcome]) -> None:
+    """One row for each quantity that is a number, one column for each parameter."""
+    units = {c.quantity: c.unit for one in found for c in one.rows if not isinstance(c.measured, str)}
+    with panels(file, max(len(units), 1), len(axes), 3.6 * len(axes), 2.2 * max(len(units), 1)) as (_, shown):
+        for place, (quantity, unit) in enumerate(units.items()):
+            for i, axis in enumerate(axes):
+                part = shown[place * len(axes) + i]
+                for role, colour in (("predicted", TRUE), ("measured", MEASURED)):
+                    pairs = [
+                        (value, getattr(c, role))
+                        for value, one in zip(_column(sets, i), found, strict=True)
+                        for c in one.rows
+                        if c.quantity == quantity and not isinstance(getattr(c, role), str)
+                    ]
+                    if pairs:
+                        across, up = zip(*pairs, strict=True)
+                        part.scatter(across, up, s=14, label=role, color=colour)
+                part.set(title=quantity, xlabel=axis.name, ylabel=unit)
+                part.legend()

@@ -10,6 +10,7 @@ rows            a result: predicted and measured quantities, curves, tables
 figure, page    the result as a figure, and on a page of the documentation
 claims          what the thesis claims and where it is shown: rows of docs/thesis.yaml
 samples         the sample bags and their index
+sweeping        an experiment with many parameter sets
 
 step_response   (5.2), (5.3), half cycles of (5.17) and (5.18)
 limit_cycles    stiction (5.8), (5.9); actuator (5.20) to (5.22)
