@@ -44,7 +44,7 @@ from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
 from wam_live.panel import POINTS, Controls, Play, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
-from wam_live.scene import RELEASE, STRONGEST, LinkPush, Scene, band_push  # noqa: E402
+from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
 
 CONFIGURATION = Configuration.load(packaged("wam"))
@@ -122,12 +122,25 @@ def test_contacts_are_drawn_as_arrows_along_the_force_and_vanish(server: Any) ->
     assert not band.visible
 
 
+START, END = np.zeros(3), np.array([0.5, 0.0, 0.0])
+
+
 def test_a_drag_pushes_like_a_rubber_band_of_limited_strength() -> None:
-    push = band_push("outer_link", np.array([0.2, 0.0, 0.0]), np.array([0.2, 0.1, 0.0]))
+    grip = Grip("outer_link", np.array([0.2, 0.0, 0.0]), START, END)
+    push = band_push(grip, np.array([0.2, 0.1, 0.0]))
     assert push.force == pytest.approx((0.0, 6.0, 0.0))
     assert push.torque == pytest.approx((0.0, 0.0, 1.2))
-    far = band_push("outer_link", np.zeros(3), np.array([0.0, 0.0, 9.0]))
+    far = band_push(Grip("outer_link", START, START, END), np.array([0.0, 0.0, 9.0]))
     assert far.force == pytest.approx((0.0, 0.0, STRONGEST))
+
+
+def test_a_drag_at_the_surface_pushes_at_the_axis_and_across_it_only() -> None:
+    surface = np.array([0.2, 0.03, -0.02])
+    push = band_push(Grip("outer_link", surface, START, END), surface + (0.3, 0.1, 0.2))
+    assert push.force == pytest.approx((0.0, 6.0, 12.0))
+    assert push.torque == pytest.approx((0.0, -0.2 * 12.0, 0.2 * 6.0))
+    beyond = band_push(Grip("outer_link", np.array([0.52, 0.0, 0.02]), START, END), np.array([0.52, 0.1, 0.02]))
+    assert beyond.torque[2] == pytest.approx(0.5 * 6.0)  # a grip at the round end acts at the end of the axis
 
 
 def test_the_status_escapes_what_comes_from_topics() -> None:

@@ -47,6 +47,15 @@ class LinkPush(NamedTuple):
     torque: Triple  # N m
 
 
+class Grip(NamedTuple):
+    """Where a drag holds a cover, m, in its frame: the point, and the ends of the axis of its tube, (3,) each."""
+
+    cover: str
+    point: Array
+    start: Array
+    end: Array
+
+
 RELEASE = LinkPush(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -66,7 +75,7 @@ class Scene:
         self._scene, self._arm, self._push = server.scene, arm, push
         self._body = RigidBody(arm)
         self._q = list(arm.joints.start)
-        self._grabbed: tuple[str, Array] | None = None
+        self._grabbed: Grip | None = None
         self._pointer = np.zeros(3)
         self._scene.set_up_direction("+z")
         # shadows and the environment map take most of the time of a browser that draws by software
@@ -126,7 +135,7 @@ class Scene:
             cast_shadow=False,
         )
         if self._push is not None:
-            tube.on_drag("left")(self._dragged(name))
+            tube.on_drag("left")(self._dragged(name, (start, end)))
         return frame
 
     def _add_surroundings(self, obstacles: Obstacles) -> None:
@@ -187,14 +196,15 @@ class Scene:
 
     # dragging
 
-    def _dragged(self, cover: str) -> Callable[[Any], Any]:
+    def _dragged(self, cover: str, axis: tuple[Array, Array]) -> Callable[[Any], Any]:
         async def take(event: Any) -> None:  # an async callback: others run in a pool, out of order
             if event.phase == "end":
                 self._let_go()
                 return
             if self._grabbed is None:
                 pose = self._body.cover_pose(self._q, cover)
-                self._grabbed = (cover, pose.rotation.T @ (np.array(event.start_position) - pose.position))
+                point = pose.rotation.T @ (np.array(event.start_position) - pose.position)
+                self._grabbed = Grip(cover, point, *axis)
             self._pointer = np.array(event.end_position)
 
         return take
@@ -212,26 +222,32 @@ class Scene:
         """Send the push of the present drag; returns its force, N.  Call it at every drawing."""
         if self._grabbed is None or self._push is None:
             return 0.0
-        cover, point = self._grabbed
-        pose = self._body.cover_pose(self._q, cover)
-        push = band_push(cover, point, pose.rotation.T @ (self._pointer - pose.position))
+        pose = self._body.cover_pose(self._q, self._grabbed.cover)
+        push = band_push(self._grabbed, pose.rotation.T @ (self._pointer - pose.position))
         self._push(push)
         return size(push.force)
 
     def _show_hand(self) -> None:
         self._band.visible = self._grabbed is not None
         if self._grabbed is not None:
-            cover, point = self._grabbed
-            self._band.points = np.array([[self._body.point(self._q, cover, point), self._pointer]], dtype=np.float32)
+            point = self._body.point(self._q, self._grabbed.cover, self._grabbed.point)
+            self._band.points = np.array([[point, self._pointer]], dtype=np.float32)
 
 
-def band_push(cover: str, point: Array, pointer: Array) -> LinkPush:
-    """LinkPush of a rubber band between a point of a cover and the pointer, both (3,), m, in the cover's frame."""
-    force = STIFFNESS * (pointer - point)
+def band_push(grip: Grip, pointer: Array) -> LinkPush:
+    """LinkPush of a rubber band between where a cover is gripped and the pointer, (3,), m, in the cover's frame.
+
+    It acts at the cover's axis, beside the grip, and across the axis only, as contacts do that the estimator is made
+    for: no torque about the axis, no force along it.
+    """
+    along = (grip.end - grip.start) / np.linalg.norm(grip.end - grip.start)
+    at = grip.start + along * np.clip(along @ (grip.point - grip.start), 0.0, along @ (grip.end - grip.start))
+    stretch = pointer - grip.point
+    force = STIFFNESS * (stretch - along * (along @ stretch))
     force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), 1e-9))
     fx, fy, fz = force.tolist()
-    tx, ty, tz = np.cross(point, force).tolist()
-    return LinkPush(cover, (fx, fy, fz), (tx, ty, tz))
+    tx, ty, tz = np.cross(at, force).tolist()
+    return LinkPush(grip.cover, (fx, fy, fz), (tx, ty, tz))
 
 
 def quaternion(rotation: Array) -> tuple[float, float, float, float]:
