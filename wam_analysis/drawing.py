@@ -6,6 +6,7 @@ from typing import Any, Final
 COMMANDED, TRUE, MEASURED, ESTIMATED = "#222222", "#0072b2", "#009e73", "#d55e00"
 PREDICTED: Final = "#6b7280"  # by theory
 LIKELY: Final = "#f2a11a"  # where a contact may be
+HAND: Final = "#7a3db8"  # of the user who drags a link
 # outcomes of a trial
 RIGHT, REFUSED, BETWEEN, WRONG = "#4d7c0f", "#9aa3ad", "#a16207", "#be185d"
 INK: Final = "#222222"  # text and axes

@@ -17,7 +17,7 @@ from wam_description.wiring import Call, SetParameters
 from wam_description.world import World
 from wam_live.hold import HeldTopic
 from wam_live.object_meshes import ObjectMeshes, at_rest
-from wam_live.page import quiet, serve
+from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import NO_PRESS, SLIDERS, Controls, Play, Press, Request, mode_of
 from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import RELEASE, LinkPush, Scene
@@ -77,6 +77,9 @@ class LivePage:
             driver = flat["driver"]
             shared = build_part(Shared, driver)
             world = build_part(World, driver, "world.")
+            domain = self._connection.context.get_domain_id()
+            title = f"{self._asking.get_namespace()}, {shared.arm.name}, ROS domain {domain}"
+            name_page(self._server, f"{title}, since {time.strftime('%H:%M:%S')}")
             source = RunningStack(self._connection.context, self._namespace, shared)
             self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
             self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
@@ -85,7 +88,7 @@ class LivePage:
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)
             self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
-            self._say(f"live page: http://{self._server.get_host()}:{self._port}")
+            self._say(f"live page: {url(self._port)}  ({title})")
             self._draw(source, scene, objects, panel, until)
             self._release(source.stamp)
         finally:
@@ -130,8 +133,9 @@ class LivePage:
                 scene.show(snapshot)
                 objects.show(snapshot.objects)
                 pushing = scene.drag()
+                panel.take(snapshot)
                 if count % PANEL_EVERY == 0:
-                    panel.show(snapshot, pushing)
+                    panel.show(snapshot, pushing, size(self._press.force) if self._press else 0.0)
             count += 1
             self._send(source, panel)
             if self._player is not None and (ended := self._player.ended()):
@@ -177,7 +181,7 @@ class LivePage:
             self._states = self._asking.create_subscription(
                 message_type(row), row.name, lambda data: self._answer(data, panel), qos(row), raw=True
             )
-        panel.say(f"pressing with {size(press.force):.1f} N")
+        panel.say("")  # the status has what becomes of it
 
     def _answer(self, state: bytes, panel: Controls) -> None:
         if self._press is None:

@@ -19,6 +19,7 @@ from wam_analysis.drawing import (
     BLOCK_COLOUR,
     COLOURS,
     FLOOR,
+    HAND,
     LIKELY,
     METRES_PER_NEWTON,
     PEDESTAL,
@@ -33,6 +34,8 @@ from wam_description.world import Obstacles
 from wam_live.snapshot import Snapshot, size
 
 LONGEST_ARROW = 0.6  # m
+ARROWS = {"true": (0.011, 0.02), "estimated": (0.006, 0.026)}  # m, radii of shaft and head: both are seen at one place
+DEEPER = 1.8  # exponent of a colour that the lights of the page would turn into a paler one
 STIFFNESS = 60.0  # N/m, of the rubber band between the pointer and the link
 STRONGEST = 40.0  # N, that a drag pushes with
 
@@ -86,7 +89,7 @@ class Scene:
         self._add_surroundings(obstacles)
         self._arrows = {name: self._add_arrow(name) for name in ("true", "estimated")}
         self._place = self._scene.add_icosphere(
-            "/contact/place", 0.02, channels(COLOURS["estimated"]), visible=False, cast_shadow=False
+            "/contact/place", 0.02, lit(COLOURS["estimated"]), visible=False, cast_shadow=False
         )
         self._bands = [
             self._scene.add_cylinder(
@@ -95,7 +98,7 @@ class Scene:
             for i in range(len(arm.covers.names))
         ]
         self._band = self._scene.add_arrows(
-            "/hand", np.zeros((1, 2, 3)), channels("#7a3db8"), shaft_radius=0.006, head_radius=0.016, head_length=0.04,
+            "/hand", np.zeros((1, 2, 3)), channels(HAND), shaft_radius=0.006, head_radius=0.016, head_length=0.04,
             visible=False,
         )  # fmt: skip
         self.show(Snapshot(q=tuple(self._q)))
@@ -160,8 +163,9 @@ class Scene:
         self._scene.add_grid("/world/floor", 4.0, 4.0, position=(0.0, 0.0, FLOOR), cell_size=0.2)
 
     def _add_arrow(self, name: str) -> Any:
+        shaft, head = ARROWS[name]
         return self._scene.add_arrows(
-            f"/contact/{name}", np.zeros((1, 2, 3)), channels(COLOURS[name]), shaft_radius=0.008, head_radius=0.02,
+            f"/contact/{name}", np.zeros((1, 2, 3)), lit(COLOURS[name]), shaft_radius=shaft, head_radius=head,
             head_length=0.05, visible=False,
         )  # fmt: skip
 
@@ -248,6 +252,12 @@ def band_push(grip: Grip, pointer: Array) -> LinkPush:
     fx, fy, fz = force.tolist()
     tx, ty, tz = np.cross(at, force).tolist()
     return LinkPush(grip.cover, (fx, fy, fz), (tx, ty, tz))
+
+
+def lit(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue of a thing that is to be seen in a colour under the lights of the page."""
+    red, green, blue = (round(255.0 * (part / 255.0) ** DEEPER) for part in channels(colour))
+    return red, green, blue
 
 
 def quaternion(rotation: Array) -> tuple[float, float, float, float]:
