@@ -140,7 +140,7 @@ class LivePage:
             self._send(source, panel)
             if self._player is not None and (ended := self._player.ended()):
                 panel.say(ended)
-                panel.requests.put(Call("driver", "pause", False))  # a scenario pauses the arm at its end
+                self._ask(Call("driver", "pause", False), source, panel, ended)  # a scenario pauses the arm at its end
             while not panel.requests.empty():
                 self._ask(panel.requests.get(), source, panel)
 
@@ -213,7 +213,8 @@ class LivePage:
         refusal = self._player.play(script)
         panel.say(refusal or f"playing {script}", refused=bool(refusal))
 
-    def _ask(self, request: Request, source: RunningStack, panel: Controls) -> None:
+    def _ask(self, request: Request, source: RunningStack, panel: Controls, told: str = "") -> None:
+        """Make a request, and show its answer, or what is told in place of it."""
         if isinstance(request, Play):
             self._play(request.script, panel)
             return
@@ -232,12 +233,14 @@ class LivePage:
         if not client.service_is_ready():
             panel.say(f"{request.node} does not answer", refused=True)
             return
-        client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result(), panel))
+        client.call_async(message).add_done_callback(
+            lambda future: self._answered(request, future.result(), panel, told)
+        )
 
-    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls) -> None:
+    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls, told: str) -> None:
         reasons = refusal_of(request, answer)
         if isinstance(request, Call):
-            panel.say(answer.message, refused=not answer.success)
+            panel.say(told or answer.message, refused=not answer.success)
             return
         for name, value in request.values.items():
             if reasons:
