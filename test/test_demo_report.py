@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from matplotlib.figure import Figure
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture
-from wam_analysis.demo_figure import save
+from wam_analysis.demo_figure import draw_forces, save
 from wam_analysis.demo_report import report, text, verdict
 from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summarize
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ
@@ -222,7 +223,21 @@ def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():
     assert math.isnan(inner.position_estimated)
     assert inner.reason == REASON
     assert f"* {REASON}" in text(summary)
-    assert "position within 4 cm: YES (2.0 cm)" in verdict(summary)
+    assert verdict(summary).endswith(": YES (2.0 cm, without 1 of 4 contacts, whose position is unknown)")
+    row = next(line for line in text(summary).splitlines() if "push inner" in line)
+    assert ">=10.00" in row.split()
+
+
+def test_a_lower_bound_of_the_force_is_drawn_as_one():
+    figure = Figure()
+    axes = figure.add_subplot()
+    draw_forces(axes, Recording().summary())
+    lines = {line.get_label(): line for line in axes.lines}
+    known, bound = (np.asarray(lines[name].get_ydata()) for name in ("estimated", "at least"))
+    rows = slice(500, 700)  # the push on the inner link
+    assert np.isnan(known[rows]).all()
+    assert bound[rows] == pytest.approx(10.0)
+    assert np.isnan(np.delete(bound, np.arange(500, 700))).all()
 
 
 def test_bounce_does_not_end_a_contact():
@@ -244,7 +259,8 @@ def test_contact_felt_without_one_is_counted():
 def test_good_run_has_a_good_verdict_in_narrow_lines():
     summary = Recording().summary()
     assert verdict(summary) == (
-        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | position within 4 cm: YES (2.0 cm)"
+        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | position within 4 cm: YES (2.0 cm, "
+        "without 1 of 4 contacts, whose position is unknown)"
     )
     assert all(len(line) <= 100 for line in text(summary).splitlines())
 
