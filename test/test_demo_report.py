@@ -223,7 +223,7 @@ def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():
     assert math.isnan(inner.position_estimated)
     assert inner.reason == REASON
     assert f"* {REASON}" in text(summary)
-    assert verdict(summary).endswith(": YES (2.0 cm, without 1 of 4 contacts, whose position is unknown)")
+    assert verdict(summary).endswith("position within 4 cm: YES (2.0 cm), unknown for 1 of 4 contacts")
     row = next(line for line in text(summary).splitlines() if "push inner" in line)
     assert ">=10.00" in row.split()
 
@@ -259,8 +259,8 @@ def test_contact_felt_without_one_is_counted():
 def test_good_run_has_a_good_verdict_in_narrow_lines():
     summary = Recording().summary()
     assert verdict(summary) == (
-        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | position within 4 cm: YES (2.0 cm, "
-        "without 1 of 4 contacts, whose position is unknown)"
+        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
+        "position within 4 cm: YES (2.0 cm), unknown for 1 of 4 contacts"
     )
     assert all(len(line) <= 100 for line in text(summary).splitlines())
 

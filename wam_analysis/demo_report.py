@@ -112,11 +112,8 @@ def _position_verdict(summary: DemoSummary) -> str:
     errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.reason]
     question = f"position within {100.0 * POSITION_TOLERANCE:g} cm"
     unknown = len(touches) - len(errors)
-    without = f", without {unknown} of {len(touches)} contacts, whose position is unknown" if unknown else ""
-    answer = _answer(
-        question, errors, lambda error: error <= POSITION_TOLERANCE, lambda worst: f"{100.0 * worst:.1f} cm"
-    )
-    return answer.removesuffix(")") + f"{without})" if answer.endswith(")") else answer + without
+    answer = _answer(question, errors, lambda error: error <= POSITION_TOLERANCE, lambda far: f"{100.0 * far:.1f} cm")
+    return answer + f", unknown for {unknown} of {len(touches)} contacts" * bool(unknown)
 
 
 def _answer(
