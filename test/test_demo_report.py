@@ -1,6 +1,7 @@
 """The report of a demonstration against recordings made by hand, whose answers are known."""
 
 import itertools
+import json
 import math
 import struct
 from pathlib import Path
@@ -21,13 +22,17 @@ from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summar
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_cli.commands.demo import _report
 from wam_cli.main import main
 from wam_control.contact_inference import REASONS
+from wam_control.scenario import load as load_steps
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
+from wam_experiments.thesis.definition import load
 from wam_sim.recorded_parameters import recorded_parameters
+from wam_sim.simulated_bag import record
 
 MS = 1_000_000
 PERIOD = 5 * MS
@@ -238,6 +243,23 @@ def test_a_lower_bound_of_the_force_is_drawn_as_one():
     assert np.isnan(known[rows]).all()
     assert bound[rows] == pytest.approx(10.0)
     assert np.isnan(np.delete(bound, np.arange(500, 700))).all()
+
+
+def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
+    steps = [
+        {"name": "enable", "seconds": 0.1, "request": "enable"},
+        {"name": "lower onto nothing", "seconds": 0.2, "posture": POSE, "until_force": 1.5},
+    ]
+    task = load("follow-surface")
+    script, bag = tmp_path / "script.yaml", tmp_path / "bag"
+    script.write_text(json.dumps({"steps": steps}))
+    configuration = Configuration.load(packaged("wam"))
+    assert "no contact" in record(configuration, load_steps(script, configuration.shared.arm), bag)
+    assert _report(bag, True, task)
+    assert (bag / "demo.png").is_file()
+    out, err = capsys.readouterr()
+    assert "no report of task follow-surface" in err
+    assert "FAILED: step 'lower onto nothing'" in out
 
 
 def test_bounce_does_not_end_a_contact():

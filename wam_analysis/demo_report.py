@@ -153,7 +153,7 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
     return [
         title,
         *_table(rows, head),
-        "  true: of all that acts on the link (simulator), the component along the commanded force, +- half of",
+        "  true: of all that acts on the link (simulator), the part along the commanded force; +-: half of",
         "    its range; measured: force loop; estimated: contact estimator",
     ]
 
