@@ -107,7 +107,7 @@ def _link_verdict(summary: DemoSummary) -> str:
 
 
 def _position_verdict(summary: DemoSummary) -> str:
-    """Positions are compared unless the estimator reports that it cannot observe them; how many, is said."""
+    """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
     touches = summary.touches
     errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.reason]
     question = f"position within {100.0 * POSITION_TOLERANCE:g} cm"

@@ -19,6 +19,8 @@ OBJECT_COLOUR: Final = "#5f93bd"
 PEDESTAL_COLOUR: Final = "#c9ced4"
 PEDESTAL: Final = 0.07  # m, radius of the drawn base, which is not in the parameters
 FLOOR: Final = -1.0  # m, height of the foot of the drawn base
+STILL: Final = 1e-5  # rad, rad/s, N; a smaller range of a plot is not blown up
+FLAT: Final = 1e-4  # nor one that is smaller than this part of the value
 METRES_PER_NEWTON: Final = 0.015  # length of an arrow
 
 
@@ -35,10 +37,19 @@ STYLE: Any = {
     "text.color": INK,
     "xtick.color": INK,
     "ytick.color": INK,
+    "axes.formatter.useoffset": False,  # numbers as they are, not what is to be added to one in a corner
     "lines.linewidth": 1.4,
     "legend.frameon": False,
     "legend.fontsize": 8.0,
 }
+
+
+def widen_flat(axes: Any) -> None:
+    """Show a quantity that does not change as a line, not its rounding errors."""
+    low, high = axes.get_ylim()
+    least = max(STILL, FLAT * abs(low + high) / 2.0)
+    if high - low < least:
+        axes.set_ylim((low + high - least) / 2.0, (low + high + least) / 2.0)
 
 
 def channels(colour: str) -> tuple[int, int, int]:

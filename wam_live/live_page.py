@@ -213,8 +213,8 @@ class LivePage:
         refusal = self._player.play(script)
         panel.say(refusal or f"playing {script}", refused=bool(refusal))
 
-    def _ask(self, request: Request, source: RunningStack, panel: Controls, told: str = "") -> None:
-        """Make a request, and show its answer, or what is told in place of it."""
+    def _ask(self, request: Request, source: RunningStack, panel: Controls, text: str = "") -> None:
+        """Make a request, and show its answer, or a text in place of it."""
         if isinstance(request, Play):
             self._play(request.script, panel)
             return
@@ -234,13 +234,13 @@ class LivePage:
             panel.say(f"{request.node} does not answer", refused=True)
             return
         client.call_async(message).add_done_callback(
-            lambda future: self._answered(request, future.result(), panel, told)
+            lambda future: self._answered(request, future.result(), panel, text)
         )
 
-    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls, told: str) -> None:
+    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls, text: str) -> None:
         reasons = refusal_of(request, answer)
         if isinstance(request, Call):
-            panel.say(told or answer.message, refused=not answer.success)
+            panel.say(text or answer.message, refused=not answer.success)
             return
         for name, value in request.values.items():
             if reasons:

@@ -37,16 +37,16 @@ def port_is_free(port: int) -> bool:
     return True
 
 
-def free_port(asked: int | None, say: Callable[[str], None]) -> int:
+def free_port(wanted: int | None, say: Callable[[str], None]) -> int:
     """The port of a page.
 
     Parameters
     ----------
-    asked : port that was asked for; None takes `PORT`, or the next one that is free.
+    wanted : the one of an option; None takes `PORT`, or the next one that is free.
     say : called with a line for people where `PORT` was not free.
     """
-    if asked is not None or port_is_free(PORT):
-        return PORT if asked is None else asked
+    if wanted is not None or port_is_free(PORT):
+        return PORT if wanted is None else wanted
     port = next(filter(port_is_free, range(PORT + 1, PORT + PORTS)), PORT)
     if port != PORT:
         say(f"port {PORT} is taken by another program: a page there may be of another arm; this one's is {url(port)}")

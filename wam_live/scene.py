@@ -241,8 +241,8 @@ class Scene:
 def band_push(grip: Grip, pointer: Array) -> LinkPush:
     """LinkPush of a rubber band between where a cover is gripped and the pointer, (3,), m, in the cover's frame.
 
-    It acts at the cover's axis, beside the grip, and across the axis only, as contacts do that the estimator is made
-    for: no torque about the axis, no force along it.
+    It acts at the cover's axis, at the position of the grip along it, and across the axis only, as contacts do that the
+    estimator is made for: no torque about the axis, no force along it.
     """
     along = (grip.end - grip.start) / np.linalg.norm(grip.end - grip.start)
     at = grip.start + along * np.clip(along @ (grip.point - grip.start), 0.0, along @ (grip.end - grip.start))
