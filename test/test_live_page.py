@@ -568,7 +568,7 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
         def drive() -> None:
             with opened(f"http://{HOST}:{shown.port}/", tmp_path) as tab:
                 until(lambda: "Emergency stop" in tab.text() and server.get_clients())
-                until(lambda: tab.title().startswith(f"/wam, {ARM.name}, ROS domain {domain_id}, since "))
+                until(lambda: tab.title().startswith(f"/wam, domain {domain_id}, {ARM.name}, since "))
                 height = tab.height("Emergency stop")
                 tab.click("Enable")
                 until(lambda: mode_of(shown) == "enabled" and "enabled" in tab.text())

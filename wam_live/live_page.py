@@ -78,8 +78,9 @@ class LivePage:
             shared = build_part(Shared, driver)
             world = build_part(World, driver, "world.")
             domain = self._connection.context.get_domain_id()
-            title = f"{self._asking.get_namespace()}, {shared.arm.name}, ROS domain {domain}"
-            name_page(self._server, f"{title}, since {time.strftime('%H:%M:%S')}")
+            label = f"{self._asking.get_namespace()}, domain {domain}"
+            more = f", {shared.arm.name}, since {time.strftime('%H:%M:%S')}"
+            name_page(self._server, label, more)
             source = RunningStack(self._connection.context, self._namespace, shared)
             self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
             self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
@@ -88,7 +89,7 @@ class LivePage:
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)
             self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
-            self._say(f"live page: {url(self._port)}  ({title})")
+            self._say(f"live page: {url(self._port)}  ({label}{more})")
             self._draw(source, scene, objects, panel, until)
             self._release(source.stamp)
         finally:

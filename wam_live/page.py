@@ -112,9 +112,10 @@ def serve(port: int) -> Any:
     return made
 
 
-def name_page(server: Any, title: str) -> None:
-    """Give a page a title that tells it from others, in its window and at the top of its panel."""
-    server.gui.set_panel_label(title)
+def name_page(server: Any, label: str, more: str = "") -> None:
+    """Give a page a label that tells it from others: at the top of its panel, with more in the title of its window."""
+    title = label + more
+    server.gui.set_panel_label(label)
     # viser has no call for the title of the window; this picture cannot be loaded, and says so
     script = html.escape(f"document.title={json.dumps(title)}", quote=True)
     server.gui.add_html(f'<img src="data:," alt="" style="display:none" onerror="{script}">')

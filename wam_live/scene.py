@@ -35,6 +35,7 @@ from wam_live.snapshot import Snapshot, size
 
 LONGEST_ARROW = 0.6  # m
 ARROWS = {"true": (0.011, 0.02), "estimated": (0.006, 0.026)}  # m, radii of shaft and head: both are seen at one place
+VISERS_LONGEST = 0.9  # m, beyond which the head of viser's arrow does not grow
 DEEPER = 1.8  # exponent of a colour that the lights of the page would turn into a paler one
 STIFFNESS = 60.0  # N/m, of the rubber band between the pointer and the link
 STRONGEST = 40.0  # N, that a drag pushes with
@@ -236,6 +237,9 @@ class Scene:
         if self._grabbed is not None:
             point = self._body.point(self._q, self._grabbed.cover, self._grabbed.point)
             self._band.points = np.array([[point, self._pointer]], dtype=np.float32)
+            # viser draws an arrow of its own in another colour at the pointer that drags; this one is around it
+            length = min(float(np.linalg.norm(self._pointer - point)), VISERS_LONGEST)
+            self._band.head_length, self._band.head_radius = 0.22 * length, 0.06 * length
 
 
 def band_push(grip: Grip, pointer: Array) -> LinkPush:
