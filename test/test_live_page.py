@@ -33,12 +33,14 @@ from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
 from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, ObjectState, Wrench
+from wam_description.topics import BY_NAME
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
 from wam_live.page import free_port as next_free_port
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
 from geometry_msgs.msg import WrenchStamped  # noqa: E402
+from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
@@ -47,6 +49,7 @@ from wam_live.panel import FORCES, POINTS, Controls, Play, sample, status_page  
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
+from wam_ros.display import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm
@@ -393,6 +396,41 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
     assert not hold.is_on
     assert "another program publishes sim/disturbance" in hold.send(1, push)
     del other
+
+
+def test_copies_for_the_page_are_few_and_newest_first(ros: RosWorld) -> None:
+    sender, viewer = ros.node("sender"), ros.node("viewer")
+    copy = DisplayCopy(sender, BY_NAME["sim/disturbance"])
+    heard: list[int] = []
+    many = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+    name = copy_name("sim/disturbance")
+    viewer.create_subscription(WrenchStamped, name, lambda message: heard.append(message.header.stamp.nanosec), many)
+    ros.wait(lambda: sender.count_subscribers(name) == 1 and viewer.count_publishers(name) == 1)
+    begin = time.monotonic()
+    for i in range(1000):
+        message = WrenchStamped()
+        message.header.stamp.nanosec = i
+        copy.send(message)
+    most = 2 + int((time.monotonic() - begin) / PERIOD)
+    ros.wait(lambda: heard)
+    assert len(heard) <= most
+    assert heard[0] == 0
+
+
+def test_the_page_takes_copies_and_not_every_message(domain_id: int) -> None:
+    with running(domain_id) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel, node = shown.page.panel, composition.nodes["driver"]
+        assert panel is not None
+
+        def whole() -> set[str]:
+            listeners = {name: node.get_subscriptions_info_by_topic(f"/wam/{name}") for name in COPIED}
+            return {name for name, found in listeners.items() if any(one.node_name == "live_view" for one in found)}
+
+        shown.wait(lambda: not whole(), spin)
+        before = panel.snapshot.stamp
+        shown.wait(lambda: panel.snapshot.stamp > before + 10**9 and panel.snapshot.q, spin)
 
 
 def test_an_arm_goes_on_where_the_page_presses_and_lets_go(domain_id: int) -> None:
