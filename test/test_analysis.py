@@ -9,14 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 import yaml
 from browser import looked_at
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from rosbags.rosbag2 import StoragePlugin, Writer
 from test_bag import STORE, joint_state
 from test_lockstep import configuration, record_composed
 
+from wam_analysis.drawing import STYLE, widen_flat
 from wam_analysis.findings.analysis import Analysis, analyse, analyse_bag, analyse_foreign_bag
 from wam_analysis.findings.charts import charts
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
@@ -714,3 +718,19 @@ def test_every_joint_and_the_force_have_a_chart_of_their_own(planted: Analysis) 
     spectrum = drawn[-1]
     assert spectrum.x[int(np.argmax(spectrum.series[0].values))] == pytest.approx(3.1, abs=0.13)
     assert max(spectrum.series[0].values) == pytest.approx(0.3, rel=0.1)
+
+
+def test_a_quantity_that_does_not_change_is_a_line_with_readable_numbers():
+    with mpl.rc_context(STYLE):
+        figure = Figure()
+        FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        axes.plot([0.0, 1.0], [5.0, 5.0 + 1e-9])
+        widen_flat(axes)
+        figure.canvas.draw()
+    assert axes.yaxis.get_offset_text().get_text() == ""
+    texts = [label.get_text() for label in axes.get_yticklabels()]
+    assert len(set(texts)) == len(texts)
+    assert max(map(len, texts)) <= len("5.0001")
+    low, high = axes.get_ylim()
+    assert low < 5.0 - 1e-4 < 5.0 + 1e-4 < high

@@ -53,6 +53,20 @@ def test_a_live_parameter_is_read_changed_and_refused(stack: None) -> None:
     assert "did you mean 'posture_gain'?" in err
 
 
+def test_the_live_parameters_of_a_node_come_first_and_those_of_all_nodes_on_demand(stack: None) -> None:
+    code, out, err = called("get", "force_loop")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "# live, changed by wam call set"
+    own = lines.index("# of this node, chosen at its start")
+    assert any(line.startswith("force_loop:force_gain=") for line in lines[:own])
+    assert not any(":arm." in line or ":timing." in line for line in lines)
+    assert lines[-1].endswith("wam call get force_loop --all")
+    everything = called("get", "force_loop", "--all")[1].splitlines()
+    assert set(lines[:-1]) < set(everything)
+    assert any(line.startswith("force_loop:timing.period=") for line in everything)
+
+
 def test_a_push_reaches_the_arm_and_a_wrong_one_is_refused(stack: None) -> None:
     assert called("enable")[0] == 0
     code, out, _ = called("push", "outer_link", "0", "12", "0", "--at", "0.3", "--seconds", "0.5")

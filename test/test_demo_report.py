@@ -1,6 +1,7 @@
 """The report of a demonstration against recordings made by hand, whose answers are known."""
 
 import itertools
+import json
 import math
 import struct
 from pathlib import Path
@@ -10,23 +11,28 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from matplotlib.figure import Figure
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture
-from wam_analysis.demo_figure import save
+from wam_analysis.demo_figure import draw_forces, save
 from wam_analysis.demo_report import report, text, verdict
 from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summarize
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_cli.commands.demo import _report
 from wam_cli.main import main
 from wam_control.contact_inference import REASONS
+from wam_control.scenario import load as load_steps
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
+from wam_experiments.thesis.definition import load
 from wam_sim.recorded_parameters import recorded_parameters
+from wam_sim.simulated_bag import record
 
 MS = 1_000_000
 PERIOD = 5 * MS
@@ -222,7 +228,38 @@ def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():
     assert math.isnan(inner.position_estimated)
     assert inner.reason == REASON
     assert f"* {REASON}" in text(summary)
-    assert "position within 4 cm: YES (2.0 cm)" in verdict(summary)
+    assert verdict(summary).endswith("position within 4 cm: YES (2.0 cm), unknown for 1 of 4 contacts")
+    row = next(line for line in text(summary).splitlines() if "push inner" in line)
+    assert ">=10.00" in row.split()
+
+
+def test_a_lower_bound_of_the_force_is_drawn_as_one():
+    figure = Figure()
+    axes = figure.add_subplot()
+    draw_forces(axes, Recording().summary())
+    lines = {line.get_label(): line for line in axes.lines}
+    known, bound = (np.asarray(lines[name].get_ydata()) for name in ("estimated", "at least"))
+    rows = slice(500, 700)  # the push on the inner link
+    assert np.isnan(known[rows]).all()
+    assert bound[rows] == pytest.approx(10.0)
+    assert np.isnan(np.delete(bound, np.arange(500, 700))).all()
+
+
+def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
+    steps = [
+        {"name": "enable", "seconds": 0.1, "request": "enable"},
+        {"name": "lower onto nothing", "seconds": 0.2, "posture": POSE, "until_force": 1.5},
+    ]
+    task = load("follow-surface")
+    script, bag = tmp_path / "script.yaml", tmp_path / "bag"
+    script.write_text(json.dumps({"steps": steps}))
+    configuration = Configuration.load(packaged("wam"))
+    assert "no contact" in record(configuration, load_steps(script, configuration.shared.arm), bag)
+    assert _report(bag, True, task)
+    assert (bag / "demo.png").is_file()
+    out, err = capsys.readouterr()
+    assert "no report of task follow-surface" in err
+    assert "FAILED: step 'lower onto nothing'" in out
 
 
 def test_bounce_does_not_end_a_contact():
@@ -244,7 +281,8 @@ def test_contact_felt_without_one_is_counted():
 def test_good_run_has_a_good_verdict_in_narrow_lines():
     summary = Recording().summary()
     assert verdict(summary) == (
-        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | position within 4 cm: YES (2.0 cm)"
+        "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
+        "position within 4 cm: YES (2.0 cm), unknown for 1 of 4 contacts"
     )
     assert all(len(line) <= 100 for line in text(summary).splitlines())
 

@@ -33,19 +33,23 @@ from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
 from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, ObjectState, Wrench
+from wam_description.topics import BY_NAME
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
+from wam_live.page import free_port as next_free_port
 
 viser = pytest.importorskip("viser", reason="the live page needs viser: pip install 'wam_stack[live]'")
 from geometry_msgs.msg import WrenchStamped  # noqa: E402
+from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
-from wam_live.panel import POINTS, Controls, Play, sample, status_page  # noqa: E402
+from wam_live.panel import FORCES, POINTS, Controls, Play, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
-from wam_live.scene import RELEASE, STRONGEST, LinkPush, Scene, band_push  # noqa: E402
+from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
+from wam_ros.display import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm
@@ -122,12 +126,25 @@ def test_contacts_are_drawn_as_arrows_along_the_force_and_vanish(server: Any) ->
     assert not band.visible
 
 
+START, END = np.zeros(3), np.array([0.5, 0.0, 0.0])
+
+
 def test_a_drag_pushes_like_a_rubber_band_of_limited_strength() -> None:
-    push = band_push("outer_link", np.array([0.2, 0.0, 0.0]), np.array([0.2, 0.1, 0.0]))
+    grip = Grip("outer_link", np.array([0.2, 0.0, 0.0]), START, END)
+    push = band_push(grip, np.array([0.2, 0.1, 0.0]))
     assert push.force == pytest.approx((0.0, 6.0, 0.0))
     assert push.torque == pytest.approx((0.0, 0.0, 1.2))
-    far = band_push("outer_link", np.zeros(3), np.array([0.0, 0.0, 9.0]))
+    far = band_push(Grip("outer_link", START, START, END), np.array([0.0, 0.0, 9.0]))
     assert far.force == pytest.approx((0.0, 0.0, STRONGEST))
+
+
+def test_a_drag_at_the_surface_pushes_at_the_axis_and_across_it_only() -> None:
+    surface = np.array([0.2, 0.03, -0.02])
+    push = band_push(Grip("outer_link", surface, START, END), surface + np.array([0.3, 0.1, 0.2]))
+    assert push.force == pytest.approx((0.0, 6.0, 12.0))
+    assert push.torque == pytest.approx((0.0, -0.2 * 12.0, 0.2 * 6.0))
+    beyond = band_push(Grip("outer_link", np.array([0.52, 0.0, 0.02]), START, END), np.array([0.52, 0.1, 0.02]))
+    assert beyond.torque[2] == pytest.approx(0.5 * 6.0)  # a grip at the round end acts at the end of the axis
 
 
 def test_the_status_escapes_what_comes_from_topics() -> None:
@@ -135,7 +152,39 @@ def test_the_status_escapes_what_comes_from_topics() -> None:
     page = status_page(Snapshot(statuses={"driver": status}), 0.0)
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
-    assert len(sample(Snapshot())) == 7
+    assert len(sample(Snapshot())) == 1 + len(FORCES) + 2
+
+
+def test_a_lower_bound_of_the_force_is_no_estimate_and_an_unknown_position_a_gap(server: Any) -> None:
+    panel = Controls(server, ARM, {})
+    bound, known = (Contact("inner_link", place, (0.0, 6.0, 8.0)) for place in (math.nan, 0.3))
+    for i in range(40):
+        panel.take(Snapshot(i * 100_000_000, POSE, estimated=bound if i < 20 else known))
+    panel.show(Snapshot(4_000_000_000, POSE, estimated=bound))
+    assert "at least 10.0 N</b> somewhere on the inner link" in panel._status.content
+    lines = dict(zip(FORCES, panel._force_plot.data[1:], strict=True))
+    assert np.isnan(lines["estimated"][:20]).all()
+    assert lines["estimated"][20:40] == pytest.approx(10.0)
+    assert np.nanmax(lines["at least"][:20]) == pytest.approx(10.0)
+    assert np.isnan(lines["at least"][20:40]).all()
+    assert np.isnan(panel._place_plot.data[1][:20]).all()
+    assert panel._place_plot.data[1][20:40] == pytest.approx(0.3)
+    assert panel._force_plot.scales["y"]["range"] == (0.0, 20.0)
+
+
+def test_a_force_that_is_not_done_is_not_shown_as_done() -> None:
+    loop = NodeStatus(Level.WARN, "another link is touched", node="force_loop", facts={"reaction": "other_link"})
+    page = status_page(Snapshot(measured=0.0, statuses={"force_loop": loop}), pressing=5.0)
+    assert "commanded 5.0 N, not done: another link is touched" in page
+    loop = loop._replace(facts={"reaction": "none"})
+    assert "measured 4.8 N" in status_page(Snapshot(measured=4.8, statuses={"force_loop": loop}), pressing=5.0)
+
+
+def test_buttons_are_above_all_that_changes_its_height(server: Any) -> None:
+    panel = Controls(server, ARM, {})
+    stop = next(one for one in server.gui._gui_input_handle_from_uuid.values() if one.label == "Emergency stop")
+    assert stop.order < panel._status.order
+    assert stop.order < panel._said.order
 
 
 def test_a_slider_that_the_page_moves_asks_for_nothing(server: Any) -> None:
@@ -154,6 +203,24 @@ def test_a_taken_port_is_refused_by_name() -> None:
     finally:
         first.stop()
     assert port_is_free(free_port())
+
+
+def test_a_page_goes_beside_a_taken_port_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    with socket.socket() as taken:
+        taken.bind((HOST, 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        monkeypatch.setattr("wam_live.page.PORT", port)
+        ours = next_free_port(None, said.append)
+        assert next_free_port(port, said.append) == port  # one that was asked for
+    assert ours > port
+    assert port_is_free(ours)
+    assert len(said) == 1
+    assert f"port {port} is taken by another program" in said[0]
+    assert said[0].endswith(f"http://{HOST}:{ours}")
+    assert next_free_port(None, said.append) == port
+    assert len(said) == 1
 
 
 def test_pages_of_other_sites_are_refused(server: Any) -> None:
@@ -331,6 +398,41 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
     del other
 
 
+def test_copies_for_the_page_are_few_and_newest_first(ros: RosWorld) -> None:
+    sender, viewer = ros.node("sender"), ros.node("viewer")
+    copy = DisplayCopy(sender, BY_NAME["sim/disturbance"])
+    heard: list[int] = []
+    many = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+    name = copy_name("sim/disturbance")
+    viewer.create_subscription(WrenchStamped, name, lambda message: heard.append(message.header.stamp.nanosec), many)
+    ros.wait(lambda: sender.count_subscribers(name) == 1 and viewer.count_publishers(name) == 1)
+    begin = time.monotonic()
+    for i in range(1000):
+        message = WrenchStamped()
+        message.header.stamp.nanosec = i
+        copy.send(message)
+    most = 2 + int((time.monotonic() - begin) / PERIOD)
+    ros.wait(lambda: heard)
+    assert len(heard) <= most
+    assert heard[0] == 0
+
+
+def test_the_page_takes_copies_and_not_every_message(domain_id: int) -> None:
+    with running(domain_id) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel, node = shown.page.panel, composition.nodes["driver"]
+        assert panel is not None
+
+        def whole() -> set[str]:
+            listeners = {name: node.get_subscriptions_info_by_topic(f"/wam/{name}") for name in COPIED}
+            return {name for name, found in listeners.items() if any(one.node_name == "live_view" for one in found)}
+
+        shown.wait(lambda: not whole(), spin)
+        before = panel.snapshot.stamp
+        shown.wait(lambda: panel.snapshot.stamp > before + 10**9 and panel.snapshot.q, spin)
+
+
 def test_an_arm_goes_on_where_the_page_presses_and_lets_go(domain_id: int) -> None:
     from wam_description.wiring import Call
     from wam_live.panel import NO_PRESS, Press
@@ -421,6 +523,17 @@ class Tab:
         found = self.ask("Runtime.evaluate", expression="document.body.innerText", returnByValue=True)
         return str(found["result"].get("value", ""))
 
+    def title(self) -> str:
+        """Title of the window."""
+        found = self.ask("Runtime.evaluate", expression="document.title", returnByValue=True)
+        return str(found["result"].get("value", ""))
+
+    def height(self, label: str) -> float:
+        """Distance of a button from the top of the window, px."""
+        find = f"[...document.querySelectorAll('button')].find(b => b.innerText.trim() === {label!r})"
+        top = self.ask("Runtime.evaluate", expression=f"{find}.getBoundingClientRect().top", returnByValue=True)
+        return float(top["result"]["value"])
+
     def mouse(self, kind: str, x: float, y: float, pressed: bool) -> None:
         """Move, press or release the left button."""
         button = {"button": "left" if pressed or kind == "mouseReleased" else "none", "buttons": int(pressed)}
@@ -493,6 +606,8 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
         def drive() -> None:
             with opened(f"http://{HOST}:{shown.port}/", tmp_path) as tab:
                 until(lambda: "Emergency stop" in tab.text() and server.get_clients())
+                until(lambda: tab.title().startswith(f"/wam, domain {domain_id}, {ARM.name}, since "))
+                height = tab.height("Emergency stop")
                 tab.click("Enable")
                 until(lambda: mode_of(shown) == "enabled" and "enabled" in tab.text())
                 clients = list(server.get_clients().values())
@@ -519,6 +634,7 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
                 until(lambda: panel._force_plot.data[0][-1] > before / 1e9)
                 tab.click("Brake")
                 until(lambda: mode_of(shown) == "braked")
+                assert tab.height("Emergency stop") == height
                 assert len(tab.picture()) > 10_000
 
         failed: list[BaseException] = []

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
 from wam_analysis.demo_summary import DemoSummary, StepContact
-from wam_analysis.demo_traces import ForceSignal, Numbers, Traces
+from wam_analysis.demo_traces import ForceSignal, Mask, Numbers, Traces
 from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, STYLE, TRUE
 from wam_analysis.recorded import RecordedArm
 from wam_description.arm import Arm
@@ -190,7 +190,11 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     axes.plot(time, shown(traces.true, -1.0), color=TRUE, lw=1.6, label="true", zorder=3)
     measured = np.where(pressed, traces.along(traces.measured), np.nan)
     axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured", zorder=6)
-    axes.plot(time, shown(traces.estimated, -1.0), color=ESTIMATED, lw=1.0, label="estimated", zorder=5)
+    estimated = shown(traces.estimated, -1.0)
+    bound = np.where(_is_lower_bound(traces.estimated), estimated, np.nan)
+    axes.plot(time, np.where(np.isnan(bound), estimated, np.nan), color=ESTIMATED, lw=1.0, label="estimated", zorder=5)
+    if np.any(np.isfinite(bound)):
+        axes.plot(time, bound, color=ESTIMATED, lw=1.6, ls=(0, (0.6, 2.0)), label="at least", zorder=5)
     axes.plot(time, commanded, color=COMMANDED, lw=1.1, ls=(0, (1.2, 1.2)), label="commanded", zorder=7)
     axes.set_ylabel("force [N]")
     axes.tick_params(labelbottom=False)
@@ -200,13 +204,19 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     ]
     axes.set_ylim(min(0.0, -0.02 * max(highest)), 1.38 * float(max(highest)))
     handles, labels = axes.get_legend_handles_labels()
-    order = [3, 0, 1, 2]
+    order = [labels.index("commanded"), *(i for i, label in enumerate(labels) if label != "commanded")]
     axes.legend(
         [handles[i] for i in order], [labels[i] for i in order], loc="lower center", bbox_to_anchor=(0.5, 1.0),
-        ncols=4 if room > 60 else 2, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2,
+        ncols=len(order) if room > 60 else 2, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2,
     )  # fmt: skip
     _frame(axes, summary, letter)
     _name_steps(axes, summary, room)
+
+
+def _is_lower_bound(estimated: ForceSignal) -> Mask:
+    """Where the position is not known: then the force is the least one that explains the torques."""
+    unknown: Mask = estimated.acts & np.isnan(estimated.position)
+    return unknown & bool(np.any(np.isfinite(estimated.position)))  # else positions were not recorded
 
 
 def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c)", most: int = 0) -> None:

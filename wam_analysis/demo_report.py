@@ -107,10 +107,13 @@ def _link_verdict(summary: DemoSummary) -> str:
 
 
 def _position_verdict(summary: DemoSummary) -> str:
-    """Positions are compared unless the estimator reports that it cannot observe them."""
-    errors = [abs(touch.position_estimated - touch.position_true) for touch in summary.touches if not touch.reason]
+    """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
+    touches = summary.touches
+    errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.reason]
     question = f"position within {100.0 * POSITION_TOLERANCE:g} cm"
-    return _answer(question, errors, lambda error: error <= POSITION_TOLERANCE, lambda worst: f"{100.0 * worst:.1f} cm")
+    unknown = len(touches) - len(errors)
+    answer = _answer(question, errors, lambda error: error <= POSITION_TOLERANCE, lambda far: f"{100.0 * far:.1f} cm")
+    return answer + f", unknown for {unknown} of {len(touches)} contacts" * bool(unknown)
 
 
 def _answer(
@@ -150,7 +153,8 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
     return [
         title,
         *_table(rows, head),
-        "  true: simulator, +- half of its range; measured: force loop; estimated: contact estimator",
+        "  true: of all that acts on the link (simulator), the part along the commanded force; +-: half of",
+        "    its range; measured: force loop; estimated: contact estimator",
     ]
 
 
@@ -165,7 +169,9 @@ def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
             *(touch.step, touch.link_true, touch.link_estimated, _number(100.0 * touch.right, 0)),
             _number(100.0 * touch.position_true, 1),
             "?*" if touch.reason else _number(100.0 * touch.position_estimated, 1),
-            *(_number(touch.force_true, 2), _number(touch.force_estimated, 2), _latency(touch.latency, period)),
+            _number(touch.force_true, 2),
+            f">={_number(touch.force_estimated, 2)}" if touch.reason else _number(touch.force_estimated, 2),
+            _latency(touch.latency, period),
         ]
         for touch in touches
     ]
@@ -174,7 +180,8 @@ def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
         lines += _wrapped(f"  * {reason}", "    ")
     right = "right: fraction of the contact's time in which the estimated link was the true one"
     latency = f"latency: of the detection; the simulator's contact is recorded every {1e3 * period:.0f} ms"
-    return [*lines, *_wrapped(f"  {right}; {latency}", "    ")]
+    force = "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world"
+    return [*lines, *_wrapped(f"  {right}; {force}; {latency}", "    ")]
 
 
 def _false_contacts(summary: DemoSummary) -> str:

@@ -6,6 +6,7 @@ from typing import Any, Final
 COMMANDED, TRUE, MEASURED, ESTIMATED = "#222222", "#0072b2", "#009e73", "#d55e00"
 PREDICTED: Final = "#6b7280"  # by theory
 LIKELY: Final = "#f2a11a"  # where a contact may be
+HAND: Final = "#7a3db8"  # of the user who drags a link
 # outcomes of a trial
 RIGHT, REFUSED, BETWEEN, WRONG = "#4d7c0f", "#9aa3ad", "#a16207", "#be185d"
 INK: Final = "#222222"  # text and axes
@@ -18,6 +19,8 @@ OBJECT_COLOUR: Final = "#5f93bd"
 PEDESTAL_COLOUR: Final = "#c9ced4"
 PEDESTAL: Final = 0.07  # m, radius of the drawn base, which is not in the parameters
 FLOOR: Final = -1.0  # m, height of the foot of the drawn base
+STILL: Final = 1e-5  # rad, rad/s, N; a smaller range of a plot is not blown up
+FLAT: Final = 1e-4  # nor one that is smaller than this part of the value
 METRES_PER_NEWTON: Final = 0.015  # length of an arrow
 
 
@@ -34,10 +37,19 @@ STYLE: Any = {
     "text.color": INK,
     "xtick.color": INK,
     "ytick.color": INK,
+    "axes.formatter.useoffset": False,  # numbers as they are, not what is to be added to one in a corner
     "lines.linewidth": 1.4,
     "legend.frameon": False,
     "legend.fontsize": 8.0,
 }
+
+
+def widen_flat(axes: Any) -> None:
+    """Show a quantity that does not change as a line, not its rounding errors."""
+    low, high = axes.get_ylim()
+    least = max(STILL, FLAT * abs(low + high) / 2.0)
+    if high - low < least:
+        axes.set_ylim((low + high - least) / 2.0, (low + high + least) / 2.0)
 
 
 def channels(colour: str) -> tuple[int, int, int]:

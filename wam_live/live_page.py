@@ -17,7 +17,7 @@ from wam_description.wiring import Call, SetParameters
 from wam_description.world import World
 from wam_live.hold import HeldTopic
 from wam_live.object_meshes import ObjectMeshes, at_rest
-from wam_live.page import quiet, serve
+from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import NO_PRESS, SLIDERS, Controls, Play, Press, Request, mode_of
 from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import RELEASE, LinkPush, Scene
@@ -77,6 +77,10 @@ class LivePage:
             driver = flat["driver"]
             shared = build_part(Shared, driver)
             world = build_part(World, driver, "world.")
+            domain = self._connection.context.get_domain_id()
+            label = f"{self._asking.get_namespace()}, domain {domain}"
+            more = f", {shared.arm.name}, since {time.strftime('%H:%M:%S')}"
+            name_page(self._server, label, more)
             source = RunningStack(self._connection.context, self._namespace, shared)
             self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
             self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
@@ -85,7 +89,7 @@ class LivePage:
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)
             self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
-            self._say(f"live page: http://{self._server.get_host()}:{self._port}")
+            self._say(f"live page: {url(self._port)}  ({label}{more})")
             self._draw(source, scene, objects, panel, until)
             self._release(source.stamp)
         finally:
@@ -130,13 +134,14 @@ class LivePage:
                 scene.show(snapshot)
                 objects.show(snapshot.objects)
                 pushing = scene.drag()
+                panel.take(snapshot)
                 if count % PANEL_EVERY == 0:
-                    panel.show(snapshot, pushing)
+                    panel.show(snapshot, pushing, size(self._press.force) if self._press else 0.0)
             count += 1
             self._send(source, panel)
             if self._player is not None and (ended := self._player.ended()):
                 panel.say(ended)
-                panel.requests.put(Call("driver", "pause", False))  # a scenario pauses the arm at its end
+                self._ask(Call("driver", "pause", False), source, panel, ended)  # a scenario pauses the arm at its end
             while not panel.requests.empty():
                 self._ask(panel.requests.get(), source, panel)
 
@@ -177,7 +182,7 @@ class LivePage:
             self._states = self._asking.create_subscription(
                 message_type(row), row.name, lambda data: self._answer(data, panel), qos(row), raw=True
             )
-        panel.say(f"pressing with {size(press.force):.1f} N")
+        panel.say("")  # the status has what becomes of it
 
     def _answer(self, state: bytes, panel: Controls) -> None:
         if self._press is None:
@@ -209,7 +214,8 @@ class LivePage:
         refusal = self._player.play(script)
         panel.say(refusal or f"playing {script}", refused=bool(refusal))
 
-    def _ask(self, request: Request, source: RunningStack, panel: Controls) -> None:
+    def _ask(self, request: Request, source: RunningStack, panel: Controls, text: str = "") -> None:
+        """Make a request, and show its answer, or a text in place of it."""
         if isinstance(request, Play):
             self._play(request.script, panel)
             return
@@ -228,12 +234,14 @@ class LivePage:
         if not client.service_is_ready():
             panel.say(f"{request.node} does not answer", refused=True)
             return
-        client.call_async(message).add_done_callback(lambda future: self._answered(request, future.result(), panel))
+        client.call_async(message).add_done_callback(
+            lambda future: self._answered(request, future.result(), panel, text)
+        )
 
-    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls) -> None:
+    def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls, text: str) -> None:
         reasons = refusal_of(request, answer)
         if isinstance(request, Call):
-            panel.say(answer.message, refused=not answer.success)
+            panel.say(text or answer.message, refused=not answer.success)
             return
         for name, value in request.values.items():
             if reasons:

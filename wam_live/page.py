@@ -2,16 +2,19 @@
 
 import contextlib
 import functools
+import html
 import io
+import json
 import logging
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from importlib.util import find_spec
 from typing import Any, Final
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 8080
+PORTS: Final = 100  # from that one on, of which the first free one is taken
 TITLE: Final = "WAM"
 NARROW: Final = 576  # px, of a window; below it viser puts the panel under the picture
 CAMERA: Final = (1.1, -1.7, 0.5), (0.35, 0.0, -0.15)  # m, where it is and what it looks at
@@ -32,6 +35,27 @@ def port_is_free(port: int) -> bool:
         except OSError:
             return False
     return True
+
+
+def free_port(wanted: int | None, say: Callable[[str], None]) -> int:
+    """The port of a page.
+
+    Parameters
+    ----------
+    wanted : the one of an option; None takes `PORT`, or the next one that is free.
+    say : called with a line for people where `PORT` was not free.
+    """
+    if wanted is not None or port_is_free(PORT):
+        return PORT if wanted is None else wanted
+    port = next(filter(port_is_free, range(PORT + 1, PORT + PORTS)), PORT)
+    if port != PORT:
+        say(f"port {PORT} is taken by another program: a page there may be of another arm; this one's is {url(port)}")
+    return port
+
+
+def url(port: int) -> str:
+    """Address of the page."""
+    return f"http://{HOST}:{port}"
 
 
 def obstacle(port: int) -> str:
@@ -86,6 +110,15 @@ def serve(port: int) -> Any:
     made.initial_camera.position, made.initial_camera.look_at = CAMERA
     made.on_client_connect(_look_from_a_telephone)
     return made
+
+
+def name_page(server: Any, label: str, more: str = "") -> None:
+    """Give a page a label that tells it from others: at the top of its panel, with more in the title of its window."""
+    title = label + more
+    server.gui.set_panel_label(label)
+    # viser has no call for the title of the window; this picture cannot be loaded, and says so
+    script = html.escape(f"document.title={json.dumps(title)}", quote=True)
+    server.gui.add_html(f'<img src="data:," alt="" style="display:none" onerror="{script}">')
 
 
 def _look_from_a_telephone(client: Any) -> None:

@@ -11,14 +11,25 @@ import numpy as np
 import viser
 from viser import uplot
 
-from wam_analysis.drawing import COLOURS
+from wam_analysis.drawing import COLOURS, HAND, LIKELY
 from wam_description.arm import Arm
-from wam_description.signals import BASE, Level, NodeStatus, Triple
+from wam_description.signals import BASE, Contact, Level, NodeStatus, Triple
 from wam_description.wiring import Call, SetParameters
 from wam_live.snapshot import Snapshot, size
 
 WINDOW: Final = 15.0  # s of the arm's time in the plots
 POINTS: Final = 300  # of a line at most
+FORCES: Final = ("commanded", "measured", "estimated", "at least", "true")  # of the plot
+RANGES: Final = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)  # N, upper ends of its axis
+STATUS_HEIGHT: Final = 150  # px
+SAID_HEIGHT: Final = 40  # px
+MARK: Final = 0.5  # s between the rings of a lower bound
+LEGEND: Final = (  # of the arrows and the range in the scene
+    ("&#10145;", "true", "true (simulator)"),
+    ("&#10145;", "estimated", "estimated"),
+    ("&#9646;", "likely", "holds it with 90 %"),
+    ("&#10145;", "hand", "your hand"),
+)
 BUTTONS: Final[dict[str, dict[str, tuple[Call, ...]]]] = {  # by row: label and its requests
     "arm": {"Enable": (Call("driver", "enable", True),), "Brake": (Call("driver", "enable", False),)},
     "time": {
@@ -76,32 +87,46 @@ class Controls:
         self.requests: SimpleQueue[Request] = SimpleQueue()
         self._gui = gui = server.gui
         self.snapshot = Snapshot()
+        self._drawn, self._high = math.nan, RANGES[0]
         self._samples: deque[tuple[float, ...]] = deque(maxlen=POINTS)
         self._sliders: dict[tuple[str, str], Any] = {}
         gui.configure_theme(control_width="medium", show_share_button=False)
-        self._status = gui.add_html(status_page(Snapshot(), 0.0))
-        self._said = gui.add_html("")
         if live is not None:
-            self._add_buttons()
+            self._add_buttons()  # above all that changes its height
+        self._status = gui.add_html(boxed(status_page(Snapshot()), STATUS_HEIGHT))
+        self._said = gui.add_html(boxed("", SAID_HEIGHT) if live is not None else "")
+        gui.add_html(legend())
+        if live is not None:
             self._add_press(arm)
             self._add_scenario()
-        self._force_plot = self._add_plot("force [N]", ("commanded", "measured", "estimated", "true"), {"auto": True})
-        self._place_plot = self._add_plot(
-            "position along the link [m]", ("estimated", "true"), {"auto": False, "range": (0.0, max(arm.covers.end))}
-        )
+        self._force_plot = self._add_plot("force [N]", FORCES, RANGES[0])
+        self._place_plot = self._add_plot("position along the link [m]", ("estimated", "true"), max(arm.covers.end))
         if live:
             self._add_sliders(live)
         if dither:
             gui.add_html(paragraph(html.escape(dither)))
 
-    def show(self, snapshot: Snapshot, pushing: float = 0.0) -> None:
-        """Show an instant; call it a few times a second."""
-        self.snapshot = snapshot
-        self._status.content = status_page(snapshot, pushing)
+    def take(self, snapshot: Snapshot) -> None:
+        """Keep an instant for the plots; call it with every picture."""
         if self._samples and snapshot.seconds < self._samples[-1][0]:
             self._samples.clear()  # the arm was started again, or the bag was moved back
-        if not self._samples or snapshot.seconds > self._samples[-1][0] + WINDOW / POINTS:
+        if not self._samples or snapshot.seconds > self._samples[-1][0] + 0.9 * WINDOW / POINTS:
             self._samples.append(sample(snapshot))
+
+    def show(self, snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0) -> None:
+        """Show an instant and what was taken before it; call it a few times a second.
+
+        Parameters
+        ----------
+        snapshot : the instant.
+        pushing, pressing : forces that the page pushes a link with and commands, N, 0 for none.
+        """
+        self.snapshot = snapshot
+        status = boxed(status_page(snapshot, pushing, pressing), STATUS_HEIGHT)
+        if status != self._status.content:
+            self._status.content = status
+        self.take(snapshot)
+        if self._samples[-1][0] != self._drawn:
             self._draw()
 
     def fill(self, past: Iterable[Snapshot]) -> None:
@@ -113,9 +138,8 @@ class Controls:
 
     def say(self, text: str, refused: bool = False) -> None:
         """Show the answer to the last request."""
-        self._said.content = paragraph(
-            f"{'refused: ' * refused}{html.escape(text)}", DOTS[Level.ERROR] if refused else ""
-        )
+        told = paragraph(f"{'refused: ' * refused}{html.escape(text)}", DOTS[Level.ERROR] if refused else "")
+        self._said.content = boxed(told, SAID_HEIGHT)
 
     def set_slider(self, node: str, name: str, value: Any) -> None:
         """Put a slider where its parameter is."""
@@ -171,38 +195,76 @@ class Controls:
         values = value if isinstance(like, float) else [value] * len(like)
         self.requests.put(SetParameters(key[0], {key[1]: values}))
 
-    def _add_plot(self, title: str, names: tuple[str, ...], scale: dict[str, Any]) -> Any:
+    def _add_plot(self, title: str, names: tuple[str, ...], high: float) -> Any:
         empty = tuple(np.zeros(1) for _ in range(1 + len(names)))
-        lines = [uplot.Series(label=name, stroke=COLOURS[name], width=2, spanGaps=False) for name in names]
         return self._gui.add_uplot(
             empty,
-            (uplot.Series(label="time [s]"), *lines),
-            scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(**scale)},
+            (uplot.Series(label="time [s]"), *map(line, names)),
+            scales=scales(high),
             title=title,
             height=170,
+            padding=(8, 24, 0, 0),
+            legend=uplot.Legend(live=False),
         )
 
     def _draw(self) -> None:
-        newest = self._samples[-1][0]
+        newest = self._drawn = self._samples[-1][0]
         rows = np.array([row for row in self._samples if row[0] >= newest - WINDOW])
-        time, force, place = rows[:, :1], rows[:, 1:5], rows[:, 5:7]
+        time, force, place = rows[:, :1], rows[:, 1 : 1 + len(FORCES)], rows[:, 1 + len(FORCES) :]
+        between = np.diff(np.floor(rows[:, 0] / MARK), prepend=math.nan) == 0.0
+        force[between, FORCES.index("at least")] = math.nan
+        high = next((one for one in RANGES if one > np.nanmax(force, initial=0.0)), RANGES[-1])
+        if high != self._high:
+            self._high, self._force_plot.scales = high, scales(high)
         for plot, values in ((self._force_plot, force), (self._place_plot, place)):
-            # a NaN would blank the whole plot
-            plot.data = tuple(np.ascontiguousarray(column) for column in np.hstack([time, np.nan_to_num(values)]).T)
+            plot.data = tuple(np.ascontiguousarray(column) for column in np.hstack([time, values]).T)
+
+
+def line(name: str) -> uplot.Series:
+    """How a quantity is plotted: in points, as a line goes on where a NaN is; a lower bound in rings."""
+    colour = COLOURS["estimated" if name == "at least" else name]
+    is_bound = name == "at least"
+    points = {"show": True, "size": 7 if is_bound else 2.5, "width": 1, "stroke": colour}
+    points["fill"] = "white" if is_bound else colour
+    return uplot.Series(label="at least (rings)" if is_bound else name, stroke=colour, width=0, points=points)
+
+
+def scales(high: float) -> dict[str, uplot.Scale]:
+    """Axes of a plot; that of the quantity is fixed, because a line without a number would blank the plot."""
+    return {"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=False, range=(0.0, high))}
 
 
 def sample(snapshot: Snapshot) -> tuple[float, ...]:
-    """Row of the plots: time; force commanded, measured, estimated, true; position estimated, true."""
+    """Row of the plots: time; `FORCES`; position estimated, true.  NaN is a gap."""
     estimated, true = snapshot.estimated, snapshot.true
+    newtons, is_bound = size(estimated.force), is_lower_bound(estimated)
     return (
         snapshot.seconds,
         snapshot.commanded,
         snapshot.measured,
-        size(estimated.force) if estimated.cover else 0.0,
+        math.nan if is_bound else newtons if estimated.cover else 0.0,
+        newtons if is_bound else math.nan,
         size(true.force) if true.cover else 0.0,
         estimated.place,
         true.place,
     )
+
+
+def is_lower_bound(estimated: Contact) -> bool:
+    """Whether the force is the least one that explains the torques, as it is where the position is not known."""
+    return bool(estimated.cover) and not math.isfinite(estimated.place)
+
+
+def legend() -> str:
+    """What the colours of the scene mean, as HTML."""
+    colours = {**COLOURS, "likely": LIKELY, "hand": HAND}
+    marks = (f'<span style="color:{colours[name]}">{mark}</span> {text}' for mark, name, text in LEGEND)
+    return paragraph(" &nbsp; ".join(f'<span style="white-space:nowrap">{mark}</span>' for mark in marks))
+
+
+def boxed(text: str, height: int) -> str:
+    """HTML in a box of a height, px, so that what is below it stays where it is."""
+    return f'<div style="height:{height}px;overflow-y:auto">{text}</div>'
 
 
 def paragraph(text: str, colour: str = "") -> str:
@@ -211,8 +273,8 @@ def paragraph(text: str, colour: str = "") -> str:
     return f'<p style="margin:2px 12px;font-size:13px;line-height:1.35{style}">{text}</p>'
 
 
-def status_page(snapshot: Snapshot, pushing: float) -> str:
-    """Status as HTML: the driver first, then the nodes that warn, then the contact."""
+def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0) -> str:
+    """Status as HTML: the driver first, then what is done by hand, the nodes that warn, the contact."""
     driver = snapshot.statuses.get("driver")
     mode = mode_of(snapshot.statuses) or "waiting for the stack"
     factor = f" · {snapshot.real_time_factor:.2f} × real time" if math.isfinite(snapshot.real_time_factor) else ""
@@ -224,14 +286,29 @@ def status_page(snapshot: Snapshot, pushing: float) -> str:
     ]
     if driver and driver.fault:
         lines.append(paragraph(html.escape(driver.fault), DOTS[Level.ERROR]))
+    if pressing:
+        lines.append(press_text(snapshot, pressing))
     for name, status in sorted(snapshot.statuses.items()):
         if name != "driver" and (status.level is not Level.OK or status.step or name == "force_loop"):
             text = f"{name}: {status.step or status.message}{margin_text(status.facts)}"
             lines.append(paragraph(f"{dot(status.level)} {html.escape(text)}"))
-    lines.append(paragraph(contact_text(snapshot)))
+    lines.append(paragraph(f"estimated: {contact_text(snapshot.estimated)}"))
+    if snapshot.true.cover:
+        lines.append(paragraph(f"true: {contact_text(snapshot.true)}"))
     if pushing:
-        lines.append(paragraph(f"you push with <b>{pushing:.1f} N</b>"))
+        lines.append(paragraph(f"of it by your hand: you push with <b>{pushing:.1f} N</b>"))
     return "".join(lines)
+
+
+def press_text(snapshot: Snapshot, pressing: float) -> str:
+    """What becomes of a commanded force, N, as HTML: the force loop may not do it."""
+    loop = snapshot.statuses.get("force_loop")
+    if loop is not None and loop.facts.get("reaction", "none") != "none":
+        text = f"commanded {pressing:.1f} N, not done: {html.escape(loop.message)}"
+        return paragraph(text, DOTS[Level.ERROR])
+    if not snapshot.measured:
+        return paragraph(f"commanded {pressing:.1f} N, nothing is measured yet")
+    return paragraph(f"commanded <b>{pressing:.1f} N</b>, measured {snapshot.measured:.1f} N")
 
 
 def mode_of(statuses: Mapping[str, NodeStatus]) -> str:
@@ -253,13 +330,12 @@ def dot(level: Level | None) -> str:
     return f'<span style="color:{DOTS[level]}">&#9679;</span>'
 
 
-def contact_text(snapshot: Snapshot) -> str:
-    """The estimated contact in a sentence, as HTML."""
-    contact = snapshot.estimated
+def contact_text(contact: Contact) -> str:
+    """A contact in a sentence, as HTML."""
     if not contact.cover:
         return "nothing touches the arm"
-    place = "somewhere on"
+    bound, place = "at least ", "somewhere on"
     if math.isfinite(contact.place):
         spread = f" ± {contact.position_sd * 100:.0f}" if math.isfinite(contact.position_sd) else ""
-        place = f"{contact.place * 100:.0f}{spread} cm along"
-    return f"<b>{size(contact.force):.1f} N</b> {place} the {html.escape(contact.cover.replace('_', ' '))}"
+        bound, place = "", f"{contact.place * 100:.0f}{spread} cm along"
+    return f"<b>{bound}{size(contact.force):.1f} N</b> {place} the {html.escape(contact.cover.replace('_', ' '))}"

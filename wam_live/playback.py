@@ -17,7 +17,7 @@ from wam_control.contact_table import contact_of, likely_of
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, NodeStatus, ObjectState
 from wam_description.world import NO_SPRINGS, World
 from wam_live.object_meshes import ObjectMeshes, at_rest
-from wam_live.page import quiet, serve
+from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import POINTS, WINDOW, Controls
 from wam_live.scene import Scene
 from wam_live.snapshot import NAN, Snapshot
@@ -129,12 +129,13 @@ def play(
         scene = Scene(server, source.recorded.arm, at_rest(source.world), None)
         objects = ObjectMeshes(server, source.world)
         length = (source.end - source.begin) / 1e9
+        name_page(server, recording.bag.path.name)
         place, then = min(max(at or 0.0, 0.0), length), time.monotonic()
         slider = server.gui.add_slider("time [s]", 0.0, max(length, 0.01), 0.01, place)
         speed = server.gui.add_dropdown("speed", SPEEDS, initial_value="1")
         running = server.gui.add_checkbox("play", at is None)
         panel = Controls(server, source.recorded.arm)
-        say(f"{recording.bag.path}: http://{server.get_host()}:{port}")
+        say(f"{recording.bag.path}: {url(port)}")
 
         def moved(event: object) -> None:
             nonlocal place

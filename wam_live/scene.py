@@ -19,6 +19,7 @@ from wam_analysis.drawing import (
     BLOCK_COLOUR,
     COLOURS,
     FLOOR,
+    HAND,
     LIKELY,
     METRES_PER_NEWTON,
     PEDESTAL,
@@ -33,6 +34,9 @@ from wam_description.world import Obstacles
 from wam_live.snapshot import Snapshot, size
 
 LONGEST_ARROW = 0.6  # m
+ARROWS = {"true": (0.011, 0.02), "estimated": (0.006, 0.026)}  # m, radii of shaft and head: both are seen at one place
+VISERS_LONGEST = 0.9  # m, beyond which the head of viser's arrow does not grow
+DEEPER = 1.8  # exponent of a colour that the lights of the page would turn into a paler one
 STIFFNESS = 60.0  # N/m, of the rubber band between the pointer and the link
 STRONGEST = 40.0  # N, that a drag pushes with
 
@@ -45,6 +49,15 @@ class LinkPush(NamedTuple):
     cover: str
     force: Triple  # N
     torque: Triple  # N m
+
+
+class Grip(NamedTuple):
+    """Where a drag holds a cover, m, in its frame: the point, and the ends of the axis of its tube, (3,) each."""
+
+    cover: str
+    point: Array
+    start: Array
+    end: Array
 
 
 RELEASE = LinkPush(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -66,7 +79,7 @@ class Scene:
         self._scene, self._arm, self._push = server.scene, arm, push
         self._body = RigidBody(arm)
         self._q = list(arm.joints.start)
-        self._grabbed: tuple[str, Array] | None = None
+        self._grabbed: Grip | None = None
         self._pointer = np.zeros(3)
         self._scene.set_up_direction("+z")
         # shadows and the environment map take most of the time of a browser that draws by software
@@ -77,7 +90,7 @@ class Scene:
         self._add_surroundings(obstacles)
         self._arrows = {name: self._add_arrow(name) for name in ("true", "estimated")}
         self._place = self._scene.add_icosphere(
-            "/contact/place", 0.02, channels(COLOURS["estimated"]), visible=False, cast_shadow=False
+            "/contact/place", 0.02, lit(COLOURS["estimated"]), visible=False, cast_shadow=False
         )
         self._bands = [
             self._scene.add_cylinder(
@@ -86,7 +99,7 @@ class Scene:
             for i in range(len(arm.covers.names))
         ]
         self._band = self._scene.add_arrows(
-            "/hand", np.zeros((1, 2, 3)), channels("#7a3db8"), shaft_radius=0.006, head_radius=0.016, head_length=0.04,
+            "/hand", np.zeros((1, 2, 3)), channels(HAND), shaft_radius=0.006, head_radius=0.016, head_length=0.04,
             visible=False,
         )  # fmt: skip
         self.show(Snapshot(q=tuple(self._q)))
@@ -126,7 +139,7 @@ class Scene:
             cast_shadow=False,
         )
         if self._push is not None:
-            tube.on_drag("left")(self._dragged(name))
+            tube.on_drag("left")(self._dragged(name, (start, end)))
         return frame
 
     def _add_surroundings(self, obstacles: Obstacles) -> None:
@@ -151,8 +164,9 @@ class Scene:
         self._scene.add_grid("/world/floor", 4.0, 4.0, position=(0.0, 0.0, FLOOR), cell_size=0.2)
 
     def _add_arrow(self, name: str) -> Any:
+        shaft, head = ARROWS[name]
         return self._scene.add_arrows(
-            f"/contact/{name}", np.zeros((1, 2, 3)), channels(COLOURS[name]), shaft_radius=0.008, head_radius=0.02,
+            f"/contact/{name}", np.zeros((1, 2, 3)), lit(COLOURS[name]), shaft_radius=shaft, head_radius=head,
             head_length=0.05, visible=False,
         )  # fmt: skip
 
@@ -187,14 +201,15 @@ class Scene:
 
     # dragging
 
-    def _dragged(self, cover: str) -> Callable[[Any], Any]:
+    def _dragged(self, cover: str, axis: tuple[Array, Array]) -> Callable[[Any], Any]:
         async def take(event: Any) -> None:  # an async callback: others run in a pool, out of order
             if event.phase == "end":
                 self._let_go()
                 return
             if self._grabbed is None:
                 pose = self._body.cover_pose(self._q, cover)
-                self._grabbed = (cover, pose.rotation.T @ (np.array(event.start_position) - pose.position))
+                point = pose.rotation.T @ (np.array(event.start_position) - pose.position)
+                self._grabbed = Grip(cover, point, *axis)
             self._pointer = np.array(event.end_position)
 
         return take
@@ -212,26 +227,41 @@ class Scene:
         """Send the push of the present drag; returns its force, N.  Call it at every drawing."""
         if self._grabbed is None or self._push is None:
             return 0.0
-        cover, point = self._grabbed
-        pose = self._body.cover_pose(self._q, cover)
-        push = band_push(cover, point, pose.rotation.T @ (self._pointer - pose.position))
+        pose = self._body.cover_pose(self._q, self._grabbed.cover)
+        push = band_push(self._grabbed, pose.rotation.T @ (self._pointer - pose.position))
         self._push(push)
         return size(push.force)
 
     def _show_hand(self) -> None:
         self._band.visible = self._grabbed is not None
         if self._grabbed is not None:
-            cover, point = self._grabbed
-            self._band.points = np.array([[self._body.point(self._q, cover, point), self._pointer]], dtype=np.float32)
+            point = self._body.point(self._q, self._grabbed.cover, self._grabbed.point)
+            self._band.points = np.array([[point, self._pointer]], dtype=np.float32)
+            # viser draws an arrow of its own in another colour at the pointer that drags; this one is around it
+            length = min(float(np.linalg.norm(self._pointer - point)), VISERS_LONGEST)
+            self._band.head_length, self._band.head_radius = 0.22 * length, 0.06 * length
 
 
-def band_push(cover: str, point: Array, pointer: Array) -> LinkPush:
-    """LinkPush of a rubber band between a point of a cover and the pointer, both (3,), m, in the cover's frame."""
-    force = STIFFNESS * (pointer - point)
+def band_push(grip: Grip, pointer: Array) -> LinkPush:
+    """LinkPush of a rubber band between where a cover is gripped and the pointer, (3,), m, in the cover's frame.
+
+    It acts at the cover's axis, at the position of the grip along it, and across the axis only, as contacts do that the
+    estimator is made for: no torque about the axis, no force along it.
+    """
+    along = (grip.end - grip.start) / np.linalg.norm(grip.end - grip.start)
+    at = grip.start + along * np.clip(along @ (grip.point - grip.start), 0.0, along @ (grip.end - grip.start))
+    stretch = pointer - grip.point
+    force = STIFFNESS * (stretch - along * (along @ stretch))
     force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), 1e-9))
     fx, fy, fz = force.tolist()
-    tx, ty, tz = np.cross(point, force).tolist()
-    return LinkPush(cover, (fx, fy, fz), (tx, ty, tz))
+    tx, ty, tz = np.cross(at, force).tolist()
+    return LinkPush(grip.cover, (fx, fy, fz), (tx, ty, tz))
+
+
+def lit(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue of a thing that is to be seen in a colour under the lights of the page."""
+    red, green, blue = (round(255.0 * (part / 255.0) ** DEEPER) for part in channels(colour))
+    return red, green, blue
 
 
 def quaternion(rotation: Array) -> tuple[float, float, float, float]:

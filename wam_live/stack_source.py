@@ -9,26 +9,18 @@ from typing import Any, Final
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 
 from wam_control.contact_table import contact_of, likely_of
 from wam_description.arm import Shared
 from wam_description.signals import BASE, NO_CONTACT, Contact, NodeStatus, ObjectState, State, Table
 from wam_description.topics import BY_NAME, STATUS
 from wam_live.snapshot import NAN, Snapshot, size
+from wam_ros.display import COPIED, NEWEST, copy_name
 from wam_ros.messages import Refused, message_type, read_status
 from wam_ros.wire import decoder, stamp_of
 
-TOPICS: Final = (
-    "joint_states",
-    "sim/joint_states",
-    "sim/contact/wrench",
-    "sim/contact/point",
-    "sim/objects",
-    "contact/hypotheses",
-    "force_command",
-    "force_measured",
-)
-NEWEST: Final = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, history=HistoryPolicy.KEEP_LAST, depth=1)
+TOPICS: Final = (*sorted(COPIED), "force_command")  # of which everybody may be the publisher
 LATCHED: Final = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     history=HistoryPolicy.KEEP_LAST,
@@ -55,13 +47,11 @@ class RunningStack:
         # its node is in no executor: what has come is taken when a picture is drawn
         self.node = Node("live_view", context=context, namespace=namespace)
         self._covers = shared.arm.covers.names
-        self._topics = {
-            name: (
-                self.node.create_subscription(message_type(BY_NAME[name]), name, print, NEWEST, raw=True),
-                decoder(BY_NAME[name], shared, "position?" if "joint" in name else ""),
-            )
-            for name in TOPICS
+        self._topics = {name: self._subscription(name, name) for name in TOPICS}
+        self._decoders = {
+            name: decoder(BY_NAME[name], shared, "position?" if "joint" in name else "") for name in TOPICS
         }
+        self._whole = set(COPIED)  # of which all messages are taken, because copies have not been found
         self._status = self.node.create_subscription(message_type(BY_NAME[STATUS]), STATUS, print, LATCHED)
         self._newest: dict[str, Any] = {}
         self._stamps: dict[str, int] = {}
@@ -71,10 +61,10 @@ class RunningStack:
 
     def snapshot(self) -> Snapshot:
         """What the stack shows now."""
-        for name, (subscription, decode) in self._topics.items():
+        for name, subscription in self._topics.items():
             if (data := _taken(subscription, raw=True)) is not None:
                 try:
-                    self._newest[name], self._stamps[name] = decode(data), stamp_of(data)
+                    self._newest[name], self._stamps[name] = self._decoders[name](data), stamp_of(data)
                 except Refused:
                     continue
         while (message := _taken(self._status, raw=False)) is not None:
@@ -117,7 +107,19 @@ class RunningStack:
             if 0 < stamp <= self.stamp:
                 self._factor = (self.stamp - stamp) / 1e9 / (now - then)
             self._pace = now, self.stamp
+            self._look_for_copies()
         return self._factor
+
+    def _subscription(self, topic: str, name: str) -> Subscription:
+        return self.node.create_subscription(message_type(BY_NAME[topic]), name, print, NEWEST, raw=True)
+
+    def _look_for_copies(self) -> None:
+        """Take the copies of a topic instead of all its messages, where its node makes them."""
+        for topic in sorted(self._whole):
+            if self.node.count_publishers(copy_name(topic)):
+                self._whole.remove(topic)
+                self.node.destroy_subscription(self._topics[topic])
+                self._topics[topic] = self._subscription(topic, copy_name(topic))
 
 
 def objects_of(table: Table | None) -> tuple[ObjectState, ...]:

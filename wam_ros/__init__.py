@@ -3,6 +3,7 @@
 - node: the ROS node of a declared node (`wam_description.wiring`); the program that starts one
 - ports: publishers, subscriptions, status and diagnostics of a node; qos: quality of service
 - local_bus: messages between nodes of one process, without the middleware
+- display: copies of topics for a viewer, few a second
 - claims: one publisher for each topic that a node works on
 - messages: ROS messages to values and back; header: stamps and frames; markers: what viewers draw
 - wire: the same from and to bytes, faster, for the types that carry numbers

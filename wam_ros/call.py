@@ -3,12 +3,13 @@
 import importlib
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.srv import DescribeParameters
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -101,6 +102,22 @@ class CalledStack:
         self._wait(is_answered, f"no node '{node}' answers", nodes)
         return asked.found[node]
 
+    def live(self, node: str, names: Collection[str]) -> list[str]:
+        """Those of the parameters of a node that a request may change while it runs.
+
+        Raises
+        ------
+        NoAnswerError
+            where it does not answer.
+        """
+        client = self.node.create_client(DescribeParameters, f"{node}/describe_parameters")
+        wait = partial(self._connection.executor.spin_until_future_complete, timeout_sec=PATIENCE / ATTEMPTS)
+        question = DescribeParameters.Request(names=list(names))
+        answer = answer_of(client, question, ATTEMPTS, wait) if client.wait_for_service(PATIENCE) else None
+        if answer is None:
+            raise NoAnswerError(f"node '{node}' does not describe its parameters within {PATIENCE:g} s; {START}")
+        return [found.name for found in answer.descriptors if not found.read_only]
+
     def statuses(self) -> dict[str, NodeStatus]:
         """The newest status of each node by its name; kept up to date while messages are awaited.
 
@@ -145,9 +162,8 @@ class CalledStack:
             return dict(self.node.get_topic_names_and_types()).get(name, [])
 
         def topics() -> list[str]:
-            return [
-                found.removeprefix(own) for found, _ in self.node.get_topic_names_and_types() if found.startswith(own)
-            ]
+            found = (name for name, _ in self.node.get_topic_names_and_types() if name.startswith(own))
+            return [name.removeprefix(own) for name in found if "/_" not in name]  # those are hidden
 
         self._wait(kinds, f"no topic {name}", topics)
         package, _, kind = kinds()[0].split("/")

@@ -20,6 +20,7 @@ from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance
 from wam_description.topics import STATUS, Topic
 from wam_description.wiring import Declaration
 from wam_ros.claims import Claims
+from wam_ros.display import COPIED, DisplayCopy
 from wam_ros.header import header
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
@@ -100,6 +101,7 @@ class Ports:
         self._publishers: dict[str, Publisher] = {
             row.name: node.create_publisher(message_type(row), topic_name(node, row), qos(row)) for row in [*rows, *own]
         }
+        self._copies = {row.name: DisplayCopy(node, row) for row in rows if row.name in COPIED}
         self._published = dict.fromkeys(self._publishers, 0)
         self._full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in [*rows, *own]}
         self._encoders = {row.name: encoder(row, shared) for row in rows}
@@ -113,7 +115,10 @@ class Ports:
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value on a topic of the table, with the stamp of the state that caused it, ns."""
-        self._send(topic, self._encoders[topic](stamp, value))
+        message = self._encoders[topic](stamp, value)
+        self._send(topic, message)
+        if (copy := self._copies.get(topic)) is not None:
+            copy.send(message)
 
     def _send(self, topic: str, message: Any) -> None:
         self._published[topic] += 1

@@ -5,14 +5,15 @@
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const drawn = [];
-  const short = (value) => (value === null ? "" : String(Number(value.toPrecision(4))));
+  const short = (value, step) => value.toFixed(Math.min(9, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9))));
   const decade = (value) => (Math.abs(Math.log10(value) % 1) < 1e-9 ? value.toExponential(0) : "");
   function axis(label, size, logarithmic) {
     const text = logarithmic ? decade : short;
-    return { values: (plot, values) => values.map((value) => (value === null ? "" : text(value))), label, size, stroke: style("--ink"), grid: { stroke: style("--line"), width: 1 }, ticks: { stroke: style("--line") } };
+    return { values: (plot, values, index, space, step) => values.map((value) => (value === null ? "" : text(value, step))), label, size, stroke: style("--ink"), grid: { stroke: style("--line"), width: 1 }, ticks: { stroke: style("--line") } };
   }
   function range(plot, low, high) {
-    const room = Math.max(0.05 * (high - low), 1e-6);
+    const least = 1e-4 * Math.max(Math.abs(low), Math.abs(high));  // a flat line is no row of rounding errors
+    const room = Math.max(0.05 * (high - low), high - low < least ? least : 1e-6);
     return [low - room, high + room];
   }
   function draw(chart, figure) {

@@ -20,7 +20,7 @@ from wam_analysis.demo_figure import (
     draw_positions,
     seconds_at,
 )
-from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, SHAFTS, STYLE, TRUE
+from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, SHAFTS, STYLE, TRUE, widen_flat
 from wam_analysis.findings.analysis import Analysis
 from wam_analysis.findings.signals import envelope, forces_over_time, moving
 from wam_analysis.measures.loop_timing import latency
@@ -31,7 +31,6 @@ Numbers = NDArray[np.float64]
 
 WIDE, NARROW = 9.6, 4.1  # inches
 MOST = {WIDE: 3000, NARROW: 1200}  # points of a line
-STILL = 1e-5  # rad or rad/s; a smaller range is not blown up
 PNG_DPI = 130
 PAGE_STYLE: Any = {
     **STYLE,
@@ -161,16 +160,9 @@ def _positions(figure: Figure, width: float, columns: JointColumns) -> None:
     for i, (axes, name) in enumerate(zip(rows, columns.names, strict=True)):
         axes.plot(*envelope(time, columns.position[:, i], MOST[width]), color=SHAFTS[i % len(SHAFTS)], lw=1.2)
         axes.set(ylabel=f"{name} [rad]")
-        _widened(axes)
+        widen_flat(axes)
     rows[-1].set_xlabel("time [s]")
     figure.align_ylabels()
-
-
-def _widened(axes: Axes) -> None:
-    """Show a shaft at rest as one, not its rounding errors."""
-    low, high = axes.get_ylim()
-    if high - low < STILL:
-        axes.set_ylim((low + high - STILL) / 2.0, (low + high + STILL) / 2.0)
 
 
 def _phases(figure: Figure, width: float, columns: JointColumns) -> None:
@@ -183,7 +175,7 @@ def _phases(figure: Figure, width: float, columns: JointColumns) -> None:
         position, velocity = columns.position[::every, i], columns.velocity[::every, i]
         axes.plot(position, velocity, color=SHAFTS[i % len(SHAFTS)], lw=0.8)
         axes.set(xlabel=f"{name} [rad]", ylabel="velocity [rad/s]")
-        _widened(axes)
+        widen_flat(axes)
     for axes in list(grid.flat)[n:]:
         axes.set_axis_off()
 
@@ -194,6 +186,7 @@ def _wrench(figure: Figure, width: float, columns: WrenchColumns) -> None:
     for i, name in enumerate("xyz"):
         axes.plot(*envelope(time, columns.force[:, i], MOST[width]), color=SHAFTS[i], lw=1.2, label=name)
     axes.set(xlabel="time [s]", ylabel="force [N]")
+    widen_flat(axes)
     _legend(axes, width)
 
 
@@ -212,6 +205,7 @@ def _holds(figure: Figure, width: float, analysis: Analysis) -> None:
             axes.plot(*envelope(one.time_true, one.true, most), color=TRUE, lw=1.6, label="true")
         axes.plot(*envelope(one.time, one.measured, most), color=MEASURED, lw=1.0, ls=(0, (4, 2)), label="measured")
         axes.axhline(one.hold.commanded, color=COMMANDED, lw=0.9, ls=(0, (1.2, 1.2)), label="commanded")
+        widen_flat(axes)
         axes.set_title(one.hold.name if len(one.hold.name) < 34 else f"{one.hold.name[:32]}…")
         axes.set_xlabel("time [s]")
     for row in grid:

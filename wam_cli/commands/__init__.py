@@ -118,7 +118,9 @@ def runs_apart(configuration: Configuration, given: argparse.Namespace) -> bool:
 
 def take_port(parser: argparse.ArgumentParser) -> None:
     """Give a command the option --port."""
-    parser.add_argument("--port", type=port, default=PORT, help="of the page on this machine; default: %(default)s")
+    parser.add_argument(
+        "--port", type=port, help=f"of the page on this machine; default: {PORT}, or the next one that is free"
+    )
 
 
 def take_page(parser: argparse.ArgumentParser, default: bool | None) -> None:

@@ -14,7 +14,7 @@ import yaml
 from wam_cli.commands import at_least, namespace
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
-from wam_description.parameters import build_part
+from wam_description.parameters import build_part, fields
 from wam_description.signals import BASE, NodeStatus, Wrench
 from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME, TABLE
@@ -52,6 +52,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         requests.add_parser(name, parents=[where], help=text, description=f"{text[0].upper()}{text[1:]}.")
     found = requests.add_parser("get", parents=[where], help="print parameters of a node")
     found.add_argument("name", metavar="NODE[:PARAMETER]", help="force_loop, or force_loop:force_gain")
+    found.add_argument("--all", action="store_true", help="of a node also those that all nodes share")
     new = requests.add_parser("set", parents=[where], help="change a live parameter, or be refused with the reason")
     new.add_argument("value", metavar="NODE:PARAMETER=VALUE", help="for example force_loop:force_gain=0.01")
     heard = requests.add_parser("echo", parents=[where], help="print messages of a topic")
@@ -86,8 +87,23 @@ def _get(given: argparse.Namespace, stack: CalledStack) -> int:
     wanted = {key: value for key, value in values.items() if not name or key == name or key.startswith(f"{name}.")}
     if not wanted:
         raise ValueError(_unknown(node, name, values))
-    for key, value in sorted(wanted.items()):
-        print(value if key == name else f"{node}:{key}={value}")
+    if name:
+        for key, value in sorted(wanted.items()):
+            print(value if key == name else f"{node}:{key}={value}")
+        return 0
+    live = set(stack.live(node, values))
+    shared = {field.name for field in fields(Shared)} - live
+    own = values.keys() - live - shared
+    hidden = 0 if given.all else len(shared & values.keys())
+    for what, keys in (
+        ("live, changed by wam call set", live),
+        ("of this node, chosen at its start", own),
+        ("of all nodes, chosen at the start", set() if hidden else shared & values.keys()),
+    ):
+        if keys:
+            print(f"# {what}", *(f"{node}:{key}={values[key]}" for key in sorted(keys)), sep="\n")
+    if hidden:
+        print(f"# and {hidden} of all nodes; to see them: wam call get {node} --all")
     return 0
 
 

@@ -107,8 +107,8 @@ def _report(bag: Path, failed: bool, task: Experiment | None) -> bool:
     except (BagError, OSError) as error:
         if not failed:
             raise
-        print(f"no report: {error}", file=sys.stderr)
-        return False
+        print(f"no report{f' of task {task.name}' if task else ''}: {error}", file=sys.stderr)
+        return task is not None and _report(bag, failed, None)  # how far it came, with a picture
     return True
 
 

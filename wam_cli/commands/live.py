@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from wam_cli.commands import namespace, take_port
-from wam_live.page import NoPageError, needing_viser, obstacle
+from wam_live.page import NoPageError, free_port, needing_viser, obstacle
 from wam_ros.program import Stop, end_at_once_on_signals
 from wam_ros.run import NAMESPACE, PARENT, die_with_parent
 
@@ -34,15 +34,18 @@ def page_beside(given: argparse.Namespace, namespace: str) -> Iterator[Callable[
     NoPageError
         if a page is required and there can be none.
     """
-    reason = obstacle(given.port) if given.live is not False else ""
+    if given.live is False:
+        yield lambda: None
+        return
+    port = free_port(given.port, _print)
+    reason = obstacle(port)
     if reason and given.live:
         raise NoPageError(reason)
     if reason:
-        print(f"no live page: {reason}", flush=True)
-    if reason or given.live is False:
+        _print(f"no live page: {reason}")
         yield lambda: None
         return
-    page = PageProcess(given.port, namespace)
+    page = PageProcess(port, namespace)
     try:
         yield page.close
     finally:
@@ -77,6 +80,10 @@ def run(given: argparse.Namespace) -> int:
     with needing_viser():
         from wam_live.live_page import LivePage
     stop = Stop()
-    page = LivePage(given.namespace, given.port, lambda line: print(line, flush=True))
+    page = LivePage(given.namespace, free_port(given.port, _print), _print)
     page.run(lambda: stop.is_set)
     return 0
+
+
+def _print(line: str) -> None:
+    print(line, flush=True)

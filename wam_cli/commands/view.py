@@ -7,7 +7,7 @@ from wam_analysis.findings.analysed_run import analysed_run
 from wam_analysis.rerun_view import load_rerun, view, viewer
 from wam_bag.bag import read
 from wam_cli.commands import take_port, writable_file
-from wam_live.page import needing_viser
+from wam_live.page import free_port, needing_viser
 from wam_ros.program import Stop
 
 
@@ -35,5 +35,6 @@ def run(given: argparse.Namespace) -> int:
     with needing_viser():
         from wam_live.playback import play
     stop = Stop()
-    play(analysed_run(read(given.bag)), given.port, given.at, lambda: stop.is_set, lambda line: print(line, flush=True))
+    port = free_port(given.port, lambda line: print(line, flush=True))
+    play(analysed_run(read(given.bag)), port, given.at, lambda: stop.is_set, lambda line: print(line, flush=True))
     return 0

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
-from wam_analysis.drawing import COLOURS, MEASURED, PREDICTED, SHAFTS
+from wam_analysis.drawing import COLOURS, MEASURED, PREDICTED, SHAFTS, widen_flat
 from wam_experiments.figures.style import panels
 from wam_experiments.thesis.definition import Experiment
 from wam_experiments.thesis.rows import Panel, Result
@@ -56,5 +56,7 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
         axes.set_xscale("log")
     if "y" in panel.logarithmic:
         axes.set_yscale("log")
+    else:
+        widen_flat(axes)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(frameon=False, fontsize=8)
