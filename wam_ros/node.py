@@ -5,10 +5,10 @@ import re
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -330,15 +330,27 @@ def make_node(entry: str, **ros: Any) -> Node:
     return node_factory(entry)(**ros)
 
 
+def node_makers(entries: Iterable[str]) -> dict[str, Callable[..., Node]]:
+    """What makes the node of each entry of the parameter `nodes`, by its name, as `wam_ros.run.run` takes it.
+
+    Raises
+    ------
+    ParameterError
+        where there is no such node.
+    """
+    return {declared(entry).name: partial(make_node, entry) for entry in entries}
+
+
 def main() -> None:
-    """Run the node that the name of this program, or its first argument, names; for `wam_ros.program`."""
-    name = Path(sys.argv[0]).name
-    if name in ("node", "program.py"):
-        if len(sys.argv) < 2:
-            raise SystemExit("usage: python3 -m wam_ros.program NAME [--ros-args ...]")
-        name = sys.argv.pop(1)
+    """Run the nodes that the name of this program, or its first arguments, name; for `wam_ros.program`."""
+    entries = [Path(sys.argv[0]).name]
+    if entries[0] in ("node", "program.py"):
+        entries = list(takewhile(lambda word: not word.startswith("-"), sys.argv[1:]))
+        if not entries:
+            raise SystemExit("usage: python3 -m wam_ros.program NAME [NAME ...] [--ros-args ...]")
+        del sys.argv[1 : len(entries) + 1]
     try:
-        declared(name)
+        makers = node_makers(entries)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     with ExitStack() as files:
@@ -346,7 +358,7 @@ def main() -> None:
             arguments = [named_file(given, before, files) for before, given in pairwise(["", *sys.argv])]
         except ParameterError as error:
             raise SystemExit(f"error: {error}") from None
-        run(lambda **ros: make_node(name, **ros), arguments)
+        run(makers, arguments)
 
 
 def named_file(given: str, before: str, files: ExitStack) -> str:

@@ -91,7 +91,8 @@ class Ports:
         self._absent: set[str] = set()
         self._refused: Counter[str] = Counter()  # by kind
         self._logged: dict[str, tuple[float, int]] = {}  # by kind: when, and how many had been refused by then
-        self._bus = BUSES.get(node.context)
+        is_lockstep = shared.timing.mode == "lockstep"
+        self._bus = BUSES.get(node.context) if is_lockstep else None  # in realtime a late node needs the newest only
         self._subscriptions: dict[str, Subscription] = {}
         self._claimed: dict[str, Subscription] = {}
         self.claims = Claims(node, self._claimed)
