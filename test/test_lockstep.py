@@ -184,7 +184,7 @@ def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_p
     assert outputs[0] == outputs[1]
 
 
-TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0)
+TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0, 0)
 
 
 def puts(synchroniser: Synchroniser, topic: str, stamp: int, value: str) -> list[tuple[int, float, str, str | None]]:

@@ -369,6 +369,7 @@ def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any
     stack = started("-m", "wam_cli.main", "node", "driver", "-p", "timing.mode:=realtime")
     ros.wait(lambda: said and len(states) > 100, what="states of a driver that is alone")
     assert set(said) == {"braked"}
+    assert "[wam.driver]: priority: " in stack.said()
     stack.process.terminate()
     wait(lambda: stack.process.poll() is not None, "the end", soon())
 

@@ -30,7 +30,7 @@ from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow_other, follow_together
 from wam_ros.ports import SECOND, Ports
 from wam_ros.requests import refusal_of, service_request
-from wam_ros.run import raise_priority, run
+from wam_ros.run import run
 from wam_ros.tolerance import TolerantNode
 
 REPEATED = 10  # steps, after which a loss is reported again while the arm is enabled
@@ -62,8 +62,6 @@ class AdaptedNode(TolerantNode):
         self._worked = 0  # stamp of the last step, ns
         self._declaration, self._outputs = declaration, frozenset(declaration.outputs)
         self._is_realtime = shared.timing.mode == "realtime"
-        if self._is_realtime and getattr(self.node, "high_priority", False):
-            raise_priority(shared.timing.niceness)
         live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
         if owned:
             live.append((getattr(shared, owned), self.node.retune, f"{owned}."))
@@ -104,6 +102,11 @@ class AdaptedNode(TolerantNode):
     def failure(self) -> str:
         """Why the node failed, '' where it did not."""
         return getattr(self.node, "failure", "")
+
+    def raise_priority(self) -> None:
+        """Ask the system to prefer this process, where the node is not to be late."""
+        if getattr(self.node, "high_priority", False):
+            self._ports.raise_priority()
 
     def take_fault(self, reason: str) -> None:
         """Report what a callback raised."""
@@ -229,7 +232,7 @@ class AdaptedNode(TolerantNode):
                 self._ports.publish(topic, stamp, value)
         if self._ports.report_due(stamp):
             if diagnostics := getattr(self.node, "diagnostics", None):
-                self._ports.facts = diagnostics()
+                self._ports.facts |= diagnostics()
             self._ports.report(stamp)
 
     def _set_status(self, stamp: int, status: NodeStatus) -> None:

@@ -38,16 +38,6 @@ PR_SET_PDEATHSIG = 1
 MakeNode = Callable[..., Node]
 
 
-def raise_priority(niceness: int) -> None:
-    """Ask the system to prefer this process; most grant it to privileged users only.
-
-    On Linux priority belongs to the thread, and those of the middleware are there already.
-    """
-    with contextlib.suppress(PermissionError, FileNotFoundError):
-        for thread in Path("/proc/self/task").iterdir():
-            os.setpriority(os.PRIO_PROCESS, int(thread.name), niceness)
-
-
 def die_with_parent() -> None:
     """Let the system end this process when the one that started it is gone, even by SIGKILL."""
     parent = os.environ.get(PARENT)
@@ -190,6 +180,8 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
         for name, make in makers.items():
             nodes[name] = make(context=connection.context, namespace=NAMESPACE)
             connection.add(nodes[name])
+        for node in nodes.values():  # all threads are there
+            getattr(node, "raise_priority", lambda: None)()
         spin(connection.executor, is_over, end)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
