@@ -111,6 +111,7 @@ def measure_stack(way: str, seconds: float) -> Any:
             "nodes": ["driver", "velocity_loop"],
             "timing.mode": "realtime",
             "timing.period": PERIOD,
+            "timing.fifo_priority": 0,
             "timing.niceness": 0,  # the relay has no priority either
         }
     )

@@ -1,4 +1,4 @@
-"""Real-time factor of the simulation: lockstep over topics, and the loop without ROS.
+"""Real-time factor of the simulation: lockstep over topics in one process and in several, and the loop without ROS.
 
 The scenario is a short form of the demonstration: enable, move, a push on the outer link, brake.
 """
@@ -12,15 +12,27 @@ import yaml
 from comparing import arguments, machine, mark, ratios, save, spread, table
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock as ClockMessage
 
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
-from wam_ros.bring_up import Composition
+from wam_description.nodes import EACH, GROUPED
+from wam_ros.bring_up import Composition, Processes
+from wam_ros.run import Connection
+from wam_ros.wire import stamp_of
 from wam_sim.simulation import Simulation
 
 STEADY = ClockType.STEADY_TIME
 POLL = 0.02  # s between two readings of the arm's time
-ROWS = {"direct run": (14.0, 20.0), "lockstep": (4.0, 5.5), "lockstep, recorded": (3.0, 4.5)}  # must, aim
+ROWS = {  # must, aim
+    "direct run": (14.0, 20.0),
+    "lockstep": (4.0, 5.5),
+    "lockstep, recorded": (3.0, 4.5),
+    "grouped, recorded": (1.8, 3.0),
+    "one process per node, recorded": (1.2, 1.6),
+}
+Readings = list[tuple[float, int]]  # wall clock in s, the arm's time in ns
 
 
 def scenario(seconds: float) -> dict[str, Any]:
@@ -48,7 +60,7 @@ def direct(configuration: Configuration, script: Path) -> float:
 def lockstep(configuration: Configuration, *recorder: str) -> float:
     """The same over topics in one process, without the start of the nodes."""
     nodes = {"nodes": [*configuration.shared.nodes, "scenario", *recorder]}
-    seen: list[tuple[float, int]] = []
+    seen: Readings = []
     with Composition(configuration.with_values(nodes)) as composition:
         driver: Any = composition.nodes["driver"]
         player: Any = composition.nodes["scenario"]
@@ -62,6 +74,33 @@ def lockstep(configuration: Configuration, *recorder: str) -> float:
         watch.destroy_node()
         if player.failure:
             raise SystemExit(player.failure)
+    return _speed(seen)
+
+
+def processes(configuration: Configuration, how: str) -> float:
+    """The same in processes, with the recorder, seen from outside."""
+    nodes = {"nodes": [*configuration.shared.nodes, "scenario", "recorder"]}
+    seen: Readings = []
+    connection = Connection()
+    watch = Node("stopwatch", context=connection.context, namespace="wam")
+    connection.add(watch)
+
+    def take(data: bytes) -> None:
+        seen.append((time.perf_counter(), stamp_of(data)))
+
+    watch.create_subscription(ClockMessage, "/clock", take, qos_profile_sensor_data, raw=True)
+    with Processes(configuration.with_values(nodes), log_level="warn", processes=how) as stack:
+        while not stack.ended():
+            connection.executor.spin_once(timeout_sec=0.1)
+        if stack.failures:
+            raise SystemExit(stack.failures[0])
+    connection.close()
+    if stack.bag_failure:
+        raise SystemExit(stack.bag_failure)
+    return _speed(seen)
+
+
+def _speed(seen: Readings) -> float:
     first, last = seen[0][1], seen[-1][1]
     running = [(at, stamp) for at, stamp in seen if first < stamp < last]
     (begin, start), (end, stop) = running[0], running[-1]
@@ -88,6 +127,9 @@ def main() -> None:
             speeds["direct run"].append(direct(configuration, script))
             speeds["lockstep"].append(lockstep(configuration))
             speeds["lockstep, recorded"].append(lockstep(recorded, "recorder"))
+            for row, how in (("grouped", GROUPED), ("one process per node", EACH)):
+                named = configuration.with_values({"recorder:name": f"{how}_{i}"})
+                speeds[f"{row}, recorded"].append(processes(named, how))
     rows, measured = [], dict[str, Any]()
     for name, values in speeds.items():
         real, least = spread(values), ratios(speeds["direct run"], values)

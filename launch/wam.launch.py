@@ -1,4 +1,4 @@
-"""Start every node of one configuration, all in one process or each in its own, with transforms and RViz.
+"""Start every node of one configuration, in one process or in several, with transforms and RViz.
 
     ros2 launch wam_stack wam.launch.py config:=wam namespace:=wam rviz:=true scenario:=demo_scenario bag:=bags/first
 
@@ -22,6 +22,8 @@ from launch_ros.actions import Node
 from launch import LaunchContext, LaunchDescription
 from wam_control.scenario import load, script_file
 from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.interface import process_groups
+from wam_description.nodes import EACH, GROUPED, NODES
 from wam_description.urdf import urdf
 from wam_ros.run import NAMESPACE, PARENT
 
@@ -42,8 +44,8 @@ ARGUMENTS = {  # name: default, description, allowed values
     ),
     "processes": (
         "false",
-        "a process for each node; false: all nodes in one process, unless the mode is realtime",
-        SWITCH,
+        "a process for each node; grouped: one each for inner loop, outer loop, recorder; false: one, but in realtime",
+        [*SWITCH, GROUPED],
     ),
     "scenario": ("", "scenario that is played: name of an installed one, or path of a YAML file; empty: none", None),
     "record": (
@@ -70,7 +72,7 @@ ARGUMENTS = {  # name: default, description, allowed values
 
 
 def start_nodes(context: LaunchContext) -> list[Any]:
-    """All nodes in one process, or one process per node, with the parameters of the configuration; viewers."""
+    """All nodes in one process or in several, with the parameters of the configuration; viewers."""
     given = {argument: LaunchConfiguration(argument).perform(context) for argument in ARGUMENTS}
     configuration = chosen(given)
     namespace = given["namespace"].strip("/")
@@ -92,14 +94,14 @@ def start_nodes(context: LaunchContext) -> list[Any]:
     nodes = [
         Node(
             package="wam_stack",
-            executable="node" if ":" in entry else entry,
-            arguments=[entry] if ":" in entry else [],
+            executable="node" if set(group) - {*NODES} or len(group) > 1 else group[0],
+            arguments=group if set(group) - {*NODES} or len(group) > 1 else [],
             ros_arguments=["--log-level", given["log_level"]],
             namespace=namespace,
             parameters=[str(parameters)],
             **ends,
         )
-        for entry in configuration.shared.nodes
+        for group in process_groups(configuration.shared.nodes, GROUPED if given["processes"] == GROUPED else EACH)
     ]
     return [*nodes, *viewers]
 

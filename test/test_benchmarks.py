@@ -29,7 +29,13 @@ ROWS = {
     "plant.py": ["arm free, moving", "arm free, pushed", "arm, every effect on", "in contact", "testbed, moving"],
     "recording.py": ["messages in the bag", "writing a message [us]"],
     "round_trip.py": ["one process, p50", "one process, p99", "two processes, p50", "two processes, p99"],
-    "speed.py": ["direct run", "lockstep", "lockstep, recorded"],
+    "speed.py": [
+        "direct run",
+        "lockstep",
+        "lockstep, recorded",
+        "grouped, recorded",
+        "one process per node, recorded",
+    ],
     "stability_map.py": [
         "map, against solve_ivp",
         "the same points only, against solve_ivp",

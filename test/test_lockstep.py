@@ -16,6 +16,8 @@ from wam_bag.bag import Bag, JointColumns, PointColumns, TableColumns, WrenchCol
 from wam_control.scenario import load
 from wam_description.arm import Timing
 from wam_description.configuration import Configuration, packaged
+from wam_description.interface import process_groups
+from wam_description.nodes import EACH, GROUPED, ONE
 from wam_description.synchroniser import InputSpec, Synchroniser
 from wam_sim.replay import tables
 from wam_sim.simulation import Rows, Simulation
@@ -65,11 +67,12 @@ def record_composed(configured: Configuration, domain_id: int) -> None:
         assert scenario.failure == ""  # type: ignore[attr-defined]
 
 
-def record_in_processes(configured: Configuration) -> None:
+def record_in_processes(configured: Configuration, how: str = EACH) -> None:
     from wam_ros.bring_up import Processes
 
-    with Processes(configured) as processes:
-        assert processes.wait(bool) == {"scenario": 0}
+    with Processes(configured, processes=how) as processes:
+        ((name, code),) = processes.wait(bool).items()
+        assert (name.split()[-1], code) == ("scenario", 0)
 
 
 def play_directly(configured: Configuration, script: Path) -> Simulation:
@@ -139,10 +142,22 @@ def test_processes_under_load_say_what_one_process_says(script: Path, tmp_path: 
     record_in_processes(configuration(script, tmp_path, "quiet"))
     record_composed(configuration(script, tmp_path, "composed"), domain_id)
     assert compare(tmp_path / "loaded", tmp_path / "quiet") == []
+    record_in_processes(configuration(script, tmp_path, "grouped"), GROUPED)
     assert compare(tmp_path / "quiet", tmp_path / "composed") == []
+    assert compare(tmp_path / "grouped", tmp_path / "composed") == []
     bag = read(tmp_path / "loaded")
     assert "/wam/status" in bag.topics
     assert len(bag.topics["/wam/motor_states"].log_time_ns) == 801
+
+
+def test_what_works_every_inner_period_shares_a_process_and_so_does_the_rest_without_the_recorder() -> None:
+    nodes = [*Configuration.load(packaged("wam")).shared.nodes, "scenario", "recorder"]
+    inner = ["driver", "transform", "velocity_loop", "gravity"]
+    assert process_groups(nodes, GROUPED) == [inner, ["force_loop", "contact_estimator", "scenario"], ["recorder"]]
+    assert process_groups(nodes, ONE) == [nodes]
+    assert process_groups(nodes, EACH) == [[node] for node in nodes]
+    own = "wam_control.gravity_node:GravityNode"
+    assert process_groups(["driver", own], GROUPED) == [["driver", own]], "what counts is the name of the node"
 
 
 @pytest.mark.slow
@@ -169,7 +184,7 @@ def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_p
     assert outputs[0] == outputs[1]
 
 
-TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0)
+TIMING = Timing("lockstep", 0.001, 2, 5, 1, 10, 0, 5.0, 0.0, 0, 0)
 
 
 def puts(synchroniser: Synchroniser, topic: str, stamp: int, value: str) -> list[tuple[int, float, str, str | None]]:

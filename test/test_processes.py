@@ -17,6 +17,7 @@ from conftest import LONG, soon
 from wam_bag.bag import read
 from wam_cli.main import COMMANDS, main
 from wam_description.configuration import Configuration, packaged
+from wam_description.nodes import GROUPED
 from wam_ros import bring_up
 from wam_ros.bring_up import Processes
 
@@ -92,8 +93,8 @@ def up(started: Callable[..., Stack], *arguments: str) -> Stack:
     """The whole stack and a recorder, running, with a bag that grows."""
     stack = started("-m", "wam_cli.main", "up", "--record", *arguments)
     wait(lambda: recorded(stack) > 400_000, f"a bag that grows; {stack.said()}")
-    apart = {"--processes", "--realtime"} & set(arguments)
-    assert len(stack.alive()) == (NODES + 1 if apart else 1)
+    others = 3 if GROUPED in arguments else NODES if {"--processes", "--realtime"} & set(arguments) else 0
+    assert len(stack.alive()) == others + 1
     return stack
 
 
@@ -122,8 +123,15 @@ def enable(ros: Any, stack: Stack) -> None:
         assert "no motor_current_command comes in" in future.result().message
 
 
-@pytest.mark.parametrize("options", [(), ("--processes",)], ids=["one process", "processes"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("number", "options"),
+    [
+        (signal.SIGINT, ()),
+        (signal.SIGTERM, ()),
+        (signal.SIGINT, ("--processes",)),
+        (signal.SIGTERM, ("--processes", GROUPED)),
+    ],
+)
 def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
     number: signal.Signals, options: tuple[str, ...], started: Any, tmp_path: Path, ros: Any
 ) -> None:
@@ -134,6 +142,7 @@ def test_a_signal_ends_all_with_brakes_on_and_the_bag_closed(
     assert stack.alive() == []
     assert stack.process.returncode == 0
     assert "Traceback" not in stack.said()
+    assert "fault" not in stack.said(), "the brakes are on before a command ceases"
     assert statuses(tmp_path, "driver")[-2:] == ["enabled", "braked"]
 
 
@@ -321,6 +330,18 @@ def test_signals_while_a_program_ends_do_not_change_how_it_ends(program: str, ro
     assert "Traceback" not in stack.said()
 
 
+def test_a_group_that_loses_its_process_is_named_and_takes_the_stack_with_it(
+    started: Any, tmp_path: Path, domain_id: int
+) -> None:
+    stack = up(started, "--processes", GROUPED, "--realtime")
+    (victim,) = (pid for pid in stack.alive() if b"force_loop" in Path(f"/proc/{pid}/cmdline").read_bytes())
+    os.kill(victim, signal.SIGKILL)
+    wait(lambda: stack.process.poll() is not None, f"the end; {stack.said()}", soon_delivered())
+    assert stack.alive() == []
+    assert "node force_loop or contact_estimator was ended from outside by SIGKILL" in stack.said()
+    assert statuses(tmp_path, "driver")[-1] == "braked"
+
+
 @pytest.mark.parametrize("name", ["driver", "velocity_loop"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_node_alone_ends_on_a_signal(name: str, number: signal.Signals, ros: Any, started: Any) -> None:
@@ -348,6 +369,7 @@ def test_driver_alone_goes_on_in_realtime_and_says_braked(ros: Any, started: Any
     stack = started("-m", "wam_cli.main", "node", "driver", "-p", "timing.mode:=realtime")
     ros.wait(lambda: said and len(states) > 100, what="states of a driver that is alone")
     assert set(said) == {"braked"}
+    assert "[wam.driver]: priority: " in stack.said()
     stack.process.terminate()
     wait(lambda: stack.process.poll() is not None, "the end", soon())
 

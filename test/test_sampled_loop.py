@@ -26,7 +26,7 @@ def stiff_arm(damping: float) -> Arm:
 
 
 def timing(divisor: int) -> Timing:
-    return Timing("lockstep", 1e-4, 1, divisor, 0, 10, 0, 5.0, 0.0, 0)
+    return Timing("lockstep", 1e-4, 1, divisor, 0, 10, 0, 5.0, 0.0, 0, 0)
 
 
 def margin(

@@ -365,7 +365,7 @@ def test_the_velocity_obeys_the_factor() -> None:
 
 # ----------------------------------------------------------------------------------- scheduling
 ROD = changed(one_joint(), motors={"inertia": (2e-3,)}, joints={"viscous_friction": (4.0,)})
-FAST = Timing("lockstep", 1e-4, 1, 10, 0, 10, 0, 5.0, 0.0, 0)
+FAST = Timing("lockstep", 1e-4, 1, 10, 0, 10, 0, 5.0, 0.0, 0, 0)
 
 
 def rod(schedule: str) -> ForceLoop:

@@ -358,7 +358,10 @@ class Timing:
     outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", low=0, high=1)
     display_divisor: int = parameter("outer periods between messages at the display rate", low=1, high=1000)
     niceness: int = parameter(
-        "scheduling priority of driver and velocity_loop in realtime, if the system grants it", low=-20, high=0
+        "niceness of driver and velocity_loop, and of their sessions, in realtime, if the system grants it and not "
+        "timing.fifo_priority; 0: as other programs",
+        low=-20,
+        high=0,
     )
     timeout: float = parameter("longest wait for a command in lockstep, on the steady clock", "s", low=0.1, high=3600.0)
     real_time_factor: float = parameter(
@@ -372,6 +375,13 @@ class Timing:
         "inner periods in one cycle of the dither of the motor torques, which detects contact at rest; 0: none",
         low=0,
         high=1000,
+    )
+    fifo_priority: int = parameter(
+        "SCHED_FIFO priority of driver and velocity_loop in realtime, if the system grants it; 0: not requested; "
+        "interrupts have 50",
+        low=0,
+        high=49,
+        before=0,
     )
 
     @cached_property

@@ -1,13 +1,13 @@
 """The interface of a bring-up: who publishes and who takes each topic, from the declarations of its nodes."""
 
 import importlib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
 from wam_description.arm import Shared
 from wam_description.defects import Check, output_check
-from wam_description.nodes import NODES
+from wam_description.nodes import EACH, GROUPED, GROUPS, NODES, ONE, OUTER
 from wam_description.parameters import ParameterError
 from wam_description.signals import BASE
 from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
@@ -43,6 +43,21 @@ def declared(entry: str) -> Declaration:
         ) from error
     except Exception as error:
         raise ParameterError(f"node '{entry}' cannot be imported: {raised(error)}; correct '{module}'") from error
+
+
+def process_groups(entries: Iterable[str], processes: str) -> list[list[str]]:
+    """Entries of the parameter `nodes` that share a process, for each process.
+
+    Parameters
+    ----------
+    entries : of the parameter `nodes`.
+    processes : ONE, GROUPED or EACH, of `wam_description.nodes`.
+    """
+    groups: dict[str, list[str]] = {}
+    for entry in entries:
+        name = declared(entry).name
+        groups.setdefault({ONE: "", GROUPED: GROUPS.get(name, OUTER), EACH: name}[processes], []).append(entry)
+    return list(groups.values())
 
 
 class Interface:

@@ -12,3 +12,14 @@ NODES: Final = {
     "scenario": "wam_control.scenario_node:ScenarioNode",
     "recorder": "wam_ros.recorder_interface:RecorderInterface",
 }
+ONE, GROUPED, EACH = "one", "grouped", "each"  # process for all nodes, for each group, for each node
+# What works in every inner period is together: its messages do not leave the process.  The outer loop has a period for
+# its answer, and the recorder has time.
+GROUPS: Final = {
+    "driver": "inner",
+    "transform": "inner",
+    "velocity_loop": "inner",
+    "gravity": "inner",
+    "recorder": "recorder",
+}
+OUTER: Final = "outer"  # group of all others, also of nodes of your own

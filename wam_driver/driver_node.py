@@ -23,7 +23,6 @@ from wam_ros.messages import Refused
 from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow
 from wam_ros.ports import Ports
-from wam_ros.run import raise_priority
 from wam_ros.tolerance import TolerantNode
 
 STATUS_PERIOD = 0.05  # s, between repetitions of the status in realtime, so that every node knows the brakes
@@ -88,7 +87,6 @@ class DriverNode(TolerantNode):
             if factor := shared.timing.real_time_factor:
                 self.create_timer(shared.timing.period / factor, self.time.go_on, clock=steady)
         else:
-            raise_priority(shared.timing.niceness)
             self._started = True
             self._announce()  # in lockstep the first status goes to all peers
             self.create_timer(shared.timing.period, self.time.tick, clock=steady)
@@ -103,6 +101,10 @@ class DriverNode(TolerantNode):
         self._ports.wait_for_delivery()
         super().destroy_node()
         self._place.close()
+
+    def raise_priority(self) -> None:
+        """Ask the system to prefer this process."""
+        self._ports.raise_priority()
 
     def take_fault(self, reason: str) -> None:
         """Brake where a callback raised."""

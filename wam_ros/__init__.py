@@ -10,7 +10,7 @@
 - tolerance: a node that goes on when a callback raises, and reports it as a fault
 - parameters: declared, described, live; remote_parameters: those of other nodes
 - recorder, recorder_node, recorder_interface: every topic into a bag
-- bring_up: all nodes, in processes or in this one; run: context, executor and signals
+- bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
 - program: ends a program quietly whose imports are interrupted
 - requests: requests to services and their answers; call: one request from a shell
 - conformance: a running driver tested against its contract; driver_probe: the node that does it

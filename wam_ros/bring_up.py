@@ -1,4 +1,4 @@
-"""Starting the nodes together: each as its own process, or several in this one."""
+"""Starting the nodes together: in processes of their own, one or several in each, or all in this one."""
 
 import os
 import signal
@@ -16,15 +16,14 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 
 from wam_description.configuration import Configuration
-from wam_description.interface import declared
+from wam_description.interface import declared, process_groups
+from wam_description.nodes import EACH, ONE
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node
-from wam_ros.run import NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
+from wam_ros.run import FIRST, LAST, NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
 LOGGER: Final = get_logger("wam")
-FIRST: Final = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
-LAST: Final = "recorder"  # to be stopped: it closes the bag
 PATIENCE: Final = 15.0  # s, for all nodes but the recorder to end on a busy machine; usually they take a tenth of one
 RECORDER_PATIENCE: Final = 30.0  # s without any sign of work, before a recorder that does not end is killed
 TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
@@ -32,7 +31,7 @@ TOLD: Final = 2.0  # s between two lines about a recorder that is still writing
 
 def start(
     configuration: Configuration,
-    apart: bool,
+    processes: str,
     is_stopped: Callable[[], bool],
     namespace: str = NAMESPACE,
     log_level: str = "info",
@@ -42,7 +41,7 @@ def start(
     Parameters
     ----------
     configuration : values for all nodes; its `shared.nodes` says which ones are started.
-    apart : a process for each node; otherwise all in this one.
+    processes : ONE, GROUPED or EACH, of `wam_description.nodes`; ONE is this one.
     is_stopped : whether the start is to be broken off.
     namespace : namespace of the nodes.
     log_level : least severity of what they print.
@@ -53,9 +52,9 @@ def start(
         where there is no such node, or one of this name runs already in this namespace.
     """
     require_places(node_names(configuration).values(), namespace)
-    if apart:
-        return Processes(configuration, namespace, log_level)
-    return Composition(configuration, namespace, None, is_stopped, log_level)
+    if processes == ONE:
+        return Composition(configuration, namespace, None, is_stopped, log_level)
+    return Processes(configuration, namespace, log_level, processes)
 
 
 def node_names(configuration: Configuration) -> dict[str, str]:
@@ -79,13 +78,14 @@ def parameter_file(configuration: Configuration) -> Iterator[Path]:
 
 
 class Processes:
-    """Nodes as processes of their own; leaving the context stops them all, brakes first, bag last.
+    """Nodes in processes of their own; leaving the context stops them all, brakes first, bag last.
 
     Parameters
     ----------
     configuration : values for all nodes; its `shared.nodes` says which ones are started.
     namespace : namespace of the nodes.
     log_level : least severity of what they print.
+    processes : GROUPED or EACH, of `wam_description.nodes`; a process of several nodes is named for all of them.
 
     Attributes
     ----------
@@ -95,16 +95,25 @@ class Processes:
 
     bag_failure = ""
 
-    def __init__(self, configuration: Configuration, namespace: str = NAMESPACE, log_level: str = "info") -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        namespace: str = NAMESPACE,
+        log_level: str = "info",
+        processes: str = EACH,
+    ) -> None:
         names = node_names(configuration)
         prepare_logging_directory()
         self.killed: list[str] = []
         self._stack = ExitStack()
         parameters = self._stack.enter_context(parameter_file(configuration))
         own = ["--params-file", str(parameters), "--log-level", log_level]
+        place = f"__ns:=/{namespace.strip('/')}"
         self._processes = {
-            name: _start(entry, [*own, "-r", f"__ns:=/{namespace.strip('/')}"]) for entry, name in names.items()
+            " or ".join(names[entry] for entry in group): _start(group, [*own, "-r", place])
+            for group in process_groups(configuration.shared.nodes, processes)
         }
+        self._first = next((name for name in self._processes if FIRST in name.split()), FIRST)
 
     def __enter__(self) -> "Processes":
         return self
@@ -134,8 +143,8 @@ class Processes:
         All nodes but the recorder have one deadline together.  The recorder has as long as it goes on.
         """
         deadline = time.monotonic() + PATIENCE
-        others = [name for name in self._processes if name not in (FIRST, LAST)]
-        for names in ([FIRST], others):
+        others = [name for name in self._processes if name not in (self._first, LAST)]
+        for names in ([self._first], others):
             for name in names:
                 self._terminate(name)
             for name in names:
@@ -203,7 +212,7 @@ class NodeProcess:
 
     def start(self) -> None:
         """Start the node."""
-        self._process = _start(self._entry, self._arguments)
+        self._process = _start([self._entry], self._arguments)
 
     @property
     def code(self) -> int | None:
@@ -225,10 +234,10 @@ class NodeProcess:
         self._stack.close()
 
 
-def _start(entry: str, arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+def _start(entries: Sequence[str], arguments: Sequence[str]) -> subprocess.Popen[bytes]:
     # a session of its own: Ctrl-C reaches the parent alone, which stops the nodes in order
     return subprocess.Popen(
-        [sys.executable, "-m", "wam_ros.program", entry, "--ros-args", *arguments],
+        [sys.executable, "-m", "wam_ros.program", *entries, "--ros-args", *arguments],
         start_new_session=True,
         env={**os.environ, PARENT: str(os.getpid())},
     )
@@ -288,8 +297,7 @@ class Composition:
         names = node_names(configuration)
         self._connection = Connection(["wam", "--ros-args", "--log-level", log_level], domain_id)
         self.context, self.executor = self._connection.context, self._connection.executor
-        if configuration.shared.timing.mode == "lockstep":
-            BUSES[self.context] = LocalBus(self.executor, names.values())
+        BUSES[self.context] = LocalBus(self.executor, names.values())
         self.nodes: dict[str, Node] = {}
         self._may_end: dict[str, Any] = {}
         try:
@@ -340,8 +348,7 @@ class Composition:
 
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last."""
-        names = {node: name for name, node in self.nodes.items()}
         recorder = self.nodes.get(LAST)
-        self._connection.close(lambda node: (names[node] == LAST) - (names[node] == FIRST))
+        self._connection.close()
         self.bag_failure = str(getattr(recorder, "failure", ""))
         self.nodes.clear()

@@ -5,10 +5,10 @@ import re
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -30,7 +30,7 @@ from wam_ros.network import take_place
 from wam_ros.parameters import declare, follow_other, follow_together
 from wam_ros.ports import SECOND, Ports
 from wam_ros.requests import refusal_of, service_request
-from wam_ros.run import raise_priority, run
+from wam_ros.run import run
 from wam_ros.tolerance import TolerantNode
 
 REPEATED = 10  # steps, after which a loss is reported again while the arm is enabled
@@ -62,8 +62,6 @@ class AdaptedNode(TolerantNode):
         self._worked = 0  # stamp of the last step, ns
         self._declaration, self._outputs = declaration, frozenset(declaration.outputs)
         self._is_realtime = shared.timing.mode == "realtime"
-        if self._is_realtime and getattr(self.node, "high_priority", False):
-            raise_priority(shared.timing.niceness)
         live = [(own, tune, "")] if (tune := getattr(self.node, "tune", None)) else []
         if owned:
             live.append((getattr(shared, owned), self.node.retune, f"{owned}."))
@@ -105,6 +103,11 @@ class AdaptedNode(TolerantNode):
     def failure(self) -> str:
         """Why the node failed, '' where it did not."""
         return getattr(self.node, "failure", "")
+
+    def raise_priority(self) -> None:
+        """Ask the system to prefer this process, where the node is not to be late."""
+        if getattr(self.node, "high_priority", False):
+            self._ports.raise_priority()
 
     def take_fault(self, reason: str) -> None:
         """Report what a callback raised."""
@@ -232,7 +235,7 @@ class AdaptedNode(TolerantNode):
                 self._ports.publish(topic, stamp, value)
         if self._ports.report_due(stamp):
             if diagnostics := getattr(self.node, "diagnostics", None):
-                self._ports.facts = diagnostics()
+                self._ports.facts |= diagnostics()
             self._ports.report(stamp)
 
     def _set_status(self, stamp: int, status: NodeStatus) -> None:
@@ -335,15 +338,27 @@ def make_node(entry: str, **ros: Any) -> Node:
     return node_factory(entry)(**ros)
 
 
+def node_makers(entries: Iterable[str]) -> dict[str, Callable[..., Node]]:
+    """What makes the node of each entry of the parameter `nodes`, by its name, as `wam_ros.run.run` takes it.
+
+    Raises
+    ------
+    ParameterError
+        where there is no such node.
+    """
+    return {declared(entry).name: partial(make_node, entry) for entry in entries}
+
+
 def main() -> None:
-    """Run the node that the name of this program, or its first argument, names; for `wam_ros.program`."""
-    name = Path(sys.argv[0]).name
-    if name in ("node", "program.py"):
-        if len(sys.argv) < 2:
-            raise SystemExit("usage: python3 -m wam_ros.program NAME [--ros-args ...]")
-        name = sys.argv.pop(1)
+    """Run the nodes that the name of this program, or its first arguments, name; for `wam_ros.program`."""
+    entries = [Path(sys.argv[0]).name]
+    if entries[0] in ("node", "program.py"):
+        entries = list(takewhile(lambda word: not word.startswith("-"), sys.argv[1:]))
+        if not entries:
+            raise SystemExit("usage: python3 -m wam_ros.program NAME [NAME ...] [--ros-args ...]")
+        del sys.argv[1 : len(entries) + 1]
     try:
-        declared(name)
+        makers = node_makers(entries)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     with ExitStack() as files:
@@ -351,7 +366,7 @@ def main() -> None:
             arguments = [named_file(given, before, files) for before, given in pairwise(["", *sys.argv])]
         except ParameterError as error:
             raise SystemExit(f"error: {error}") from None
-        run(lambda **ros: make_node(name, **ros), arguments)
+        run(makers, arguments)
 
 
 def named_file(given: str, before: str, files: ExitStack) -> str:

@@ -24,6 +24,7 @@ from wam_ros.display import COPIED, DisplayCopy
 from wam_ros.header import header
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
+from wam_ros.priority import PRIORITY, raise_priority
 from wam_ros.qos import DEPTH, qos
 from wam_ros.run import NAMESPACE, end_of_delivery
 from wam_ros.tolerance import TolerantNode
@@ -92,7 +93,8 @@ class Ports:
         self._absent: set[str] = set()
         self._refused: Counter[str] = Counter()  # by kind
         self._logged: dict[str, tuple[float, int]] = {}  # by kind: when, and how many had been refused by then
-        self._bus = BUSES.get(node.context)
+        is_lockstep = shared.timing.mode == "lockstep"
+        self._bus = BUSES.get(node.context) if is_lockstep else None  # in realtime a late node needs the newest only
         self._subscriptions: dict[str, Subscription] = {}
         self._claimed: dict[str, Subscription] = {}
         self.claims = Claims(node, self._claimed)
@@ -283,6 +285,13 @@ class Ports:
         before, self._told = self._told[0], state
         is_played = "scenario" in self.shared.nodes
         self.node.get_logger().info(guidance(mode, before, self.absent, faulty, self.node.get_namespace(), is_played))
+
+    def raise_priority(self) -> None:
+        """In realtime: ask the system to prefer this process, and report what was granted."""
+        timing = self.shared.timing
+        if timing.mode == "realtime":
+            granted = self.facts[PRIORITY] = raise_priority(timing.fifo_priority, timing.niceness)
+            self.node.get_logger().info(f"{PRIORITY}: {granted}")
 
     def wait_for_delivery(self) -> None:
         """Report how much was published, then wait until the recorder and all others have the last messages.

@@ -38,7 +38,7 @@ class Stop:
 
 
 def main() -> None:
-    """Run the node that the name of this program, or its first argument, names."""
+    """Run the nodes that the name of this program, or its first arguments, name."""
     end_at_once_on_signals()
     try:
         from wam_ros.node import main as run_node

@@ -1,4 +1,4 @@
-"""One way to run nodes: in a process of their own or several in one, ended by SIGINT, SIGTERM or themselves."""
+"""One way to run nodes: each in a process of its own or several in one, ended by SIGINT, SIGTERM or themselves."""
 
 import contextlib
 import ctypes
@@ -8,7 +8,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -23,9 +23,12 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from wam_description.parameters import ParameterError
+from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import limit_to_this_machine
 from wam_ros.program import Stop
 
+FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
+LAST = "recorder"  # to be stopped: it closes the bag
 NAMESPACE = "wam"  # of the nodes, unless remapped with -r __ns:=/other
 PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up started this one from
 LONGEST_END = 0.5  # s, for what has arrived before the end
@@ -33,16 +36,6 @@ LONGEST_END = 0.5  # s, for what has arrived before the end
 LONGEST_DELIVERY = 4.0
 PR_SET_PDEATHSIG = 1
 MakeNode = Callable[..., Node]
-
-
-def raise_priority(niceness: int) -> None:
-    """Ask the system to prefer this process; most grant it to privileged users only.
-
-    On Linux priority belongs to the thread, and those of the middleware are there already.
-    """
-    with contextlib.suppress(PermissionError, FileNotFoundError):
-        for thread in Path("/proc/self/task").iterdir():
-            os.setpriority(os.PRIO_PROCESS, int(thread.name), niceness)
 
 
 def die_with_parent() -> None:
@@ -107,7 +100,7 @@ def prepare_logging_directory() -> None:
 
 
 class Connection:
-    """A context and an executor for the nodes of this process; leaving it destroys them.
+    """A context and an executor for the nodes of this process.
 
     Parameters
     ----------
@@ -137,10 +130,10 @@ class Connection:
         self.executor.add_node(node)
         self._nodes.append(node)
 
-    def close(self, order: Callable[[Node], int] = lambda node: 0) -> None:
-        """Destroy the nodes, lowest order first, and leave the network."""
+    def close(self) -> None:
+        """Destroy the nodes, driver first, recorder last, and leave the network."""
         _ENDS[self.context] = time.monotonic() + LONGEST_DELIVERY
-        for node in sorted(self._nodes, key=order):
+        for node in sorted(self._nodes, key=lambda node: (node.get_name() == LAST) - (node.get_name() == FIRST)):
             self.executor.remove_node(node)
             node.destroy_node()
         self._nodes.clear()
@@ -148,18 +141,18 @@ class Connection:
         rclpy.try_shutdown(context=self.context)
 
 
-def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
-    """Run one node as this process, until SIGINT, SIGTERM or until its attribute `done` is true.
+def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) -> None:
+    """Run nodes as this process, until SIGINT, SIGTERM or until the attribute `done` of one is true.
 
     Parameters
     ----------
-    make : node class, called with ``context`` and ``namespace``.
+    makers : what makes each node, by its name; called with ``context`` and ``namespace``.
     arguments : command line, sys.argv where None.
 
     Raises
     ------
     SystemExit
-        with code 1 where the ROS arguments or the parameters are refused or the node has a `failure`.
+        with code 1 where the ROS arguments or the parameters are refused or a node has a `failure`.
     """
     die_with_parent()
     stop = Stop()
@@ -171,16 +164,30 @@ def run(make: MakeNode, arguments: Sequence[str] | None = None) -> None:
     except RuntimeError as error:
         reason = str(error).split(", at /")[0]
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
+    BUSES[connection.context] = LocalBus(connection.executor, makers)
+    nodes: dict[str, Node] = {}
+
+    def end() -> None:
+        # where the driver puts the brakes on, no other node has to say that it ends
+        for node in [nodes[FIRST]] if FIRST in nodes else nodes.values():
+            if stop.is_set and hasattr(node, "end"):
+                node.end()
+
+    def is_over() -> bool:
+        return stop.is_set or any(getattr(node, "done", False) for node in nodes.values())
+
     try:
-        node = make(context=connection.context, namespace=NAMESPACE)
-        connection.add(node)
-        end = getattr(node, "end", lambda: None)
-        spin(connection.executor, lambda: stop.is_set or getattr(node, "done", False), lambda: stop.is_set and end())
+        for name, make in makers.items():
+            nodes[name] = make(context=connection.context, namespace=NAMESPACE)
+            connection.add(nodes[name])
+        for node in nodes.values():  # all threads are there
+            getattr(node, "raise_priority", lambda: None)()
+        spin(connection.executor, is_over, end)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     except RCLError as error:  # for example security that is enforced where the middleware has none
         raise SystemExit(f"error: {str(error).split(', at /')[0]}") from None
     finally:
         connection.close()
-    if failure := getattr(node, "failure", ""):
+    if failure := next(filter(None, (getattr(node, "failure", "") for node in nodes.values())), ""):
         raise SystemExit(f"error: {failure}")

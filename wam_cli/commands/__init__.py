@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from wam_analysis.foreign.topic_map import MAPPED, TopicMap, topic_map
 from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.nodes import EACH, GROUPED, ONE
 from wam_live.page import PORT
 from wam_sim.batch import executor
 from wam_sim.pieces import default_folder
@@ -79,11 +80,19 @@ def configuration_of(given: argparse.Namespace) -> Configuration:
 
 def take_time(parser: argparse.ArgumentParser) -> None:
     """Give a command the options that say how time passes."""
-    parser.add_argument("--processes", action="store_true", help="a process for each node; default: all in one process")
+    parser.add_argument(
+        "--processes",
+        nargs="?",
+        const=EACH,
+        choices=(EACH, GROUPED),
+        help="a process for each node, or grouped: for the inner loop, the outer loop and the recorder; default: all "
+        "in one process",
+    )
     parser.add_argument(
         "--realtime",
         action="store_true",
-        help="do not wait for commands, as a real driver; a process for each node; default: timing.mode, lockstep",
+        help="do not wait for commands, as a real driver; a process for each node, or as --processes says; default: "
+        "timing.mode, lockstep",
     )
     parser.add_argument(
         "--real-time-factor",
@@ -111,9 +120,9 @@ def timed(configuration: Configuration, given: argparse.Namespace) -> Configurat
     return timed
 
 
-def runs_apart(configuration: Configuration, given: argparse.Namespace) -> bool:
-    """Whether each node gets a process of its own."""
-    return given.processes or configuration.shared.timing.mode == "realtime"
+def processes_of(configuration: Configuration, given: argparse.Namespace) -> str:
+    """How the nodes are distributed to processes: ONE, GROUPED or EACH, of `wam_description.nodes`."""
+    return given.processes or (EACH if configuration.shared.timing.mode == "realtime" else ONE)
 
 
 def take_port(parser: argparse.ArgumentParser) -> None:

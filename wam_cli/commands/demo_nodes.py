@@ -7,9 +7,10 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wam_cli.commands import runs_apart
+from wam_cli.commands import processes_of
 from wam_control.scenario import ScenarioStep
 from wam_description.configuration import Configuration
+from wam_description.nodes import ONE
 from wam_ros.program import Stop, end_at_once_on_signals
 from wam_sim.simulated_bag import record
 
@@ -47,7 +48,7 @@ def play(configuration: Configuration, steps: list[ScenarioStep], bag: Path, giv
 def _simulated(
     configuration: Configuration, steps: list[ScenarioStep], bag: Path, given: argparse.Namespace
 ) -> PlayedDemo:
-    if runs_apart(configuration, given) or given.live:
+    if processes_of(configuration, given) != ONE or given.live:
         option = "--live" if given.live else "--processes" if given.processes else "--realtime"
         raise ValueError(f"{option} needs ROS; pip install 'wam_stack[ros,live]', or leave it out")
     print(WITHOUT_ROS, flush=True)
@@ -77,7 +78,7 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
     late = time.monotonic() + LONGEST_START
     with (
         page_beside(given, NAMESPACE) as close_page,
-        start(configuration, runs_apart(configuration, given), lambda: stop.is_set) as stack,
+        start(configuration, processes_of(configuration, given), lambda: stop.is_set) as stack,
     ):
         driver: Any = getattr(stack, "nodes", {}).get("driver")
 

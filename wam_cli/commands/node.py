@@ -1,12 +1,10 @@
-"""`wam node`: one node as a process."""
+"""`wam node`: one node, or several, as a process."""
 
 import argparse
-from functools import partial
 
 from wam_cli.commands import configuration_of, take_configuration
-from wam_description.interface import declared
 from wam_ros.bring_up import parameter_file
-from wam_ros.node import make_node
+from wam_ros.node import node_makers
 from wam_ros.program import end_at_once_on_signals
 from wam_ros.run import run as run_node
 
@@ -15,16 +13,16 @@ TAKES_ROS_ARGUMENTS = True
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command; the rest of the line is ROS's."""
-    parser.add_argument("name", help="driver, transform, velocity_loop, gravity, force_loop, contact_estimator, ...")
-    parser.usage = "wam node [--config CONFIG] NAME [ROS ARGUMENT ...]"
+    parser.add_argument("name", nargs="+", help="driver, transform, velocity_loop, gravity, force_loop, ...")
+    parser.usage = "wam node [--config CONFIG] NAME... [ROS ARGUMENT...]"
     parser.epilog = "ROS arguments are for example: -p timing.mode:=lockstep -r __ns:=/left"
     take_configuration(parser)
 
 
 def run(given: argparse.Namespace) -> int:
-    """Run the node until it is stopped."""
+    """Run the nodes until they are stopped."""
     end_at_once_on_signals()  # until run_node handles them; an exception would break the import of the node
-    declared(given.name)
+    makers = node_makers(given.name)
     with parameter_file(configuration_of(given)) as file:
-        run_node(partial(make_node, given.name), ["wam", "--ros-args", "--params-file", str(file), *given.ros])
+        run_node(makers, ["wam", "--ros-args", "--params-file", str(file), *given.ros])
     return 0

@@ -1,12 +1,11 @@
 """`wam record`: every topic of a running stack into a bag."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 
 from wam_cli.commands import configuration_of, new_bag, take_configuration, writable_directory
 from wam_ros.bring_up import parameter_file
-from wam_ros.node import make_node
+from wam_ros.node import node_makers
 from wam_ros.run import run as run_node
 
 
@@ -28,5 +27,5 @@ def run(given: argparse.Namespace) -> int:
     if given.name:
         new_bag(directory / given.name)
     with parameter_file(configuration) as file:
-        run_node(partial(make_node, "recorder"), ["wam", "--ros-args", "--params-file", str(file)])
+        run_node(node_makers(["recorder"]), ["wam", "--ros-args", "--params-file", str(file)])
     return 0

@@ -6,7 +6,7 @@ import sys
 from wam_cli.commands import (
     configuration_of,
     namespace,
-    runs_apart,
+    processes_of,
     take_configuration,
     take_page,
     take_time,
@@ -15,10 +15,17 @@ from wam_cli.commands import (
 from wam_cli.commands.live import page_beside
 from wam_control.scenario import load, script_file
 from wam_description.configuration import Configuration
+from wam_description.nodes import EACH, GROUPED, ONE
 from wam_ros.bring_up import start
 from wam_ros.node import node_factory
 from wam_ros.program import Stop, end_at_once_on_signals
 from wam_ros.run import NAMESPACE, die_with_parent
+
+WHERE = {
+    ONE: "this process",
+    GROUPED: "processes of inner loop, outer loop and recorder",
+    EACH: "processes of their own",
+}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +49,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def import_nodes(configuration: Configuration, given: argparse.Namespace) -> None:
     """Import what the nodes need, while a signal may still end the program at once."""
-    if not runs_apart(configuration, given):
+    if processes_of(configuration, given) == ONE:
         for entry in configuration.shared.nodes:
             node_factory(entry)
 
@@ -59,13 +66,13 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()
     import_nodes(configuration, given)
     stop = Stop()
-    apart = runs_apart(configuration, given)
+    processes = processes_of(configuration, given)
     with (
         page_beside(given, given.namespace) as close_page,
-        start(configuration, apart, lambda: stop.is_set, given.namespace, given.log_level) as stack,
+        start(configuration, processes, lambda: stop.is_set, given.namespace, given.log_level) as stack,
     ):
         if not stop.is_set:
-            where = "processes of their own" if apart else "this process"
+            where = WHERE[processes]
             print(f"{len(configuration.shared.nodes)} nodes started in {where}; Ctrl-C stops them", flush=True)
         ended = stack.wait(lambda ended: stop.is_set or bool(ended))
         failures = stack.failures

@@ -48,7 +48,7 @@ COMMANDS: Final = ("joint_posture_command", "force_command")
 
 def run_node(entry: str, arguments: list[str], quiet: bool) -> None:
     """Run one node as this process, as `python3 -m wam_ros.program` does."""
-    from wam_ros.node import make_node
+    from wam_ros.node import node_makers
     from wam_ros.run import run
 
     if quiet:
@@ -56,7 +56,7 @@ def run_node(entry: str, arguments: list[str], quiet: bool) -> None:
         os.dup2(null, 1)
         os.dup2(null, 2)
     sys.argv = [entry, *arguments]
-    run(lambda **ros: make_node(entry, **ros))
+    run(node_makers([entry]))
 
 
 class NodeProcesses:

@@ -1,0 +1,58 @@
+"""Priority: what is reported is what the system has granted, to every thread."""
+
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import ctypes, os, resource, sys, threading
+from wam_ros.priority import SESSION, raise_priority
+fifo, nice, permitted = map(int, sys.argv[1:])
+if not permitted:
+    for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_NICE):
+        resource.setrlimit(limit, (0, 0))
+    if os.getuid() == 0:
+        os.setuid(65534)
+        ctypes.CDLL(None).prctl(4, 1)  # PR_SET_DUMPABLE, as after exec
+begin = lambda: threading.Thread(target=threading.Event().wait, daemon=True).start()
+begin()
+print(raise_priority(fifo, nice))
+begin()  # as the executor does
+threads = [int(thread) for thread in os.listdir("/proc/self/task")]
+print({os.sched_getscheduler(thread) == os.SCHED_FIFO for thread in threads})
+print({os.getpriority(os.PRIO_PROCESS, thread) for thread in threads})
+print(SESSION.read_text().split()[-1] if SESSION.exists() else 0)
+"""
+
+
+def told(fifo: int, niceness: int, permitted: bool = True) -> tuple[str, ...]:
+    """What a process reports; whether its threads have FIFO, their niceness, that of its session."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(fifo), str(niceness), str(int(permitted))],
+        capture_output=True,
+        text=True,
+        check=True,
+        start_new_session=True,
+    )
+    return tuple(done.stdout.splitlines())
+
+
+@pytest.mark.parametrize("asked", [(0, 0), (0, -15), (10, 0), (10, -15)])
+def test_what_is_reported_is_what_every_thread_has(asked: tuple[int, int]) -> None:
+    answers = {
+        "SCHED_FIFO 10": ("SCHED_FIFO 10", "{True}", "{0}", "0"),
+        "nice -15 with its session": ("nice -15 with its session", "{False}", "{-15}", "-15"),
+        "nice -15": ("nice -15", "{False}", "{-15}", "0"),
+        "usual": ("usual", "{False}", "{0}", "0"),
+    }
+    found = told(*asked)
+    assert found == answers[found[0]]
+    if asked == (0, 0):
+        assert found[0] == "usual"
+    if asked[0] == 0:
+        assert "FIFO" not in found[0]
+
+
+def test_without_permission_everything_is_as_usual() -> None:
+    assert told(10, -15, permitted=False) == ("usual", "{False}", "{0}", "0")

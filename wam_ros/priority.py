@@ -1,0 +1,54 @@
+"""Priority of a process that must not be late, as far as the system grants it.
+
+On Linux priority belongs to the thread, and the middleware has threads of its own.  The niceness of threads counts only
+within their session where the kernel shares processors between sessions first (autogroup), and bring-up gives each
+process a session of its own: there the session needs the niceness, too.
+"""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+SESSION: Final = Path("/proc/self/autogroup")
+PRIORITY: Final = "priority"  # key of what was granted, in the diagnostics
+
+
+def raise_priority(fifo: int, niceness: int) -> str:
+    """Ask the system to prefer this process: ahead of all usual ones, or else with a larger part of their time.
+
+    Parameters
+    ----------
+    fifo : of SCHED_FIFO; 0: not asked for.
+    niceness : where that is not granted; 0: not asked for.
+
+    Returns
+    -------
+    What was granted, for people.
+    """
+    level = os.sched_param(fifo)  # inherited by threads that begin later: the executor has one for its timers
+    if fifo and _granted(lambda thread: os.sched_setscheduler(thread, os.SCHED_FIFO, level)):
+        return f"SCHED_FIFO {fifo}"
+    if niceness and _granted(lambda thread: os.setpriority(os.PRIO_PROCESS, thread, niceness)):
+        return f"nice {niceness}{' with its session' if _session_granted(niceness) else ''}"
+    return "usual"
+
+
+def _granted(ask: Callable[[int], None]) -> bool:
+    """Ask for something for all threads; whether the system has granted it to each that has not ended meanwhile."""
+    for thread in Path("/proc/self/task").iterdir():
+        try:
+            ask(int(thread.name))
+        except PermissionError:
+            return False
+        except ProcessLookupError:
+            pass
+    return True
+
+
+def _session_granted(niceness: int) -> bool:
+    try:
+        SESSION.write_text(str(niceness), encoding="ascii")
+    except OSError:  # a kernel without it, or which answers 'try again' to a second request within 0.1 s
+        return False
+    return True
