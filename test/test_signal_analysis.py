@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wam_analysis.measures.efficiency import backdrivability, efficiency
+from wam_analysis.measures.episodes import episodes
 from wam_analysis.measures.force_accuracy import dynamic_range, force_accuracy
 from wam_analysis.measures.frequency import bandwidth, believable, fit_poles, frequency_response
 from wam_analysis.measures.friction import identify_friction
@@ -573,3 +574,13 @@ def test_a_signal_that_hardly_turns_negative_in_its_correlation_ends_the_search(
         rng = np.random.default_rng(seed)
         found = limit_cycle(np.arange(200) / 1e3, 1e-15 * rng.integers(-1, 2, 200).astype(float))
         assert found.confidence < 0.8
+
+
+@pytest.mark.parametrize("phase", [2.25, 3.0, 6.0])
+def test_a_cycle_that_few_samples_share_a_phase_with_is_not_that_of_its_ends(phase):
+    """Of 8.0016 Hz at 200 Hz some phases have samples in the first and the last cycle only."""
+    time = np.arange(4000) / 200.0
+    value = np.sin(2.0 * math.pi * 8.0016 * time + phase) + draws(1, len(time), 1e-3)
+    (found,) = episodes(time, value, 0.01)
+    assert found.cycle.peak_to_peak == pytest.approx(2.0, rel=0.008)
+    assert found.cycle.period * 8.0016 == pytest.approx(1.0, rel=3e-7)

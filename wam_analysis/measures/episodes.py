@@ -90,13 +90,20 @@ def _refined(time: Numbers, flat: Numbers, period: float) -> float:
 
 
 def _without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
-    """A signal without what changes slowly: less its mean over exactly two periods, of which a cycle has none."""
+    """A signal without what changes slowly: less its mean over exactly two periods, of which a cycle has none.
+
+    In the first and the last period the mean goes on as in the next: a window that ends there is not two periods long.
+    """
     half = period / float(time[1] - time[0])
-    reach = math.ceil(half) + 1
-    total = np.concatenate([[0.0], np.cumsum(np.pad(value, reach, "edge"))])
-    middle = np.arange(len(value)) + reach + 0.5
+    end = math.ceil(half)
+    total = np.concatenate([[0.0], np.cumsum(value)])
+    middle = np.arange(end, len(value) - end) + 0.5
     ends = (np.interp(middle + way * half, np.arange(len(total)), total) for way in (1.0, -1.0))
-    flat: Numbers = value - (next(ends) - next(ends)) / (2.0 * half)
+    slow = (next(ends) - next(ends)) / (2.0 * half)
+    away = np.arange(1, end + 1) / end
+    before = slow[0] - away[::-1] * (slow[end] - slow[0])
+    after = slow[-1] + away * (slow[-1] - slow[-1 - end])
+    flat: Numbers = value - np.concatenate([before, slow, after])
     return flat
 
 
