@@ -111,7 +111,7 @@ def _draw_contacts(axes: Axes, summary: DemoSummary, arm: Arm, q: Sequence[float
         if contact.cover in arm.covers.names and math.isfinite(contact.place):
             point, force = arm_picture.contact_on_surface(arm, q, contact)
             start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
-            arrows.append((start, end, colour, f"{label} {np.linalg.norm(force):.1f} N"))
+            arrows.append((start, end, colour, f"{label}, magnitude {np.linalg.norm(force):.1f} N"))
     for i, (start, end, colour, _) in enumerate(arrows):
         width = 4.2 if colour is TRUE else 1.3  # so that the true force is visible under a correct estimate
         head = f"-|>,head_width={0.14 + 0.05 * width:.2f},head_length={0.4 + 0.07 * width:.2f}"
@@ -196,7 +196,7 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     if np.any(np.isfinite(bound)):
         axes.plot(time, bound, color=ESTIMATED, lw=1.6, ls=(0, (0.6, 2.0)), label="at least", zorder=5)
     axes.plot(time, commanded, color=COMMANDED, lw=1.1, ls=(0, (1.2, 1.2)), label="commanded", zorder=7)
-    axes.set_ylabel("force [N]")
+    axes.set_ylabel("force, along\ncommand [N]" if np.any(pressed) else "force [N]")
     axes.tick_params(labelbottom=False)
     highest = [
         np.nanmax(values, initial=1.0)
