@@ -97,7 +97,7 @@ def draw_arm(
         axes.imshow(pixels, extent=(*axes.get_xlim(), *axes.get_ylim()), interpolation="lanczos", zorder=0)
     _draw_contacts(axes, summary, arm, q, view)
     if letter is not None:
-        title = f"{letter}the arm at {seconds_at(summary, moment.stamp):.1f} s and the force on it"
+        title = f"{letter}the arm at {seconds_at(summary, moment.stamp):.1f} s, magnitude of the force on it"
         axes.text(0.02, 1.0, title, va="bottom", transform=axes.transAxes, fontsize=10)
 
 
@@ -111,7 +111,7 @@ def _draw_contacts(axes: Axes, summary: DemoSummary, arm: Arm, q: Sequence[float
         if contact.cover in arm.covers.names and math.isfinite(contact.place):
             point, force = arm_picture.contact_on_surface(arm, q, contact)
             start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
-            arrows.append((start, end, colour, f"{label}, magnitude {np.linalg.norm(force):.1f} N"))
+            arrows.append((start, end, colour, f"{label} {np.linalg.norm(force):.1f} N"))
     for i, (start, end, colour, _) in enumerate(arrows):
         width = 4.2 if colour is TRUE else 1.3  # so that the true force is visible under a correct estimate
         head = f"-|>,head_width={0.14 + 0.05 * width:.2f},head_length={0.4 + 0.07 * width:.2f}"
