@@ -97,7 +97,7 @@ def draw_arm(
         axes.imshow(pixels, extent=(*axes.get_xlim(), *axes.get_ylim()), interpolation="lanczos", zorder=0)
     _draw_contacts(axes, summary, arm, q, view)
     if letter is not None:
-        title = f"{letter}the arm at {seconds_at(summary, moment.stamp):.1f} s and the force on it"
+        title = f"{letter}the arm at {seconds_at(summary, moment.stamp):.1f} s, magnitude of the force on it"
         axes.text(0.02, 1.0, title, va="bottom", transform=axes.transAxes, fontsize=10)
 
 
@@ -196,7 +196,7 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     if np.any(np.isfinite(bound)):
         axes.plot(time, bound, color=ESTIMATED, lw=1.6, ls=(0, (0.6, 2.0)), label="at least", zorder=5)
     axes.plot(time, commanded, color=COMMANDED, lw=1.1, ls=(0, (1.2, 1.2)), label="commanded", zorder=7)
-    axes.set_ylabel("force [N]")
+    axes.set_ylabel("force, along\ncommand [N]" if np.any(pressed) else "force [N]")
     axes.tick_params(labelbottom=False)
     highest = [
         np.nanmax(values, initial=1.0)
