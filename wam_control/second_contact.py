@@ -24,9 +24,10 @@ SETTLING = 0.05  # s, of the filters of the observer, from the start of a contac
 OLDEST, YOUNGEST = 0.141, 0.059  # s, ages of the moments that are the steady contact
 LEAST = 3  # of them
 LASTING = 2  # changes in succession
-CERTAIN = (
-    4.0  # times the threshold, in the time in which the steady contact is remembered: later, it has changed itself
-)
+# sd of the friction of the first contact, per its force: at the usual threshold of 5 sd a friction coefficient of 0.8
+# may turn back. What even that does not explain is nearly certain to be a second contact, if it is noticed before the
+# steady contact is older than `OLDEST`: later, it has changed itself
+TURNED = 0.32
 RELEASED = 1.0 / 3.0  # of the threshold, below which the second contact has gone
 GROWTH = 3.0  # sd of the change of the first contact's force, per force
 FRICTION = 0.1  # sd of its components across that, per change
@@ -96,7 +97,8 @@ class SecondContact:
                 self.reset()
                 self._begin = time - SETTLING
             elif time - self._since < OLDEST:
-                self.is_certain = self.is_certain or self._exceeds(CERTAIN * self._threshold, statistic)
+                careful = 0.0 if self.is_certain else self._statistic(observer, inference, TURNED)
+                self.is_certain = self.is_certain or self._exceeds(self._threshold, careful)
             return
         if self._exceeds(self._threshold, statistic):
             self.is_suspected, self._since, self._found = True, time, 0
@@ -116,8 +118,8 @@ class SecondContact:
         while steady and moment.time - steady[0].time > OLDEST:
             self._sums = [total - part for total, part in zip(self._sums, steady.popleft().seen, strict=True)]
 
-    def _statistic(self, observer: MomentumObserver, inference: ContactInference) -> float:
-        """chi^2 of the change that the first contact does not explain."""
+    def _statistic(self, observer: MomentumObserver, inference: ContactInference, turned: float = 0.0) -> float:
+        """chi^2 of the change that the first contact does not explain; `turned` of its force may change across it."""
         count = len(self._steady)
         change, covariance = observer.change(Observation(*(total / count for total in self._sums)))
         first = self._steady[count // 2]
@@ -125,11 +127,11 @@ class SecondContact:
         weights = [max(h.probability, LEAST_PROBABILITY) for h in first.hypotheses]
         weight = np.array(weights) / sum(weights)
         force = inference.torques(first.hypotheses)
-        turned = force - first.torques
-        turn = weight.dot(turned)
+        moved = force - first.torques
+        turn = weight.dot(moved)
         change -= turn
         own = np.empty((others + 3, len(change)))  # of one sd each
-        own[:others] = (turned - turn) * np.sqrt(weight)[:, None]
+        own[:others] = (moved - turn) * np.sqrt(weight)[:, None]
         own[others] = TURN * turn
         own[others + 1] = SLIDE * inference.slide(best)
         own[others + 2] = GROWTH * force[0]
@@ -139,5 +141,6 @@ class SecondContact:
         if statistic < RELEASED * self._threshold:
             return statistic
         grown = GROWTH * GROWTH * abs(float(force[0].dot(explained)))
-        across = FRICTION * grown * math.hypot(*best.force) * inference.sides(best)
+        friction = FRICTION * grown * math.hypot(*best.force) + turned * math.hypot(*first.hypotheses[0].force)
+        across = friction * inference.sides(best)
         return float(change.dot(np.linalg.solve(covariance + across.T.dot(across), change)))
