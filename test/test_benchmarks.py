@@ -12,6 +12,18 @@ from conftest import LONG
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = sorted(path.name for path in ROOT.glob("benchmarks/*.py"))
 ROWS = {
+    "growth.py": [
+        "joints: 4",
+        "joints: 7",
+        "contacts: 1",
+        "contacts: 2",
+        "minutes of a bag: 1",
+        "minutes of a bag: 2",
+        "points of a map: 100",
+        "points of a map: 400",
+        "workers: 1",
+        "workers: 2",
+    ],
     "demo_under_load.py": ["0 busy loops", "2 busy loops"],
     "live_page.py": [
         "real-time factor with the page, paced",

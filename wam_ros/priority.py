@@ -19,8 +19,8 @@ def raise_priority(fifo: int, niceness: int) -> str:
 
     Parameters
     ----------
-    fifo : of SCHED_FIFO; 0: not requested for.
-    niceness : where that is not granted; 0: not requested for.
+    fifo : of SCHED_FIFO; 0: not requested.
+    niceness : where that is not granted; 0: not requested.
 
     Returns
     -------

@@ -1,0 +1,176 @@
+"""Cost as the work grows: joints, contacts, minutes of a bag, points of a map, runs on one and two workers.
+
+Each size is measured in turns with the smallest of its kind.  A run that is not quick draws `growth.png` next to this
+file.
+"""
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import matplotlib.pyplot as plt
+import numpy as np
+from comparing import Spread, arguments, machine, ratios, save, spread, table
+from long_bag import repeated
+from plant import FREE, Case
+
+from wam_analysis.drawing import STYLE, TRUE
+from wam_analysis.findings.analysis import TOPICS_READ, analyse_bag
+from wam_bag.bag import read
+from wam_control.scenario import ScenarioStep
+from wam_description.configuration import Configuration, packaged
+from wam_description.rigid_body import RigidBody
+from wam_sim.batch import processes, results
+from wam_sim.simulated_bag import record
+from wam_sim.simulation import Simulation
+from wam_theory.stability_map import largest_stable_steps
+
+PICTURE: Final = Path(__file__).with_name("growth.png")
+ARMS: Final = {4: "wam", 7: "barrett-wam7"}  # joints: configuration
+RUNS: Final = 24  # of the batch
+POST, DEPTH = 0.05, 1e-3  # m, half length; how far the link is in its surface at the start
+LENGTH: Final = 1.0  # s of the arm in a direct run
+
+
+class Work(NamedTuple):
+    """A kind of work, the cost of one size in s, and its sizes: in a quick run, and in others."""
+
+    name: str
+    cost: Callable[[int], float]
+    quick: tuple[int, ...]
+    sizes: tuple[int, ...]
+
+
+def seconds(work: Callable[[], Any]) -> float:
+    """Processor time, because other programs disturb it less."""
+    begin = time.process_time()
+    work()
+    return time.process_time() - begin
+
+
+def moving(name: str, length: float) -> tuple[Configuration, list[ScenarioStep]]:
+    """A configuration whose arm is released and moves all joints."""
+    configuration = Configuration.load(packaged(name))
+    posture = tuple(angle + 0.1 for angle in configuration.shared.arm.joints.start)
+    release = ScenarioStep("release", 0.1 * length, request="enable")
+    return configuration, [release, ScenarioStep("move", 0.9 * length, posture)]
+
+
+def joints(count: int) -> float:
+    """A direct run of the whole stack, for a second of the arm."""
+    run = Simulation(*moving(ARMS[count], LENGTH))
+    return seconds(run.play) / LENGTH
+
+
+def contacts(count: int) -> float:
+    """A substep of the plant, the outer link on that many posts."""
+    arm = Configuration.load(packaged("wam")).shared.arm
+    body, length, radius = RigidBody(arm), arm.covers.length[-1], arm.covers.radius[-1]
+    along = np.linspace(0.2, 0.8, count) * length if count > 1 else [0.5 * length]
+    root, tip, *posts = (np.array(body.point(FREE, arm.covers.names[-1], (x, 0.0, 0.0))) for x in (0.0, length, *along))
+    slope = np.hypot(*(tip - root)[:2]) / np.linalg.norm(tip - root)
+    posts = np.array(posts) - [0.0, 0.0, radius / slope + POST - DEPTH]
+    one = {"shapes": "cylinder", "stiffness": 4000.0, "damping": 20.0, "hardening": 0.0, "friction": 0.3}
+    posted = {key: [value] * count for key, value in one.items()} | {
+        "names": [f"post{i}" for i in range(count)],
+        "positions": posts.ravel().tolist(),
+        "rotations": [0.0] * (3 * count),
+        "sizes": [0.003, POST, 0.0] * count,
+    }
+    case = Case(FREE, 0.0, values={f"driver:world.obstacles.{key}": value for key, value in posted.items()})
+    if (found := case.plant.data.ncon) != count:
+        raise SystemExit(f"{found} contacts, not {count}; look at `contacts`")
+    return min(case.measure(40)[0] for _ in range(50))
+
+
+def stability_map(points: int) -> float:
+    """The map of figure 5.8."""
+    side = round(points**0.5)
+    gamma, zeta = np.meshgrid(np.linspace(1.02, 3.0, side), np.geomspace(0.05, 1.0, side))
+    return seconds(lambda: largest_stable_steps(gamma, zeta))
+
+
+def played(number: int) -> int:
+    """One run of the batch: the stamp at its end."""
+    run = Simulation(*moving("wam", LENGTH))
+    run.play()
+    return run.driver.stamp + 0 * number
+
+
+def batch(workers: int, runs: int) -> float:
+    """Direct runs on the wall clock, after the workers have started."""
+    with processes(workers) as executor:
+        results(played, range(2 * workers), executor)
+        begin = time.perf_counter()
+        results(played, range(runs), executor)
+        return time.perf_counter() - begin
+
+
+class Bags:
+    """Bags of some minutes in a folder, made from one of a few seconds."""
+
+    def __init__(self, folder: Path, length: float) -> None:
+        self._folder, self._short = folder, folder / "short"
+        if failure := record(*moving("wam", length), self._short):
+            raise SystemExit(failure)
+
+    def analysed(self, minutes: int) -> float:
+        """Reading and analysis."""
+        bag = self._folder / str(minutes)
+        if not bag.exists():
+            repeated(self._short, bag, 60.0 * minutes)
+        return seconds(lambda: analyse_bag(read(bag, TOPICS_READ, may_lack=True), lambda doing: None))
+
+
+def draw(costs: dict[str, dict[int, list[float]]]) -> None:
+    """Cost against size, relative to the smallest; dashed: in proportion."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(1, len(costs), figsize=(9.0, 2.4), layout="constrained")
+        for panel, (name, found) in zip(axes, costs.items(), strict=True):
+            sizes = np.array(list(found)) / min(found)
+            growth = np.array([spread(values).median for values in found.values()])
+            panel.loglog(sizes, growth / growth[0], "o-", color=TRUE)
+            panel.loglog(sizes, sizes ** (-1.0 if name == "workers" else 1.0), "--", color="0.6", linewidth=1.0)
+            panel.set_title(name)
+            panel.set_xticks(sizes, [f"{size:g}" for size in found])
+            panel.minorticks_off()
+        axes[0].set_ylabel("cost, relative")
+        figure.savefig(PICTURE, dpi=110)
+
+
+def main() -> None:
+    """Measure in turns, print the table, draw the picture."""
+    given = arguments(__doc__ or "", rounds=3, quick_rounds=1)
+    costs: dict[str, dict[int, list[float]]] = {}
+    with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
+        bags = Bags(Path(folder), 2.0 if given.quick else 20.0)
+        works = [
+            Work("joints", joints, (4, 7), (4, 7)),
+            Work("contacts", contacts, (1, 2), (1, 2, 4, 8)),
+            Work("minutes of a bag", bags.analysed, (1, 2), (1, 4, 15, 60)),
+            Work("points of a map", stability_map, (100, 400), (10_000, 90_000, 1_000_000)),
+            Work("workers", lambda workers: batch(workers, 4 if given.quick else RUNS), (1, 2), (1, 2)),
+        ]
+        for _ in range(given.rounds):
+            for work in works:
+                for size in work.quick if given.quick else work.sizes:
+                    costs.setdefault(work.name, {}).setdefault(size, []).append(work.cost(size))
+    rows, measured = [], dict[str, dict[int, Spread]]()
+    for name, found in costs.items():
+        smallest = min(found)
+        for size, values in found.items():
+            growth = ratios(values, found[smallest])
+            each = f"{growth.median * (size / smallest if name == 'workers' else smallest / size):.2f}"
+            rows.append([f"{name}: {size}", f"{1e3 * spread(values).median:.3g}", f"{growth:.2f}", each])
+            measured.setdefault(name, {})[size] = growth
+    print(machine())
+    print(table(["work", "cost [ms]", "relative to the smallest", "the same, in proportion"], rows))
+    save("growth", given, measured)
+    if not given.quick:
+        draw(costs)
+
+
+if __name__ == "__main__":
+    main()
