@@ -15,6 +15,7 @@ from wam_experiments.design_choices import (
     friction_or_stiffness,
     half_friction,
     stiffness_rule,
+    stronger_rotor,
     twice_stiffness,
     twisted_circuit,
 )
@@ -134,3 +135,19 @@ def test_twist_of_the_circuit_of_joint_4_costs_little_torque_on_joint_3() -> Non
     assert 0.2 < twisted.change / t0 < 0.25
     friction = 0.01 * 2.0 * 15.2 * 43.0 * 0.1129848  # 1 % of the peak torque of joint 3
     assert twisted.torque < 0.25 * friction
+
+
+def test_two_motors_in_parallel_have_half_the_rotor_inertia_of_one_of_larger_diameter() -> None:
+    """By sums over shells of solid cylinders with the same stress on their surface."""
+
+    def cylinder(radius: float, length: float) -> tuple[float, float]:
+        edges = np.linspace(0.0, radius, 2001)
+        shells = 2.0 * math.pi * 0.5 * (edges[1:] + edges[:-1]) * np.diff(edges) * length
+        inertia = float(shells @ (0.5 * (edges[1:] + edges[:-1])) ** 2)
+        return 2.0 * math.pi * radius * length * radius, inertia  # torque of a stress of 1
+
+    one, longer, wider = cylinder(0.02, 0.05), cylinder(0.02, 0.1), cylinder(0.02 * math.sqrt(2.0), 0.05)
+    assert longer[0] == pytest.approx(2.0 * one[0])
+    assert wider[0] == pytest.approx(2.0 * one[0])
+    found = stronger_rotor(2.0)
+    assert (longer[1] / one[1], wider[1] / one[1]) == (pytest.approx(found.by_length), pytest.approx(found.by_diameter))

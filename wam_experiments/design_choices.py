@@ -128,6 +128,22 @@ BASE = FrictionNode(0.45194, 2.0 * 0.25 * math.sqrt(0.45194 * 3097.0), 1632.7, 1
 GAMMA, STEP = 1.8, 20.0  # G_I in the units of (5.15) at BASE; F_error, N m
 
 
+class StrongerRotor(NamedTuple):
+    """Rotor inertia for more torque, per that of one motor: by length, as of motors in parallel, or by diameter."""
+
+    by_length: float
+    by_diameter: float
+
+
+def stronger_rotor(torque: float) -> StrongerRotor:
+    """Rotor inertia for so many times the torque of one motor (7.2.2).
+
+    The magnetic stress on the rotor's surface is that of the same magnets and currents: torque goes with L D^2, inertia
+    with L D^4.
+    """
+    return StrongerRotor(torque, torque**2)
+
+
 def friction_or_stiffness() -> tuple[Choice, ...]:
     """Half the friction or twice k_tr, at the same G_I, k_c and b: the question of 5.7."""
     gain = GAMMA * float(routh_gain(*_linear(BASE)))
