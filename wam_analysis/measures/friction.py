@@ -18,6 +18,7 @@ PRECISE = 0.01  # of the torque: noise at a breakaway after the line
 SIGMAS = 3.0  # standard errors that are meant to hold the truth
 FREEDOM = 2.0  # least degrees of freedom: with fewer, an error could be anything
 NEGLECTED = 2e-3  # of a number: what the averaged law neglects, where a recording without noise leaves no error
+SINGULAR = 1e12  # condition of normal equations beyond which a column has no information
 JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
 
 
@@ -203,8 +204,8 @@ def _disagreement(columns: Numbers, wanted: Numbers, half: NDArray[np.int64]) ->
     By the normal equations of all without those of the half: the time goes with the length of the recording.
     """
     begins = np.flatnonzero(np.diff(half, prepend=half[0] - 1))
-    products = np.add.reduceat(columns[:, :, None] * columns[:, None, :], begins)
-    targets = np.add.reduceat(columns * wanted[:, None], begins)
+    parts = zip(np.split(columns, begins[1:]), np.split(wanted, begins[1:]), strict=True)
+    products, targets = (np.array(each) for each in zip(*((a.T @ a, a.T @ b) for a, b in parts), strict=True))
     left, right = products.sum(axis=0) - products, targets.sum(axis=0) - targets
     is_known = np.linalg.cond(left) < SINGULAR
     found = np.linalg.solve(left[is_known], right[is_known][:, :, None])[:, :, 0]
