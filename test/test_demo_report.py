@@ -197,6 +197,15 @@ def test_ripple_is_half_of_the_range_in_the_steady_state():
     assert press.true == pytest.approx((4.2 + 5.2) / 2)
 
 
+def test_a_force_that_swings_is_not_right_because_its_mean_is():
+    recording = Recording()
+    recording.set(recording.true, 8.0, 8.5, "outer_link", (0.0, 3.5, 0.0), 0.25)
+    recording.set(recording.true, 8.5, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
+    press = recording.summary().presses[1]
+    assert (press.commanded, press.true) == (4.0, pytest.approx(4.0))
+    assert "force within 10 %: NO (12.5 %)" in verdict(recording.summary())
+
+
 def test_lost_contact_while_pressing_counts_as_no_force():
     recording = Recording()
     recording.set(recording.true, 8.0, 9.0, "base", (0.0, 0.0, 0.0))

@@ -87,7 +87,8 @@ def verdict(summary: DemoSummary) -> str:
 
 def _force_verdict(presses: Sequence[SteadyPress]) -> str:
     question = f"force within {FORCE_TOLERANCE:g} %"
-    errors = [abs(press.error(press.true)) for press in presses]
+    # not the mean alone: a force that swings or is lost is not the commanded one
+    errors = [abs(press.error(press.true)) + 100.0 * press.ripple / abs(press.commanded) for press in presses]
     return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, lambda worst: f"{worst:.1f} %")
 
 
