@@ -584,3 +584,45 @@ def test_a_cycle_that_few_samples_share_a_phase_with_is_not_that_of_its_ends(pha
     (found,) = episodes(time, value, 0.01)
     assert found.cycle.peak_to_peak == pytest.approx(2.0, rel=0.008)
     assert found.cycle.period * 8.0016 == pytest.approx(1.0, rel=3e-7)
+
+
+@pytest.mark.parametrize(
+    ("length", "frequency", "spans", "drift"),
+    [
+        (60, 2.0, [(5, 55)], 0.0),
+        (60, 2.0, [(20, 35)], 0.0),
+        (60, 2.0, [(10, 40)], 0.0),
+        (20, 2.0, [(6, 14)], 0.0),
+        (60, 2.0, [(33, 58)], 0.0),
+        (60, 2.0, [(1, 58)], 0.0),
+        (60, 0.7, [(5, 55)], 0.0),
+        (60, 5.0, [(5, 55)], 0.0),
+        (60, 2.0, [(5, 15), (25, 40)], 0.0),
+        (60, 2.0, [(10, 40)], 0.02),
+    ],
+)
+def test_a_cycle_in_a_part_of_a_recording_is_found_with_its_ends(length, frequency, spans, drift):
+    """A window that also held quiet parts was taken, the phase fitted over these too, and the cycle then lost."""
+    time = np.arange(100 * length) / 100.0
+    value = drift * time + draws(1, len(time), 1e-5)
+    for begin, end in spans:
+        value += np.where((time >= begin) & (time < end), 0.008 * np.sin(2.0 * math.pi * frequency * (time - begin)), 0)
+    found = episodes(time, value, 1e-4)
+    assert [(one.begin, one.end) for one in found] == [pytest.approx(span, abs=1.0 / frequency) for span in spans]
+    assert [one.cycle.peak_to_peak for one in found] == pytest.approx([0.016] * len(spans), rel=0.01)
+    assert [1.0 / one.cycle.period for one in found] == pytest.approx([frequency] * len(spans), rel=1e-3)
+
+
+@pytest.mark.parametrize("rate", [0.02, 0.1325, 0.1766])
+def test_a_swept_frequency_is_no_cycle(rate):
+    time = np.arange(10000) / 250.0
+    assert (
+        episodes(time, np.sin(2.0 * math.pi * (0.1 * time + 0.5 * rate * time**2)) + draws(4, 10000, 1e-4), 1e-3) == []
+    )
+
+
+@pytest.mark.parametrize(("decay", "frequency"), [(1.5, 6.0), (5.0, 6.0), (-5.0, 6.0), (-10.0, 2.0)])
+def test_what_decays_or_grows_in_a_part_of_a_recording_is_no_cycle(decay, frequency):
+    time = np.arange(10000) / 250.0
+    size = np.where(time > 6.0, np.exp(-(time - (6.0 if decay > 0.0 else 40.0)) / decay), 0.0)
+    assert episodes(time, size * np.sin(2.0 * math.pi * frequency * time) + draws(3, len(time), 1e-3), 4e-3) == []

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.limit_cycle import LimitCycle, limit_cycle
-from wam_analysis.measures.runs import smoothed
+from wam_analysis.measures.runs import runs, smoothed
 
 Numbers = NDArray[np.float64]
 
@@ -29,8 +29,8 @@ class Episode(NamedTuple):
 def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     """Limit cycles in windows of the whole, of half, of a quarter ... of a signal, in the order of time.
 
-    The first window that holds a cycle is extended to where its amplitude at that period falls to half; the cycle is
-    then evaluated between these ends.  A motion that decays or grows between them is none.
+    Where a window holds a cycle, the cycle begins and ends where its amplitude at that period falls to half, within the
+    window or beyond it, and is evaluated between these ends.  A motion that decays or grows between them is none.
 
     Parameters
     ----------
@@ -52,15 +52,14 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
                 continue
             flat = _without_drift(time, value, cycle.period)
             first, last = _extended(time, flat, rows, cycle.period, free)
-            edge = round(EDGE * cycle.period / float(time[1] - time[0]))
-            inner = slice(first + edge if first else 0, last - edge if last < n else n)
-            inner = inner if inner.stop - inner.start >= length else rows
+            inner = _evaluated(first, last, n, cycle.period / float(time[1] - time[0]))
             period = _refined(time[inner], flat[inner], cycle.period)
             both = [_cycle(time[inner], signal[inner], least, period) for signal in (flat, value)]
             cycle = max(filter(None, both), key=lambda one: round(one.confidence, 2), default=None)
-            free[first:last] = False  # also where it decays: its last part is no limit cycle
             if cycle is not None:
                 found.append(Episode(float(time[first]), float(time[last - 1]), cycle))
+            if cycle is not None or _changes(time[inner], flat[inner], period):
+                free[first:last] = False  # also where it decays: its last part is no limit cycle
         length //= 2
     return sorted(found, key=lambda episode: episode.begin)
 
@@ -108,12 +107,31 @@ def _without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
 
 
 def _extended(time: Numbers, flat: Numbers, rows: slice, period: float, free: NDArray[np.bool_]) -> tuple[int, int]:
-    """Rows about a window between which the amplitude at a period, averaged over two, is above half of its own."""
-    n, width = len(flat), _width(time, period)
+    """Rows between which the amplitude at a period, averaged over two, is above half of what it is where it cycles.
+
+    Of several such stretches it is the one that holds most of the window, which may have quiet parts.
+    """
+    width = _width(time, period)
     turns = flat * np.exp(-2j * np.pi * (time - time[0]) / period)
-    amplitude = np.abs(np.convolve(turns, np.ones(width) / width, "same"))
+    held = np.convolve(np.ones(len(flat)), np.ones(width), "same")  # fewer at both ends
+    amplitude = np.abs(np.convolve(turns, np.ones(width), "same")) / held
     inside = amplitude[rows][width // 2 : -(width // 2)]
-    weak = np.flatnonzero((amplitude < 0.5 * float(np.median(inside))) | ~free)
-    weak = weak[(weak >= width) & (weak < n - width)]  # nearer to the ends the mean is incomplete
-    middle = (rows.start + rows.stop) // 2
-    return int(max(weak[weak < middle], default=-1)) + 1, int(min(weak[weak > middle], default=n))
+    size = float(np.sum(inside**3) / np.sum(inside**2))  # quiet parts do not count
+    parts = runs((amplitude >= 0.5 * size) & free)
+    shared = np.minimum(parts[:, 1], rows.stop) - np.maximum(parts[:, 0], rows.start)
+    first, last = parts[int(np.argmax(shared))].tolist()
+    return first, last
+
+
+def _evaluated(first: int, last: int, n: int, lag: float) -> slice:
+    """Rows of an episode without its ends within the recording, unless too few cycles of `lag` samples are left."""
+    edge = round(EDGE * lag)
+    inner = slice(first + edge if first else 0, last - edge if last < n else n)
+    return inner if inner.stop - inner.start >= FEWEST * lag else slice(first, last)
+
+
+def _changes(time: Numbers, flat: Numbers, period: float) -> bool:
+    """Whether a motion repeats at a period, but decays or grows."""
+    cycle = limit_cycle(time, flat, period)
+    change = 1.0 - min(cycle.growth, 1.0 / cycle.growth) if cycle.growth > 0.0 else 1.0
+    return cycle.cycles > 0.0 and change > 1.0 - SURE and cycle.confidence + change >= SURE
