@@ -2,7 +2,8 @@
 
     python docs/notebook.py docs/notebooks/*.ipynb     # run and keep the outputs
 
-Each code cell is run as Jupyter would, in the folder of the notebook: what it prints, the value of its last line, then its figures.
+Each code cell is run as Jupyter would, in the folder of the notebook: what it prints, the value of its last line,
+then its figures.
 """
 
 import argparse
