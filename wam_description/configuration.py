@@ -89,7 +89,8 @@ class Configuration(NamedTuple):
 
         Parameters
         ----------
-        values : ``'timing.mode'`` names a shared parameter, ``'driver:seed'`` one of a node.
+        values : ``'timing.mode'`` names a shared parameter, ``'driver:seed'`` one of a node; a number in place of a
+            list is that of each of its values.
 
         Raises
         ------
@@ -106,6 +107,9 @@ class Configuration(NamedTuple):
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
                     f"it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
                 )
+            like = flat.get(parameter)
+            if isinstance(like, list | tuple) and isinstance(value, int | float) and not isinstance(value, bool):
+                value = [value] * max(len(like), 1)
             flat[parameter] = list(value) if isinstance(value, tuple) else value
         return Configuration(self.path, _text(sections), _frozen(sections))
 
