@@ -2,7 +2,8 @@
 
     python docs/notebook.py docs/notebooks/*.ipynb     # run and keep the outputs
 
-Each code cell is run as Jupyter would: what it prints, the value of its last line, then its figures.
+Each code cell is run as Jupyter would, in the folder of the notebook: what it prints, the value of its last line,
+then its figures.
 """
 
 import argparse
@@ -92,12 +93,12 @@ def read(file: Path) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Run notebooks at the root of the repository and keep their outputs."""
+    """Run notebooks in their own folders, as Jupyter does, and keep their outputs."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("notebooks", nargs="+", type=Path)
     files = [file.resolve() for file in parser.parse_args().notebooks]
-    os.chdir(ROOT)
     for file in files:
+        os.chdir(file.parent)
         file.write_text(json.dumps(run(read(file)), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         print(file.relative_to(ROOT))
 

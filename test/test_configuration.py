@@ -55,6 +55,16 @@ def test_replaced_values_leave_the_original_alone(file: Path) -> None:
     assert changed.path == original.path
 
 
+def test_a_number_in_place_of_a_list_is_each_of_its_values() -> None:
+    changed = WAM.with_values(
+        {"force_loop:force_gain": 0.01, "arm.tool": 0.5, "force_loop:guard.stability_fraction": 1}
+    )
+    assert changed.sections["force_loop"]["force_gain"] == [0.01]
+    assert changed.sections["/**"]["arm.tool"] == [0.5] * 3
+    assert changed.sections["force_loop"]["guard.stability_fraction"] == 1
+    assert WAM.with_values({"force_loop:force_gain": "abc"}).sections["force_loop"]["force_gain"] == "abc"
+
+
 def test_text_of_a_changed_configuration_gives_the_same_values(file: Path, tmp_path: Path) -> None:
     changed = Configuration.load(file).with_values({"loop:gain": 1e-7, "arm.tool": (0.5, 0.0, 1 / 3)})
     (tmp_path / "again.yaml").write_text(changed.text)

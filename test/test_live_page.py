@@ -45,7 +45,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
-from wam_live.panel import FORCES, POINTS, Controls, Play, sample, status_page  # noqa: E402
+from wam_live.panel import FORCES, NO_PRESS, POINTS, Bend, Controls, Play, Press, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
@@ -433,9 +433,33 @@ def test_the_page_takes_copies_and_not_every_message(domain_id: int) -> None:
         shown.wait(lambda: panel.snapshot.stamp > before + 10**9 and panel.snapshot.q, spin)
 
 
+def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    from wam_description.wiring import Call
+
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
+    with running(domain_id) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        panel = shown.page.panel
+        assert panel is not None
+        panel.requests.put(Bend())
+        shown.wait(lambda: "enable the arm first" in panel._said.content, spin)
+        panel.requests.put(Call("driver", "enable", True))
+        shown.wait(lambda: mode_of(shown) == "enabled", spin)
+        press = Press(BASE, (0.0, 0.0, -5.0))  # as the page opens
+        reaction = lambda: panel.snapshot.statuses["force_loop"].facts.get("reaction")  # noqa: E731
+        panel.requests.put(press)
+        shown.wait(lambda: reaction() not in (None, "none"), spin)
+        panel.requests.put(NO_PRESS)
+        panel.requests.put(Bend())
+        shown.wait(lambda: "the scenario has ended" in panel._said.content, spin)
+        panel.requests.put(press)
+        shown.wait(lambda: panel.snapshot.measured == pytest.approx(5.0, abs=0.25), spin)
+        assert panel.snapshot.true.cover == "outer_link"
+
+
 def test_an_arm_goes_on_where_the_page_presses_and_lets_go(domain_id: int) -> None:
     from wam_description.wiring import Call
-    from wam_live.panel import NO_PRESS, Press
 
     with running(domain_id) as (composition, shown):
         spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731

@@ -317,6 +317,23 @@ def test_an_output_that_no_node_could_use_is_refused_by_node_topic_and_value(
     assert text in str(refusal.value)
 
 
+def test_a_controller_that_returns_nothing_is_named_in_the_simulation_too(configured: Configuration) -> None:
+    class Silent(Careless):
+        name = "silent"
+
+        @reaction(Input("joint_states", "position"), outputs=("joint_velocity_command", "joint_effort_command"))
+        def step(self, inputs: Inputs) -> Outputs:
+            return {}
+
+    with_own = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
+    steps = [ScenarioStep("release", 0.1, request="enable"), ScenarioStep("wait", 0.3)]
+    run = Simulation(with_own, steps, {"silent": Silent})
+    run.play()
+    fault = run.driver.safety.fault
+    assert fault.startswith("command stale"), fault
+    assert "silent runs, but did not publish joint_effort_command and joint_velocity_command: let each of" in fault
+
+
 @pytest.mark.parametrize(
     ("given", "text"),
     [

@@ -89,7 +89,8 @@ class Configuration(NamedTuple):
 
         Parameters
         ----------
-        values : ``'timing.mode'`` names a shared parameter, ``'driver:seed'`` one of a node.
+        values : ``'timing.mode'`` names a shared parameter, ``'driver:seed'`` one of a node; a number in place of a
+            list is that of each of its values.
 
         Raises
         ------
@@ -106,7 +107,7 @@ class Configuration(NamedTuple):
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
                     f"it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
                 )
-            flat[parameter] = list(value) if isinstance(value, tuple) else value
+            flat[parameter] = _like(flat.get(parameter), value)
         return Configuration(self.path, _text(sections), _frozen(sections))
 
     def _overlaid(self, path: Path, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
@@ -212,6 +213,13 @@ def _folders() -> Iterator[Path]:
     ament = [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
     for prefix in (*here.parents, *ament, Path(sys.prefix)):
         yield prefix / "share" / "wam_stack" / "config"
+
+
+def _like(present: Any, value: Any) -> Any:
+    """A new value in the place of a present one: in that of a list, a number is each of its values."""
+    if isinstance(present, list | tuple) and isinstance(value, int | float) and not isinstance(value, bool):
+        return [value] * max(len(present), 1)
+    return list(value) if isinstance(value, tuple) else value
 
 
 def _may_be(entry: str, name: str) -> bool:

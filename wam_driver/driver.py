@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -77,6 +77,7 @@ class Driver:
     currents : actual currents, A, (n,).
     recent : the last periods, up to the last fault.
     warnings : quantities that are near their limit.
+    stale_advice : what to do about a command that is too old; replace it where more is known.
     """
 
     def __init__(self, shared: Shared, parameters: DriverParameters) -> None:
@@ -96,6 +97,7 @@ class Driver:
         self._sensors = Sensors(arm, parameters.sensors, random)
         self.recent: deque[DriverSample] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str]
+        self.stale_advice: Callable[[], str] = lambda: "check that velocity_loop runs"
         self._arm, self._timing, self._parameters = arm, timing, parameters
         self._watch = LimitWatch(arm, parameters.elbow_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
@@ -150,7 +152,7 @@ class Driver:
             if age >= self._parameters.watchdog:
                 self._trip(
                     f"command stale: {age * 1e3:.0f} ms old, allowed {self._parameters.watchdog * 1e3:.0f} ms; "
-                    "check that velocity_loop runs"
+                    f"{self.stale_advice()}"
                 )
                 enabled = False
         self.plant.brake(not enabled)

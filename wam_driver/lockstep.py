@@ -15,6 +15,12 @@ ROLL_CALL: Final = 0.4  # s before the time-out, in which the nodes say that the
 LONGEST_LOOK: Final = 0.1  # s; a process that was frozen did not wait for longer than that
 
 
+def unpublished(found: Mapping[str, Sequence[str]]) -> str:
+    """What to do about nodes that run and do not answer, each with the topics that it did not publish."""
+    node, topics = next(iter(found.items()))
+    return f"{node} runs, but did not publish {' and '.join(topics)}: let each of its steps return that"
+
+
 class Lockstep:
     """Advances the driver with the command that answers its present state, and says when none comes.
 
@@ -140,8 +146,7 @@ class Lockstep:
         found = self._unanswered(missing, self._session.awaited)
         if not found or found.keys() - self._session.awaited.keys():
             return f"check that {' and '.join(self._senders[topic] for topic in missing)} runs"
-        node, topics = next(iter(found.items()))
-        return f"{node} runs, but did not publish {' and '.join(topics)}: let each of its steps return that"
+        return unpublished(found)
 
     @property
     def start_overdue(self) -> bool:

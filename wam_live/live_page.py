@@ -18,7 +18,7 @@ from wam_description.world import World
 from wam_live.hold import HeldTopic
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
-from wam_live.panel import NO_PRESS, SLIDERS, Controls, Play, Press, Request, mode_of
+from wam_live.panel import NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, mode_of
 from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import RELEASE, LinkPush, Scene
 from wam_live.snapshot import size
@@ -65,6 +65,7 @@ class LivePage:
         self._holds: dict[str, HeldTopic] = {}
         self._states: Any = None  # subscription while somebody presses
         self._live: dict[tuple[str, str], Any] = {}
+        self._bent: tuple[float, ...] = ()  # posture for a press, rad
         self._player: ScenarioPlayer | None = None
 
     def run(self, until: Callable[[], bool]) -> None:
@@ -86,6 +87,7 @@ class LivePage:
             self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
             self.objects = objects = ObjectMeshes(self._server, world)
             self._live = {key: flat[key[0]][key[1]] for key in SLIDERS if key[1] in flat.get(key[0], {})}
+            self._bent = tuple(flat.get("force_loop", {}).get("guard.posture", ()))
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)
             self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
@@ -98,7 +100,7 @@ class LivePage:
     def close(self) -> None:
         """End the server and leave ROS; a scenario that was begun here ends."""
         if self._player is not None:
-            self._player.stop()
+            self._player.close()
         if self._server is not None:
             with quiet():
                 self._server.stop()
@@ -214,10 +216,25 @@ class LivePage:
         refusal = self._player.play(script)
         panel.say(refusal or f"playing {script}", refused=bool(refusal))
 
+    def _bend(self, source: RunningStack, panel: Controls) -> None:
+        assert self._player is not None
+        present = source.snapshot().q
+        refusal = (
+            "enable the arm first"
+            if mode_of(source.statuses) != "enabled"
+            else "no force loop runs"
+            if len(self._bent) != len(present)
+            else self._player.move(present, self._bent)
+        )
+        panel.say(f"not moved: {refusal}" if refusal else "bending the arm", refused=bool(refusal))
+
     def _ask(self, request: Request, source: RunningStack, panel: Controls, text: str = "") -> None:
         """Make a request, and show its answer, or a text in place of it."""
         if isinstance(request, Play):
             self._play(request.script, panel)
+            return
+        if isinstance(request, Bend):
+            self._bend(source, panel)
             return
         if isinstance(request, Press):
             if any(request.force):

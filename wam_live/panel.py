@@ -60,9 +60,13 @@ class Play(NamedTuple):
     script: str
 
 
+class Bend(NamedTuple):
+    """The arm to the posture in which the force loop was assessed, `guard.posture`."""
+
+
 NO_PRESS: Final = Press(BASE, (0.0, 0.0, 0.0))
 FIRST_SCRIPT: Final = "demo_scenario"
-Request = Call | SetParameters | Press | Play
+Request = Call | SetParameters | Press | Play | Bend
 
 
 class Controls:
@@ -170,6 +174,8 @@ class Controls:
                 force["xyz".index(axis.value[1])] = math.copysign(newtons.value, float(axis.value[0] + "1"))
                 self.requests.put(Press(frame.value, (force[0], force[1], force[2])))
 
+            bend = self._gui.add_button("Bend the arm", hint="before a press: to guard.posture of the force loop")
+            bend.on_click(lambda _: self.requests.put(Bend()))
             self._gui.add_button("Press").on_click(press)
             self._gui.add_button("Let go").on_click(lambda _: self.requests.put(NO_PRESS))
 

@@ -1,6 +1,10 @@
 """A scenario that the page plays into a running stack: the scenario node as a process of its own."""
 
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+
+import yaml
 
 from wam_control.scenario import load, script_file
 from wam_description.arm import Shared
@@ -10,6 +14,8 @@ from wam_description.yaml_text import parameter_text
 from wam_ros.bring_up import NodeProcess
 
 NODE = "scenario"
+SPEED = 0.5  # rad/s, mean of the fastest joint in a motion that the page asks for
+SHORTEST = 1.0  # s
 
 
 class ScenarioPlayer:
@@ -24,6 +30,15 @@ class ScenarioPlayer:
     def __init__(self, shared: Shared, namespace: str) -> None:
         self._shared, self._namespace = shared, namespace
         self._node: NodeProcess | None = None
+        self._folder = tempfile.TemporaryDirectory()
+
+    def move(self, start: Sequence[float], end: Sequence[float]) -> str:
+        """Move from posture to posture, rad; returns why that is not possible, '' where it is."""
+        most = max(abs(b - a) for a, b in zip(start, end, strict=True))
+        step = {"name": "bend the arm", "seconds": max(SHORTEST, round(most / SPEED, 1)), "posture": list(end)}
+        file = Path(self._folder.name) / "move.yaml"
+        file.write_text(yaml.safe_dump({"steps": [step]}), encoding="utf-8")
+        return self.play(str(file))
 
     def play(self, script: str) -> str:
         """Begin a scenario, named or as a file; returns why that is not possible, '' where it is."""
@@ -54,3 +69,8 @@ class ScenarioPlayer:
         if self._node is not None:
             self._node.close()
             self._node = None
+
+    def close(self) -> None:
+        """End the scenario and leave no file."""
+        self.stop()
+        self._folder.cleanup()

@@ -49,9 +49,13 @@ def start(
     Raises
     ------
     ParameterError
-        where there is no such node, or one of this name runs already in this namespace.
+        where there is no such node, one of this name runs already in this namespace, or a value is not allowed.
     """
-    require_places(node_names(configuration).values(), namespace)
+    names = node_names(configuration)
+    require_places(names.values(), namespace)
+    for entry, name in names.items():
+        if name in configuration.sections:
+            configuration.node(name, declared(entry).parameter_class)  # refused before anything starts
     if processes == ONE:
         return Composition(configuration, namespace, None, is_stopped, log_level)
     return Processes(configuration, namespace, log_level, processes)

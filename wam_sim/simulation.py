@@ -20,6 +20,7 @@ from wam_description.synchroniser import Inputs, Synchroniser
 from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Outputs, SetParameters
 from wam_driver.driver import Driver, DriverParameters
+from wam_driver.lockstep import unpublished
 from wam_sim.bus import Bus, Rows, of_node
 
 
@@ -57,6 +58,7 @@ class Simulation:
         shared = configuration.shared
         self._timing = shared.timing
         self.driver = Driver(shared, configuration.node("driver", DriverParameters))
+        self.driver.stale_advice = self._cause
         self._interface = Interface(shared, dict(controllers or {}))
         self._settings = {"driver": dict(configuration.sections["driver"])}
         self._bus = Bus(self._interface.topics)
@@ -66,7 +68,7 @@ class Simulation:
         self._currents: tuple[int, list[float]] = (0, [])
         self._fault = ""
         self.nodes: dict[str, Any] = {}
-        self._synchronisers: set[Synchroniser] = set()
+        self._synchronisers: dict[str, set[Synchroniser]] = {}
         for name, declaration in self._interface.declarations.items():
             if name != "driver":
                 self._connect(name, declaration, shared, configuration, steps)
@@ -88,7 +90,7 @@ class Simulation:
         self.nodes[name] = node
         self._settings[name] = dict(configuration.sections.get(name, {}))
         feeds = self._interface.feeds(declaration, node)
-        self._synchronisers.update(feed.synchroniser for found in feeds.values() for feed in found)
+        self._synchronisers[name] = {feed.synchroniser for found in feeds.values() for feed in found}
         if hasattr(node, "requests"):
             feeds = {t: [feed._replace(work=self._requesting(node, feed.work)) for feed in feeds[t]] for t in feeds}
         self._bus.connect(declaration, feeds, self._interface.checks(declaration))
@@ -200,7 +202,7 @@ class Simulation:
             return ""
         if request.service == "enable":
             answer = self.driver.enable("") if request.data else self.driver.disable()
-            for synchroniser in self._synchronisers:
+            for synchroniser in set().union(*self._synchronisers.values()):
                 synchroniser.discard_commands(self.driver.stamp + self._timing.period_ns)
         else:
             answer = getattr(self.driver if request.node == "driver" else self.nodes[request.node], request.service)()
@@ -217,6 +219,16 @@ class Simulation:
             declaration = self._interface.declarations[request.node]
             self.nodes[request.node].tune(build(declaration.parameter_class, values))
         self._settings[request.node] = values
+
+    def _cause(self) -> str:
+        """The node that is the reason why no command comes, and what to do about it."""
+        stamp = self.driver.stamp
+        awaited = {
+            name: {topic for one in found for topic in one.awaited(stamp)}
+            for name, found in self._synchronisers.items()
+        }
+        found = self._interface.unanswered(["motor_current_command"], awaited)
+        return unpublished(found) if found else "list a node in 'nodes' that publishes motor_current_command"
 
     def _watch_driver(self) -> None:
         """Report a new fault of the driver to every node that takes status."""
