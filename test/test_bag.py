@@ -305,7 +305,7 @@ def test_broken_bags_are_refused_in_words(tmp_path: Path) -> None:
     (tmp_path / "directory").mkdir()
     cases = {
         "nothing": (None, "does not exist"),
-        "directory": (None, "no .mcap file"),
+        "directory": (None, "no .mcap file and no .db3 file"),
         "empty.mcap": (b"", "is empty"),
         "text.mcap": (b"hello, this is not a bag at all", "is not MCAP"),
         "cut.mcap": (whole[: len(whole) * 2 // 3], "was not closed"),

@@ -45,7 +45,7 @@ def files(path: Path) -> list[Path]:
     if named:
         return [path / name for name in named]
     if not found:
-        raise BagError(f"{path} has no .mcap file; give a bag directory recorded with storage 'mcap'")
+        raise BagError(f"{path} has no .mcap file and no .db3 file; give the directory of a bag")
     return found
 
 

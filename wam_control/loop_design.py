@@ -52,7 +52,7 @@ class LoopDesign(NamedTuple):
             f"domain {verdict.domain}: {MEANING[verdict.domain]}",
             f"margin: the gain is {part:.3g} of the largest linearly stable one, {verdict.margin:.4g}",
             f"largest safe error: {verdict.stable_error:.4g}; the loop has {self.loop.error_limit:.4g}",
-            f"limit cycle of stiction: {stiction}",
+            *([] if verdict.domain is Domain.III else [f"limit cycle of stiction: {stiction}"]),  # has another one
             f"figure 5.8: gamma {self.gamma:.3g}, zeta {self.zeta:.3g}, k_tr/k_c {ratio:.3g}",
             ASSUMED,
         ]

@@ -40,6 +40,11 @@ class LimitCycle(NamedTuple):
     growth: float
     shape: Numbers
 
+    def __repr__(self) -> str:
+        """The numbers, and how many phases there are in place of all."""
+        numbers = (f"{name}={getattr(self, name):.4g}" for name in self._fields if name != "shape")
+        return f"LimitCycle({', '.join(numbers)}, shape of {len(self.shape)} phases)"
+
 
 NO_CYCLE = LimitCycle(math.nan, math.nan, 0.0, 0.0, math.nan, np.empty(0))
 
