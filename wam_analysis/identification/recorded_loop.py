@@ -75,7 +75,7 @@ def recorded_loop(path: Path, given: TopicMap) -> RecordedLoop:
         values["damping"] = _identified(label, fit.viscous, fit.viscous_error)
     if is_sure(fit.inertia, fit.inertia_error):
         values["inertia"] = _identified(label, fit.inertia, fit.inertia_error)
-    if fit.breakaways > 2:
+    if "friction" in values and fit.breakaways > 2:
         values["stiction"] = _identified(label, max(fit.static, fit.dynamic), fit.static_error)
     return RecordedLoop(values, "")
 
