@@ -696,7 +696,7 @@ def test_cycle_and_friction_of_another_robot_are_found(planted: Analysis) -> Non
     assert found["/r/wrench force.y: cycle, peak to peak"].measured == pytest.approx(2.4, rel=0.02)
     assert found["elbow: dry friction"].measured == pytest.approx(0.8, rel=0.01)
     assert found["elbow: viscous friction"].measured == pytest.approx(0.4, rel=0.01)
-    assert found["elbow: inertia"].measured == pytest.approx(0.12, rel=0.01)
+    assert "elbow: inertia" not in found  # at one frequency a weight would look the same
     assert not any(name.startswith("wrist: cy") for name in found)
     assert "elbow repeats at 3.1 Hz" in verdict_of(planted)
 

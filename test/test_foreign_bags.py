@@ -572,3 +572,32 @@ def test_without_rosbags_a_sentence_says_how_to_read_the_bag(tmp_path: Path, mon
     monkeypatch.setattr(reading.importlib, "import_module", nowhere)
     with pytest.raises(BagError, match=r"rosbags reads it: pip install 'wam_stack\[rosbags\]'$"):
         found((bag, TopicMap()))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize("dry", [DRY, 0.0])
+@pytest.mark.parametrize("waves", [[(0.3, 2.0)], [(0.5, 0.31), (0.3, 0.53), (0.15, 1.07)]])
+def test_inertia_is_given_only_where_the_motion_tells_it_from_a_weight(
+    waves: list[tuple[float, float]], dry: float, noise: float, tmp_path: Path
+) -> None:
+    """At 2 Hz a weight of 3 N m changes the inertia by a tenth; a joint without dry friction was refused."""
+    time, drawn = times(30.0), chance(71)
+    parts = [(a, 2.0 * np.pi * f) for a, f in waves]
+    q = sum(a * np.sin(w * time) for a, w in parts)
+    v = sum(a * w * np.cos(w * time) for a, w in parts)
+    effort = dry * np.sign(v) + VISCOUS * v - sum(0.2 * a * w * w * np.sin(w * time) for a, w in parts)
+    effort += 3.0 * np.sin(q) + 0.02 * drawn.normal(size=len(time))
+    velocity = v + noise * drawn.normal(size=len(time))
+    states = {"position": q, "velocity": velocity, "effort": effort}
+    sent = joints("/joint_states", time, ["j"], **{name: value[:, np.newaxis] for name, value in states.items()})
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "weight", sent), TopicMap()))
+    planted = {"j: viscous friction": VISCOUS, "j: inertia": 0.2, "j: dry friction": dry}
+    identifiable = {
+        name: value for name, value in planted.items() if value > 0.0 and (len(waves) > 1 or "inertia" not in name)
+    }
+    assert {name: numbers[name] for name in planted if name in numbers} == pytest.approx(identifiable, rel=CLOSE)
+    (section,) = (one for one in analysis.sections if one.key == "friction")
+    told = section.sentences[-1]
+    assert ("cannot be separated from its weight" in told) is (len(waves) == 1)
+    assert ("not identifiable: dry friction" in told) is (dry == 0.0)
+    assert "% of the effort's rms is unexplained" in told

@@ -21,6 +21,7 @@ TURNS = 0.8  # of the rests of such a joint have motion to the other side behind
 WINDOW = 0.03  # s over which friction is averaged
 FEWEST_SAMPLES = 6  # in that window
 BETTER = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
+APART = 0.1  # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
 SURE = 0.25  # of a number; with a larger standard error it is not identifiable
 AGREE = 0.2  # by which a recorded velocity may differ from the rate of the position
 BELOW_ZERO = 3.0  # standard errors: a fit in which one number is so negative holds more than friction
@@ -128,7 +129,8 @@ def friction(source: Source) -> Friction | None:
     Nor is there one where the recorded velocity is not the rate of the position.
 
     The load is that of a weight on the joint itself, over its angle, a sin q + b cos q + c, where this explains the
-    effort better than a constant: in a motion of one frequency, inertia and weight are the same.
+    effort better than a constant.  Where it does not, the error of the inertia counts what a weight would change.  In a
+    motion of one frequency inertia and weight are the same: the inertia is NaN.
     """
     some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
     if not some or math.isfinite(velocity_factor(source)):
@@ -147,11 +149,35 @@ def friction(source: Source) -> Friction | None:
     if "position" in joined and source.units["position"] == "rad":
         weight = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])])
         loaded = identify_friction(time, joined["velocity"], joined["effort"], rest, window, load=weight)
-        found = loaded if loaded.residual < BETTER * found.residual else found
-    numbers = ((found.viscous, found.viscous_error), (found.inertia, found.inertia_error))
-    if not is_sure(found.dynamic, found.dynamic_error) or any(v < -BELOW_ZERO * e for v, e in numbers):
+        apart = math.hypot(found.inertia_error, loaded.inertia_error, loaded.inertia - found.inertia)
+        is_better = loaded.residual < BETTER * found.residual
+        found = loaded if is_better else found._replace(inertia_error=apart)
+        sd = max(piece.noise["velocity"] for piece in some)
+        moves = np.abs(joined["velocity"]) > rest
+        if _own_part(joined["velocity"], weight, moves, sd, period, round(window / period)) < APART:
+            found = found._replace(inertia=math.nan, inertia_error=math.nan)
+    dry, viscous = (found.dynamic, found.dynamic_error), (found.viscous, found.viscous_error)
+    numbers = (dry, viscous, (found.inertia, found.inertia_error))
+    if not (is_sure(*dry) or is_sure(*viscous)) or any(v < -BELOW_ZERO * e for v, e in numbers):
         return None
     return found
+
+
+def _own_part(
+    velocity: Numbers, weight: Numbers, moves: NDArray[np.bool_], sd: float, period: float, width: int
+) -> float:
+    """Share of the acceleration, rms, that is not alike the columns of a weight, without the noise of the velocity."""
+    kernel = np.repeat([1.0, -1.0], width) / (width**2 * period)
+    acceleration = np.convolve(velocity, kernel, "same")
+    rows = moves & np.isfinite(acceleration) & np.all(np.isfinite(weight), axis=1)
+    rows[:width] = rows[-width:] = False  # the mean is incomplete
+    if int(np.sum(rows)) < FEWEST:
+        return 0.0
+    columns, wanted = np.column_stack([np.ones(int(np.sum(rows))), weight[rows]]), acceleration[rows]
+    rest = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    by_noise = sd**2 * float(kernel @ kernel)
+    own, whole = float(np.mean(rest**2)) - by_noise, float(np.var(wanted)) - by_noise
+    return math.sqrt(own / whole) if 0.0 < own < whole else 0.0
 
 
 def is_sure(value: float, error: float) -> bool:

@@ -253,7 +253,9 @@ def _friction(states: Sequence[Source]) -> Section:
         if found is None:
             continue
         effort, speed = one.units["effort"], one.units.get("velocity", "rad/s")
-        numbers = [("dry friction", effort, found.dynamic, found.dynamic_error)]
+        numbers = []
+        if is_sure(found.dynamic, found.dynamic_error):
+            numbers.append(("dry friction", effort, found.dynamic, found.dynamic_error))
         if is_sure(found.viscous, found.viscous_error):
             numbers.append(
                 ("viscous friction", f"{effort} s/{speed.partition('/')[0]}", found.viscous, found.viscous_error)
@@ -263,13 +265,18 @@ def _friction(states: Sequence[Source]) -> Section:
             numbers.append(("inertia", inertia, found.inertia, found.inertia_error))
         findings += [Finding(f"{one.label}: {what}", unit, value, error=error) for what, unit, value, error in numbers]
         told = ", ".join(f"{what} {shown(value)} +- {shown(error, unit)}" for what, unit, value, error in numbers)
-        sentences.append(f"{one.label}: {told}.")
+        missing = {"dry friction", "viscous friction", "inertia"} - {what for what, *_ in numbers}
+        if math.isnan(found.inertia):
+            missing.remove("inertia")
+            told += "; its inertia cannot be separated from its weight, since it moved at one frequency"
+        told += f"; not identifiable: {', '.join(sorted(missing))}" if missing else ""
+        sentences.append(f"{one.label}: {told}; {100.0 * found.unexplained:.2g} % of the effort's rms is unexplained.")
     if sentences:
         assumed = "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone:"
         return Section(
             "friction", "Friction", (assumed, *sentences, *doubts), tuple(findings), (), (*sentences, *doubts)
         )
-    why = "The friction of the joints cannot be identified: no effort in this bag that friction and inertia explain."
+    why = "The friction of the joints cannot be identified: no recorded effort determines a dry or viscous friction."
     return Section("friction", "Friction", (why, *doubts), (), (), tuple(doubts))
 
 

@@ -68,12 +68,14 @@ def recorded_loop(path: Path, given: TopicMap) -> RecordedLoop:
     if len(seen) > 1:
         raise ValueError(f"{path} shows friction of {', '.join(seen)}; choose one with --joint")
     ((label, (joint, fit)),) = seen.items()
-    values = {"friction": _identified(label, fit.dynamic, fit.dynamic_error), "rate": _rate(joint)}
+    values = {"rate": _rate(joint)}
+    if is_sure(fit.dynamic, fit.dynamic_error):
+        values["friction"] = _identified(label, fit.dynamic, fit.dynamic_error)
     if is_sure(fit.viscous, fit.viscous_error):
         values["damping"] = _identified(label, fit.viscous, fit.viscous_error)
     if is_sure(fit.inertia, fit.inertia_error):
         values["inertia"] = _identified(label, fit.inertia, fit.inertia_error)
-    if fit.breakaways > 2:
+    if "friction" in values and fit.breakaways > 2:
         values["stiction"] = _identified(label, max(fit.static, fit.dynamic), fit.static_error)
     return RecordedLoop(values, "")
 

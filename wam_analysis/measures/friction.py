@@ -37,6 +37,7 @@ class Friction(NamedTuple):
         the truth also where there are few breakaways or motions.  NaN of fewer than three breakaways.
     breakaways : their number.
     residual : rms of the averaged torque that the fit in motion leaves.
+    unexplained : the same as a share of the rms of that torque about its mean.
     """
 
     static: float
@@ -50,6 +51,7 @@ class Friction(NamedTuple):
     inertia_error: float
     breakaways: int
     residual: float
+    unexplained: float
 
 
 def identify_friction(
@@ -108,19 +110,19 @@ def identify_friction(
         spread = 1.4826 * float(np.median(np.abs(statics - static)))
         error = math.hypot(_few(len(statics) - 1.0) * spread / math.sqrt(len(statics)), NEGLECTED * static)
     return Friction(
-        static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics), left
+        static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics), *left
     )
 
 
 _NAN = math.nan
-_UNSEEN = Friction(_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0, _NAN)
+_UNSEEN = Friction(_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN, 0, _NAN, _NAN)
 
 
 def _in_motion(
     velocity: Numbers, torque: Numbers, load: Numbers, rest: float, half: int, period: float, allowed: Mask
-) -> tuple[tuple[float, ...], tuple[float, ...], float]:
-    """Dynamic, viscous, inertia, offset and factors of the load by least squares, their errors, rms of the rest."""
-    nothing = ((math.nan,) * (4 + load.shape[1]), (math.nan,) * 4, math.nan)
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
+    """Dynamic, viscous, inertia, offset and factors of the load by least squares, errors, rms and share of the rest."""
+    nothing = ((math.nan,) * (4 + load.shape[1]), (math.nan,) * 4, (math.nan, math.nan))
     triangle = np.pad(np.concatenate([np.arange(1, half + 2), np.arange(half, 0, -1)]).astype(float), 2)
     slope = np.gradient(triangle / triangle.sum())
     triangle /= triangle.sum()
@@ -142,8 +144,8 @@ def _in_motion(
 
 def _robust(
     columns: Numbers, wanted: Numbers, width: int, half: NDArray[np.int64]
-) -> tuple[tuple[float, ...], tuple[float, ...], float]:
-    """Least squares without outliers, standard errors, rms of the rest; a column without information gives NaN.
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, float]]:
+    """Least squares without outliers, errors, rms and share of the rest; a column without information gives NaN.
 
     The averages of `width` samples overlap, so the errors count at most one sample in `width`, and fewer where what is
     left over is alike for longer.  What the law leaves out, such as creep of the cables, is similar within a motion and
@@ -173,7 +175,8 @@ def _robust(
     found[used] = solution / scale[used]
     errors[used] = np.maximum(noisy, _disagreement(a, wanted[keep], half[keep])) / scale[used]
     errors = np.hypot(errors, NEGLECTED * found)
-    return tuple(found.tolist()), tuple(errors.tolist()), float(np.sqrt(np.mean(rest[keep] ** 2)))
+    left = float(np.sqrt(np.mean(rest[keep] ** 2)))
+    return tuple(found.tolist()), tuple(errors.tolist()), (left, left / max(float(np.std(wanted[keep])), 1e-300))
 
 
 def _correlation_length(rest: Numbers) -> float:
