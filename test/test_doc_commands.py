@@ -86,6 +86,14 @@ def test_every_block_says_whether_it_is_run(page: Path) -> None:
     assert unmarked(blocks_of(page)) == []
 
 
+def test_code_in_the_pages_is_as_the_project_writes_it() -> None:
+    for block in [block for page in PAGES for block in blocks_of(page) if block.language == "python"]:
+        file = block.mark.partition(": ")[2] if block.mark.startswith("file: ") else "docs/block.py"
+        command = [sys.executable, "-P", "-m", "ruff", "check", "--quiet", "--stdin-filename", file, "-"]
+        done = subprocess.run(command, input=block.code, capture_output=True, text=True, cwd=ROOT, check=False)
+        assert done.returncode == 0, f"{block.where}\n{done.stdout}{done.stderr}"
+
+
 def test_a_block_without_a_mark_is_noticed() -> None:
     assert unmarked(
         [Block("", "sh", "wam demo\n"), Block("", "", "wam up\n"), Block("not run here: why", "sh", "x\n")]

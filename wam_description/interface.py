@@ -139,7 +139,7 @@ class Interface:
         The nodes of the stack are not looked at: the simulation would be slower by a twentieth.
         """
         found: dict[str, Check] = {}
-        if f"{declaration.node.__module__}:{declaration.node.__qualname__}" in NODES.values():
+        if is_packaged(declaration):
             return found
         for name in declaration.outputs:
             taken = [item.arrays for one in self.declarations.values() for item in one.taken if item.topic == name]
@@ -250,6 +250,11 @@ class Interface:
                     raise ParameterError(
                         f"topic '{topic}' has {len(others)} publishers, {', '.join(others)}; list only one in 'nodes'"
                     )
+
+
+def is_packaged(declaration: Declaration) -> bool:
+    """Whether a node is one of the stack's, none of your own."""
+    return f"{declaration.node.__module__}:{declaration.node.__qualname__}" in NODES.values()
 
 
 class Feed(NamedTuple):

@@ -6,11 +6,14 @@ import html
 import io
 import json
 import logging
+import math
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from importlib.util import find_spec
 from typing import Any, Final
+
+import numpy as np
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 8080
@@ -18,7 +21,10 @@ PORTS: Final = 100  # from that one on, of which the first free one is taken
 TITLE: Final = "WAM"
 NARROW: Final = 576  # px, of a window; below it viser puts the panel under the picture
 CAMERA: Final = (1.1, -1.7, 0.5), (0.35, 0.0, -0.15)  # m, where it is and what it looks at
-NARROW_CAMERA: Final = (1.6, -2.5, 0.3), (0.35, 0.0, -0.55)
+UP: Final = np.array([0.0, 0.0, 1.0])
+WIDE: Final = 1100  # px, of a window; in one that is narrower the panel covers a part of the arm
+PANEL: Final = 335  # px, width of the panel and its margin
+FARTHER: Final = 1.8, 1.3  # times, in a narrow window and in one between
 INSTALL: Final = "pip install 'wam_stack[live]'"
 
 
@@ -108,7 +114,7 @@ def serve(port: int) -> Any:
     with _only_this_page(server, port), quiet():
         made = viser.ViserServer(host=HOST, port=port, label=TITLE, verbose=False)
     made.initial_camera.position, made.initial_camera.look_at = CAMERA
-    made.on_client_connect(_look_from_a_telephone)
+    made.on_client_connect(_look_beside_the_panel)
     return made
 
 
@@ -121,10 +127,18 @@ def name_page(server: Any, label: str, more: str = "") -> None:
     server.gui.add_html(f'<img src="data:," alt="" style="display:none" onerror="{script}">')
 
 
-def _look_from_a_telephone(client: Any) -> None:
-    """Where the panel covers the lower half of a narrow window, look from farther away, at a point below the arm."""
-    if client.camera.image_width < NARROW:
-        client.camera.position, client.camera.look_at = NARROW_CAMERA
+def _look_beside_the_panel(client: Any) -> None:
+    """Where the panel covers the lower half of a window, or much of its right, see the arm amid the rest."""
+    camera = client.camera
+    if camera.image_width >= WIDE:
+        return
+    is_narrow = camera.image_width < NARROW
+    position, target = map(np.array, CAMERA)
+    away = FARTHER[not is_narrow] * (position - target)
+    metres = np.linalg.norm(away) * math.tan(0.5 * camera.fov) / (0.5 * camera.image_height)  # of a pixel
+    right = np.cross(UP, away) / np.linalg.norm(np.cross(UP, away))
+    camera.position = target + away
+    camera.look_at = target + metres * (-0.29 * camera.image_height * UP if is_narrow else 0.5 * PANEL * right)
 
 
 @contextlib.contextmanager

@@ -19,7 +19,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from wam_description.configuration import BASE, Configuration, packaged
-from wam_description.interface import Feed, Interface, declared
+from wam_description.interface import Feed, Interface, declared, is_packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import Level, NodeStatus
 from wam_description.synchroniser import Inputs, OutOfTime, Synchroniser
@@ -209,9 +209,11 @@ class AdaptedNode(TolerantNode):
         self._worked = inputs.stamp
         outputs = work(inputs)
         if (taken := time.monotonic() - began) > SLOW_STEP:
+            is_own = not is_packaged(self._declaration)
             self.get_logger().warning(
                 f"node {self.get_name()}: a step took {taken:.1f} s; the other nodes wait for it, and an enabled arm "
-                "brakes if they wait too long: let its steps compute less",
+                "brakes if they wait too long: "
+                f"{'let its steps compute less' if is_own else 'the machine is busy, end what else runs on it'}",
                 throttle_duration_sec=SLOW_STEP_REPORTS,
             )
         self._report_refusals(inputs)

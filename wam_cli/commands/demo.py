@@ -63,9 +63,10 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()  # the bag is closed
     told = _report(bag, bool(failures), task)
     if failures:
-        print(f"\nthe demonstration failed: {_cause(bag) or ', '.join(failures)}", file=sys.stderr)
+        stream = sys.stdout if told else sys.stderr  # that of the report
+        print(f"\nthe demonstration failed: {_cause(bag) or ', '.join(failures)}", file=stream)
         for command in _next(configuration.shared.timing.mode, bag if told else None):
-            print(f"next: {command}", file=sys.stderr)
+            print(f"next: {command}", file=stream)
         return 1
     print(f"next     wam view {bag}       # the recording in the browser, to play and to scrub")
     print(f"         wam analyse {bag}    # measured and compared with theory")
