@@ -16,6 +16,7 @@ from arms import LINK_INERTIA, NOWHERE, WAM, changed, frictionless, one_joint
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects, Ripples, no_effects
+from wam_description.parameters import ParameterError
 from wam_description.world import NO_SPRINGS, Springs, World
 from wam_driver.plant import Plant
 from wam_theory.cable import propagated_pretension, unequal_tension
@@ -678,3 +679,12 @@ def test_each_effect_makes_a_difference(effect: str) -> None:
     whole = story(Plant(arm, World(NOWHERE, NO_SPRINGS), EVERYTHING, STEP))
     fewer = dataclasses.replace(EVERYTHING, **{effect: getattr(no_effects(WAM), effect)})
     assert np.abs(np.subtract(story(Plant(arm, World(NOWHERE, NO_SPRINGS), fewer, STEP)), whole)).max() > 1e-4
+
+
+def test_a_pretension_without_room_for_the_load_is_refused_by_name() -> None:
+    arm = Configuration.load(packaged("wam")).shared.arm
+    fine = dataclasses.replace(no_effects(arm), pretension_share=(1.9,))
+    fine.require_pretension(arm)
+    for shares in ((2.0,), (1.0, 1.0, 7.0, 1.0)):
+        with pytest.raises(ParameterError, match=r"pretension_share of motor\d is .*; allowed: up to 1.98"):
+            dataclasses.replace(fine, pretension_share=shares).require_pretension(arm)

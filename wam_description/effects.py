@@ -1,9 +1,10 @@
 """Effects of the transmission besides its stiffness; each can be switched off."""
 
+import math
 from dataclasses import dataclass
 
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import lengths, parameter, require
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,29 @@ class Effects:
     def tightened(self, motor: int) -> float:
         """Part of the pretension of this motor's circuit that is set."""
         return self.pretension_share[motor if len(self.pretension_share) > 1 else 0]
+
+    def require_pretension(self, arm: Arm) -> None:
+        """Refuse a pretension that leaves a cable no room for its load up to its breaking strength.
+
+        The load at full torque is that for which the configured pretension was chosen, half of it on each strand.
+
+        Raises
+        ------
+        ParameterError
+            naming motor, value and what is allowed.
+        """
+        motors, cables = arm.motors.names, arm.cables
+        if len(self.pretension_share) != 1:
+            lengths("effects", motors, {"pretension_share": self.pretension_share})
+        for i, (name, pretension, strength) in enumerate(
+            zip(motors, cables.pretension, cables.breaking_strength, strict=True)
+        ):
+            most = max(strength / pretension - 1.0, 1.0) if pretension else math.inf
+            require(
+                self.tightened(i) <= most,
+                f"effects.pretension_share of {name} is {self.tightened(i):.4g}; allowed: up to {most:.4g}, or at full "
+                f"torque its cable would be above its breaking strength, {strength:g} N",
+            )
 
     def play(self, motor: int) -> float:
         """Backlash of the circuit of this motor, rad."""

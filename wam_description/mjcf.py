@@ -86,9 +86,9 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
         shafts = (*motors, *joints)
         require(name in shafts, f"effects.ripples.shafts names '{name}'; motors and joints: {', '.join(shafts)}")
     lengths("effects", motors, {"tension_friction": effects.tension_friction})
-    for name, values in (("backlash", effects.backlash), ("pretension_share", effects.pretension_share)):
-        if len(values) != 1:
-            lengths("effects", motors, {name: values})
+    if len(effects.backlash) != 1:
+        lengths("effects", motors, {"backlash": effects.backlash})
+    effects.require_pretension(arm)
     lengths("effects", joints, {"added_coulomb_friction": effects.added_coulomb_friction})
 
 

@@ -244,8 +244,7 @@ class Driver:
 
     def set_effects(self, effects: Effects) -> None:
         """Take the effects that can change while the arm runs: added friction, active pretension."""
-        if len(effects.pretension_share) != 1:
-            lengths("effects", self._arm.motors.names, {"pretension_share": effects.pretension_share})
+        effects.require_pretension(self._arm)
         self.set_added_friction(effects.added_coulomb_friction)
         if effects.pretension_share != self._pretension_share:
             self.plant.set_pretension(effects.pretension_share)
