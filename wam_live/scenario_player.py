@@ -14,7 +14,7 @@ from wam_description.yaml_text import parameter_text
 from wam_ros.bring_up import NodeProcess
 
 NODE = "scenario"
-SPEED = 0.5  # rad/s, mean of the fastest joint in a motion that the page commands
+SPEED = 0.5  # rad/s, mean of the fastest joint in a motion that the page requested
 SHORTEST = 1.0  # s
 
 
