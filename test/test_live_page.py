@@ -631,9 +631,6 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
             with opened(f"http://{HOST}:{shown.port}/", tmp_path) as tab:
                 until(lambda: "Emergency stop" in tab.text() and server.get_clients())
                 until(lambda: tab.title().startswith(f"/wam, domain {domain_id}, {ARM.name}, since "))
-                seen = [0.0, tab.height("Emergency stop")]
-                until(lambda: seen[-1] == seen[-2] or seen.append(tab.height("Emergency stop")))  # the panel unfolds
-                height = seen[-1]
                 tab.click("Enable")
                 until(lambda: mode_of(shown) == "enabled" and "enabled" in tab.text())
                 clients = list(server.get_clients().values())
@@ -642,6 +639,7 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
                     pytest.skip(
                         f"the browser draws {rate:.1f} frames a second beside all that runs here, too few to drag"
                     )
+                height = tab.height("Emergency stop")  # the panel has unfolded
                 camera = clients[0].camera
                 window = (camera.image_width, camera.image_height)
                 start = panel.snapshot.q
