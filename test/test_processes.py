@@ -248,7 +248,7 @@ def test_children_of_a_killed_parent_end_by_themselves(started: Any, tmp_path: P
     stack = up(started, "--processes")
     stack.process.kill()
     stack.process.wait()
-    wait(lambda: not stack.alive(), "the end of the children", soon())
+    wait(lambda: not stack.alive(), "the end of the children", soon_delivered())
     (bag,) = (tmp_path / "bags").iterdir()
     assert (bag / "metadata.yaml").is_file(), "the recorder closed its bag"
 
