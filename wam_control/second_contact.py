@@ -45,6 +45,15 @@ class _Moment(NamedTuple):
     torques: Array  # (hypotheses, n), N m
 
 
+class _Change(NamedTuple):
+    """A change of the torques (n,), N m, its covariance without friction, and the first contact with its torques."""
+
+    torques: Array
+    covariance: Array
+    first: Hypothesis
+    first_torques: Array
+
+
 class SecondContact:
     """Watches one contact while it lasts.
 
@@ -91,21 +100,21 @@ class SecondContact:
             self._remember(_Moment(time, seen, hypotheses, inference.torques(hypotheses)))
         if len(self._steady) < LEAST:
             return
-        statistic = self._statistic(observer, inference)
+        change = self._change(observer, inference)
+        statistic = self._statistic(change, inference, 0.0)
         if self.is_suspected:
             if statistic < RELEASED * self._threshold:
                 self.reset()
                 self._begin = time - SETTLING
-            elif time - self._since < OLDEST:
-                careful = 0.0 if self.is_certain else self._statistic(observer, inference, TURNED)
-                self.is_certain = self.is_certain or self._exceeds(self._threshold, careful)
+            elif time - self._since < OLDEST and not self.is_certain:
+                self.is_certain = self._exceeds(self._statistic(change, inference, TURNED))
             return
-        if self._exceeds(self._threshold, statistic):
+        if self._exceeds(statistic):
             self.is_suspected, self._since, self._found = True, time, 0
 
-    def _exceeds(self, limit: float, statistic: float) -> bool:
-        """Whether so many changes in succession have exceeded a limit."""
-        self._found = self._found + 1 if statistic > limit else 0
+    def _exceeds(self, statistic: float) -> bool:
+        """Whether so many changes in succession have exceeded the threshold."""
+        self._found = self._found + 1 if statistic > self._threshold else 0
         return self._found >= LASTING
 
     def _remember(self, moment: _Moment) -> None:
@@ -118,8 +127,8 @@ class SecondContact:
         while steady and moment.time - steady[0].time > OLDEST:
             self._sums = [total - part for total, part in zip(self._sums, steady.popleft().seen, strict=True)]
 
-    def _statistic(self, observer: MomentumObserver, inference: ContactInference, turned: float = 0.0) -> float:
-        """chi^2 of the change that the first contact does not explain; `turned` of its force may change across it."""
+    def _change(self, observer: MomentumObserver, inference: ContactInference) -> _Change:
+        """The change of the torques since the steady moments, without the friction of the first contact."""
         count = len(self._steady)
         change, covariance = observer.change(Observation(*(total / count for total in self._sums)))
         first = self._steady[count // 2]
@@ -136,11 +145,15 @@ class SecondContact:
         own[others + 1] = SLIDE * inference.slide(best)
         own[others + 2] = GROWTH * force[0]
         covariance += own.T.dot(own)
-        explained = np.linalg.solve(covariance, change)
-        statistic = float(change.dot(explained))
+        return _Change(change, covariance, best, force[0])
+
+    def _statistic(self, change: _Change, inference: ContactInference, turned: float) -> float:
+        """chi^2 of a change that the first contact does not explain; `turned` of its force may change across it."""
+        torques, covariance = change.torques, change.covariance
+        explained = np.linalg.solve(covariance, torques)
+        statistic = float(torques.dot(explained))
         if statistic < RELEASED * self._threshold:
             return statistic
-        grown = GROWTH * GROWTH * abs(float(force[0].dot(explained)))
-        friction = FRICTION * grown * math.hypot(*best.force) + turned * math.hypot(*first.hypotheses[0].force)
-        across = friction * inference.sides(best)
-        return float(change.dot(np.linalg.solve(covariance + across.T.dot(across), change)))
+        grown = GROWTH * GROWTH * abs(float(change.first_torques.dot(explained)))
+        across = (FRICTION * grown + turned) * math.hypot(*change.first.force) * inference.sides(change.first)
+        return float(torques.dot(np.linalg.solve(covariance + across.T.dot(across), torques)))
