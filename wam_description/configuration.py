@@ -12,7 +12,7 @@ import yaml
 
 from wam_description import yaml_text
 from wam_description.arm import Shared
-from wam_description.parameters import ParameterError, build, fields, flatten, nested
+from wam_description.parameters import ParameterError, build, fields, flatten, listed, nested
 
 T = TypeVar("T")
 SHARED = "/**"
@@ -219,7 +219,7 @@ def _like(present: Any, value: Any) -> Any:
     """A new value in the place of a present one: in that of a list, a number is each of its values."""
     if isinstance(present, list | tuple) and isinstance(value, int | float) and not isinstance(value, bool):
         return [value] * max(len(present), 1)
-    return list(value) if isinstance(value, tuple) else value
+    return listed(value)
 
 
 def _may_be(entry: str, name: str) -> bool:

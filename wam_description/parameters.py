@@ -131,6 +131,11 @@ def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
     return tree
 
 
+def listed(value: Any) -> Any:
+    """A value as ROS and YAML carry it, where a tuple is a list."""
+    return list(value) if isinstance(value, tuple) else value
+
+
 def values(instance: Any, prefix: str = "") -> dict[str, Value]:
     """The flat ``{dotted name: value}`` of a parameter object; the inverse of `build`."""
     flat: dict[str, Value] = {}

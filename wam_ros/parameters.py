@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
 
 from wam_description.arm import Shared
-from wam_description.parameters import Field, ParameterError, build, fields, values
+from wam_description.parameters import Field, ParameterError, build, fields, listed, values
 
 T = TypeVar("T")
 OWN_NAMES = ("use_sim_time", "start_type_description_service")  # what rclpy itself declares
@@ -58,7 +58,7 @@ def declare(node: Node, cls: type[T], live: str | None = None) -> tuple[Shared, 
             is_followed = part is cls or (live is not None and field.name.startswith(live))
             node.declare_parameter(
                 field.name,
-                Parameter(field.name, value=list(value) if isinstance(value, tuple) else value).value,
+                Parameter(field.name, value=listed(value)).value,
                 descriptor(field._replace(live=field.live and is_followed)),
                 ignore_override=True,
             )

@@ -15,6 +15,7 @@ from rclpy.subscription import Subscription
 from wam_bag.printable import printable
 from wam_description.arm import Shared
 from wam_description.interface import Interface
+from wam_description.parameters import listed
 from wam_description.signals import Level, NodeStatus
 from wam_description.status import AWAITED, CHANGES, diagnosed_name, guidance
 from wam_description.topics import STATUS, Topic
@@ -237,7 +238,7 @@ class Ports:
         if stamp != self._changed_after:
             self._changed_after, self._changed = stamp, {CHANGES: str(self._change_number + 1)}
             self._change_number += 1
-        self._changed |= {f"{self._name}:{name}": str(_listed(value)) for name, value in values.items()}
+        self._changed |= {f"{self._name}:{name}": str(listed(value)) for name, value in values.items()}
         status = self._status._replace(stamp=stamp, facts={**self._status.facts, **self._changed})
         self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
 
@@ -389,7 +390,3 @@ class Ports:
         status = NodeStatus(level, text, name, fault=self._status.fault, facts=facts)
         message = diagnostic_status(status._replace(connected=self.ready), self.shared.arm.name)
         self._send(DIAGNOSTICS, DiagnosticArray(header=header(self._last_report), status=[message]))
-
-
-def _listed(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
