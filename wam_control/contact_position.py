@@ -82,8 +82,8 @@ class ContactPosition:
             self._last = None
             cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
             conflict = _conflict(contact, cover, parameters)
-            length = self._covers.length[self._covers.names.index(cover)]
-            if position < length - self._covers.radius[self._covers.names.index(cover)]:
+            length = self._covers.length_of(cover)
+            if position < length - self._covers.radius_of(cover):
                 position = min(max(position - self._slid, 0.0), length)
             return ForcePoint(cover, position, 0.0, True, True, True, False, "", conflict, contact.is_single)
         problem = _problem(contact, lean, parameters) if contact.cover else ""
@@ -108,7 +108,7 @@ class ContactPosition:
 
 def anywhere_sd(covers: Covers, cover: str, position: float) -> float:
     """Deviation from a position, m, rms, of one that is uniformly distributed over a cover, m."""
-    length = covers.length[covers.names.index(cover)]
+    length = covers.length_of(cover)
     return math.hypot(length / math.sqrt(12.0), position - length / 2.0)
 
 

@@ -192,7 +192,7 @@ class ForceAxes:
         covers = self._covers
         normal = self._body.cover_pose(q, cover).rotation.T @ direction
         point = np.array([position, *covers.aside(cover, position)])
-        point += covers.radius[covers.names.index(cover)] * normal
+        point += covers.radius_of(cover) * normal
         return self._body.point_jacobian(q, cover, point), point
 
     def axis(
@@ -243,7 +243,7 @@ class ForceAxes:
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        length = self._covers.length[self._covers.names.index(cover)]
+        length = self._covers.length_of(cover)
         anywhere = spread + max(length * length / 12.0, position_sd**2) * moved
         sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(lever @ np.linalg.solve(anywhere, lever))))
         yielding = float(lever @ self._compliance @ lever)

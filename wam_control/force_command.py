@@ -125,7 +125,7 @@ class CommandAdmission:
                 f"or such a force{last}"
             )
         cover, place = pinned
-        length = covers.length[covers.names.index(cover)]
+        length = covers.length_of(cover)
         own = torque_of_position(command.force, place)
         if math.dist(own, command.torque) > ASIDE * _size(command):
             return (

@@ -117,7 +117,7 @@ class Supervision:
     ) -> list[GuardedContact]:
         guard, covers = self._guard, self._covers
         if self._parameters.schedule == "position" and not point.is_certain:
-            return possible_contacts(guard, q, point.cover, covers.length[covers.names.index(point.cover)])
+            return possible_contacts(guard, q, point.cover, covers.length_of(point.cover))
         if direction is None:
             return guard.contacts(q, point.cover, point.position, point.position_sd)
         contact = GuardedContact(q, point.cover, point.position, point.position_sd, direction, force)

@@ -371,7 +371,7 @@ def _push(where: str, body: Any, arm: Arm) -> Push:
     )
     x, y, z = numbers(where, "newtons", body["newtons"], 3)
     place, begin, end = (number(where, key, body[key]) for key in ("place", "begin", "end"))
-    length = arm.covers.length[arm.covers.names.index(body["cover"])]
+    length = arm.covers.length_of(body["cover"])
     require(0.0 <= place <= length, f"{where}: place is {place:g} m; {body['cover']} reaches from 0 to {length:g} m")
     require(0.0 <= begin < end, f"{where}: begin is {begin:g} s, end {end:g} s; end must be later, begin 0 or later")
     return Push(body["cover"], place, (x, y, z), begin, end, arm.covers.aside(body["cover"], place))

@@ -87,7 +87,7 @@ def line_axes(arm: Arm, cover: str, point: Triple, along: Triple) -> tuple[TaskA
     point : on the line (3,), base frame, m.
     along : direction of the line (3,), base frame.
     """
-    length = arm.covers.length[arm.covers.names.index(cover)]
+    length = arm.covers.length_of(cover)
     first, second = across(along)
     return tuple(
         TaskAxis(AxisKind.POSITION, -1, cover, place, axis, _dot(axis, point))
@@ -186,7 +186,7 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
             f"{where}: {arm.joints.names[axis.joint]} is to be at {axis.value} rad; allowed: {low:.4g} to {high:.4g}",
         )
         return axis
-    length = arm.covers.length[arm.covers.names.index(axis.cover)]
+    length = arm.covers.length_of(axis.cover)
     require(axis.place is not None or axis.is_sensed, f"{where}: no place is given; only that of a force is estimated")
     require(
         axis.place is None or 0.0 <= axis.place <= length,

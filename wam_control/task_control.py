@@ -201,7 +201,7 @@ class TaskControl:
             if axis.place is not None:
                 found.append(ForcePoint(axis.cover, axis.place, 0.0, True, True, True, False, "", conflict, is_single))
                 continue
-            length = self._covers.length[self._covers.names.index(axis.cover)]
+            length = self._covers.length_of(axis.cover)
             place, sd = self._places.get(axis.cover, (length / 2.0, length / math.sqrt(12.0)))
             is_known = axis.cover in self._places
             found.append(ForcePoint(axis.cover, place, sd, is_known, False, is_known, False, "", conflict, is_single))

@@ -177,6 +177,14 @@ class Covers:
         spatial = {key: getattr(self, key) for key in ("origin", "rotation", "start", "end")}
         lengths("arm.covers", self.names, spatial, width=3)
 
+    def length_of(self, name: str) -> float:
+        """Length of the tube of this name, m."""
+        return self.length[self.names.index(name)]
+
+    def radius_of(self, name: str) -> float:
+        """Outer radius of the tube of this name, m."""
+        return self.radius[self.names.index(name)]
+
     def aside(self, name: str, place: float) -> tuple[float, float]:
         """Offset of the tube's axis from the frame's x axis, y and z, m, at a contact position x, m."""
         at = 3 * self.names.index(name)

@@ -168,7 +168,7 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float) -> li
 
 
 def _length(arm: Arm, cover: str) -> float:
-    return arm.covers.length[arm.covers.names.index(cover)]
+    return arm.covers.length_of(cover)
 
 
 def _size(random: np.random.Generator) -> float:

@@ -59,7 +59,7 @@ def is_clear(body: RigidBody, q: Sequence[float], surface: Surface) -> bool:
 def position(body: RigidBody, q: Sequence[float], surface: Surface) -> Array:
     """A point of the plane, or the centre of the rod, (3,), m, base frame."""
     covers = body.arm.covers
-    radius = covers.radius[covers.names.index(surface.cover)]
+    radius = covers.radius_of(surface.cover)
     point = body.point(q, surface.cover, (surface.place, *covers.aside(surface.cover, surface.place)))
     return point + (radius + GAP + (0.0 if surface.is_plane else ROD[0])) * np.array(surface.direction)
 

@@ -151,7 +151,7 @@ def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -
     covers = body.arm.covers
     share = random.random()
     cover = covers.names[1 + int(share / ON_OUTER * (len(covers.names) - 1)) if share < ON_OUTER else 0]
-    length = covers.length[covers.names.index(cover)]
+    length = covers.length_of(cover)
     is_plane = cover == covers.names[-1] and bool(random.random() < AT_A_PLANE)
     lean = float(random.uniform(0.0, STEEPEST)) if is_plane else 0.0
     place = length if is_plane else float(random.uniform(0.1 * length, 0.97 * length))
