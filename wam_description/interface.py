@@ -14,6 +14,8 @@ from wam_description.synchroniser import Inputs, InputSpec, Synchroniser
 from wam_description.topics import BY_NAME, EVERY_NODE, STATUS, Topic
 from wam_description.wiring import WHOLE, Declaration, Input, Outputs, Reaction, declaration, needed_arrays, raised
 
+TOGETHER = 0.7  # of the age of the oldest: topics of this age have stopped with it, younger ones are only late
+
 
 @cache
 def declared(entry: str) -> Declaration:
@@ -199,16 +201,23 @@ class Interface:
                 waiting += [trigger for trigger in triggers if trigger not in passed]
         return frozenset(found)
 
-    def silent(self, lost: Collection[str], present: Collection[str]) -> list[str]:
-        """Which nodes must have ended for these topics to be lost while others still come.
+    def silent(self, ages: Mapping[str, float]) -> tuple[list[str], list[str]]:
+        """Which topics are lost, and which nodes must have ended for it while the other topics still come.
 
         A node that still answers in one of the topics that come cannot be it; one that all lost topics have in
         common explains them best.
+
+        Parameters
+        ----------
+        ages : of the newest message by topic, as parts of their limits.
         """
+        oldest = max(ages.values())
+        lost = [topic for topic, age in ages.items() if age > TOGETHER * oldest]
+        present = [topic for topic in ages if topic not in lost]
         suspects = [self.upstream(topic) for topic in lost]
         every: frozenset[str] = frozenset().union(*suspects)
         alive: frozenset[str] = frozenset().union(*(self.upstream(topic) for topic in present))
-        return sorted(every.intersection(*suspects) - alive or every - alive or every)
+        return lost, sorted(every.intersection(*suspects) - alive or every - alive or every)
 
     def unanswered(self, topics: Collection[str], awaited: Mapping[str, Collection[str]]) -> dict[str, list[str]]:
         """The nodes that are the reason why topics do not come, each with what it should have published.

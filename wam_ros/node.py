@@ -155,11 +155,11 @@ class AdaptedNode(TolerantNode):
         """Let an enabled driver brake where an input has stopped to come without which the node cannot control."""
         needed = essential & getattr(self.node, "needs", essential)
         ages = {topic: age for topic, age in synchroniser.ages().items() if topic in needed}
-        if not (self._is_enabled and ages) or max(ages.values()) <= 1.0:
+        if not self._is_enabled or max(ages.values(), default=0.0) <= 1.0:
             self._ports.set_problem("inputs", "")
         elif not self._ports.problems.get("inputs"):
-            lost = [topic for topic, age in ages.items() if age > 0.5]  # what stopped together is not lost together
-            silent = ", ".join(self._interface.silent(lost, [topic for topic in ages if topic not in lost]))
+            lost, stopped = self._interface.silent(ages)
+            silent = ", ".join(stopped)
             self._ports.set_problem(
                 "inputs",
                 f"{silent} has stopped: {' and '.join(lost)} too old; start {silent} again, then reset_fault",
