@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_control.scenario import ScenarioStep
-from wam_description.configuration import SHARED, Configuration
+from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_description.wiring import raised
 from wam_sim.batch import Report, results
@@ -94,7 +94,7 @@ def drawn(axes: Sequence[Axis], count: int, seed: int) -> list[tuple[Any, ...]]:
 def points(
     configuration: Configuration, steps: Sequence[ScenarioStep], axes: Sequence[Axis], sets: Sequence[Sequence[Any]]
 ) -> list[SweepPoint]:
-    """The runs of these parameter sets; a number for a parameter that is a list becomes a list of one.
+    """The runs of these parameter sets.
 
     Raises
     ------
@@ -104,25 +104,8 @@ def points(
     found = []
     for values in sets:
         named = {axis.name: value for axis, value in zip(axes, values, strict=True)}
-        found.append(SweepPoint(configuration.with_values(as_declared(configuration, named)), tuple(steps)))
+        found.append(SweepPoint(configuration.with_values(named), tuple(steps)))
     return found
-
-
-def as_declared(configuration: Configuration, named: dict[str, Any]) -> dict[str, Any]:
-    """Values by name, in which a number for a parameter that is a list is a list of one.
-
-    Raises
-    ------
-    ParameterError
-        where the configuration has no such parameter.
-    """
-    configuration.with_values(named)  # refuses unknown names
-    for name, value in named.items():
-        node, _, parameter = name.rpartition(":")
-        section = configuration.sections.get(node or SHARED, {})
-        if isinstance(section.get(parameter), (list, tuple)) and not isinstance(value, (list, tuple)):
-            named[name] = [value]
-    return named
 
 
 def outcome(point: SweepPoint) -> SweepResult:

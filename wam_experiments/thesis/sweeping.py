@@ -14,7 +14,7 @@ from wam_experiments.thesis.definition import Experiment, configured
 from wam_experiments.thesis.evaluation import evaluate
 from wam_experiments.thesis.rows import Comparison
 from wam_sim.simulated_bag import record
-from wam_sim.sweep import Axis, as_declared
+from wam_sim.sweep import Axis
 
 
 class ExperimentPoint(NamedTuple):
@@ -41,7 +41,9 @@ def points(experiment: Experiment, axes: Sequence[Axis], sets: Sequence[Sequence
     """
     base = Configuration.load(packaged(experiment.configuration))
     named = [{axis.name: value for axis, value in zip(axes, values, strict=True)} for values in sets]
-    return [ExperimentPoint(experiment, tuple(as_declared(base, values).items())) for values in named]
+    for values in named:
+        base.with_values(values)
+    return [ExperimentPoint(experiment, tuple(values.items())) for values in named]
 
 
 def outcome(point: ExperimentPoint) -> ExperimentOutcome:
