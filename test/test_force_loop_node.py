@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from test_nodes import ARM, WAM, Listener, start
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State, Wrench
@@ -110,6 +111,21 @@ def test_a_torque_in_a_force_command_is_refused_by_name_once_for_each_message(
     assert feeder.loop._ports.refusals["force_command"] == 1
     said = capfd.readouterr().err
     assert said.count("force_command: refused: torque (0.0, 0.0, 0.5) N m is commanded in frame 'base'") == 1
+
+
+def test_a_trajectory_that_is_refused_is_in_the_status_until_it_ends(ros: Any, tmp_path: Path) -> None:
+    feeder = Feeder(ros, tmp_path)
+    publisher = feeder.node.create_publisher(JointTrajectory, "joint_trajectory", 10)
+    ros.wait(publisher.get_subscription_count)
+    beyond = JointTrajectory(joint_names=list(ARM.joints.names))
+    beyond.points = [JointTrajectoryPoint(positions=[9.0, -1.8, 0.0, 1.45])]
+
+    def is_refused() -> bool:
+        publisher.publish(beyond)
+        return any(m.level == DiagnosticStatus.WARN and "joint1" in m.message for m in feeder.heard.seen["status"])
+
+    feeder.feed_until(is_refused)
+    feeder.feed_until(lambda: "domain" in feeder.facts()[0].message)
 
 
 def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: Any, tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ class ForceLoopNode:
         self._refusal = ""
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
-        self._reported: tuple[Report, ForceReaction] | None = None
+        self._reported: tuple[Report, ForceReaction, str] | None = None
         self._reaction = ForceReaction.NONE
 
     @reaction(
@@ -132,14 +132,16 @@ class ForceLoopNode:
         return {"force_axis": Table(point.cover, ((*row, point.position, point.position_sd),))}
 
     def _status(self) -> Outputs:
-        """What the guard reports and how the loop reacts, where it has changed."""
+        """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
         report, reaction = self._loop.report, self._loop.reaction
-        if self._reported is not None and report is self._reported[0] and reaction is self._reported[1]:
+        refusal = self._refusal or self._player.refusal
+        if (report, reaction, refusal) == self._reported:
             return {}
-        self._reported = report, reaction
-        message = self._loop.reason or report.message
-        level = Level.WARN if report.is_warning or self._loop.reason else Level.OK
-        return {"status": NodeStatus(level, message, facts={**report.facts, "reaction": reaction.name.lower()})}
+        self._reported = report, reaction, refusal
+        problem = self._loop.reason or refusal
+        level = Level.WARN if report.is_warning or problem else Level.OK
+        facts = {**report.facts, "reaction": reaction.name.lower()}
+        return {"status": NodeStatus(level, problem or report.message, facts=facts)}
 
     @property
     def refusals(self) -> dict[str, str]:
