@@ -12,8 +12,8 @@ REPLAYED = Path("bags/sample/wam-touch")  # of the repository; `--bag` names ano
 def kinds(bag: Path = REPLAYED) -> dict[str, FaultKind]:
     """Every kind by name; `bag` is replayed, and the kind is left out where it is missing."""
     found = [
-        FaultKind("messages", "broken messages, lockstep", "messages", 920, 6, partial(messages.play, "lockstep")),
-        FaultKind("messages-realtime", "the same in realtime", "messages", 920, 6, partial(messages.play, "realtime")),
+        FaultKind("messages", "broken messages, lockstep", "messages", 960, 6, partial(messages.play, "lockstep")),
+        FaultKind("messages-realtime", "the same in realtime", "messages", 960, 6, partial(messages.play, "realtime")),
         FaultKind("parameters", "sets of live parameters", "sets", 2000, 20, parameter_sets.play),
         FaultKind("losses", "nodes killed and frozen, lockstep", "losses", 108, 0, partial(losses.play, "lockstep")),
         FaultKind("losses-realtime", "the same in realtime", "losses", 108, 0, partial(losses.play, "realtime")),
