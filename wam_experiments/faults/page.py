@@ -113,7 +113,7 @@ those of the simulated plant, currents and texts those that arrive over topics.
 `messages` are published on every topic that a node takes, by the topic's own publisher and by a second one.
 `-realtime` is the contract of a real driver; there, and in lockstep, the nodes of all kinds but `losses` are in one
 process, on a clock that waits for the answers, so a busy machine is slower and not different. `losses` are real
-processes.
+processes: each is killed, ended or frozen, and started again by an operator.
 
 Each trial depends on its kind, seed and number alone. An escape is repeated with the line that the command prints
 for it, `wam evaluate faults --only KIND --count 1 --seed SEED --first NUMBER`.
