@@ -601,3 +601,60 @@ def test_inertia_is_given_only_where_the_motion_tells_it_from_a_weight(
     assert ("cannot be separated from its weight" in told) is (len(waves) == 1)
     assert ("not identifiable: dry friction" in told) is (dry == 0.0)
     assert "% of the effort's rms is unexplained" in told
+
+
+def recorded_late(effort: Any, how: str) -> Any:
+    """An effort through a filter of the first order at 20 Hz, or 16 ms late."""
+    if how == "late":
+        return np.concatenate([np.full(4, effort[0]), effort[:-4]])
+    kept, late = math.exp(-2.0 * math.pi * 20.0 / RATE), effort.copy()
+    for i in range(1, len(late)):
+        late[i] = kept * late[i - 1] + (1.0 - kept) * 0.5 * (effort[i] + effort[i - 1])
+    return late
+
+
+@pytest.mark.parametrize(
+    ("how", "drag", "said"), [("filter", 0.0, "is filtered"), ("late", 0.0, "behind the motion"), ("", 0.4, "drag")]
+)
+def test_an_effort_that_lags_or_holds_a_drag_gives_the_friction_all_the_same(
+    how: str, drag: float, said: str, tmp_path: Path
+) -> None:
+    """The viscous friction was up to 1.65 times the truth, with an error of a few percent."""
+    time = times(40.0)
+    q, v, a = swung(time, 81)
+    effort = loaded(q, v, a, WEIGHT, 82) + drag * v * np.abs(v)
+    states = {"position": q, "velocity": v, "effort": recorded_late(effort, how) if how else effort}
+    sent = joints("/joint_states", time, ["j"], **{name: value[:, np.newaxis] for name, value in states.items()})
+    analysis, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    planted = {"j: dry friction": DRY, "j: viscous friction": VISCOUS, "j: inertia": INERTIA}
+    assert {name: numbers.get(name) for name in planted} == pytest.approx(planted, rel=CLOSE)
+    assert said in section(analysis, "friction")[1]
+
+
+def test_viscous_friction_of_one_frequency_is_said_to_be_that_of_a_delay_too(tmp_path: Path) -> None:
+    """By hand: the inertia's part -J w^2 q of an effort that is dt later holds J w^2 dt of viscous friction."""
+    time, w = times(20.0), 2.0 * math.pi * 2.0
+    q, v = 0.3 * np.sin(w * time), 0.3 * w * np.cos(w * time)
+    effort = 1.0 * v - 0.5 * w**2 * q + 0.002 * chance(83).normal(size=len(time))
+    states = {"position": q, "velocity": v, "effort": effort}
+    sent = joints("/joint_states", time, ["j"], **{name: value[:, np.newaxis] for name, value in states.items()})
+    analysis, _ = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    assert f"1 ms of which changes it by {0.5 * w**2 * 1e-3:.2g}" in section(analysis, "friction")[1]
+
+
+def test_friction_of_a_slow_motion_by_hand_is_within_its_errors(tmp_path: Path) -> None:
+    time = times(40.0)
+    drawn, speed = chance(84), np.zeros(10000)
+    for i in range(1, len(speed)):
+        speed[i] = 0.992 * speed[i - 1] + 0.008 * drawn.normal()
+    speed = 0.06 * np.convolve(speed, np.ones(100) / 100, "same") / np.std(speed)
+    q, a = np.cumsum(speed) / RATE, np.gradient(speed, time)
+    effort = loaded(q, speed, a, 0.0, 85) + 0.05 * drawn.normal(size=len(time))
+    velocity = speed + 2e-3 * drawn.normal(size=len(time))
+    states = {"position": q, "velocity": velocity, "effort": effort}
+    sent = joints("/joint_states", time, ["j"], **{name: value[:, np.newaxis] for name, value in states.items()})
+    analysis, _ = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    (friction,) = (one for one in analysis.sections if one.key == "friction")
+    for one in friction.findings:
+        truth = {"dry friction": DRY, "viscous friction": VISCOUS, "inertia": INERTIA}[one.quantity]
+        assert abs(one.measured - truth) < max(3.0 * one.error, CLOSE * truth)

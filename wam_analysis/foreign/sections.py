@@ -8,7 +8,16 @@ import numpy as np
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.foreign.cycles import COMMANDED_CYCLE, LIMIT_CYCLE, FoundCycle, cycles, lines
 from wam_analysis.foreign.forces import ForceStep, force_steps
-from wam_analysis.foreign.mechanics import friction, hidden_motion, is_sure, sticking, velocity_factor
+from wam_analysis.foreign.mechanics import (
+    DRAG,
+    FILTER,
+    WEIGHT,
+    friction,
+    hidden_motion,
+    is_sure,
+    sticking,
+    velocity_factor,
+)  # fmt: skip
 from wam_analysis.foreign.sources import FEWEST, Source, alternates, rising, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.loop_timing import stamp_timing
@@ -16,6 +25,11 @@ from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 DISOBEYED = 0.5  # of the time at rest, in which a joint was commanded to move: it sticks
 TURNS = 4.0 * math.pi  # rad; few joints turn so far, and most that are recorded in degrees do
+ALSO = {
+    WEIGHT: "with its weight",
+    DRAG: "with a drag by the square of the velocity",
+    FILTER: "the effort is filtered, or otherwise lags behind the motion, which was corrected",
+}
 TURNING = 5.0  # % of the time at rest that a motion back and forth has where it turns
 
 
@@ -249,9 +263,10 @@ def _friction(states: Sequence[Source]) -> Section:
                 f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the two is "
                 f"of another unit or sign, so that neither friction nor inertia is given."
             )
-        found = friction(one) if one.is_joint else None
-        if found is None:
+        whole = friction(one) if one.is_joint else None
+        if whole is None:
             continue
+        found = whole.friction
         effort, speed = one.units["effort"], one.units.get("velocity", "rad/s")
         numbers = []
         if is_sure(found.dynamic, found.dynamic_error):
@@ -268,11 +283,22 @@ def _friction(states: Sequence[Source]) -> Section:
         missing = {"dry friction", "viscous friction", "inertia"} - {what for what, *_ in numbers}
         if math.isnan(found.inertia):
             missing.remove("inertia")
-            told += "; its inertia cannot be separated from its weight, since it moved at one frequency"
+            told += (
+                "; it moved at one frequency, so that its inertia cannot be separated from its weight, nor its viscous "
+                f"friction from a delay of the effort, 1 ms of which changes it by {shown(1e-3 * abs(whole.per_lag))}"
+            )
         told += f"; not identifiable: {', '.join(sorted(missing))}" if missing else ""
+        told += "".join(f"; {ALSO[name]}" for name in whole.also)
+        if whole.lag:
+            told += (
+                f"; the effort is {shown(abs(whole.lag), 's')} {'behind' if whole.lag > 0.0 else 'before'} the motion"
+            )
         sentences.append(f"{one.label}: {told}; {100.0 * found.unexplained:.2g} % of the effort's rms is unexplained.")
     if sentences:
-        assumed = "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone:"
+        assumed = (
+            "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone; drag and delays "
+            "that it may also hold are taken off where they are found, and otherwise count in the errors:"
+        )
         return Section(
             "friction", "Friction", (assumed, *sentences, *doubts), tuple(findings), (), (*sentences, *doubts)
         )
