@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
-from wam_analysis.foreign.cycles import COMMANDED_CYCLE, LIMIT_CYCLE, FoundCycle, cycles, lines
+from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines
 from wam_analysis.foreign.forces import ForceStep, force_steps
 from wam_analysis.foreign.mechanics import (
     DRAG,
@@ -30,6 +30,8 @@ ALSO = {
     DRAG: "with a drag by the square of the velocity",
     FILTER: "the effort is filtered, or otherwise lags behind the motion, which was corrected",
 }
+UNSURE = 0.02  # of the size of a cycle: a larger error is printed
+STEADY = 0.9  # of a size: a cycle whose second half has less of the first, or more, is said to change
 TURNING = 5.0  # % of the time at rest that a motion back and forth has where it turns
 
 
@@ -189,10 +191,10 @@ def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
         taken.add(one.label)
         sentence = _cycle_sentence(one)
         sentences.append(sentence)
-        if one.origin != COMMANDED_CYCLE:
+        if one.origin not in (COMMANDED_CYCLE, HARMONIC):
             verdict.append(sentence)
         findings += [
-            Finding(f"{label}: cycle, peak to peak", one.unit, one.peak_to_peak, note=one.origin),
+            Finding(f"{label}: cycle, peak to peak", one.unit, one.peak_to_peak, note=one.origin, error=one.error),
             Finding(f"{label}: frequency", "Hz", one.frequency, note=one.origin),
             Finding(f"{label}: begin", "s", one.begin),
             Finding(f"{label}: end", "s", one.end),
@@ -204,12 +206,22 @@ def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
 
 def _cycle_sentence(one: FoundCycle) -> str:
     size = f"{shown(one.peak_to_peak, one.unit)} peak to peak"
+    if one.error > UNSURE * one.peak_to_peak:
+        size = f"{shown(one.peak_to_peak)} +- {shown(one.error, one.unit)} peak to peak"
+    if not STEADY < one.growth < 1.0 / STEADY:
+        change = f"{'growing' if one.growth > 1.0 else 'shrinking'} by {100.0 * abs(one.growth - 1.0):.0f} %"
+        size += f", {change} from half to half,"
     where = f"from {one.begin:.1f} to {one.end:.1f} s (confidence {one.confidence:.2f})"
     frequency = shown(one.frequency, "Hz")
     if one.origin == LIMIT_CYCLE:
         return f"{one.label}: limit cycle of {size} at {frequency} {where}; it was not commanded."
     if one.origin == COMMANDED_CYCLE:
         return f"{one.label} repeats at {frequency}, {size}, {where}, as it was commanded."
+    if one.origin == HARMONIC:
+        return (
+            f"{one.label} repeats at {frequency}, {size}, {where}, near a multiple of the commanded frequency: a limit "
+            "cycle, or the commanded motion that is not followed linearly."
+        )
     return f"{one.label} repeats at {frequency}, {size}, {where}; whether it was commanded to is not in this bag."
 
 
