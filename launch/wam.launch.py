@@ -57,7 +57,7 @@ ARGUMENTS = {  # name: default, description, allowed values
     "log_level": ("info", "least severity of what the nodes print", ["debug", "info", "warn", "error", "fatal"]),
     "tf": (
         "auto",
-        "robot_state_publisher for /tf and /tf_static; auto: where it is installed",
+        "/tf and /tf_static: by the stack where tf2_msgs is installed, or robot_state_publisher; auto: where one is",
         ["auto", *SWITCH],
     ),
     "frame_prefix": ("", "put before every frame of /tf; the frames in the arm's own messages have none", None),
@@ -67,7 +67,7 @@ ARGUMENTS = {  # name: default, description, allowed values
         "the action FollowJointTrajectory, for MoveIt; auto: where control_msgs is installed",
         ["auto", *SWITCH],
     ),
-    "use_sim_time": ("true", "robot_state_publisher and RViz take the arm's /clock", SWITCH),
+    "use_sim_time": ("true", "RViz and robot_state_publisher take the arm's /clock", SWITCH),
 }
 
 
@@ -89,8 +89,8 @@ def start_nodes(context: LaunchContext) -> list[Any]:
         *action(given, namespace, ends),
     ]
     if configuration.shared.timing.mode == "lockstep" and given["processes"] == "false":
-        command = [sys.executable, "-m", "wam_cli.main", "up", "--config", str(parameters), "--namespace", namespace]
-        return [ExecuteProcess(cmd=[*command, "--log-level", given["log_level"]], **ends), *viewers]
+        command = ["up", "--config", str(parameters), "--namespace", namespace, "--log-level", given["log_level"]]
+        return [program(command, ends), *viewers]
     nodes = [
         Node(
             package="wam_stack",
@@ -137,11 +137,13 @@ def own_names(namespace: str, prefix: str) -> list[tuple[str, str]]:
 
 
 def transforms(configuration: Configuration, given: dict[str, str], namespace: str, ends: dict[str, Any]) -> list[Any]:
-    """robot_state_publisher, or a line that says why there is none."""
+    """The frames by the stack itself, by robot_state_publisher, or a line that says why there are none."""
     if given["tf"] == "false":
         return []
+    if importlib.util.find_spec("tf2_msgs") is not None:
+        return [program(["tf", "--namespace", namespace, f"--frame-prefix={given['frame_prefix']}"], ends)]
     if given["tf"] == "auto" and "robot_state_publisher" not in get_packages_with_prefixes():
-        return [LogInfo(msg="no /tf: install robot_state_publisher (apt install ros-jazzy-robot-state-publisher)")]
+        return [LogInfo(msg="no /tf: install tf2_msgs (apt install ros-jazzy-tf2-msgs)")]
     return [
         Node(
             package="robot_state_publisher",
@@ -190,7 +192,12 @@ def action(given: dict[str, str], namespace: str, ends: dict[str, Any]) -> list[
     wanted = given["trajectory_action"]
     if wanted == "false" or (wanted == "auto" and importlib.util.find_spec("control_msgs") is None):
         return []
-    return [ExecuteProcess(cmd=[sys.executable, "-m", "wam_cli.main", "follow", "--namespace", namespace], **ends)]
+    return [program(["follow", "--namespace", namespace], ends)]
+
+
+def program(command: list[str], ends: dict[str, Any]) -> Any:
+    """The command `wam` as a process."""
+    return ExecuteProcess(cmd=[sys.executable, "-m", "wam_cli.main", *command], **ends)
 
 
 def generate_launch_description() -> LaunchDescription:

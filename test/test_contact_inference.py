@@ -286,6 +286,42 @@ def test_a_single_joint_reports_what_it_measures() -> None:
     assert found.force == pytest.approx((0.0, 1.2 / L4, 0.0), rel=0.01)
 
 
+def without_the_first_joint(arm: Arm) -> Arm:
+    """A shoulder of two axes instead of three, and its elbow."""
+    others = lambda group: type(group)(**{k: v[len(v) // 4 :] for k, v in vars(group).items()})  # noqa: E731
+    joint_from_motor = np.reshape(arm.joint_from_motor, (4, 4))[1:, 1:]
+    return dataclasses.replace(
+        arm,
+        motors=others(arm.motors),
+        cables=others(arm.cables),
+        joints=others(arm.joints),
+        links=others(arm.links),
+        joint_from_motor=tuple(joint_from_motor.ravel().tolist()),
+    )
+
+
+@pytest.mark.parametrize(
+    ("q", "cover", "point", "force", "reason"), [case for case in AMBIGUOUS if case[4] != contact_inference.SHOULDER]
+)
+def test_reasons_follow_from_the_arms_structure_and_not_from_a_number_of_joints(
+    q: tuple[float, ...], cover: str, point: tuple[float, ...], force: tuple[float, ...], reason: str
+) -> None:
+    arm = without_the_first_joint(ARM)
+    inference = ContactInference(arm, RigidBody(arm), PARAMETERS)
+    found = inference.infer(q[1:], torques(q, cover, point, force)[1:].tolist(), W[1:, 1:])
+    assert reason in of(found, cover).reason
+    assert "the shoulder" in of(found, "inner_link").reason
+
+
+@pytest.mark.parametrize("theta3", [0.0, 1.2])
+def test_a_shoulder_of_two_axes_leaves_a_moment_unmeasured_in_every_pose(theta3: float) -> None:
+    arm = without_the_first_joint(ARM)
+    q, tau = (-1.0, theta3, 0.5), torques((0.0, -1.0, theta3, 0.5), "outer_link", (0.2, 0, 0), (0, 0.6, 0))[1:]
+    inference = ContactInference(arm, RigidBody(arm), PARAMETERS)
+    found = of(inference.infer(q, tau.tolist(), np.eye(3) / 0.3**2), "outer_link")
+    assert contact_inference.SHOULDER in found.reason
+
+
 @pytest.mark.slow
 def test_the_links_count_before_anything_is_felt_by_the_area_that_they_sweep() -> None:
     """Any pose within the limits, each joint at any speed up to its own; by geometry done by hand, not by the arm's."""

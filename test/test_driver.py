@@ -28,7 +28,7 @@ BODY = RigidBody(WAM)
 START = np.array(WAM.joints.start)
 SLOW = 0.05  # s; a stop must come within it
 FAST_JOINTS = {"speed_limit": (1e6,) * 4}
-NO_LIMITS = {"elbow_speed_limit": 1e6, "tip_speed_limit": 1e6}
+NO_LIMITS = {"cover_speed_limit": 1e6, "tip_speed_limit": 1e6}
 
 
 def driver(joints: dict[str, tuple[float, ...]] | None = None, **parameters: float) -> Driver:
@@ -226,7 +226,7 @@ SPIN = (6.0, 0.0, 0.0, 0.0)
     [
         (1.0, {"speed_limit": (1.0, 1e6, 1e6, 1e6)}, NO_LIMITS, "speed of joint1"),
         (0.8, FAST_JOINTS, NO_LIMITS | {"tip_speed_limit": 0.8}, "speed of the tip"),
-        (0.4, FAST_JOINTS, NO_LIMITS | {"elbow_speed_limit": 0.4}, "speed of the start of outer_link"),
+        (0.4, FAST_JOINTS, NO_LIMITS | {"cover_speed_limit": 0.4}, "speed of the start of outer_link"),
     ],
 )
 def test_too_fast_is_a_fault_and_nearly_too_fast_a_warning(
@@ -252,7 +252,7 @@ def test_speeds_that_are_watched_are_those_of_the_arm() -> None:
     speed, q = abs(arm.plant.qd[0]), arm.plant.q
     elbow = speed * 0.5588 * abs(math.sin(q[1]))
     tip = speed * abs(-0.5588 * math.sin(q[1]) + 0.4064 * math.cos(q[1] + q[3]))
-    for what, value in (("elbow", elbow), ("tip", tip)):
+    for what, value in (("cover", elbow), ("tip", tip)):
         for factor, mode in ((0.95, Mode.FAULT), (1.05, Mode.ENABLED)):
             watched = enabled(FAST_JOINTS, **(NO_LIMITS | {f"{what}_speed_limit": factor * value}))
             play(watched, 0.2, SPIN)

@@ -195,7 +195,7 @@ def test_an_arm_that_is_enabled_beyond_a_stop_can_come_back_and_no_further() -> 
 
 def test_an_arm_that_is_driven_into_a_stop_is_stopped() -> None:
     hardware = enabled(
-        **{"driver:elbow_speed_limit": 100.0, "driver:tip_speed_limit": 100.0, "arm.joints.speed_limit": [100.0] * N}
+        **{"driver:cover_speed_limit": 100.0, "driver:tip_speed_limit": 100.0, "arm.joints.speed_limit": [100.0] * N}
     )
     for _ in range(2000):
         hardware.command(hardware.stamp, [0.0, 0.0, 0.0, 3.0])

@@ -24,6 +24,7 @@ from conftest import LONG
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from wam_cli.commands import tf as tf_command
 from wam_cli.commands import up
 from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import NODES as TABLE
@@ -314,7 +315,7 @@ def test_every_launch_argument_has_a_description_and_a_default_that_is_allowed(l
         assert argument.choices is None or argument.default_value in argument.choices
     defaults = {name: argument.default_value for name, argument in declared.items()}
     whole, note = start({**defaults, "trajectory_action": "false"})
-    assert note.msg.startswith("no /tf: install robot_state_publisher")
+    assert note.msg.startswith("no /tf: install tf2_msgs")
     file = Path(whole.cmd[whole.cmd.index("--config") + 1])
     assert file.read_text() == packaged("wam").read_text()
 
@@ -337,8 +338,23 @@ def test_launch_plays_a_scenario_into_a_bag_with_values_of_its_own(launch_file, 
         start({**CHOSEN, "overrides": "gain"})
 
 
-def test_launch_starts_transforms_and_rviz_in_the_namespace_of_the_arm(launch_file):
+def test_launch_lets_the_stack_publish_its_frames_where_their_type_is(launch_file, monkeypatch):
     _, start = launch_file
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: SimpleNamespace())
+    for tf in ("auto", "true"):
+        _, frames = start({**CHOSEN, "processes": "false", "tf": tf, "frame_prefix": "left/"})
+        assert frames.cmd[1:4] == ["-m", "wam_cli.main", "tf"]
+        options = argparse.ArgumentParser()
+        tf_command.arguments(options)
+        chosen = options.parse_args(frames.cmd[4:])
+        assert (chosen.namespace, chosen.frame_prefix) == ("left", "left/")
+        assert frames.additional_env == {"WAM_STACK_PARENT": str(os.getpid())}
+    assert len(start({**CHOSEN, "processes": "false"})) == 1
+
+
+def test_launch_starts_transforms_and_rviz_in_the_namespace_of_the_arm(launch_file, monkeypatch):
+    _, start = launch_file
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     viewers = {"record": "false", "processes": "false", "tf": "true", "rviz": "true"}
     for more, fixed, tree in (({}, "base_link", True), ({"frame_prefix": "left/"}, "left/base_link", False)):
         _, state, rviz = start(CHOSEN | viewers | more)

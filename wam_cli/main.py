@@ -28,6 +28,7 @@ COMMANDS = {
     "identify": "identify the controllers' model (friction, gravity, inertia) from a recording of free motion",
     "live": "show a running stack in the browser: watch it, push it, press its buttons",
     "follow": "serve the action FollowJointTrajectory of a running stack, for MoveIt and other planners",
+    "tf": "publish the frames of a running stack on /tf and /tf_static",
     "view": "show a recording in the browser or in the Rerun viewer, or save it as a Rerun file",
     "replay": "run a node on its recorded inputs and compare its outputs with the recorded ones",
     "experiment": "run an experiment of the thesis, record it and print predicted against measured",

@@ -17,16 +17,14 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from wam_cli.stack_client import run_next_to
 from wam_control.motion import Moving
 from wam_control.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
 from wam_description.arm import Shared
-from wam_description.parameters import build_part
 from wam_description.signals import State
 from wam_description.topics import BY_NAME, STATUS
 from wam_ros.messages import Refused, message_type, read_status, read_trajectory
 from wam_ros.qos import qos
-from wam_ros.remote_parameters import RemoteParameters
-from wam_ros.run import Connection
 
 ACTION: Final = "follow_joint_trajectory"
 TOPIC: Final = "joint_trajectory"
@@ -187,20 +185,10 @@ def _require_joints_alone(goal: Any) -> None:
 
 def serve(namespace: str, until: Callable[[], bool], say: Callable[[str], None]) -> None:
     """Serve the action of the stack in a namespace until a condition holds; a stack that comes later is waited for."""
-    connection = Connection()
-    try:
-        connection.add(asking := Node("trajectory_action_parameters", context=connection.context, namespace=namespace))
-        asked = RemoteParameters(asking, ["driver"])
-        while not until() and asked.missing:
-            asked.ask()
-            connection.executor.spin_once(timeout_sec=0.05)
-        if asked.missing:
-            return
-        node = TrajectoryActionNode(connection.context, namespace, build_part(Shared, asked.found["driver"]))
-        connection.add(node)
+
+    def make(context: Any, shared: Shared) -> TrajectoryActionNode:
+        node = TrajectoryActionNode(context, namespace, shared)
         say(f"action {node.get_namespace().rstrip('/')}/{ACTION}")
-        while not until():
-            connection.executor.spin_once(timeout_sec=0.1)
-            node.watch()
-    finally:
-        connection.close()
+        return node
+
+    run_next_to(namespace, make, until, TrajectoryActionNode.watch)

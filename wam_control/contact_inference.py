@@ -23,16 +23,14 @@ Triple = tuple[float, float, float]
 
 NEAR = math.cos(math.radians(20.0))  # how close to an ambiguous pose or direction that is given as the reason
 
-SHOULDER_JOINTS = 3  # of the arms whose elbow the reasons name
-
 NOTED = 0.05  # probability of a force along the tube above which that is a reason why the link is not identified
 
 MOMENT_ONLY = "measures only the moment: the contact position is unknown, the force is a lower bound"
 BENT = "elbow at 90 deg and force in plane: contact position and force cannot be separated"
 STRAIGHT = "elbow straight and force out of plane: contact position and force cannot be separated"
-SHOULDER = "theta2 = 0: axes 1 and 3 are aligned and one moment of the shoulder is not measured"
+SHOULDER = "the axes of the shoulder leave one of its moments unmeasured in this pose"
 WEAK = "the torques are too small, compared with their uncertainty, to identify the contact position"
-ELBOW = "tau3 and tau4 near 0: a contact at the elbow and one on the inner link cannot be distinguished"
+ELBOW = "torque of the elbow near 0: a contact at the elbow and one on the inner link cannot be distinguished"
 STRAIGHT_LINK = "elbow straight and force out of plane: the links cannot be distinguished"
 LINKS = "the torques do not identify the link"
 MORE = "one contact does not explain the torques"
@@ -132,10 +130,10 @@ class _Elbow(NamedTuple):
 
 
 def _elbow(covers: Sequence[_Cover]) -> _Elbow | None:
-    """The elbow behind a shoulder of three axes, None where the arm has none."""
+    """The one joint between a cover of which a moment alone is measured and one that is located, None without one."""
     for i, outer in enumerate(covers[1:], start=1):
         inner = covers[i - 1]
-        if inner.is_moment_only and inner.joints == SHOULDER_JOINTS == outer.joints - 1:
+        if inner.is_moment_only and not outer.is_moment_only and inner.joints == outer.joints - 1:
             return _Elbow(i - 1, i)
     return None
 
@@ -155,8 +153,8 @@ def detection_statistic(torques: Sequence[float], precision: Array) -> float:
 class ContactInference:
     """One hypothesis per cover, by the probability of contact positions along it.
 
-    Any joints, links and covers will do.  Where three joints meet in a shoulder, with a cover from there to the next
-    joint, the elbow, and a cover from that on, reasons name poses of these two.
+    Any joints, links and covers will do.  Where joints meet in a shoulder, with a cover from there to the next joint,
+    the elbow, and a cover from that on, reasons name poses of these two.
     """
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
@@ -266,14 +264,7 @@ class ContactInference:
     def _in_words(self, reason: str, cover: _Cover) -> str:
         if reason != MOMENT_ONLY:
             return reason
-        joint = (
-            "the shoulder"
-            if cover.joints == SHOULDER_JOINTS
-            else "the only joint"
-            if cover.joints == 1
-            else "the pivot"
-        )
-        return f"{joint} {reason}"
+        return f"{'the only joint' if cover.joints == 1 else 'the shoulder'} {reason}"
 
     def _why_unknown(self, q: Sequence[float], cover: _Cover, fit: Fit) -> str:
         if cover.is_moment_only:
@@ -285,7 +276,8 @@ class ContactInference:
             return BENT
         if in_plane < math.sqrt(1.0 - NEAR**2) and straight > NEAR:
             return STRAIGHT
-        if abs(math.cos(q[1])) > NEAR:
+        axes = self._jacobians[self._elbow.inner][3:, : self._covers[self._elbow.inner].joints]
+        if np.linalg.eigvalsh(axes @ axes.T)[0] < 1.0 - NEAR:  # of three axes 1 - cos of the angle of two, as theta2
             return SHOULDER
         return WEAK
 

@@ -15,6 +15,7 @@ FORMER_NAMES: Final = {
     "mismatch.": "departure.",
     "effects.added_coulomb_friction": "effects.rubbing_friction",
     "world.pushers.positions": "world.pushers.places",
+    "cover_speed_limit": "elbow_speed_limit",
     "contact_position": "contact_place",
     "position_uncertainty_limit": "place_uncertainty_limit",
     "guard.stability_fraction": "guard.share",

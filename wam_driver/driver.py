@@ -41,8 +41,11 @@ class DriverParameters:
         high=1e3,
         before=1e3,
     )
-    elbow_speed_limit: float = parameter(
-        "speed of the start of a cover, as the elbow, above which there is a fault", "m/s", low=0.0, high=100.0
+    cover_speed_limit: float = parameter(
+        "speed of the start of a cover, where it meets the link before, above which there is a fault",
+        "m/s",
+        low=0.0,
+        high=100.0,
     )
     tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0, high=100.0)
     disturbance_force_limit: float = parameter(
@@ -99,7 +102,7 @@ class Driver:
         self.warnings: list[str]
         self.stale_advice: Callable[[], str] = lambda: "check that velocity_loop runs"
         self._arm, self._timing, self._parameters = arm, timing, parameters
-        self._watch = LimitWatch(arm, parameters.elbow_speed_limit, parameters.tip_speed_limit)
+        self._watch = LimitWatch(arm, parameters.cover_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
         self._push_end = 0  # last tick of the present push

@@ -43,10 +43,10 @@ class LimitWatch:
     Parameters
     ----------
     arm : the arm as it is configured.
-    elbow_speed_limit, tip_speed_limit : m/s.
+    cover_speed_limit, tip_speed_limit : m/s.
     """
 
-    def __init__(self, arm: Arm, elbow_speed_limit: float, tip_speed_limit: float) -> None:
+    def __init__(self, arm: Arm, cover_speed_limit: float, tip_speed_limit: float) -> None:
         self._arm = arm
         self._map = TransmissionMap.of(arm)
         self._body = RigidBody(arm)
@@ -55,7 +55,7 @@ class LimitWatch:
         self._middle = [0.5 * (low + high) for low, high in zip(joints.lower, joints.upper, strict=True)]
         self._half = [0.5 * (high - low) for low, high in zip(joints.lower, joints.upper, strict=True)]
         starts = self._body.moving
-        self._speeds = [*[elbow_speed_limit] * len(starts), tip_speed_limit, *joints.speed_limit]
+        self._speeds = [*[cover_speed_limit] * len(starts), tip_speed_limit, *joints.speed_limit]
         self._strengths = [circuit.breaking_strength for circuit in arm.circuits]
         self._of_cables = [(f"cable tension of {name}", "N") for name in motors.names]
         self._quantities = [

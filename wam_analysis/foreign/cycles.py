@@ -1,14 +1,15 @@
 """Limit cycles of joints and wrench axes in windows of a recording, or cycles that were commanded; their spectrum."""
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.foreign.sources import Piece, Source, longest, pieces
-from wam_analysis.measures.episodes import Episode, episodes
-from wam_analysis.measures.limit_cycle import limit_cycle
+from wam_analysis.foreign.sources import FEWEST, Piece, Source, longest, pieces
+from wam_analysis.measures.episodes import EDGE, Episode, episodes, without_drift
+from wam_analysis.measures.limit_cycle import error_of_size, limit_cycle, size_of_cycle
 from wam_analysis.measures.lines import SpectralLine, spectral_lines
 
 Numbers = NDArray[np.float64]
@@ -17,15 +18,31 @@ LEAST = {"rad": 1e-4, "m": 1e-5, "rad/s": 1e-3, "m/s": 1e-4, "N m": 1e-3, "N": 1
 LOUD = 4.0  # standard deviations of the noise: a smaller cycle is not reported
 ALIKE = 0.03  # relative difference of two frequencies that are the same
 COMMANDED = 0.2  # of a cycle: a command that is smaller does not cause it
+LONGEST_LAG = 0.15  # s by which a joint may follow its command, in so many steps at most:
+MOST_LAGS = 40
+SLOW = (0.03, 0.1, 0.3)  # s, of the filters through which it may follow
+SINGULAR = 1e-8  # of the largest singular value: smaller ones of a command are rounding
 HARMONICS = 20  # of a commanded motion that are taken off before another cycle is looked for
 NEAR = 0.1  # of a frequency: what remains so near to the first harmonics is the command with a changing size
 LINES = 3  # of a spectrum
 
 COMMANDED_CYCLE, LIMIT_CYCLE, UNKNOWN = "commanded", "limit cycle", "not known whether commanded"
+HARMONIC = "near a multiple of the commanded frequency"
 
 
 class FoundCycle(NamedTuple):
-    """A cycle: of what, s, Hz, peak to peak, how sure, and `COMMANDED_CYCLE`, `LIMIT_CYCLE` or `UNKNOWN`."""
+    """A cycle of a joint or wrench axis.
+
+    Attributes
+    ----------
+    label, unit : of what.
+    begin, end : s.
+    frequency : Hz.
+    peak_to_peak, error : size, with its standard error where what was commanded had to be taken off, else NaN.
+    growth : size of the second half over that of the first.
+    confidence : 0 to 1.
+    origin : `COMMANDED_CYCLE`, `LIMIT_CYCLE`, `HARMONIC` or `UNKNOWN`.
+    """
 
     label: str
     unit: str
@@ -33,6 +50,8 @@ class FoundCycle(NamedTuple):
     end: float
     frequency: float
     peak_to_peak: float
+    error: float
+    growth: float
     confidence: float
     origin: str
 
@@ -58,37 +77,99 @@ def cycles(source: Source, command: Source | None) -> list[FoundCycle]:
         unit = source.units[quantity]
         for piece in pieces(source):
             least = max(LOUD * piece.noise[quantity], LEAST.get(unit, 0.0))
-            for one, origin in _of_piece(piece, quantity, command, least):
+            for one, origin, error in _of_piece(piece, quantity, command, least):
                 cycle = one.cycle
-                frequency = 1.0 / cycle.period
-                numbers = (one.begin, one.end, frequency, cycle.peak_to_peak, cycle.confidence)
-                found.append(FoundCycle(label, unit, *numbers, origin))
+                size = (cycle.peak_to_peak, error, cycle.growth, cycle.confidence)
+                found.append(FoundCycle(label, unit, one.begin, one.end, 1.0 / cycle.period, *size, origin))
     return found
 
 
-def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float) -> list[tuple[Episode, str]]:
-    result = []
-    for one in episodes(piece.time, piece.values[quantity], least):
+def _of_piece(piece: Piece, quantity: str, command: Source | None, least: float) -> list[tuple[Episode, str, float]]:
+    """Episodes, where each comes from, and the error of its size where a response to a command was taken off."""
+    result: list[tuple[Episode, str, float]] = []
+    rest = None if command is None else _without_response(piece, quantity, command)
+    for one in _found(piece, quantity, piece.values[quantity], least):
         frequency = _commanded_frequency(one, quantity, command)
         if frequency is None:
-            result.append((one, UNKNOWN))
+            result.append((one, UNKNOWN, math.nan))
         elif abs(frequency * one.cycle.period - 1.0) > ALIKE:
-            result.append((one, LIMIT_CYCLE))
+            if rest is None:
+                result.append((one, LIMIT_CYCLE, math.nan))
         else:
-            result.append((one, COMMANDED_CYCLE))
-            inner = (piece.time >= one.begin) & (piece.time <= one.end)
-            rest = _without(piece.time[inner], piece.values[quantity][inner], frequency)
-            result += [
-                (other, LIMIT_CYCLE)
-                for other in episodes(piece.time[inner], rest, least)
-                if abs(_order(other, frequency) - round(_order(other, frequency))) > NEAR
-                or _order(other, frequency) > 0.5 + HARMONICS
-            ]
+            result.append((one, COMMANDED_CYCLE, math.nan))
+            if rest is None:
+                inner = (piece.time >= one.begin) & (piece.time <= one.end)
+                left = _without(piece.time[inner], piece.values[quantity][inner], frequency)
+                others = episodes(piece.time[inner], left, least)
+                result += [(other, LIMIT_CYCLE, math.nan) for other in others if not _is_harmonic(other, frequency)]
+    if rest is None:
+        return result
+    for one in _found(piece, quantity, rest, least):
+        frequency = _commanded_frequency(one, quantity, command) or 0.0
+        if abs(frequency * one.cycle.period - 1.0) <= ALIKE:
+            continue  # the commanded motion itself, which it does not follow linearly
+        inner = (piece.time >= one.begin) & (piece.time <= one.end)
+        error = error_of_size(piece.time[inner], rest[inner], one.cycle.period)
+        error = math.hypot(error, (1.0 - one.cycle.confidence) * one.cycle.peak_to_peak)
+        result.append((one, HARMONIC if _is_harmonic(one, frequency) else LIMIT_CYCLE, error))
     return result
 
 
-def _order(one: Episode, frequency: float) -> float:
-    return 1.0 / (one.cycle.period * frequency)
+def _found(piece: Piece, quantity: str, value: Numbers, least: float) -> Iterator[Episode]:
+    """Episodes of a signal of a piece; where the stamps are irregular, their sizes are those of the recorded values.
+
+    Values between the samples cut the corners off a cycle, where irregular samples fill every phase of it.
+    """
+    for one in episodes(piece.time, value, least):
+        if piece.stamps is not piece.time:
+            period = one.cycle.period
+            first, last = (EDGE * period * (at not in (piece.time[0], piece.time[-1])) for at in (one.begin, one.end))
+            inner = (piece.stamps >= one.begin + first) & (piece.stamps <= one.end - last)
+            drift = piece.values[quantity] - without_drift(piece.time, value, period)
+            stamps = piece.stamps[inner]
+            level = piece.recorded[quantity][inner] - np.interp(stamps, piece.time, drift)
+            yield one._replace(cycle=one.cycle._replace(peak_to_peak=size_of_cycle(stamps, level, period)))
+        else:
+            yield one
+
+
+def _is_harmonic(one: Episode, frequency: float) -> bool:
+    """Whether an episode is one of the first harmonics of a frequency, 0 for none."""
+    order = 1.0 / (one.cycle.period * frequency) if frequency > 0.0 else math.inf
+    return order <= 0.5 + HARMONICS and abs(order - round(order)) <= NEAR
+
+
+def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers | None:
+    """A signal less what follows its command linearly, at once, late or slowly; None without a moving command."""
+    if quantity not in command.values or len(command.time) < FEWEST or command.time[0] > piece.time[0]:
+        return None
+    asked = held(command, quantity, piece.time)
+    if not np.ptp(asked) > 0.0:
+        return None
+    between = np.interp(piece.time, command.time, command.values[quantity])  # of a path that is sent in points
+    rests = [_less(piece, piece.values[quantity], one) for one in (asked, between)]
+    return min(rests, key=lambda rest: float(np.sum(rest**2)))
+
+
+def _less(piece: Piece, value: Numbers, asked: Numbers) -> Numbers:
+    """A signal less its linear response to a command at the same times."""
+    period = float(piece.time[1] - piece.time[0])
+    lags = np.unique(np.round(np.linspace(0.0, LONGEST_LAG / period, MOST_LAGS)).astype(np.int64))
+    late = [np.concatenate([np.full(lag, asked[0]), asked[: len(asked) - lag]]) for lag in lags.tolist()]
+    slow = [_slowed(asked, period / (period + tau)) for tau in SLOW]
+    columns = np.column_stack([np.ones(len(asked)), *late, *slow])
+    rest: Numbers = value - columns @ np.linalg.lstsq(columns, value, rcond=SINGULAR)[0]
+    return rest
+
+
+def _slowed(value: Numbers, share: float) -> Numbers:
+    """A signal through a filter of the first order that takes a share of each new sample."""
+    result = np.empty(len(value))
+    last = float(value[0])
+    for i, now in enumerate(value.tolist()):
+        last += share * (now - last)
+        result[i] = last
+    return result
 
 
 def _commanded_frequency(one: Episode, quantity: str, command: Source | None) -> float | None:

@@ -1,6 +1,7 @@
 """Stick-slip, friction and inertia of the joints of another robot."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,9 @@ TURNS = 0.8  # of the rests of such a joint have motion to the other side behind
 WINDOW = 0.03  # s over which friction is averaged
 FEWEST_SAMPLES = 6  # in that window
 BETTER = 0.8  # of the rest of a fit: one with the weight of the joint leaves less
+MUCH_BETTER = 0.5  # likewise, with a drag or a lag
+WEIGHT, DRAG, FILTER = "weight", "drag", "filter"
+LONGEST_LAG = 0.06  # s of the effort behind the motion, or before it
 APART = 0.1  # of the acceleration that is not alike a weight; below it, inertia and weight cannot be separated
 SURE = 0.25  # of a number; with a larger standard error it is not identifiable
 AGREE = 0.2  # by which a recorded velocity may differ from the rate of the position
@@ -123,44 +127,136 @@ def velocity_factor(source: Source) -> float:
     return math.nan if abs(factor - 1.0) <= AGREE else factor
 
 
-def friction(source: Source) -> Friction | None:
+class FoundFriction(NamedTuple):
+    """Friction and inertia of a joint, with what else its effort holds.
+
+    Attributes
+    ----------
+    friction : with errors that count what the effort may also hold.
+    also : what was found in it: of `WEIGHT`, `DRAG` and `FILTER`.
+    lag : s, of the effort behind the motion.
+    per_lag : how the viscous friction changes where the effort of a motion of one frequency is later, per s; NaN of
+        other motions.
+    """
+
+    friction: Friction
+    also: tuple[str, ...]
+    lag: float
+    per_lag: float
+
+
+def friction(source: Source) -> FoundFriction | None:
     """Friction and inertia of a joint that its weight may load; None without effort, velocity or an answer.
 
     Nor is there one where the recorded velocity is not the rate of the position.
 
-    The load is that of a weight on the joint itself, over its angle, a sin q + b cos q + c, where this explains the
-    effort better than a constant.  Where it does not, the error of the inertia counts what a weight would change.  In a
-    motion of one frequency inertia and weight are the same: the inertia is NaN.
+    The effort may also hold the weight of the joint itself, over its angle, a sin q + b cos q, or a drag c v|v|, and
+    may lag behind the motion, as where it is filtered, or the motion behind it.  What leaves less of the effort
+    unexplained is taken; by what the others would change, the errors are larger.  In a motion of one frequency inertia
+    and weight are the same, and the inertia is NaN; so are viscous friction and lag, and no lag is looked for.
     """
     some = [piece for piece in pieces(source) if {"effort", "velocity"} <= piece.values.keys()]
     if not some or math.isfinite(velocity_factor(source)):
         return None
     period = float(some[0].time[1] - some[0].time[0])
     window = max(WINDOW, FEWEST_SAMPLES * period)
-    blank = np.full(2 * round(window / period) + 2, math.nan)  # between two pieces
+    apart = 2 * round(window / period) + 2 * math.ceil(LONGEST_LAG / period) + 2  # samples between two pieces
+    blank = np.full(apart, math.nan)
     joined = {
         q: np.concatenate([part for piece in some for part in (piece.values[q], blank)])
         for q in ("position", "velocity", "effort")
         if q in some[0].values
     }
-    time = period * np.arange(len(joined["velocity"]), dtype=np.float64)
-    rest = max(_rest(piece) for piece in some)
-    found = identify_friction(time, joined["velocity"], joined["effort"], rest, window)
+    velocity, sd = joined["velocity"], max(piece.noise["velocity"] for piece in some)
+    columns = {DRAG: (velocity * np.abs(velocity))[:, np.newaxis]}
     if "position" in joined and source.units["position"] == "rad":
-        weight = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])])
-        loaded = identify_friction(time, joined["velocity"], joined["effort"], rest, window, load=weight)
-        apart = math.hypot(found.inertia_error, loaded.inertia_error, loaded.inertia - found.inertia)
-        is_better = loaded.residual < BETTER * found.residual
-        found = loaded if is_better else found._replace(inertia_error=apart)
-        sd = max(piece.noise["velocity"] for piece in some)
-        moves = np.abs(joined["velocity"]) > rest
-        if _own_part(joined["velocity"], weight, moves, sd, period, round(window / period)) < APART:
-            found = found._replace(inertia=math.nan, inertia_error=math.nan)
+        columns[WEIGHT] = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])])
+    rest = max(_rest(piece) for piece in some)
+    trial = _Trial(velocity, joined["effort"], columns, rest, window, period)
+    moves, width, per_lag = np.abs(velocity) > rest, round(window / period), math.nan
+    one_frequency = WEIGHT in columns and _own_part(velocity, columns[WEIGHT], moves, sd, period, width) < APART
+    found, also, shift = _best(trial, not one_frequency)
+    size = _size_of_noise(velocity, sd, moves, period, width)
+    found = found._replace(inertia_error=math.hypot(found.inertia_error, size * found.inertia))
+    if one_frequency:
+        per_lag = (found.viscous - trial.fit(also, 1).viscous) / period
+        found = found._replace(inertia=math.nan, inertia_error=math.nan)
     dry, viscous = (found.dynamic, found.dynamic_error), (found.viscous, found.viscous_error)
     numbers = (dry, viscous, (found.inertia, found.inertia_error))
     if not (is_sure(*dry) or is_sure(*viscous)) or any(v < -BELOW_ZERO * e for v, e in numbers):
         return None
-    return found
+    return FoundFriction(found, also, shift * period, per_lag)
+
+
+class _Trial(NamedTuple):
+    """What friction is identified from; fits with further columns and with the effort shifted."""
+
+    velocity: Numbers
+    effort: Numbers
+    columns: dict[str, Numbers]
+    rest: float
+    window: float
+    period: float
+
+    def fit(self, also: Sequence[str], shift: int) -> Friction:
+        """Friction with the columns of these names, and the effort of `shift` samples later."""
+        effort = np.roll(self.effort, -shift)
+        every = self.columns | {FILTER: np.nan_to_num(-np.gradient(effort, self.period))[:, np.newaxis]}
+        time = self.period * np.arange(len(effort), dtype=np.float64)
+        load = np.hstack([every[name] for name in also]) if also else None
+        return identify_friction(time, self.velocity, effort, self.rest, self.window, load=load)
+
+    def lag(self, also: Sequence[str]) -> int:
+        """The shift of the effort, samples, that leaves least unexplained."""
+        most = math.ceil(LONGEST_LAG / self.period)
+        step, best = max(1, most // 4), 0
+        left = {0: self.fit(also, 0).residual}
+        while step:
+            for shift in (best - step, best + step):
+                if abs(shift) <= most and shift not in left:
+                    left[shift] = self.fit(also, shift).residual
+            nearest = min(left, key=left.__getitem__)
+            step, best = (step if nearest != best and step > 1 else step // 2), nearest
+        return best
+
+
+def _best(trial: _Trial, lags: bool) -> tuple[Friction, tuple[str, ...], int]:
+    """The fit with what else explains the effort, with errors that count what was left out; names; shift.
+
+    Parameters
+    ----------
+    lags : whether the effort may lag.
+    """
+    also: tuple[str, ...] = ()
+    shift = 0
+    found = trial.fit(also, shift)
+    while True:
+        others = [((*also, name), shift) for name in (*trial.columns, *([FILTER] * lags)) if name not in also]
+        others += [(also, lag)] if lags and not shift and (lag := trial.lag(also)) else []
+        fits = [trial.fit(*other) for other in others]
+        least = [BETTER if WEIGHT in {*other[0]} - {*also} else MUCH_BETTER for other in others]
+        gains = [(fit.residual / share, i) for i, (fit, share) in enumerate(zip(fits, least, strict=True))]
+        if not gains or not min(gains)[0] < found.residual:
+            break
+        i = min(gains)[1]
+        (also, shift), found = others[i], fits[i]
+    more = {
+        name: [getattr(fit, name) - getattr(found, name) for fit in fits] for name in ("dynamic", "viscous", "inertia")
+    }
+    found = found._replace(
+        dynamic_error=math.hypot(found.dynamic_error, *more["dynamic"]),
+        viscous_error=math.hypot(found.viscous_error, *more["viscous"]),
+        inertia_error=math.hypot(found.inertia_error, *more["inertia"]),
+    )
+    return found, also, shift
+
+
+def _size_of_noise(velocity: Numbers, sd: float, moves: NDArray[np.bool_], period: float, width: int) -> float:
+    """Share of the power of the acceleration that is noise of the velocity: so much too small is the inertia."""
+    kernel = np.repeat([1.0, -1.0], width) / (width**2 * period)
+    acceleration = np.convolve(velocity, kernel, "same")
+    whole = float(np.var(acceleration[moves & np.isfinite(acceleration)])) if np.any(moves) else 0.0
+    return min(sd**2 * float(kernel @ kernel) / whole, 1.0) if whole > 0.0 else 1.0
 
 
 def _own_part(

@@ -6,9 +6,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, Section, shown, times
-from wam_analysis.foreign.cycles import COMMANDED_CYCLE, LIMIT_CYCLE, FoundCycle, cycles, lines
+from wam_analysis.foreign.cycles import COMMANDED_CYCLE, HARMONIC, LIMIT_CYCLE, FoundCycle, cycles, lines
 from wam_analysis.foreign.forces import ForceStep, force_steps
-from wam_analysis.foreign.mechanics import friction, hidden_motion, is_sure, sticking, velocity_factor
+from wam_analysis.foreign.mechanics import (
+    DRAG,
+    FILTER,
+    WEIGHT,
+    friction,
+    hidden_motion,
+    is_sure,
+    sticking,
+    velocity_factor,
+)  # fmt: skip
 from wam_analysis.foreign.sources import FEWEST, Source, alternates, rising, sources
 from wam_analysis.foreign.topic_map import TopicMap
 from wam_analysis.measures.loop_timing import stamp_timing
@@ -16,6 +25,13 @@ from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 DISOBEYED = 0.5  # of the time at rest, in which a joint was commanded to move: it sticks
 TURNS = 4.0 * math.pi  # rad; few joints turn so far, and most that are recorded in degrees do
+ALSO = {
+    WEIGHT: "with its weight",
+    DRAG: "with a drag by the square of the velocity",
+    FILTER: "the effort is filtered, or otherwise lags behind the motion, which was corrected",
+}
+UNSURE = 0.02  # of the size of a cycle: a larger error is printed
+STEADY = 0.9  # of a size: a cycle whose second half has less of the first, or more, is said to change
 TURNING = 5.0  # % of the time at rest that a motion back and forth has where it turns
 
 
@@ -175,10 +191,10 @@ def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
         taken.add(one.label)
         sentence = _cycle_sentence(one)
         sentences.append(sentence)
-        if one.origin != COMMANDED_CYCLE:
+        if one.origin not in (COMMANDED_CYCLE, HARMONIC):
             verdict.append(sentence)
         findings += [
-            Finding(f"{label}: cycle, peak to peak", one.unit, one.peak_to_peak, note=one.origin),
+            Finding(f"{label}: cycle, peak to peak", one.unit, one.peak_to_peak, note=one.origin, error=one.error),
             Finding(f"{label}: frequency", "Hz", one.frequency, note=one.origin),
             Finding(f"{label}: begin", "s", one.begin),
             Finding(f"{label}: end", "s", one.end),
@@ -190,12 +206,22 @@ def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
 
 def _cycle_sentence(one: FoundCycle) -> str:
     size = f"{shown(one.peak_to_peak, one.unit)} peak to peak"
+    if one.error > UNSURE * one.peak_to_peak:
+        size = f"{shown(one.peak_to_peak)} +- {shown(one.error, one.unit)} peak to peak"
+    if not STEADY < one.growth < 1.0 / STEADY:
+        change = f"{'growing' if one.growth > 1.0 else 'shrinking'} by {100.0 * abs(one.growth - 1.0):.0f} %"
+        size += f", {change} from half to half,"
     where = f"from {one.begin:.1f} to {one.end:.1f} s (confidence {one.confidence:.2f})"
     frequency = shown(one.frequency, "Hz")
     if one.origin == LIMIT_CYCLE:
         return f"{one.label}: limit cycle of {size} at {frequency} {where}; it was not commanded."
     if one.origin == COMMANDED_CYCLE:
         return f"{one.label} repeats at {frequency}, {size}, {where}, as it was commanded."
+    if one.origin == HARMONIC:
+        return (
+            f"{one.label} repeats at {frequency}, {size}, {where}, near a multiple of the commanded frequency: a limit "
+            "cycle, or the commanded motion that is not followed linearly."
+        )
     return f"{one.label} repeats at {frequency}, {size}, {where}; whether it was commanded to is not in this bag."
 
 
@@ -249,9 +275,10 @@ def _friction(states: Sequence[Source]) -> Section:
                 f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the two is "
                 f"of another unit or sign, so that neither friction nor inertia is given."
             )
-        found = friction(one) if one.is_joint else None
-        if found is None:
+        whole = friction(one) if one.is_joint else None
+        if whole is None:
             continue
+        found = whole.friction
         effort, speed = one.units["effort"], one.units.get("velocity", "rad/s")
         numbers = []
         if is_sure(found.dynamic, found.dynamic_error):
@@ -268,11 +295,22 @@ def _friction(states: Sequence[Source]) -> Section:
         missing = {"dry friction", "viscous friction", "inertia"} - {what for what, *_ in numbers}
         if math.isnan(found.inertia):
             missing.remove("inertia")
-            told += "; its inertia cannot be separated from its weight, since it moved at one frequency"
+            told += (
+                "; it moved at one frequency, so that its inertia cannot be separated from its weight, nor its viscous "
+                f"friction from a delay of the effort, 1 ms of which changes it by {shown(1e-3 * abs(whole.per_lag))}"
+            )
         told += f"; not identifiable: {', '.join(sorted(missing))}" if missing else ""
+        told += "".join(f"; {ALSO[name]}" for name in whole.also)
+        if whole.lag:
+            told += (
+                f"; the effort is {shown(abs(whole.lag), 's')} {'behind' if whole.lag > 0.0 else 'before'} the motion"
+            )
         sentences.append(f"{one.label}: {told}; {100.0 * found.unexplained:.2g} % of the effort's rms is unexplained.")
     if sentences:
-        assumed = "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone:"
+        assumed = (
+            "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone; drag and delays "
+            "that it may also hold are taken off where they are found, and otherwise count in the errors:"
+        )
         return Section(
             "friction", "Friction", (assumed, *sentences, *doubts), tuple(findings), (), (*sentences, *doubts)
         )

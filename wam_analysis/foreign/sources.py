@@ -59,11 +59,22 @@ class Source(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A stretch without gaps, at a constant rate: time (n,), s; values (n,) and sd of the noise by quantity."""
+    """A stretch without gaps, at a constant rate.
+
+    Attributes
+    ----------
+    time : (n,), s.
+    values : (n,) by quantity.
+    noise : its standard deviation by quantity.
+    stamps : (m,), s, where these are irregular, else the same as `time`.
+    recorded : (m,) by quantity, the values at the stamps.
+    """
 
     time: Numbers
     values: dict[str, Numbers]
     noise: dict[str, float]
+    stamps: Numbers
+    recorded: dict[str, Numbers]
 
 
 def sources(bag: Bag, given: TopicMap) -> list[Source]:
@@ -178,14 +189,16 @@ def pieces(source: Source) -> list[Piece]:
             continue
         time = source.time[begin:end]
         values = {q: v[begin:end] for q, v in source.values.items()}
+        stamps, recorded = time, values
         if float(np.max(np.abs(np.diff(time) - period))) > IRREGULAR * period:
             even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / period) + 1)
             values = {q: at_times(even, time, v) for q, v in values.items()}
             time = even
         sd = {q: resolution(v) for q, v in values.items()}
         if "position" in values and "velocity" not in values:
+            values = dict(values)
             values["velocity"], sd["velocity"] = differentiated(time, values["position"])
-        found.append(Piece(time, values, sd))
+        found.append(Piece(time, values, sd, stamps, recorded))
     return found
 
 

@@ -67,7 +67,8 @@ def recorded_loop(path: Path, given: TopicMap) -> RecordedLoop:
         )
     if len(seen) > 1:
         raise ValueError(f"{path} shows friction of {', '.join(seen)}; choose one with --joint")
-    ((label, (joint, fit)),) = seen.items()
+    ((label, (joint, found_friction)),) = seen.items()
+    fit = found_friction.friction
     values = {"rate": _rate(joint)}
     if is_sure(fit.dynamic, fit.dynamic_error):
         values["friction"] = _identified(label, fit.dynamic, fit.dynamic_error)

@@ -15,6 +15,8 @@ SURE = 0.8  # confidence from which a cycle is reported
 FEWEST = 5  # cycles of an episode; fewer repeat by chance in one of many windows
 BRIEFEST = 64  # samples of a window
 SLOWEST = 4  # cycles in a window, slower changes are drift when a cycle is looked for
+SAME = 0.05  # relative difference of two periods that are the same
+STEADY = 0.95  # of its size: the second half of a limit cycle that follows a decaying motion has so much of the first
 EDGE = 1.5  # cycles at an end within the recording that are not evaluated: it is not known better
 
 
@@ -41,6 +43,7 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
     n = length = len(value)
     free = np.ones(n, dtype=np.bool_)
     found: list[Episode] = []
+    transients: list[_Transient] = []
     while length >= min(BRIEFEST, n):
         level = value - smoothed(value, length // SLOWEST)
         for begin in range(0, n - length + 1, max(length // 2, 1)):
@@ -50,18 +53,52 @@ def episodes(time: Numbers, value: Numbers, least: float) -> list[Episode]:
             cycle = _cycle(time[rows], value[rows], least) or _cycle(time[rows], level[rows], least)
             if cycle is None:
                 continue
-            flat = _without_drift(time, value, cycle.period)
-            first, last = _extended(time, flat, rows, cycle.period, free)
-            inner = _evaluated(first, last, n, cycle.period / float(time[1] - time[0]))
-            period = _refined(time[inner], flat[inner], cycle.period)
-            both = [_cycle(time[inner], signal[inner], least, period) for signal in (flat, value)]
-            cycle = max(filter(None, both), key=lambda one: round(one.confidence, 2), default=None)
-            if cycle is not None:
-                found.append(Episode(float(time[first]), float(time[last - 1]), cycle))
-            if cycle is not None or _changes(time[inner], flat[inner], period):
-                free[first:last] = False  # also where it decays: its last part is no limit cycle
+            flat = without_drift(time, value, cycle.period)
+            for may in (free, free & ~_jumps(time, value, cycle)):
+                if not np.any(may[rows]):
+                    continue
+                first, last = _extended(time, flat, rows, cycle.period, may)
+                inner = _evaluated(first, last, n, cycle.period / float(time[1] - time[0]))
+                period = _refined(time[inner], flat[inner], cycle.period)
+                both = [_cycle(time[inner], signal[inner], least, period) for signal in (value, flat)]
+                better = max(filter(None, both), key=lambda one: one.confidence, default=None)
+                goes_on = better is not None and any(one.goes_on(first, last, better) for one in transients)
+                if better is not None and not goes_on:
+                    found.append(Episode(float(time[first]), float(time[last - 1]), better))
+                    free[first:last] = False
+                    break
+            else:
+                if goes_on or _changes(time[inner], flat[inner], period):
+                    transients.append(_Transient(first, last, period, _width(time, period)))
+                    free[first:last] = False  # its last part is no limit cycle
         length //= 2
     return sorted(found, key=lambda episode: episode.begin)
+
+
+class _Transient(NamedTuple):
+    """Rows of a motion that decays or grows, its period, s, and how many rows from it are near."""
+
+    first: int
+    last: int
+    period: float
+    near: int
+
+    def goes_on(self, first: int, last: int, cycle: LimitCycle) -> bool:
+        """Whether a cycle is another part of it: next to it, of the same period, and of a changing size."""
+        is_next = first <= self.last + self.near and last >= self.first - self.near
+        is_alike = abs(cycle.period / self.period - 1.0) < SAME
+        return is_next and is_alike and min(cycle.growth, 1.0 / cycle.growth) < STEADY
+
+
+def _jumps(time: Numbers, value: Numbers, cycle: LimitCycle) -> NDArray[np.bool_]:
+    """Where the mean over a period is other than that over the period before by more than half of a cycle's size."""
+    width = max(round(cycle.period / float(time[1] - time[0])), 1)
+    total = np.concatenate([[0.0], np.cumsum(value)])
+    means = (total[width:] - total[:-width]) / width
+    away = np.abs(means[width:] - means[:-width]) > 0.5 * cycle.peak_to_peak
+    jumps = np.zeros(len(value), dtype=np.bool_)
+    jumps[width : width + len(away)] = away
+    return np.convolve(jumps, np.ones(2 * width + 1), "same") > 0.5
 
 
 def _cycle(time: Numbers, value: Numbers, least: float, period: float = math.nan) -> LimitCycle | None:
@@ -88,7 +125,7 @@ def _refined(time: Numbers, flat: Numbers, period: float) -> float:
     return 1.0 / (1.0 / period + slope / (2.0 * math.pi))
 
 
-def _without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
+def without_drift(time: Numbers, value: Numbers, period: float) -> Numbers:
     """A signal without what changes slowly: less its mean over exactly two periods, of which a cycle has none.
 
     In the first and the last period the mean goes on as in the next: a window that ends there is not two periods long.

@@ -93,6 +93,35 @@ def limit_cycle(time: Numbers, value: Numbers, period: float = math.nan) -> Limi
     )
 
 
+def size_of_cycle(time: Numbers, value: Numbers, period: float) -> float:
+    """Peak to peak of the mean cycle of a known period, at any times: irregular ones fill every phase.
+
+    Parameters
+    ----------
+    time : (n,), s.
+    value : (n,), the signal without drift.
+    period : s.
+    """
+    phases = max(min(PHASES, len(value) // LEAST), 2)
+    return _fold(value - np.mean(value), time / period % 1.0, phases).size
+
+
+def error_of_size(time: Numbers, value: Numbers, period: float) -> float:
+    """How far the size of the mean cycle may be off by what does not repeat with it: that of the median cycle is.
+
+    Parameters
+    ----------
+    time : (n,), s.
+    value : (n,), the signal without drift.
+    period : s.
+    """
+    cells = max(min(PHASES, len(value) // LEAST) // 4, 2)
+    cell = np.minimum((time / period % 1.0 * cells).astype(np.int64), cells - 1)
+    parts = [value[cell == i] for i in range(cells)]
+    sizes = [float(np.ptp([middle(part) for part in parts if len(part)])) for middle in (np.mean, np.median)]
+    return abs(sizes[1] - sizes[0])
+
+
 def _has_gaps(time: Numbers) -> bool:
     """Whether samples are missing, so that a number of samples is no time."""
     steps = np.diff(time)

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 CANDIDATES = 6  # random moves of which one is taken
 TRIALS = 400  # random postures without an allowed move, after which there is none
 MARGIN = 0.2  # rad, from the ends of the joints
-SPEED = 0.8  # of the force loop's joint speed limit, and of the driver's limits of elbow and tip
+SPEED = 0.8  # of the force loop's joint speed limit, and of the driver's limits of the covers' starts and the tip
 SLOWEST = 0.25  # of that speed
 QUICKEST = 0.6  # s of a move
 CLEARANCE = 0.15  # m, from obstacles
@@ -128,7 +128,7 @@ class _Space:
         self._obstacles = build_part(Obstacles, driver, "world.obstacles.")
         self._speed = SPEED * float(configuration.sections["force_loop"]["joint_speed_limit"])
         self._tip = SPEED * float(driver["tip_speed_limit"])
-        self._elbow = SPEED * float(driver["elbow_speed_limit"])
+        self._starts = SPEED * float(driver["cover_speed_limit"])
 
     def draw(self, random: np.random.Generator, begin: Array) -> ExcitingMove | None:
         """A random move, None if it is not allowed."""
@@ -144,7 +144,7 @@ class _Space:
         covers = self._arm.covers
         tip = np.linalg.norm(self._body.tool_jacobian(q) @ qd)
         starts = self._body.start_velocities(q, qd).values()
-        if tip > self._tip or any(np.linalg.norm(velocity) > self._elbow for velocity in starts):
+        if tip > self._tip or any(np.linalg.norm(velocity) > self._starts for velocity in starts):
             return False
         for i, name in enumerate(covers.names):
             start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (covers.start, covers.end))
