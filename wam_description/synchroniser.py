@@ -149,6 +149,8 @@ class Synchroniser:
         self._lacks = None
         for kept in self._kept.values():
             kept.clear()
+        for group in self._groups:
+            group.cause = 0
         for newest in self._newest.values():
             newest.clear()
 
@@ -197,8 +199,16 @@ class Synchroniser:
             self._last, self._suspect = stamp, 0
             if self._is_alone:
                 return (self._step(stamp, {topic: (stamp, value)}),)
+            if not self._triggers:  # most often: nothing waits, and all inputs are there
+                if (taken := self._taken(stamp)) is not None:
+                    taken[topic] = (stamp, value)
+                    return (self._step(stamp, taken),)
+                if self._has_missed(stamp):
+                    self._lacks = None
+                    return ()
             self._triggers.append((stamp, value))
-        elif not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase:
+            return ()
+        if not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase:
             if self._announced is not None:
                 self._early.append((topic, stamp, value))
             self._keep(topic, stamp, value)
@@ -206,7 +216,7 @@ class Synchroniser:
             return ()
         if self._lacks is not None:
             kept, cause, earliest = self._lacks
-            if cause not in kept and (stamp <= earliest or topic == self._trigger):
+            if cause not in kept and stamp <= earliest:
                 return ()  # nothing that the first step waits for, or shows that it waits in vain
         return self._complete()
 
@@ -331,23 +341,31 @@ class Synchroniser:
         Where it waits, `_lacks` is where that input will be, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
-        taken: dict[str, tuple[int, Any] | None] = {topic: each.taken(stamp) for topic, each in self._newest.items()}
-        causes = [self._cause(group, stamp) for group in self._groups]
-        for group, cause in zip(self._groups, causes, strict=True):
-            for topic, kept in group.members:
-                if cause in kept:
-                    taken[topic] = (cause, kept[cause])
-                elif cause:
-                    self._lacks = kept, cause, min(causes)
-                    return None
+        taken: dict[str, tuple[int, Any] | None] = (
+            {topic: each.taken(stamp) for topic, each in self._newest.items()} if self._newest else {}
+        )
         for group in self._groups:
+            cause = self._cause(group, stamp)
+            if not cause:
+                continue
+            if cause != group.cause:  # else the inputs are those of the step before
+                found = {}
+                for topic, kept in group.members:
+                    if cause not in kept:
+                        self._lacks = kept, cause, min(self._cause(each, stamp) for each in self._groups)
+                        return None
+                    found[topic] = (cause, kept[cause])
+                group.cause, group.found = cause, found
+            taken.update(group.found)
+        for group in self._groups:
+            if group.once:
+                for _, kept in group.members:
+                    kept.pop(stamp, None)
             for topic, kept in group.members:
                 if len(kept) > 1:
-                    found = taken.get(topic)
-                    for old in [known for known in kept if found and known < found[0]]:
+                    used = group.cause
+                    for old in [known for known in kept if known < used]:
                         del kept[old]
-                if group.once:
-                    kept.pop(stamp, None)
         return taken
 
 
@@ -394,10 +412,21 @@ class _Newest:
         return self.stamp, self._value
 
 
-class _Group(NamedTuple):
-    """Inputs that belong to a step by the same rule, each with the values kept by stamp."""
+class _Group:
+    """Inputs that belong to a step by the same rule.
 
-    outer: bool
-    delay_ns: int
-    once: bool  # each value is used by one step, that of its own stamp
-    members: list[tuple[str, dict[int, Any]]]
+    Attributes
+    ----------
+    outer : whether they come once per outer period.
+    delay_ns : time after which they are used, ns.
+    once : whether each value is used by one step, that of its own stamp.
+    members : each with the values kept by stamp.
+    cause, found : stamp of those of the last step, 0 where there are none, and the inputs.
+    """
+
+    __slots__ = ("cause", "delay_ns", "found", "members", "once", "outer")
+
+    def __init__(self, outer: bool, delay_ns: int, once: bool, members: list[tuple[str, dict[int, Any]]]) -> None:
+        self.outer, self.delay_ns, self.once, self.members = outer, delay_ns, once, members
+        self.cause = 0
+        self.found: dict[str, tuple[int, Any]] = {}
