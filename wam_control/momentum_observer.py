@@ -155,7 +155,7 @@ class MomentumObserver:
         if not (0.0 < dt < math.inf):
             return False
         position, velocity, effort = state
-        finite = math.isfinite(sum(position) + sum(velocity) + sum(effort))
+        finite = math.isfinite(sum(position, 0.0) + sum(velocity, 0.0) + sum(effort, 0.0))
         if not len(position) == len(velocity) == len(effort) == n or not finite:
             self._gap += dt
             return False
@@ -207,7 +207,7 @@ class MomentumObserver:
                 p - 0.5 * (new + old) - torque
                 for p, new, old, torque in zip(rate, known, self._known, tau, strict=True)
             ]
-        if not math.isfinite(sum(momentum) + sum(known) + sum(external) + sum(model)):
+        if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
         if span != self._decay.span:

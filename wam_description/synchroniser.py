@@ -186,28 +186,8 @@ class Synchroniser:
         OutOfTime
             where the stamp is ahead of the newest state, by more than the limit of the input.
         """
-        last = self._last
         if topic == self._trigger:
-            if self._thinned and stamp % self._outer_period != self._outer_phase:
-                return ()
-            if (
-                not last < stamp <= last + self._longest_jump
-                and (last or stamp <= 0)
-                and not (self._is_announced(stamp) or self._has_jumped(stamp))
-            ):
-                return ()
-            self._last, self._suspect = stamp, 0
-            if self._is_alone:
-                return (self._step(stamp, {topic: (stamp, value)}),)
-            if not self._triggers:  # most often: nothing waits, and all inputs are there
-                if (taken := self._taken(stamp)) is not None:
-                    taken[topic] = (stamp, value)
-                    return (self._step(stamp, taken),)
-                if self._has_missed(stamp):
-                    self._lacks = None
-                    return ()
-            self._triggers.append((stamp, value))
-            return ()
+            return self._start(stamp, value)
         if not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase:
             if self._announced is not None:
                 self._early.append((topic, stamp, value))
@@ -219,6 +199,30 @@ class Synchroniser:
             if cause not in kept and stamp <= earliest:
                 return ()  # nothing that the first step waits for, or shows that it waits in vain
         return self._complete()
+
+    def _start(self, stamp: int, value: Any) -> Sequence[Inputs]:
+        """Take a trigger; returns the inputs of its step, where that is complete."""
+        last = self._last
+        if self._thinned and stamp % self._outer_period != self._outer_phase:
+            return ()
+        if (
+            not last < stamp <= last + self._longest_jump
+            and (last or stamp <= 0)
+            and not (self._is_announced(stamp) or self._has_jumped(stamp))
+        ):
+            return ()
+        self._last, self._suspect = stamp, 0
+        if self._is_alone:
+            return (self._step(stamp, {self._trigger: (stamp, value)}),)
+        if not self._triggers:  # most often: nothing waits, and all inputs are there
+            if (taken := self._taken(stamp)) is not None:
+                taken[self._trigger] = (stamp, value)
+                return (self._step(stamp, taken),)
+            if self._has_missed(stamp):
+                self._lacks = None
+                return ()
+        self._triggers.append((stamp, value))
+        return ()
 
     def _complete(self) -> list[Inputs]:
         """The inputs of each step that is complete, in the order of their stamps."""
@@ -341,31 +345,20 @@ class Synchroniser:
         Where it waits, `_lacks` is where that input will be, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
-        taken: dict[str, tuple[int, Any] | None] = (
-            {topic: each.taken(stamp) for topic, each in self._newest.items()} if self._newest else {}
-        )
+        taken: dict[str, tuple[int, Any] | None] = {}
+        for topic, newest in self._newest.items():
+            taken[topic] = newest.taken(stamp)
         for group in self._groups:
             cause = self._cause(group, stamp)
             if not cause:
                 continue
-            if cause != group.cause:  # else the inputs are those of the step before
-                found = {}
-                for topic, kept in group.members:
-                    if cause not in kept:
-                        self._lacks = kept, cause, min(self._cause(each, stamp) for each in self._groups)
-                        return None
-                    found[topic] = (cause, kept[cause])
-                group.cause, group.found = cause, found
+            if cause != group.cause and not group.find(cause):
+                lacking = next(kept for _, kept in group.members if cause not in kept)
+                self._lacks = lacking, cause, min(self._cause(each, stamp) for each in self._groups)
+                return None
             taken.update(group.found)
         for group in self._groups:
-            if group.once:
-                for _, kept in group.members:
-                    kept.pop(stamp, None)
-            for topic, kept in group.members:
-                if len(kept) > 1:
-                    used = group.cause
-                    for old in [known for known in kept if known < used]:
-                        del kept[old]
+            group.forget(stamp)
         return taken
 
 
@@ -430,3 +423,21 @@ class _Group:
         self.outer, self.delay_ns, self.once, self.members = outer, delay_ns, once, members
         self.cause = 0
         self.found: dict[str, tuple[int, Any]] = {}
+
+    def find(self, cause: int) -> bool:
+        """Look for the inputs of this stamp, ns; whether all are there."""
+        for _, kept in self.members:
+            if cause not in kept:
+                return False
+        self.cause, self.found = cause, {topic: (cause, kept[cause]) for topic, kept in self.members}
+        return True
+
+    def forget(self, stamp: int) -> None:
+        """Forget what no step after that of this stamp, ns, will use."""
+        cause = self.cause
+        for _, kept in self.members:
+            if len(kept) > 1:
+                for old in [known for known in kept if known < cause]:
+                    del kept[old]
+            if self.once:
+                kept.pop(stamp, None)
