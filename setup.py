@@ -18,7 +18,6 @@ PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 COMPILED = (
     "wam_control/bumpless_transfer.py",
     "wam_control/contact_fit.py",
-    "wam_control/force_axis.py",
     "wam_control/force_loop.py",
     "wam_control/force_measurement.py",
     "wam_control/hybrid_velocity.py",
