@@ -108,6 +108,7 @@ class MomentumObserver:
         if self._load is not None:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
         prior = model_prior(arm, parameters, payload_sd, model)
+        self._sensors, self._at_rest = np.diag(np.full(n, parameters.joint_torque_sd**2)), np.zeros(n)
         noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
         self.reset()
@@ -253,15 +254,16 @@ class MomentumObserver:
             return torques.tolist(), covariance
         uncertainty, load = self._parameters.mass_uncertainty, self._load
         residual, model = self._torques[0][: self._n], self._torques[0][self._n :]
-        covariance = np.diag([self._parameters.joint_torque_sd**2 + (uncertainty * torque) ** 2 for torque in model])
-        effects = np.diag(uncertainty * np.array(model))
+        sizes = [uncertainty * torque for torque in model]
+        covariance, effects = np.zeros((self._n, self._n)), np.zeros((self._n, self._n))
+        covariance.flat[:: self._n + 1] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
+        effects.flat[:: self._n + 1] = sizes
         if load is not None:
             residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
             sized = np.array(load.torque) * load.sd
             covariance = covariance + np.outer(sized, sized)
             effects = np.column_stack((effects, sized))
-        sensors = np.diag(np.full(self._n, self._parameters.joint_torque_sd**2))
-        self.seen = Observation(np.array(residual), effects, sensors, np.zeros(self._n))
+        self.seen = Observation(np.array(residual), effects, self._sensors, self._at_rest)
         return residual, covariance
 
     def change(self, then: Observation) -> tuple[Array, Array]:

@@ -374,7 +374,8 @@ class _Newest:
 
     def clear(self) -> None:
         """Forget all."""
-        self.stamp, self._before, self._value = 0, 0, None
+        self.stamp, self._before = 0, 0
+        self._value: Any = None
         self._ahead.clear()
 
     def discard(self, before: int) -> None:
