@@ -1,5 +1,6 @@
 """One tree, two builds: `pip install .` where there is no ROS, `colcon build` where there is."""
 
+import os
 import shutil
 import sys
 from glob import glob
@@ -13,7 +14,45 @@ HERE = Path(__file__).resolve().parent
 NODES = run_path(str(HERE / "wam_description" / "nodes.py"))["NODES"]
 PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 
+# The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (benchmarks/compiled.py)
+COMPILED = (
+    "wam_control/bumpless_transfer.py",
+    "wam_control/contact_fit.py",
+    "wam_control/force_loop.py",
+    "wam_control/force_measurement.py",
+    "wam_control/hybrid_velocity.py",
+    "wam_control/model_errors.py",
+    "wam_control/momentum_observer.py",
+    "wam_control/shaft_friction.py",
+    "wam_control/tool_load.py",
+    "wam_control/transform.py",
+    "wam_control/velocity_fit.py",
+    "wam_description/rigid_body.py",
+    "wam_description/signals.py",
+    "wam_description/synchroniser.py",
+    "wam_description/transmission_map.py",
+    "wam_driver/circuits.py",
+    "wam_driver/limit_watch.py",
+    "wam_driver/plant.py",
+    "wam_sim/bus.py",
+    "wam_sim/simulation.py",
+)
 CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets", "config/tasks")
+
+
+def extensions():
+    """C extensions of the modules that are compiled; none without WAM_COMPILE."""
+    if not os.environ.get("WAM_COMPILE"):
+        return []
+    try:
+        from mypyc.build import mypycify
+    except ImportError:
+        sys.exit("WAM_COMPILE needs mypyc: pip install mypy, then pip install --no-build-isolation .")
+    found = mypycify([*COMPILED, "--config-file", "pyproject.toml"], opt_level="2", multi_file=True)
+    for extension in found:
+        extension.extra_compile_args.append("-ffp-contract=off")  # no fused operations: the bits of Python
+    return found
+
 
 package = ElementTree.parse(HERE / "package.xml").getroot()
 name = package.findtext("name")
@@ -91,5 +130,6 @@ setup(
         (f"lib/{name}", launchers),
     ],
     entry_points={"console_scripts": ["wam = wam_cli.program:main", *console_scripts]},
+    ext_modules=extensions(),
     zip_safe=False,
 )

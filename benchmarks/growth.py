@@ -1,9 +1,10 @@
 """Cost as the work grows: joints, contacts, minutes of a bag, points of a map, runs on one and two workers.
 
-Each size is measured in turns with the smallest of its kind.  A run that is not quick draws `growth.png` next to this
-file.
+A run that is not quick keeps every cost as soon as it is known and draws `growth.png` next to this file: one that was
+interrupted, or was given `--only`, is continued by the next within some hours, which measures what is missing.
 """
 
+import json
 import tempfile
 import time
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
-from comparing import Spread, arguments, machine, ratios, save, spread, table
+from comparing import RESULTS, machine, options, ratios, spread, table
 from long_bag import repeated
 from plant import FREE, Case
 
@@ -28,6 +29,9 @@ from wam_sim.simulation import Simulation
 from wam_theory.stability_map import largest_stable_steps
 
 PICTURE: Final = Path(__file__).with_name("growth.png")
+KEPT: Final = RESULTS / "growth.jsonl"  # of each measurement when, where, work, size and cost in s
+RECENT: Final = 12 * 3600.0  # s; older ones may be of another source
+Costs = dict[str, dict[int, list[float]]]  # by work and size
 ARMS: Final = {4: "wam", 7: "barrett-wam7"}  # joints: configuration
 RUNS: Final = 24  # of the batch
 POST, DEPTH = 0.05, 1e-3  # m, half length; how far the link is in its surface at the start
@@ -112,24 +116,47 @@ class Bags:
     """Bags of some minutes in a folder, made from one of a few seconds."""
 
     def __init__(self, folder: Path, length: float) -> None:
-        self._folder, self._short = folder, folder / "short"
-        if failure := record(*moving("wam", length), self._short):
+        self._folder, self._length = folder, length
+
+    def _bag(self, minutes: int) -> Path:
+        """A bag of this length; written the first time."""
+        bag, short = self._folder / str(minutes), self._folder / "short"
+        if not short.exists() and (failure := record(*moving("wam", self._length), short)):
             raise SystemExit(failure)
+        if not bag.exists():
+            repeated(short, bag, 60.0 * minutes)
+        return bag
 
     def read(self, minutes: int) -> float:
         """Reading the topics of the analysis."""
-        bag = self._folder / str(minutes)
-        if not bag.exists():
-            repeated(self._short, bag, 60.0 * minutes)
+        bag = self._bag(minutes)
         return seconds(lambda: read(bag, TOPICS_READ, may_lack=True))
 
     def analysed(self, minutes: int) -> float:
         """Analysis of what was read."""
-        bag = read(self._folder / str(minutes), TOPICS_READ, may_lack=True)
+        bag = read(self._bag(minutes), TOPICS_READ, may_lack=True)
         return seconds(lambda: analyse_bag(bag, lambda doing: None))
 
 
-def draw(costs: dict[str, dict[int, list[float]]]) -> None:
+def kept() -> Costs:
+    """The costs that recent runs have kept."""
+    costs: Costs = {}
+    lines = KEPT.read_text(encoding="utf-8").splitlines() if KEPT.exists() else []
+    for known in map(json.loads, lines):
+        if time.time() - known["at"] < RECENT and known["machine"] == machine():
+            costs.setdefault(known["work"], {}).setdefault(known["size"], []).append(known["cost"])
+    return costs
+
+
+def keep(work: str, size: int, cost: float) -> None:
+    """Keep one cost."""
+    RESULTS.mkdir(exist_ok=True)
+    with KEPT.open("a", encoding="utf-8") as file:
+        line = {"at": time.time(), "machine": machine(), "work": work, "size": size, "cost": cost}
+        file.write(json.dumps(line) + "\n")
+
+
+def draw(costs: Costs) -> None:
     """Cost against size, relative to the smallest; dashed: in proportion."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, len(costs), figsize=(9.0, 2.4), layout="constrained")
@@ -147,8 +174,11 @@ def draw(costs: dict[str, dict[int, list[float]]]) -> None:
 
 def main() -> None:
     """Measure in turns, print the table, draw the picture."""
-    given = arguments(__doc__ or "", rounds=1, quick_rounds=1)
-    costs: dict[str, dict[int, list[float]]] = {}
+    parser = options(__doc__ or "", rounds=1)
+    parser.add_argument("--only", help="measure this kind of work alone, as 'minutes read'")
+    given = parser.parse_args()
+    rounds = given.rounds or 1
+    costs = {} if given.quick else kept()
     with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
         bags = Bags(Path(folder), 2.0 if given.quick else 20.0)
         works = [
@@ -159,22 +189,29 @@ def main() -> None:
             Work("points of a map", stability_map, (100, 400), (10_000, 90_000, 1_000_000)),
             Work("workers", lambda workers: batch(workers, 4 if given.quick else RUNS), (1, 2), (1, 2)),
         ]
-        for _ in range(given.rounds):
+        names = [work.name for work in works]
+        if given.only not in (None, *names):
+            parser.error(f"--only is '{given.only}'; allowed: {', '.join(names)}")
+        for turn in range(rounds):
             for work in works:
                 for size in work.quick if given.quick else work.sizes:
-                    costs.setdefault(work.name, {}).setdefault(size, []).append(work.cost(size))
-    rows, measured = [], dict[str, dict[int, Spread]]()
+                    values = costs.setdefault(work.name, {}).setdefault(size, [])
+                    if len(values) <= turn and given.only in (None, work.name):
+                        values.append(work.cost(size))
+                        if not given.quick:
+                            keep(work.name, size, values[-1])
+    costs = {name: {size: costs[name][size] for size in sorted(costs[name]) if costs[name][size]} for name in names}
+    rows = []
     for name, found in costs.items():
-        smallest = min(found)
         for size, values in found.items():
-            growth = ratios(values, found[smallest])
+            smallest = min(found)
+            count = min(len(values), len(found[smallest]))
+            growth = ratios(values[:count], found[smallest][:count])
             each = f"{growth.median * (size / smallest if name == 'workers' else smallest / size):.2f}"
             rows.append([f"{name}: {size}", f"{1e3 * spread(values).median:.3g}", f"{growth:.2f}", each])
-            measured.setdefault(name, {})[size] = growth
     print(machine())
     print(table(["work", "cost [ms]", "relative to the smallest", "the same, in proportion"], rows))
-    save("growth", given, measured)
-    if not given.quick:
+    if not given.quick and all(costs.values()):
         draw(costs)
 
 

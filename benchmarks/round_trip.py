@@ -159,7 +159,18 @@ def main() -> None:
             rows.append([f"{way}, {name}", *(f"{part.median:.0f}" for part in micro), f"{ratio:#.3g}", reached])
             measured[f"{way}, {name}"] = {"ratio": ratio, "stack_us": micro[0], "relay_us": micro[1]}
     print(machine())
-    print(table(["state to current at 1 kHz", "stack [us]", "relay [us]", "ratio (middle half)", "[must, aim]"], rows))
+    print(
+        table(
+            [
+                "state to current at 1 kHz over a relay of message objects",
+                "stack [us]",
+                "relay [us]",
+                "ratio (middle half)",
+                "[must, aim]",
+            ],
+            rows,
+        )
+    )
     save("round_trip", given, measured)
 
 

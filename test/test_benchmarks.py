@@ -39,6 +39,13 @@ ROWS = {
         "everything against mcap-ros2-support",
         "columns against mcap-ros2-support",
     ],
+    "compiled.py": [
+        "direct run, times real time",
+        "substep over mj_step, arm free, moving",
+        "substep over mj_step, arm free, pushed",
+        "substep over mj_step, in contact",
+        "substep over mj_step, testbed, moving",
+    ],
     "contact.py": ["observe", "infer", "estimate", "update"],
     "plant.py": ["arm free, moving", "arm free, pushed", "arm, every effect on", "in contact", "testbed, moving"],
     "recording.py": ["messages in the bag", "writing a message [us]"],

@@ -108,6 +108,7 @@ class MomentumObserver:
         if self._load is not None:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
         prior = model_prior(arm, parameters, payload_sd, model)
+        self._sensors, self._at_rest = np.diag(np.full(n, parameters.joint_torque_sd**2)), np.zeros(n)
         noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
         self.reset()
@@ -155,7 +156,7 @@ class MomentumObserver:
         if not (0.0 < dt < math.inf):
             return False
         position, velocity, effort = state
-        finite = math.isfinite(sum(position) + sum(velocity) + sum(effort))
+        finite = math.isfinite(sum(position, 0.0) + sum(velocity, 0.0) + sum(effort, 0.0))
         if not len(position) == len(velocity) == len(effort) == n or not finite:
             self._gap += dt
             return False
@@ -207,7 +208,7 @@ class MomentumObserver:
                 p - 0.5 * (new + old) - torque
                 for p, new, old, torque in zip(rate, known, self._known, tau, strict=True)
             ]
-        if not math.isfinite(sum(momentum) + sum(known) + sum(external) + sum(model)):
+        if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
         if span != self._decay.span:
@@ -253,15 +254,16 @@ class MomentumObserver:
             return torques.tolist(), covariance
         uncertainty, load = self._parameters.mass_uncertainty, self._load
         residual, model = self._torques[0][: self._n], self._torques[0][self._n :]
-        covariance = np.diag([self._parameters.joint_torque_sd**2 + (uncertainty * torque) ** 2 for torque in model])
-        effects = np.diag(uncertainty * np.array(model))
+        sizes = [uncertainty * torque for torque in model]
+        covariance, effects = np.zeros((self._n, self._n)), np.zeros((self._n, self._n))
+        covariance.flat[:: self._n + 1] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
+        effects.flat[:: self._n + 1] = sizes
         if load is not None:
             residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
             sized = np.array(load.torque) * load.sd
             covariance = covariance + np.outer(sized, sized)
             effects = np.column_stack((effects, sized))
-        sensors = np.diag(np.full(self._n, self._parameters.joint_torque_sd**2))
-        self.seen = Observation(np.array(residual), effects, sensors, np.zeros(self._n))
+        self.seen = Observation(np.array(residual), effects, self._sensors, self._at_rest)
         return residual, covariance
 
     def change(self, then: Observation) -> tuple[Array, Array]:

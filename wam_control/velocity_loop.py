@@ -82,7 +82,10 @@ class VelocityLoop:
         currents, integral, commanded = [], self._integral, self._commanded
         faster, stronger = self._acceleration * dt, self._torque_rate * dt
         for i, peak in enumerate(self._peak):
-            carried = self._feedforward[i] = _toward(feedforward[i], self._feedforward[i], stronger)
+            carried = feedforward[i]
+            if not abs(carried - self._feedforward[i]) <= stronger:  # so that NaN goes no further
+                carried = _toward(carried, self._feedforward[i], stronger)
+            self._feedforward[i] = carried
             if not command:
                 integral[i] = 0.0
                 self._velocity[i] = thetad[i]
@@ -91,7 +94,10 @@ class VelocityLoop:
                 if tau_motor[i] == 0.0 and commanded[i] != 0.0:
                     self._velocity[i] = thetad[i]
                     integral[i] *= abs(commanded[i]) <= DEAD * peak
-                velocity = self._velocity[i] = _toward(command[i], self._velocity[i], faster)
+                velocity = command[i]
+                if not abs(velocity - self._velocity[i]) <= faster:
+                    velocity = _toward(velocity, self._velocity[i], faster)
+                self._velocity[i] = velocity
                 error = velocity - thetad[i]
                 torque = self._kp[i] * error + integral[i] + carried
                 growth = self._ki[i] * error * dt
@@ -104,5 +110,5 @@ class VelocityLoop:
 
 
 def _toward(wanted: float, present: float, most: float) -> float:
-    """The wanted value, or as near to it as a change of at most `most` allows."""
-    return wanted if abs(wanted - present) <= most else present + math.copysign(most, wanted - present)
+    """As near to the wanted value as a change of at most `most`, which is less than it takes, allows."""
+    return present + math.copysign(most, wanted - present)

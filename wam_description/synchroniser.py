@@ -149,6 +149,8 @@ class Synchroniser:
         self._lacks = None
         for kept in self._kept.values():
             kept.clear()
+        for group in self._groups:
+            group.cause = 0
         for newest in self._newest.values():
             newest.clear()
 
@@ -184,21 +186,9 @@ class Synchroniser:
         OutOfTime
             where the stamp is ahead of the newest state, by more than the limit of the input.
         """
-        last = self._last
         if topic == self._trigger:
-            if self._thinned and stamp % self._outer_period != self._outer_phase:
-                return ()
-            if (
-                not last < stamp <= last + self._longest_jump
-                and (last or stamp <= 0)
-                and not (self._is_announced(stamp) or self._has_jumped(stamp))
-            ):
-                return ()
-            self._last, self._suspect = stamp, 0
-            if self._is_alone:
-                return (self._step(stamp, {topic: (stamp, value)}),)
-            self._triggers.append((stamp, value))
-        elif not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase:
+            return self._start(stamp, value)
+        if not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase:
             if self._announced is not None:
                 self._early.append((topic, stamp, value))
             self._keep(topic, stamp, value)
@@ -206,9 +196,33 @@ class Synchroniser:
             return ()
         if self._lacks is not None:
             kept, cause, earliest = self._lacks
-            if cause not in kept and (stamp <= earliest or topic == self._trigger):
+            if cause not in kept and stamp <= earliest:
                 return ()  # nothing that the first step waits for, or shows that it waits in vain
         return self._complete()
+
+    def _start(self, stamp: int, value: Any) -> Sequence[Inputs]:
+        """Take a trigger; returns the inputs of its step, where that is complete."""
+        last = self._last
+        if self._thinned and stamp % self._outer_period != self._outer_phase:
+            return ()
+        if (
+            not last < stamp <= last + self._longest_jump
+            and (last or stamp <= 0)
+            and not (self._is_announced(stamp) or self._has_jumped(stamp))
+        ):
+            return ()
+        self._last, self._suspect = stamp, 0
+        if self._is_alone:
+            return (self._step(stamp, {self._trigger: (stamp, value)}),)
+        if not self._triggers:  # most often: nothing waits, and all inputs are there
+            if (taken := self._taken(stamp)) is not None:
+                taken[self._trigger] = (stamp, value)
+                return (self._step(stamp, taken),)
+            if self._has_missed(stamp):
+                self._lacks = None
+                return ()
+        self._triggers.append((stamp, value))
+        return ()
 
     def _complete(self) -> list[Inputs]:
         """The inputs of each step that is complete, in the order of their stamps."""
@@ -331,23 +345,20 @@ class Synchroniser:
         Where it waits, `_lacks` is where that input will be, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
-        taken: dict[str, tuple[int, Any] | None] = {topic: each.taken(stamp) for topic, each in self._newest.items()}
-        causes = [self._cause(group, stamp) for group in self._groups]
-        for group, cause in zip(self._groups, causes, strict=True):
-            for topic, kept in group.members:
-                if cause in kept:
-                    taken[topic] = (cause, kept[cause])
-                elif cause:
-                    self._lacks = kept, cause, min(causes)
-                    return None
+        taken: dict[str, tuple[int, Any] | None] = {}
+        for topic, newest in self._newest.items():
+            taken[topic] = newest.taken(stamp)
         for group in self._groups:
-            for topic, kept in group.members:
-                if len(kept) > 1:
-                    found = taken.get(topic)
-                    for old in [known for known in kept if found and known < found[0]]:
-                        del kept[old]
-                if group.once:
-                    kept.pop(stamp, None)
+            cause = self._cause(group, stamp)
+            if not cause:
+                continue
+            if cause != group.cause and not group.find(cause):
+                lacking = next(kept for _, kept in group.members if cause not in kept)
+                self._lacks = lacking, cause, min(self._cause(each, stamp) for each in self._groups)
+                return None
+            taken.update(group.found)
+        for group in self._groups:
+            group.forget(stamp)
         return taken
 
 
@@ -363,7 +374,8 @@ class _Newest:
 
     def clear(self) -> None:
         """Forget all."""
-        self.stamp, self._before, self._value = 0, 0, None
+        self.stamp, self._before = 0, 0
+        self._value: Any = None
         self._ahead.clear()
 
     def discard(self, before: int) -> None:
@@ -394,10 +406,39 @@ class _Newest:
         return self.stamp, self._value
 
 
-class _Group(NamedTuple):
-    """Inputs that belong to a step by the same rule, each with the values kept by stamp."""
+class _Group:
+    """Inputs that belong to a step by the same rule.
 
-    outer: bool
-    delay_ns: int
-    once: bool  # each value is used by one step, that of its own stamp
-    members: list[tuple[str, dict[int, Any]]]
+    Attributes
+    ----------
+    outer : whether they come once per outer period.
+    delay_ns : time after which they are used, ns.
+    once : whether each value is used by one step, that of its own stamp.
+    members : each with the values kept by stamp.
+    cause, found : stamp of those of the last step, 0 where there are none, and the inputs.
+    """
+
+    __slots__ = ("cause", "delay_ns", "found", "members", "once", "outer")
+
+    def __init__(self, outer: bool, delay_ns: int, once: bool, members: list[tuple[str, dict[int, Any]]]) -> None:
+        self.outer, self.delay_ns, self.once, self.members = outer, delay_ns, once, members
+        self.cause = 0
+        self.found: dict[str, tuple[int, Any]] = {}
+
+    def find(self, cause: int) -> bool:
+        """Look for the inputs of this stamp, ns; whether all are there."""
+        for _, kept in self.members:
+            if cause not in kept:
+                return False
+        self.cause, self.found = cause, {topic: (cause, kept[cause]) for topic, kept in self.members}
+        return True
+
+    def forget(self, stamp: int) -> None:
+        """Forget what no step after that of this stamp, ns, will use."""
+        cause = self.cause
+        for _, kept in self.members:
+            if len(kept) > 1:
+                for old in [known for known in kept if known < cause]:
+                    del kept[old]
+            if self.once:
+                kept.pop(stamp, None)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sin
+from operator import mul
 
 import numpy as np
 
@@ -82,7 +83,7 @@ class Amplifier:
 
     def nominal_torque(self, currents: Sequence[float]) -> list[float]:
         """Torque of the motors from their torque constants, N m, (n,): the reported torque."""
-        return [k * i for k, i in zip(self.torque_constant, currents, strict=True)]
+        return list(map(mul, self.torque_constant, currents))
 
     def torque(self, currents: Sequence[float], theta: Sequence[float]) -> list[float]:
         """Torque on the rotors at the angles theta, rad, with the ripple of the commutation, N m, (n,)."""

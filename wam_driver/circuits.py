@@ -4,6 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wam_description.arm import Arm
 from wam_description.cables import Circuit
 from wam_description.effects import Effects
@@ -37,6 +40,7 @@ class CableCircuits:
         self._slack_ends: Any = memoryview(data.plastic)
         # with backlash the ends are those of the play
         self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
+        self._damping = np.array([circuit.damping for circuit in arm.circuits])
         self._losses = [step * circuit.loss_per_torque if effects.creep else 0.0 for circuit in arm.circuits]
         self._prepare()
 
@@ -100,14 +104,9 @@ class CableCircuits:
         return torque
 
     @property
-    def torque(self) -> list[float]:
+    def torque(self) -> NDArray[np.float64]:
         """Torque of each circuit at its motor, elastic and damping, N m, (n,), at the start of the last step."""
-        return [
-            circuit.damping * rate - pull
-            for circuit, rate, pull in zip(
-                self._circuits, self._stretch_rate.tolist(), self._pull.tolist(), strict=True
-            )
-        ]
+        return self._damping * self._stretch_rate - self._pull
 
     def tensions(self, pulls: Sequence[float]) -> list[tuple[float, float]]:
         """Tension of the tight and of the loose strand of each first stage, N, at elastic torques, N m, (n,)."""

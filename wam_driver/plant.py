@@ -285,7 +285,8 @@ class Plant:
     @property
     def circuit_torque(self) -> list[float]:
         """Torque of each cable circuit at its motor, N m, (n,), at the start of the last step."""
-        return self._circuits.torque
+        torque: list[float] = self._circuits.torque.tolist()
+        return torque
 
     @property
     def tensions(self) -> list[tuple[float, float]]:
@@ -304,7 +305,7 @@ class Plant:
     @property
     def cable_torque(self) -> list[float]:
         """Torque of the cables on the joints, N m, (n,), at the start of the last step."""
-        torque: list[float] = np.array(self.circuit_torque).dot(self._motor_from_joint).tolist()
+        torque: list[float] = self._circuits.torque.dot(self._motor_from_joint).tolist()
         return torque
 
     @property
@@ -316,10 +317,11 @@ class Plant:
         """
         n = self._n
         acceleration, velocity, dry = self._qdd.tolist(), self._velocity[n:], self._friction_torque()[n:]
-        each = zip(self._joint_damping, velocity, self._armature, acceleration, dry, strict=True)
         return [
             torque - damping * speed - armature * qdd + friction
-            for torque, (damping, speed, armature, qdd, friction) in zip(self.cable_torque, each, strict=True)
+            for torque, damping, speed, armature, qdd, friction in zip(
+                self.cable_torque, self._joint_damping, velocity, self._armature, acceleration, dry, strict=True
+            )
         ]
 
     def loads(self) -> list[Load]:

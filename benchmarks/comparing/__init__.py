@@ -42,12 +42,17 @@ def ratios(values: Sequence[float], references: Sequence[float]) -> Spread:
     return spread([value / reference for value, reference in zip(values, references, strict=True)])
 
 
-def arguments(text: str, rounds: int, quick_rounds: int) -> argparse.Namespace:
+def options(text: str, rounds: int) -> argparse.ArgumentParser:
     """The options of every benchmark: `rounds`, `quick`."""
     parser = argparse.ArgumentParser(description=text)
     parser.add_argument("--rounds", type=int, help=f"number of measurements; default: {rounds}")
     parser.add_argument("--quick", action="store_true", help="short test run; nothing is written")
-    given = parser.parse_args()
+    return parser
+
+
+def arguments(text: str, rounds: int, quick_rounds: int) -> argparse.Namespace:
+    """What is given on the command line of a benchmark that has no other options."""
+    given = options(text, rounds).parse_args()
     given.rounds = given.rounds or (quick_rounds if given.quick else rounds)
     return given
 
