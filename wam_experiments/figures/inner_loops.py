@@ -21,7 +21,7 @@ from wam_experiments.plant.ideal_testbed import NOTHING, RATIO, ideal_testbed, l
 from wam_theory.velocity_servo import is_stable, largest_scale
 from wam_theory.zero_order_hold import zero_order_hold
 
-PERIOD, SUBSTEPS = 1e-3, 100  # the plant gives a torque half a substep early, which counts near the largest gain
+PERIOD, SUBSTEPS = 1e-3, 500  # the plant gives a torque half a substep early, which counts near the largest gain
 CONTACT = 1464.28  # N m/rad
 HALF = 0.5  # of the largest stable gain
 TOP = 1e3  # scale at which the search of the largest gain begins
@@ -144,7 +144,7 @@ def _attenuation() -> ThesisPanel:
 
 
 def _largest_gains() -> ThesisPanel:
-    stiffness, some = np.geomspace(0.1, 3.0, 25), np.array([0.15, 0.5, 1.0, 2.0])
+    stiffness, some = np.geomspace(0.5, 3.0, 60), np.array([0.6, 1.0, 1.5, 2.5])
     lines = []
     for loop in LOOPS:
         line, points = (

@@ -50,9 +50,19 @@ def friction_left(runs: Runs) -> Result:
             Comparison(f"{label}, friction left", expected, float(0.5 * (falling - rising)), "N", WITHIN, "2.1.2")
         )  # fmt: skip
         curves.append(Curve("measured", label, command[::20], shown.force[::20]))
-    return Result(
-        rows, [Panel("0.2 N m of friction at the motor", "F_des, or what the position holds [N]", "F_c [N]", curves)]
-    )
+    panel = Panel("friction at the motor", "F_des, or what the position holds [N]", "F_c [N]", curves)
+    return Result(rows, [panel])
+
+
+def torque_sample(runs: Runs) -> Result:
+    """One run of the torque loop: growth or decay by its largest gain."""
+    ((name, run),) = runs.items()
+    fraction, words = _gain(run) / _expected(run), ("decays", "grows")
+    label = f"torque loop at {fraction:.2f} of its largest gain"
+    row = Comparison(label, words[fraction > 1.0], words[_growth(run) > 0.0], equation="sampled loop")
+    motors = run.joints("motor_states")
+    curve = Curve("measured", name.replace("_", " "), motors.time, motors.velocity[:, 0])
+    return Result([row], [Panel("torque loop", "time [s]", "motor [rad/s]", [curve])])
 
 
 def _command(run: Recording, link: OneLink) -> Numbers:
