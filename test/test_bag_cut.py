@@ -96,6 +96,14 @@ def test_what_was_latched_before_the_part_is_kept_at_its_own_time(tmp_path: Path
     assert bag.metadata["recording"] == {"mode": "lockstep", "/wam/fast driver received": "100"}
 
 
+def test_a_thinned_topic_has_the_first_of_so_many_messages_and_the_part_says_so(tmp_path: Path) -> None:
+    new = cut(written(tmp_path / "whole"), tmp_path / "part", PART._replace(thinned={"fast": 10}))
+    times = [time for topic, time, *_ in messages(new) if topic == "/wam/fast"]
+    assert times == [20_000_000, 30_000_000, 40_000_000, 50_000_000]
+    assert [topic for topic, *_ in messages(new)].count("/wam/contact/in_contact") == 2
+    assert read(tmp_path / "part").metadata[CUT]["thinned"] == "fast:10"
+
+
 def test_rosbags_reads_counts_times_and_qos_of_the_part(tmp_path: Path) -> None:
     cut(written(tmp_path / "whole"), tmp_path / "part", PART)
     with Reader(tmp_path / "part") as reader:

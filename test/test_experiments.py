@@ -63,7 +63,7 @@ def test_every_experiment_has_parameters_that_exist_and_steps_that_can_be_played
 def test_the_experiments_of_chapters_four_to_six_are_there() -> None:
     needed = "testbed-5.6 stiction-limit-cycle actuator-limit-cycle step-response frequency-response"
     needed += " stiffness-allocation efficiency creep wam-press wam-slide testbed-5.6-as-described force-accuracy"
-    needed += " quantised-force active-pretension wam-along-link wam-grope"
+    needed += " quantised-force active-pretension wam-along-link wam-grope inner-loops"
     assert set(needed.split()) <= set(names())
 
 

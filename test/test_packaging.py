@@ -411,7 +411,7 @@ def test_a_node_takes_an_installed_configuration_by_its_name(tmp_path):
     [
         (
             "nowhere",
-            r"no configuration 'nowhere' .* there are: barrett-wam4, barrett-wam7, testbed, thesis-effects, wam \(",
+            r"no configuration 'nowhere' .* there are: barrett-wam4, .*position-loop, .*torque-loop, wam \(",
         ),
         ("demo_scenario", r"demo_scenario.yaml is a scenario, no configuration; play it with 'wam up --scenario"),
         ("nowhere.yaml", r"nowhere.yaml is not a file; give the path of a ROS parameter file"),

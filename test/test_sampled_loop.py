@@ -1,5 +1,6 @@
 """The linear map of the whole sampled loop beside theory that knows one friction node, and beside the plant."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -67,15 +68,17 @@ def test_whole_and_part_periods_of_delay_join() -> None:
     assert abs(found[1] - found[0]) > 0.02 * found[0]
 
 
-def pressed(gain: float) -> float:
+def pressed(gain: float, proportional: float = 0.0, divisor: int = 20, seconds: float = 5.0) -> float:
     """Peak to peak of the testbed's force some seconds after a step, without friction, N."""
     nothing = {f"arm.{p}.{kind}_friction": [0.0] for p in ("joints", "motors") for kind in ("static", "dynamic")}
-    conf = TESTBED.with_values({**nothing, "force_loop:force_gain": [gain], "force_loop:guard.mode": "off"})
+    gains = {"force_loop:force_gain": [gain], "force_loop:force_proportional_gain": [proportional]}
+    own = {"force_loop:guard.mode": "off", "timing.outer_divisor": divisor}
+    conf = TESTBED.with_values({**nothing, **gains, **own})
     asked = [ForceCommand("base", (0.0, 0.0, -newtons)) for newtons in (20.0, 24.0)]
     steps = [
         ScenarioStep("release", 0.2, request="enable"),
         ScenarioStep("press", 1.5, force=asked[0]),
-        ScenarioStep("step", 5.0, force=asked[1]),
+        ScenarioStep("step", seconds, force=asked[1]),
     ]
     run = Simulation(conf, steps)
     assert run.play() == ""
@@ -103,3 +106,21 @@ def test_proportional_gain_raises_the_margin_of_a_fast_loop_as_equation_5_23_say
     with_gp = margin(arm, clock, servo, gain * LEVER**2, proportional=gp * LEVER**2) / LEVER**2
     assert with_gp == pytest.approx(gain, rel=0.1)
     assert with_gp > 1.15 * found
+
+
+@pytest.mark.slow
+def test_on_the_plant_a_proportional_gain_raises_the_margin_at_200_hz_and_lowers_it_at_50_hz() -> None:
+    """(5.23) holds for a fast loop; a sample late, G_P destabilises: the map says both, and the plant does so."""
+    arm, servo, gp = TESTBED.shared.arm, TESTBED.shared.servo, 5e-4
+    fast, slow = (replace(TESTBED.shared.timing, outer_divisor=divisor) for divisor in (5, 20))
+
+    def found(clock: Timing, gain: float, proportional: float) -> float:
+        return margin(arm, clock, servo, gain, stiffness=1751.26835, proportional=proportional)
+
+    without, late = found(fast, 0.01, 0.0), found(slow, 0.01, 0.0)
+    assert found(fast, gain := 1.15 * without, gp) > gain
+    assert found(slow, lower := 0.75 * late, gp) < lower
+    assert pressed(gain, 0.0, 5, 2.0) > 20.0
+    assert pressed(gain, gp, 5, 2.0) < 2.0
+    assert pressed(lower, 0.0, 20, 2.0) < 2.0
+    assert pressed(lower, gp, 20, 2.0) > 20.0

@@ -13,6 +13,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from wam_bag.bag import read
+from wam_bag.cut import CUT
 from wam_cli.main import main
 from wam_description.parameters import ParameterError
 from wam_experiments.thesis.definition import load, names, tasks
@@ -57,14 +58,15 @@ def test_the_samples_are_small() -> None:
 
 
 def test_every_sample_that_an_experiment_or_task_declares_is_there_and_what_is_declared() -> None:
-    declared = [name for name in [*names(), *tasks()] if load(name).sample is not None]
-    assert [entry["name"] for entry in INDEX] == sorted(declared)
+    assert [entry["name"] for entry in INDEX] == sorted([*names(), *tasks()])
     for entry in INDEX:
         sample = load(entry["name"]).sample
         assert sample is not None
         assert [entry["run"], entry["shows"], *entry["seconds"]] == [
             sample.run, sample.shows, sample.begin, sample.end
         ], f"wam samples --make {entry['name']}"  # fmt: skip
+        thinned = read(BAGS / "sample" / entry["name"]).metadata[CUT].get("thinned", "")
+        assert thinned == " ".join(f"{topic}:{each}" for topic, each in sample.thinned.items())
 
 
 @pytest.mark.parametrize("name", sorted(ENTRIES))
@@ -158,6 +160,8 @@ def test_an_index_that_is_none_is_refused(tmp_path: Path) -> None:
         ({"run": "walk"}, "no run is named 'walk'; choose from out_and_back"),
         ({"seconds": [3.0, 1.0]}, r"'seconds' is \[3.0, 1.0\]; it must be start and end"),
         ({"second": [1.0, 3.0]}, "unknown key 'second'"),
+        ({"thinned": {"joint_sensors": 0}}, "'thinned' is .*; give each of some of the topics a number above 0"),
+        ({"thinned": {"joint_sensor": 9}}, "'thinned' is .*; give each of some of the topics a number above 0"),
     ],
 )
 def test_a_declaration_that_is_none_is_refused(change: dict, message: str, tmp_path: Path) -> None:

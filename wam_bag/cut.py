@@ -1,8 +1,9 @@
 """A bag cut out of another one: some of its time, some of its topics, and everything that explains them."""
 
 import struct
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -36,11 +37,15 @@ class CutMessage(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """What is taken: log times ``begin_ns <= t < end_ns``; topics named as for `wam_bag.bag.read`, None for all."""
+    """What is taken: log times ``begin_ns <= t < end_ns``; topics named as for `wam_bag.bag.read`, None for all.
+
+    Of a topic in `thinned`, only the first of so many messages, ``{"sim/joint_states": 10}``.
+    """
 
     begin_ns: int = 0
     end_ns: int = NEVER
     topics: Collection[str] | None = None
+    thinned: Mapping[str, int] = MappingProxyType({})
 
 
 def cut(source: Path, target: Path, part: Cut) -> Path:
@@ -116,6 +121,8 @@ def _take(some: TopicPart, part: Cut, taken: _Taken) -> None:
     begin = 0 if _is_latched(some.channel) else part.begin_ns
     kept = taken.messages.setdefault(some.channel.topic, [])
     rows = np.flatnonzero((times >= begin) & (times < part.end_ns))
+    for name, each in part.thinned.items():
+        rows = rows[::each] if is_selected(some.channel.topic, [name]) else rows
     found = Found(some.found.offsets[rows], some.found.sizes[rows])
     for start, data in zip(found.offsets.tolist(), messages(some.buffer, found), strict=True):
         sequence, log_time, publish_time = _HEAD.unpack_from(some.buffer.data, start + HEAD.size)
@@ -154,6 +161,8 @@ def _write(writer: McapWriter, name: str, taken: _Taken, part: Cut) -> dict[str,
         writer.attach(attachment)
     topics = "*" if part.topics is None else " ".join(part.topics)
     record = {"begin_ns": str(part.begin_ns), "end_ns": str(part.end_ns), "topics": topics}
+    if part.thinned:
+        record["thinned"] = " ".join(f"{name}:{each}" for name, each in part.thinned.items())
     for title, values in sorted({**taken.metadata, CUT: record}.items()):
         writer.metadata(title, dict(sorted(values.items())))
     information = bag_information(

@@ -6,6 +6,8 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ================================  ==============================================================================
 ``transform``                     motor states to joint states, joint commands to motor commands, (A.5)
 ``velocity_loop``                 inner loop: PI control of each motor's velocity, torque feed-forward
+``torque_loop``                   - in its place, on torque: law and node, 2.1.2
+``position_loop``                 - in its place, on position: law and node, 2.1.2
 ``servo_guard``                   which gains of the velocity loop are stable on the arm
 ``dither``                        alternating motor torque against stiction, for contact detection at rest
 ``force_loop``                    outer loop: force along a direction, posture elsewhere, or joint torques

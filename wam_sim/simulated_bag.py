@@ -14,7 +14,7 @@ from wam_bag.metadata import INFINITE
 from wam_control.scenario import ScenarioStep
 from wam_description.arm import Shared
 from wam_description.configuration import SHARED, Configuration
-from wam_description.interface import Interface
+from wam_description.interface import Interface, declared
 from wam_description.signals import NodeStatus
 from wam_description.status import pairs
 from wam_description.topics import JOINT_STATE, POINT, STATUS, TABLE, WRENCH, Topic
@@ -131,7 +131,8 @@ class _Recording:
 
 
 def _parameters(configuration: Configuration, namespace: str) -> str:
-    own = {name: flat for name, flat in configuration.sections.items() if name in configuration.shared.nodes}
+    nodes = {declared(entry).name for entry in configuration.shared.nodes}
+    own = {name: flat for name, flat in configuration.sections.items() if name in nodes}
     shared = configuration.sections[SHARED]
     return parameter_text({f"/{namespace}/{name}": {**shared, **flat} for name, flat in own.items()})
 

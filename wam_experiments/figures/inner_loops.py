@@ -1,7 +1,8 @@
 """Numbers of figure 2.1.2: what an inner loop on torque, velocity or position leaves of a disturbance at the motor.
 
 Every loop is sampled at 1 kHz.  A velocity loop with an integral is a position loop whose reference is the integral
-of the commanded velocity, so that both are one curve.
+of the commanded velocity, so that both are one curve.  The loops as nodes: `wam_control.torque_loop`,
+`wam_control.position_loop`; measured by the experiment `inner-loops`.
 """
 
 from collections.abc import Callable
@@ -10,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_description.arm import Arm
+from wam_description.arm import Arm, Servo
 from wam_description.configuration import Configuration, packaged
 from wam_description.world import Springs, World
 from wam_driver.plant import Plant
@@ -20,7 +21,7 @@ from wam_experiments.plant.ideal_testbed import NOTHING, RATIO, ideal_testbed, l
 from wam_theory.velocity_servo import is_stable, largest_scale
 from wam_theory.zero_order_hold import zero_order_hold
 
-PERIOD, SUBSTEPS = 1e-3, 100  # the plant gives a torque half a substep early, which counts near the largest gain
+PERIOD, SUBSTEPS = 1e-3, 500  # the plant gives a torque half a substep early, which counts near the largest gain
 CONTACT = 1464.28  # N m/rad
 HALF = 0.5  # of the largest stable gain
 TOP = 1e3  # scale at which the search of the largest gain begins
@@ -33,18 +34,25 @@ class InnerLoop(NamedTuple):
     gain: Callable[[Arm], Numbers]  # (4,), at scale 1
 
 
-def _on_torque(arm: Arm) -> Numbers:
-    """1 N m of the motor per N m, at the motor, of a sensor between cable and joint."""
-    return arm.circuits[0].stiffness * np.array([1.0, -RATIO, 0.0, 0.0])
+def on_torque(arm: Arm) -> Numbers:
+    """1 N m of the motor per N m, at the motor, of a strain gauge at the root of the link."""
+    (circuit,) = arm.circuits
+    along = np.array([1.0, -RATIO])
+    row = np.concatenate([circuit.stiffness * along, circuit.damping * along])
+    row[3] -= arm.joints.viscous_friction[0] / RATIO
+    return row
 
 
-def _on_velocity(_: Arm) -> Numbers:
-    """Gains of the velocity loop of config/testbed.yaml."""
-    servo = Configuration.load(packaged("testbed")).shared.servo
+def on_position(servo: Servo) -> Numbers:
+    """Gains of the velocity loop, or of a position loop with the same stiffness and damping."""
     return np.array([servo.integral_gain[0], 0.0, servo.proportional_gain[0], 0.0])
 
 
-LOOPS = (InnerLoop("torque, sensor at the joint", _on_torque), InnerLoop("velocity or position", _on_velocity))
+def _configured(_: Arm) -> Numbers:
+    return on_position(Configuration.load(packaged("testbed")).shared.servo)
+
+
+LOOPS = (InnerLoop("torque, sensor at the link", on_torque), InnerLoop("velocity or position", _configured))
 
 
 def damped_testbed(stiffness: float = 1.0) -> Arm:
@@ -59,11 +67,16 @@ def damped_testbed(stiffness: float = 1.0) -> Arm:
     )
 
 
-def period_map(arm: Arm) -> tuple[Numbers, Numbers]:
-    """State after a period from the state, (4, 4), and from a held motor torque, (4, 1), by theory."""
+def period_map(arm: Arm, contact: float = CONTACT) -> tuple[Numbers, Numbers]:
+    """State after a period from the state, (4, 4), and from a held motor torque, (4, 1), by theory.
+
+    Parameters
+    ----------
+    contact : its stiffness at the joint, N m/rad.
+    """
     (circuit,), inertia = arm.circuits, np.array([arm.motors.inertia[0], link_inertia(arm)])
     along = np.array([1.0, -RATIO])
-    k = circuit.stiffness * np.outer(along, along) + np.diag([0.0, CONTACT])
+    k = circuit.stiffness * np.outer(along, along) + np.diag([0.0, contact])
     d = circuit.damping * np.outer(along, along)
     d += np.diag([arm.motors.viscous_friction[0], arm.joints.viscous_friction[0]])
     rate = np.block([[np.zeros((2, 2)), np.eye(2)], [-k / inertia[:, None], -d / inertia[:, None]]])
@@ -131,7 +144,7 @@ def _attenuation() -> ThesisPanel:
 
 
 def _largest_gains() -> ThesisPanel:
-    stiffness, some = np.geomspace(0.1, 3.0, 25), np.array([0.15, 0.5, 1.0, 2.0])
+    stiffness, some = np.geomspace(0.5, 3.0, 60), np.array([0.6, 1.0, 1.5, 2.5])
     lines = []
     for loop in LOOPS:
         line, points = (

@@ -18,6 +18,7 @@ testbed         section 5.6: stable gain with friction, step size, saturation an
 transmission    chapter 4: force response by chirp, position of the reducer
 cables          chapter 6: efficiency (6.15), creep (6.19) and its correction
 force_accuracy  force without feedback, 5.2; a sensor that is calibrated wrong, 2.2
+inner_loops     largest gains of inner loops, and what they leave of friction at the motor, 2.1.2
 quantised       force feedback that is read in steps, 3.2.1
 arm_forces      the arm presses, slides, is pushed, and presses near either end of a link
 groping         the arm finds a box by contacts, 7.3

@@ -20,7 +20,7 @@ TASKS = "tasks"
 SETS = "experiments/sets"
 KEYS = ("title", "section", "configuration", "evaluation", "include", "values", "runs", "sample")
 RUN_KEYS = ("name", "values", "steps", "stops")
-SAMPLE_KEYS = ("run", "shows", "seconds", "topics", "evaluation")
+SAMPLE_KEYS = ("run", "shows", "seconds", "topics", "thinned", "evaluation")
 
 
 class Run(NamedTuple):
@@ -46,6 +46,7 @@ class SampleDefinition(NamedTuple):
     shows : description.
     begin, end : s of the arm's time.
     topics : kept of those recorded; None for all.
+    thinned : of a topic, that the first of so many messages is kept.
     evaluation : of the sample, from a mapping with this run only.
     """
 
@@ -54,6 +55,7 @@ class SampleDefinition(NamedTuple):
     begin: float
     end: float
     topics: tuple[str, ...] | None
+    thinned: Mapping[str, int]
     evaluation: str
 
 
@@ -177,7 +179,14 @@ def _sample(where: str, body: Any, evaluation: str, runs: Sequence[str]) -> Samp
     )
     chosen = None if topics is None else tuple(map(str, topics))
     begin, end = map(float, seconds)
-    return SampleDefinition(name, str(body["shows"]), begin, end, chosen, str(body.get("evaluation", evaluation)))
+    thinned = {str(topic): int(each) for topic, each in body.get("thinned", {}).items()}
+    require(
+        all(each > 0 for each in thinned.values()) and set(thinned) <= set(chosen or thinned),
+        f"{where}, sample: 'thinned' is {thinned}; give each of some of the topics a number above 0",
+    )
+    return SampleDefinition(
+        name, str(body["shows"]), begin, end, chosen, thinned, str(body.get("evaluation", evaluation))
+    )
 
 
 def _mapping(path: Path) -> dict[str, Any]:

@@ -51,6 +51,13 @@ def open_loop(run: Recording) -> tuple[list[Comparison], Panel]:
     return rows, Panel("without feedback", "F_des [N]", "F_c [N]", curves)
 
 
+def open_loop_sample(runs: Mapping[str, Recording]) -> Result:
+    """The run of `force-accuracy` without feedback, or its first steps."""
+    (run,) = runs.values()
+    rows, panel = open_loop(run)
+    return Result(rows, [panel])
+
+
 def active_pretension(runs: Mapping[str, Recording]) -> Result:
     """The experiment `active-pretension`: deadband by friction of the tension, and stretch of the cable, over it."""
     rows, curves = [], []

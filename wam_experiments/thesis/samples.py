@@ -83,7 +83,7 @@ def make(experiment: Experiment, whole: Path, directory: Path) -> Entry:
     require(sample is not None, f"experiment {experiment.name} declares no sample; add one to its YAML")
     assert sample is not None  # for mypy
     bag = directory / FOLDER / experiment.name
-    part = Cut(round(1e9 * sample.begin), round(1e9 * sample.end), sample.topics)
+    part = Cut(round(1e9 * sample.begin), round(1e9 * sample.end), sample.topics, sample.thinned)
     cut(whole, bag, part)
     of_whole = {row.quantity: row for row in evaluate_sample(experiment, recording(whole)).rows}
     rows = tuple(
