@@ -720,3 +720,15 @@ def test_a_cycle_beside_a_commanded_motion_of_any_shape_is_found(way: str, tmp_p
         assert len(stability.verdict) == (size > 0.0)
         if size:
             assert cycle_of(analysis, 8.7).measured == pytest.approx(size, rel=CLOSE)
+
+
+def test_a_velocity_that_is_filtered_gives_way_to_the_rate_of_the_position(tmp_path: Path) -> None:
+    """The effort seems to be early then; the viscous friction was up to 7 % low."""
+    time = times(40.0)
+    q, v, a = swung(time, 86)
+    effort = loaded(q, v, a, WEIGHT, 87)
+    states = {"position": q, "velocity": recorded_late(v, "filter"), "effort": effort}
+    sent = joints("/joint_states", time, ["j"], **{name: value[:, np.newaxis] for name, value in states.items()})
+    _, numbers = found((by_mcap_ros2(tmp_path / "bag", sent), TopicMap()))
+    planted = {"j: dry friction": DRY, "j: viscous friction": VISCOUS, "j: inertia": INERTIA}
+    assert {name: numbers.get(name) for name in planted} == pytest.approx(planted, rel=CLOSE)

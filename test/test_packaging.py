@@ -48,6 +48,7 @@ SHIPPED = (
     "scripts",
 )
 NODES = tuple(TABLE)
+PATHS = ("PATH", "PYTHONPATH", "AMENT_PREFIX_PATH", "LD_LIBRARY_PATH")
 
 
 def copy_tree(target: Path) -> Path:
@@ -378,6 +379,22 @@ def test_launch_starts_transforms_and_rviz_in_the_namespace_of_the_arm(launch_fi
         assert model["TF Prefix"] == more.get("frame_prefix", "").rstrip("/")
     _, state, _ = start(CHOSEN | viewers | {"namespace": "wam"})
     assert state.remappings == [("robot_description", "~/robot_description")]
+
+
+@pytest.mark.skipif(shutil.which("ros2") is None, reason="needs ros2 launch, of a ROS installation; not in the wheels")
+@pytest.mark.parametrize("form", ["py", "xml"])
+def test_ros2_launch_shows_every_argument_and_plays_a_scenario_to_its_end(form, prefix, tmp_path, domain_id):
+    file = prefix / "share" / "wam_stack" / "launch" / f"wam.launch.{form}"
+    own = environment(prefix)
+    both = {key: os.pathsep.join(filter(None, (own.get(key), os.environ.get(key)))) for key in PATHS}
+    env = {**os.environ, **own, **both, "ROS_DOMAIN_ID": str(domain_id)}
+    shown = run("ros2", "launch", file, "--show-args", cwd=tmp_path, env=env)
+    assert all(f"'{name}'" in shown for name in CHOSEN)
+    short = tmp_path / "short.yaml"
+    short.write_text("steps:\n  - {name: release the brakes, seconds: 0.3, request: enable}\n")
+    bag = tmp_path / "first"
+    run("ros2", "launch", file, f"scenario:={short}", f"bag:={bag}", "trajectory_action:=false", cwd=tmp_path, env=env)
+    assert list(tmp_path.glob("first*"))
 
 
 def test_the_launch_file_in_xml_has_the_same_arguments_and_defaults(prefix, launch_file):

@@ -176,6 +176,11 @@ def friction(source: Source) -> FoundFriction | None:
     moves, width, per_lag = np.abs(velocity) > rest, round(window / period), math.nan
     one_frequency = WEIGHT in columns and _own_part(velocity, columns[WEIGHT], moves, sd, period, width) < APART
     found, also, shift = _best(trial, not one_frequency)
+    if (shift or FILTER in also) and {"position", "velocity"} <= source.values.keys():  # or the velocity is filtered
+        rates = [part for piece in some for part in (differentiated(piece.time, piece.values["position"])[0], blank)]
+        rate = np.concatenate(rates)
+        other = trial._replace(velocity=rate, columns=columns | {DRAG: (rate * np.abs(rate))[:, np.newaxis]})
+        found, also, shift = min((found, also, shift), _best(other, True), key=lambda one: one[0].residual)
     size = _size_of_noise(velocity, sd, moves, period, width)
     found = found._replace(inertia_error=math.hypot(found.inertia_error, size * found.inertia))
     if one_frequency:
