@@ -626,3 +626,15 @@ def test_what_decays_or_grows_in_a_part_of_a_recording_is_no_cycle(decay, freque
     time = np.arange(10000) / 250.0
     size = np.where(time > 6.0, np.exp(-(time - (6.0 if decay > 0.0 else 40.0)) / decay), 0.0)
     assert episodes(time, size * np.sin(2.0 * math.pi * frequency * time) + draws(3, len(time), 1e-3), 4e-3) == []
+
+
+def test_viscous_friction_of_few_speeds_has_the_error_of_an_uneven_dry_friction() -> None:
+    """Dry friction that grows by 0.3 % with a slow speed looked like several times the viscous friction, +- 8 %."""
+    time = np.arange(40_000) / 1e3
+    velocity = 0.2 + 0.01 * np.sin(1.7 * time) + 0.005 * np.sin(4.1 * time)
+    velocity *= np.sign(np.sin(0.4 * time))
+    uneven = 0.5 * (1.0 + 0.003 * (np.abs(velocity) - 0.2) / 0.01)
+    found = identify_friction(time, velocity, uneven * np.sign(velocity) + 0.05 * velocity, rest=0.02, window=0.02)
+    assert found.viscous > 0.15
+    assert abs(found.viscous - 0.05) < 3.0 * found.viscous_error
+    assert found.dynamic_error < 0.05

@@ -31,7 +31,7 @@ ALSO = {
     FILTER: "the effort is filtered, or otherwise lags behind the motion, which was corrected",
 }
 UNSURE = 0.02  # of the size of a cycle: a larger error is printed
-STEADY = 0.9  # of a size: a cycle whose second half has less of the first, or more, is said to change
+STEADY = 0.9  # of a size: a cycle whose second half has less of the first, or more, is reported as changing
 TURNING = 5.0  # % of the time at rest that a motion back and forth has where it turns
 
 

@@ -18,6 +18,7 @@ PRECISE = 0.01  # of the torque: noise at a breakaway after the line
 SIGMAS = 3.0  # standard errors that are meant to hold the truth
 FREEDOM = 2.0  # least degrees of freedom: with fewer, an error could be anything
 NEGLECTED = 2e-3  # of a number: what the averaged law neglects, where a recording without noise leaves no error
+UNEVEN = 0.003  # of dry friction, by which it changes with load and place: over few speeds that looks like viscous
 SINGULAR = 1e12  # condition of normal equations beyond which a column has no information
 JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
 
@@ -139,7 +140,10 @@ def _in_motion(
     acting = [np.convolve(column, triangle, "same")[rows] for column in load.T]
     columns = np.column_stack([np.where(onward[rows], 1.0, -1.0), v, acceleration, np.ones(len(rows)), *acting])
     wanted = np.convolve(torque, triangle, "same")[rows]
-    return _robust(columns, wanted, len(triangle), _halves(rows))
+    solution, errors, left = _robust(columns, wanted, len(triangle), _halves(rows))
+    spread = float(np.subtract(*np.percentile(np.abs(v), (95.0, 5.0))))
+    uneven = UNEVEN * abs(solution[0]) / spread if spread > 0.0 else math.inf
+    return solution, (errors[0], math.hypot(errors[1], uneven), *errors[2:]), left
 
 
 def _robust(
