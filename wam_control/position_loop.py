@@ -61,7 +61,7 @@ class PositionLoop:
 
 
 class PositionLoopNode:
-    """Takes the place of the velocity loop, with the same gains and the same guard."""
+    """Takes the place of the velocity loop, with its gains and its guard, without its limits of rates and speeds."""
 
     name, parameters = "position_loop", ServoGuardParameters
     high_priority = True
