@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import time
 from collections.abc import Iterator
@@ -28,6 +29,7 @@ from wam_sim.simulation import Simulation
 
 ROOT = Path(__file__).resolve().parents[1]
 DIRECT = "direct run"
+COMPILER = str(sysconfig.get_config_var("CC")).split()[0]
 SUBSTEP = (1.15, 1.05)  # ratio to a bare mj_step: must, aim
 STEPS = 40  # of the plant at a time
 CASES = {
@@ -106,6 +108,9 @@ def main() -> None:
     given = parser.parse_args()
     if given.serve:
         serve(given.serve)
+        return
+    if not shutil.which(COMPILER):
+        print(f"left out: mypyc needs the C compiler of this Python, {COMPILER}; on Debian: apt install gcc python3-dev")
         return
     given.rounds = given.rounds or (1 if given.quick else 20)
     seconds = 1.0 if given.quick else 5.0

@@ -83,6 +83,8 @@ def test_benchmark_prints_a_ratio_in_every_row(script: str, domain_id: int) -> N
         check=False,
     )
     assert done.returncode == 0, done.stderr
+    if done.stdout.startswith("left out: "):
+        pytest.skip(done.stdout.removeprefix("left out: "))
     machine, table = done.stdout.index(" cores, "), done.stdout  # a live page says where it is before
     _, _, *rows = table[machine:].splitlines()
     assert [re.split(r"\s{2,}", row)[0] for row in rows] == ROWS[script]
