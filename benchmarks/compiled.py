@@ -109,8 +109,8 @@ def main() -> None:
     if given.serve:
         serve(given.serve)
         return
-    if not shutil.which(COMPILER):
-        print(f"left out: mypyc needs the C compiler of this Python, {COMPILER}; on Debian: apt install gcc python3-dev")
+    if not (shutil.which(COMPILER) and Path(sysconfig.get_path("include"), "Python.h").exists()):
+        print(f"left out: mypyc needs {COMPILER} and the headers of Python; on Debian: apt install gcc python3-dev")
         return
     given.rounds = given.rounds or (1 if given.quick else 20)
     seconds = 1.0 if given.quick else 5.0
