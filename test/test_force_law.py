@@ -244,6 +244,14 @@ def test_a_force_above_the_limit_is_refused_and_the_last_good_one_remains_in_for
     assert loop.refusals == {}
 
 
+@pytest.mark.parametrize("newtons", [5e-324, 1e-300, 1e-160, 1e-7])
+def test_a_force_too_small_to_have_a_direction_is_none(newtons: float) -> None:
+    pressing, none = force_loop(ARM, OWN), force_loop(ARM, OWN)
+    for _ in range(3):
+        out = ask(pressing, World(400.0), down(newtons))
+        assert out == ask(none, World(400.0), down(0.0))
+
+
 def test_a_torque_above_the_limit_is_refused_and_the_last_good_one_remains_in_force() -> None:
     loop = force_loop(ARM, replace(OWN, mode="joint_torque", torque_limit=4.0))
     for torque in ([1.0, 2.0, 0.0, 0.0], [1.0, -4.5, 0.0, 0.0]):

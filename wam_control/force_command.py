@@ -10,6 +10,7 @@ from wam_description.arm import Covers, Joints
 from wam_description.signals import ZERO, ForceCommand
 
 ASIDE = 1e-3  # m, lever of the part of a torque that is not that of the force at a place of the cover
+NOTHING = 1e-6  # N; a smaller force is none: its direction is a rounding, and nothing can be divided by it
 NO_FORCE = ForceCommand("", (0.0, 0.0, 0.0))
 
 
@@ -75,6 +76,8 @@ class CommandAdmission:
     ) -> Commands:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
         refusals = {}
+        if force is not None and _size(force) < NOTHING:
+            force = ForceCommand(force.frame, ZERO, force.torque)
         pressed = self._force is not None and any(self._force.force)
         commanded = _size(force)
         if commanded > parameters.force_limit:
