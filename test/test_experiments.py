@@ -22,6 +22,7 @@ from wam_experiments.thesis import (
     arm_forces,
     cables,
     force_accuracy,
+    inner_loops,
     limit_cycles,
     quantised,
     step_response,
@@ -35,6 +36,7 @@ from wam_experiments.thesis.page import write
 from wam_experiments.thesis.recording import Step
 from wam_experiments.thesis.rows import Comparison, Result, markdown, plain
 from wam_theory.stick_slip import Kind, simulate
+from wam_theory.stiction import play
 
 LEVER = 0.9144  # m
 STIFFNESS = 1464.28  # k_c of the testbed at its joint, N m/rad
@@ -614,6 +616,25 @@ def test_a_strand_that_stays_tight_under_a_low_pretension_is_not_what_is_predict
         deadband, found = force_accuracy.active_pretension({"a_fifth_of_it": run}).rows
         assert deadband.agrees
         assert found.agrees == agrees
+
+
+@pytest.mark.parametrize(("number", "left"), [(0, 1.0), (1, 1.0 / 1.46)])
+def test_friction_that_an_inner_loop_leaves_is_half_of_the_loop_of_force_over_command(
+    number: int, left: float, tmp_path: Path
+) -> None:
+    """By hand: a play of 0.2 N m at the motor, divided by one plus the gain of a torque loop."""
+    time = np.arange(0.0, 5.8, 1e-3)
+    desired = np.interp(time, [0.0, 2.8, 3.0, 5.5], [0.0, 18.0, 18.0, 2.0])
+    steps = (Step("out", 0.0, 3.0, {}), Step("back", 3.0, 5.8, {}))
+    for part, agrees in ((left, True), (0.9 * left, False)):
+        topics = {
+            "motor_effort_command": joints(time, 0.0, effort=-desired * LEVER / 14.0),
+            "motor_states": joints(time, 0.0),
+            "joint_sensors": pressed(time, play(desired, part * 0.2 * 14.0 / LEVER)),
+        }
+        run = recorded(load("inner-loops"), number, topics, steps, tmp_path)
+        (row,) = inner_loops.friction_left({"run": run}).rows
+        assert row.agrees == agrees, row
 
 
 def test_joint_angles_that_keep_their_creep_are_not_taken_as_corrected(tmp_path: Path) -> None:

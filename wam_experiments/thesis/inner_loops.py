@@ -68,7 +68,7 @@ def torque_sample(runs: Runs) -> Result:
 def _command(run: Recording, link: OneLink) -> Numbers:
     """Force, N, at the times of the sensors, of the commanded torque; of a position, that without friction."""
     time = run.joints("joint_sensors").time
-    if "position_loop" not in run.parameters.nodes:
+    if not _has(run, "position_loop"):
         command = run.joints("motor_effort_command")
         return -np.interp(time, command.time, command.effort[:, 0]) * link.ratio / link.lever
     command = run.joints("motor_velocity_command")
@@ -80,9 +80,9 @@ def _command(run: Recording, link: OneLink) -> Numbers:
 
 def _part_left(run: Recording, link: OneLink) -> float:
     """Part of the friction at the motor that reaches the contact: 1/(1 + g), or that of springs against springs."""
-    if "torque_loop" in run.parameters.nodes:
+    if _has(run, "torque_loop"):
         return 1.0 / (1.0 + run.node("torque_loop", TorqueLoopParameters).gain[0])
-    if "position_loop" not in run.parameters.nodes:
+    if not _has(run, "position_loop"):
         return 1.0
     node = link.node
     beyond = 1.0 / (1.0 / node.transmission_stiffness + 1.0 / node.contact_stiffness)
@@ -93,20 +93,25 @@ def _largest(label: str, below: Recording, above: Recording) -> Comparison:
     """Gain at which an oscillation of the motor neither grows nor decays, from runs on both sides of it."""
     (first, gain), (second, other) = ((_growth(run), _gain(run)) for run in (below, above))
     measured = gain + (other - gain) * first / (first - second) if first < second else math.nan
-    unit = "" if "torque_loop" in below.parameters.nodes else "N m/rad"
+    unit = "" if _has(below, "torque_loop") else "N m/rad"
     return Comparison(label, _expected(below), measured, unit, WITHIN, "sampled loop")
 
 
 def _expected(run: Recording) -> float:
     """The largest gain in theory, of a position loop as its stiffness with this ratio of stiffness and damping."""
     shared = run.shared
-    is_torque = "torque_loop" in run.parameters.nodes
+    is_torque = _has(run, "torque_loop")
     row = on_torque(shared.arm) if is_torque else on_position(shared.servo) / shared.servo.integral_gain[0]
     return largest_gain(period_map(shared.arm, joint_stiffness(run)), row)
 
 
+def _has(run: Recording, name: str) -> bool:
+    """Whether a node of this module ran."""
+    return any(f".{name}:" in entry for entry in run.shared.nodes)
+
+
 def _gain(run: Recording) -> float:
-    if "torque_loop" in run.parameters.nodes:
+    if _has(run, "torque_loop"):
         return run.node("torque_loop", TorqueLoopParameters).gain[0]
     return run.shared.servo.integral_gain[0]
 
