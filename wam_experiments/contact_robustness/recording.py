@@ -15,7 +15,7 @@ from wam_driver.safety import Mode
 from wam_experiments.contact_benchmark.moves import MoveGenerator
 from wam_experiments.contact_benchmark.scenarios import RELEASE, SETTLE, base_values
 from wam_experiments.contact_robustness.degradations import Degradation, Values, drawn
-from wam_experiments.contact_robustness.touches import KINDS, SECOND_KINDS, Touch, axis_of, touches
+from wam_experiments.contact_robustness.touches import KINDS, LEVEL_KINDS, SECOND_KINDS, Touch, axis_of, touches
 from wam_experiments.identification.evaluation import play
 from wam_sim.simulation import Simulation
 
@@ -24,6 +24,7 @@ WARM_UP = 6.0  # s of free motion before the first contact
 SPACING = 1.9  # s from one contact to the next
 EXCITATION = 20.0  # s of motion for an identification
 DRIFT_STEPS = 20  # of friction, over a recording
+CONTACTS = {"wide": KINDS, "second": SECOND_KINDS, "level": LEVEL_KINDS}
 
 
 class Drive(NamedTuple):
@@ -32,7 +33,7 @@ class Drive(NamedTuple):
     Attributes
     ----------
     configuration, degradation, seed, seconds : the arm, the degradation by name, what is drawn, the length in s.
-    second : whether with many second contacts.
+    contacts : which of `CONTACTS` are drawn.
     is_identified : whether the arm's model is identified before, from a motion of its own.
     """
 
@@ -40,7 +41,7 @@ class Drive(NamedTuple):
     degradation: str
     seed: int
     seconds: float
-    second: bool = False
+    contacts: str = "wide"
     is_identified: bool = False
 
 
@@ -88,7 +89,7 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
     times = np.arange(WARM_UP, drive.seconds - SPACING, SPACING) + random.uniform(0.0, 0.4)
     return (
         degradation,
-        touches(arm, random, times.tolist(), SECOND_KINDS if drive.second else KINDS),
+        touches(arm, random, times.tolist(), CONTACTS[drive.contacts]),
         steps,
         list(start),
     )
