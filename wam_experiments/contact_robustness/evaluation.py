@@ -180,8 +180,8 @@ brackets are counts."""
 
 SIZE = """With {needed} contacts or more the 95 % interval (Wilson) of a share of 91 % lies within 85 to 97 %; with
 fewer a row can only be marginal. Contacts of one arm share its errors, so these intervals are rather too narrow. No
-false alarm in 221 s or more shows less than 1 a minute (Poisson). Of the rows with a fitting share one of twenty is outside its
-interval by chance: the worst of many rows is no measure of all."""
+false alarm in 221 s or more shows less than 1 a minute (Poisson). Of the rows with a fitting share one of twenty is
+outside its interval by chance: the worst of many rows is no measure of all."""
 
 METHOD = """## Method
 
