@@ -1,16 +1,19 @@
 """All degradations of some seeds on an executor, and the page docs/contact-robustness.md."""
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from pathlib import Path
+from time import process_time
 from typing import NamedTuple
 
+from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_description.arm import seconds
 from wam_description.configuration import Configuration
-from wam_experiments.contact_benchmark.scenarios import ScenarioGenerator
-from wam_experiments.contact_benchmark.timing import times
+from wam_experiments.contact_benchmark.scenarios import base_values
 from wam_experiments.contact_robustness import degradations
 from wam_experiments.contact_robustness.recording import Drive, DriveRecording, record
-from wam_experiments.contact_robustness.replay import ReplayScore, replay
+from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, replay
 from wam_experiments.contact_robustness.requirements import (
     MIX,
     alone_table,
@@ -126,9 +129,20 @@ def friction_trials(configuration: Configuration, seeds: Sequence[int]) -> list[
 
 
 def average_update(configuration: Configuration, seed: int) -> float:
-    """Time of a whole update in contact, average over the periods, s; shortest of all calls on this computer."""
-    found = times(configuration, ScenarioGenerator(configuration, seed).contacts(1)[0])
-    return found.observe + found.estimate / found.divisor
+    """Computing time of a whole update, s, average over the periods of a recording in which there is contact."""
+    configured = configuration.with_values(base_values(configuration, False))
+    recording = record(Drive(configured, degradations.NAMES[0], seed, SHORTEST, "second"))
+    shared, own = configured.shared, configured.node("contact_estimator", ContactEstimatorParameters)
+    estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
+    spent, periods, in_contact = 0.0, 0, False
+    for i, state, dt in SignalFaults(recording, seconds(shared.timing.period_ns), seed):
+        begin = process_time()
+        estimator.observe(state, None, dt)
+        now = estimator.estimate().in_contact if i % shared.timing.outer_divisor == 0 else in_contact
+        if in_contact:
+            spent, periods = spent + process_time() - begin, periods + 1
+        in_contact = now
+    return spent / periods if periods else math.nan
 
 
 def report_text(result: RobustnessResult) -> str:
