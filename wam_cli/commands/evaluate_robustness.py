@@ -18,6 +18,7 @@ from wam_experiments.contact_robustness.evaluation import (
     SHORTEST,
     RobustnessResult,
     average_update,
+    bounds_of,
     drives,
     evaluate,
     friction_trials,
@@ -59,8 +60,8 @@ def run(given: argparse.Namespace) -> int:
         groups = [evaluate(each, *batch, recordings=given.recordings) for each in chosen]
         identifications = results(run_trial, friction_trials(configuration, given.seed), *batch)
     wide, second, level, identified = groups
-    average = average_update(configuration, given.seed[0])
-    text = report_text(RobustnessResult(wide, second, level, identified, identifications, average))
+    average, bounds = average_update(configuration, given.seed[0]), bounds_of(configuration, given.seed[0], identified)
+    text = report_text(RobustnessResult(wide, second, level, identified, identifications, average, bounds))
     print(text)
     if given.write:
         seeds = " ".join(map(str, given.seed))

@@ -7,11 +7,14 @@ from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
+import numpy as np
+
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
 from wam_experiments.contact_benchmark.scenarios import base_values
 from wam_experiments.contact_robustness import degradations
+from wam_experiments.contact_robustness.bounds import bounds_table
 from wam_experiments.contact_robustness.recording import Drive, DriveRecording, record
 from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, replay
 from wam_experiments.contact_robustness.requirements import (
@@ -48,7 +51,7 @@ class DrivePlan(NamedTuple):
 
 
 class RobustnessResult(NamedTuple):
-    """The scores of a plan, of identifications, and the time of an update, average over the periods, s."""
+    """The scores of a plan, of identifications, the time of an update, average over the periods, s, and the bounds."""
 
     wide: Groups
     second: Groups
@@ -56,6 +59,7 @@ class RobustnessResult(NamedTuple):
     identified: Groups
     identifications: list[IdentificationResult]
     average: float
+    bounds: str = ""
 
 
 class DriveTrial(NamedTuple):
@@ -145,6 +149,12 @@ def average_update(configuration: Configuration, seed: int) -> float:
     return spent / periods if periods else math.nan
 
 
+def bounds_of(configuration: Configuration, seed: int, identified: Groups) -> str:
+    """The table of bounds with the errors of the torques of identified arms, '' without any."""
+    errors = [score.torque_errors for own in identified.values() for score in own]
+    return bounds_table(configuration, seed, np.sqrt(np.mean(np.square(errors), axis=0))) if errors else ""
+
+
 def report_text(result: RobustnessResult) -> str:
     """The tables as text."""
     every = [score for own in result.wide.values() for score in own]
@@ -165,6 +175,7 @@ def report_text(result: RobustnessResult) -> str:
         ("By kind of contact, all degradations", kinds_table(every)),
         ("Second contact", table(SECOND, seconds)),
         ("After an identification", table(DETECTION, named) + "\n" + table(POSITION, named)),
+        ("What torques leave open", BOUNDS + "\n\n" + result.bounds),
     ]
     text = "\n".join(f"## {head}\n\n{body}" for head, body in parts)
     return "\n".join([text, *(f"\nEnded early: {failure}" for failure in failures)])
@@ -196,6 +207,11 @@ SIZE = """With {needed} contacts or more the 95 % interval (Wilson) of a share o
 fewer a row can only be marginal. Contacts of one arm share its errors, so these intervals are rather too narrow. No
 false alarm in 221 s or more shows less than 1 a minute (Poisson). Of the rows with a fitting share one of twenty is
 outside its interval by chance: the worst of many rows is no measure of all."""
+
+BOUNDS = """The inference alone, in poses and on contacts drawn as after an identification, with torques that have these
+errors and no others, and with just their covariance. The rows of the requirement lie between the last two: the last
+takes errors at rest, where stiction hides a force, as frequent as any. Friction of the contact is in all of them: four
+torques do not tell it from position and force. So is the inner link near the shoulder, where 10 N have no moment."""
 
 METHOD = """## Method
 
