@@ -10,10 +10,10 @@ from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.model_errors import (
     GATE,
     HINDSIGHT,
+    LARGEST,
     LEARN_EVERY,
     MARGIN,
     TRUST_TIME,
-    TRUSTED,
     ModelErrors,
     Observation,
 )
@@ -105,19 +105,19 @@ def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
 
 
 def test_the_size_of_the_errors_is_followed_in_motion_but_not_in_contact_or_at_rest() -> None:
-    for statistic in (0.6, 3.0):
+    for statistic in (1.5, 3.0):
         tracked = errors()
         follow(tracked, 6 * round(TRUST_TIME / LEARN_EVERY), statistic=statistic)
         assert tracked.size == pytest.approx(MARGIN * statistic / 2, rel=0.01)
         before = tracked.size
         follow(tracked, 100, in_contact=True, statistic=100.0)
         assert tracked.size == before
-    for statistic, limit in ((0.0, TRUSTED[0]), (0.9 * GATE, TRUSTED[1])):
+    for statistic, limit in ((0.0, 1.0), (0.9 * GATE, LARGEST)):
         follow(tracked, 6 * round(TRUST_TIME / LEARN_EVERY), statistic=statistic)
         assert tracked.size == limit
     tracked, random = errors(), np.random.default_rng(4)
     for _ in range(200):
-        tracked.follow(seen(random)._replace(moving=np.array([1.0, 0.0])), 0.0, False, LEARN_EVERY)
+        tracked.follow(seen(random)._replace(moving=np.array([1.0, 0.0])), 0.9 * GATE, False, LEARN_EVERY)
     assert tracked.size == 1.0
 
 

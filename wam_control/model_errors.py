@@ -4,8 +4,8 @@ The residual of the momentum observer is r = tau_ext + H x + e: H the torques of
 the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
 r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.
 
-How much larger or smaller than S the errors are in free motion is followed, too: S is meant for the worst of many arms,
-and for detections that may be false once in hours; a position is to be stated as certain as it is on this arm.
+How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated a position is less
+certain.  Never more: an arm better than stated makes links that are wrong by friction of the contact seem certain.
 """
 
 from collections import deque
@@ -26,7 +26,7 @@ HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after i
 NOISE_TIME = 1.0  # s, in which the noise of the motors is followed
 TRUST_TIME = 5.0  # s of motion, in which the size of the errors is followed
 MARGIN = 2.0  # of that size: errors in contact are larger, and some come rarely
-TRUSTED = (0.25, 4.0)  # smallest and largest
+LARGEST = 4.0  # of that size
 LEAST = 1e-30  # variance: avoids a division by zero for errors that are none
 SURE = 2.0  # sd of an error that it must have beyond what is tolerable
 
@@ -60,7 +60,8 @@ class ModelErrors:
 
     Attributes
     ----------
-    size : squared errors of the torques in free motion, with a margin, over the variances that are stated for them.
+    size : squared errors of the torques in free motion, with a margin, over the variances that are stated for them;
+        at least 1.
     """
 
     def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array) -> None:
@@ -129,7 +130,7 @@ class ModelErrors:
                 # of a shaft at rest stiction hides the errors
                 rate = self._since / TRUST_TIME * float(before.moving.min())
                 size = self.size + rate * (MARGIN * its / len(before.residual) - self.size)
-                self.size = min(max(size, TRUSTED[0]), TRUSTED[1])
+                self.size = min(max(size, 1.0), LARGEST)
         self._since = 0.0
 
     def _grow(self, span: float) -> None:
