@@ -4,8 +4,8 @@ The residual of the momentum observer is r = tau_ext + H x + e: H the torques of
 the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
 r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.
 
-How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated a position is less
-certain.  Never more: an arm better than stated makes links that are wrong by friction of the contact seem certain.
+How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, positions are
+less certain.  Never more: on a better arm, links that are wrong by friction of the contact would seem certain.
 """
 
 from collections import deque
