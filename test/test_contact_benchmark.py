@@ -34,7 +34,7 @@ from wam_experiments.contact_benchmark.scenarios import (
     ScenarioGenerator,
     dither_values,
 )
-from wam_experiments.contact_benchmark.score import ANY, Metric, ScenarioScore, further_metrics, required_metrics, score
+from wam_experiments.contact_benchmark.score import ANY, ScenarioScore, further_metrics, required_metrics, score
 from wam_experiments.contact_benchmark.simulation import EstimatedHypothesis, LoadTorques, Played, Record, play
 from wam_experiments.contact_benchmark.statistics import Interval, events, quantile, rms, share
 from wam_sim.batch import processes
@@ -218,20 +218,20 @@ def test_the_interval_of_an_rms_is_that_of_its_scenes_not_of_its_samples() -> No
 
 
 def test_marks_tell_a_good_number_from_a_marginal_one() -> None:
-    row = Metric("x", "", 1.0, (0.0, 2.0), (0.0, 1.0), lambda scores: Interval(0.0, 0.0, 0.0, 0))
-    assert mark(row, Interval(0.9, 0.8, 1.4, 50)) == TARGET_MET
-    assert mark(row, Interval(1.5, 1.2, 1.9, 50)) == MET
-    assert mark(row, Interval(1.5, 1.2, 2.1, 50)) == MARGINAL
-    assert mark(row, Interval(2.5, 2.2, 3.1, 50)) == MISSED
-    assert mark(row, Interval(2.5, 1.2, 3.1, 50)) == MISSED_MARGINAL
-    assert mark(row, quantile([0.5], 0.5)) == FEW
-    assert mark(row, Interval(math.nan, math.nan, math.nan, 0)) == "no data"
-    none = row._replace(required=(0.0, 0.0), target=(0.0, 0.0))
-    assert mark(none, Interval(0.0, 0.0, 3.7, 60)) == FEW
-    assert mark(none, Interval(0.0, 0.0, 3.7, 130)) == MET
-    assert mark(none, Interval(0.0, 0.0, 3.7, 600)) == TARGET_MET
-    assert mark(none, Interval(1.0, 0.0, 5.0, 600)) == MISSED
-    assert mark(row._replace(required=ANY, target=ANY), Interval(9.0, 8.0, 10.0, 5)) == ""
+    row = (0.0, 2.0), (0.0, 1.0)
+    assert mark(*row, Interval(0.9, 0.8, 1.4, 50)) == TARGET_MET
+    assert mark(*row, Interval(1.5, 1.2, 1.9, 50)) == MET
+    assert mark(*row, Interval(1.5, 1.2, 2.1, 50)) == MARGINAL
+    assert mark(*row, Interval(2.5, 2.2, 3.1, 50)) == MISSED
+    assert mark(*row, Interval(2.5, 1.2, 3.1, 50)) == MISSED_MARGINAL
+    assert mark(*row, quantile([0.5], 0.5)) == FEW
+    assert mark(*row, Interval(math.nan, math.nan, math.nan, 0)) == "no data"
+    none = (0.0, 0.0), (0.0, 0.0)
+    assert mark(*none, Interval(0.0, 0.0, 3.7, 60)) == FEW
+    assert mark(*none, Interval(0.0, 0.0, 3.7, 130)) == MET
+    assert mark(*none, Interval(0.0, 0.0, 3.7, 600)) == TARGET_MET
+    assert mark(*none, Interval(1.0, 0.0, 5.0, 600)) == MISSED
+    assert mark(ANY, ANY, Interval(9.0, 8.0, 10.0, 5)) == ""
 
 
 def synthetic(error: float, latency: float, right: float, group: str = "moving") -> list[ScenarioScore]:

@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
 
+from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
+from wam_experiments.contact_benchmark.scenarios import base_values
+from wam_experiments.contact_benchmark.statistics import share
 from wam_experiments.contact_robustness.degradations import NAMES, drawn
-from wam_experiments.contact_robustness.evaluation import drives, evaluate, page, report_text
+from wam_experiments.contact_robustness.evaluation import RobustnessResult, drives, evaluate, page, report_text
+from wam_experiments.contact_robustness.recording import Drive, record
+from wam_experiments.contact_robustness.replay import SignalFaults
+from wam_experiments.contact_robustness.requirements import COVERAGE, USUAL, contacts_needed
+from wam_experiments.contact_robustness.touches import axis_of
 
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
 EXACT = ("moving", "asymmetry", "load", "shape", "payload", "mass")
@@ -28,11 +37,40 @@ def test_a_degradation_that_does_not_exist_is_refused_with_those_that_do() -> No
         drives(CONFIGURATION, [1], ["wind"], 10.0)
 
 
+def test_with_the_contacts_that_the_page_names_a_share_in_the_middle_is_shown_to_be_allowed() -> None:
+    count = contacts_needed()
+    enough, fewer = share(round(USUAL * count), count), share(round(USUAL * (count - 1)), count - 1)
+    assert COVERAGE[0] <= enough.low < enough.high <= COVERAGE[1]
+    assert fewer.low < COVERAGE[0] or fewer.high > COVERAGE[1]
+
+
+@pytest.mark.slow
+def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
+    """By the joint torques that the estimator finds in motion: they are those of the drawn force, within 4 %."""
+    drive = Drive(CONFIGURATION.with_values(base_values(CONFIGURATION, False)), STATED, 905, 14.0, "level")
+    recording, shared = record(drive), drive.configuration.shared
+    own = drive.configuration.node("contact_estimator", ContactEstimatorParameters)
+    estimator, body = ContactEstimator(WAM, shared.timing, own, shared.model), RigidBody(WAM)
+    products = squares = 0.0
+    for i, state, dt in SignalFaults(recording, 1e-3, 905):
+        estimator.observe(state, None, dt)
+        for touch in recording.touches:
+            if i == round(1e3 * (touch.begin + 0.2)):
+                wrench = np.concatenate(touch.wrench(i * 1e-3, axis_of(WAM, touch.cover, touch.place)))
+                true = wrench @ body.cover_jacobian(
+                    TransmissionMap.of(WAM).joint_positions(state.position), touch.cover
+                )
+                products += float(true @ estimator.estimate().external_torques)
+                squares += float(true @ true)
+    assert squares > 1.0
+    assert products / squares == pytest.approx(1.0, abs=0.04)
+
+
 @pytest.mark.slow
 def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_payload_is_named() -> None:
     with ThreadPoolExecutor(1) as executor:
-        groups = evaluate(drives(CONFIGURATION, [901], [COARSE, LOADED], 10.0)[0], executor)
-        believing = evaluate(drives(CONFIGURATION.with_values(BELIEVING), [901], [LOADED], 10.0)[0], executor)
+        groups = evaluate(drives(CONFIGURATION, [901], [COARSE, LOADED], 10.0).wide, executor)
+        believing = evaluate(drives(CONFIGURATION.with_values(BELIEVING), [901], [LOADED], 10.0).wide, executor)
     for name in (COARSE, LOADED):
         (score,) = groups[name]
         assert not score.failure
@@ -42,5 +80,5 @@ def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_pa
     assert believing[LOADED][0].alarms > 0
     assert groups[LOADED][0].warnings > 0.5
     assert groups[COARSE][0].warnings == 0.0
-    text = page(report_text(groups, groups, {}), "wam evaluate robustness")
+    text = page(report_text(RobustnessResult(groups, groups, {}, {}, [], 70e-6)), "wam evaluate robustness")
     assert all(f"| {name} | " in text for name in (COARSE, LOADED))

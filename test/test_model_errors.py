@@ -7,7 +7,16 @@ import pytest
 from arms import CONFIGURATION, WAM
 
 from wam_control.contact_estimator import ContactEstimatorParameters
-from wam_control.model_errors import GATE, HINDSIGHT, LEARN_EVERY, ModelErrors, Observation
+from wam_control.model_errors import (
+    GATE,
+    HINDSIGHT,
+    LARGEST,
+    LEARN_EVERY,
+    MARGIN,
+    TRUST_TIME,
+    ModelErrors,
+    Observation,
+)
 from wam_control.model_prior import INFLATED, ModelPrior, model_prior
 from wam_control.momentum_observer import MomentumObserver
 from wam_description.signals import State
@@ -93,6 +102,23 @@ def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
     assert tracked.noise[1] == 0.0
     _, covariance = tracked.corrected(Observation(np.zeros(2), effects, 1e-4 * np.eye(2), np.ones(2)))
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.3, rel=0.3)
+
+
+def test_the_size_of_the_errors_is_followed_in_motion_but_not_in_contact_or_at_rest() -> None:
+    for statistic in (1.5, 3.0):
+        tracked = errors()
+        follow(tracked, 6 * round(TRUST_TIME / LEARN_EVERY), statistic=statistic)
+        assert tracked.size == pytest.approx(MARGIN * statistic / 2, rel=0.01)
+        before = tracked.size
+        follow(tracked, 100, in_contact=True, statistic=100.0)
+        assert tracked.size == before
+    for statistic, limit in ((0.0, 1.0), (0.9 * GATE, LARGEST)):
+        follow(tracked, 6 * round(TRUST_TIME / LEARN_EVERY), statistic=statistic)
+        assert tracked.size == limit
+    tracked, random = errors(), np.random.default_rng(4)
+    for _ in range(200):
+        tracked.follow(seen(random)._replace(moving=np.array([1.0, 0.0])), 0.9 * GATE, False, LEARN_EVERY)
+    assert tracked.size == 1.0
 
 
 def test_only_an_error_that_is_certainly_large_is_named() -> None:

@@ -3,6 +3,9 @@
 The residual of the momentum observer is r = tau_ext + H x + e: H the torques of the model's errors of size one through
 the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
 r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.
+
+How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, positions are
+less certain.  Never more: on a better arm, links that are wrong by friction of the contact would seem certain.
 """
 
 from collections import deque
@@ -21,6 +24,9 @@ CORRELATED = 4.0  # of R: the rest is the same in so many samples
 GATE = 12.0  # of the detection statistic, above which nothing is learned
 HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after it nothing is learned
 NOISE_TIME = 1.0  # s, in which the noise of the motors is followed
+TRUST_TIME = 5.0  # s of motion, in which the size of the errors is followed
+MARGIN = 2.0  # of that size: errors in contact are larger, and some come rarely
+LARGEST = 4.0  # of that size
 LEAST = 1e-30  # variance: avoids a division by zero for errors that are none
 SURE = 2.0  # sd of an error that it must have beyond what is tolerable
 
@@ -51,6 +57,11 @@ class ModelErrors:
     drift : sd of the errors' random walk per largest sd, 1/sqrt(s).
     through : (n, n), joint torques per motor torque.
     noise : (n,), N^2 m^2, variance of the motors' torque that is assumed at the start.
+
+    Attributes
+    ----------
+    size : squared errors of the torques in free motion, with a margin, over the variances that are stated for them;
+        at least 1.
     """
 
     def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array) -> None:
@@ -58,8 +69,8 @@ class ModelErrors:
         self._walk = drift**2 * np.diag(prior.limit)
         self._through, self._to_motors = through, np.linalg.inv(through)
         self.errors, self.covariance = prior.errors.copy(), prior.covariance.copy()
-        self.noise = noise.copy()
-        self._waiting: deque[Observation] = deque()
+        self.noise, self.size = noise.copy(), 1.0
+        self._waiting: deque[tuple[Observation, float]] = deque()
         self._since = self._contact = self._hold = 0.0
 
     @property
@@ -112,9 +123,14 @@ class ModelErrors:
         self._grow(self._since)
         if not in_contact and self._hold <= 0.0:
             self._contact = 0.0
-            self._waiting.append(seen)
+            self._waiting.append((seen, statistic))
             if len(self._waiting) > HINDSIGHT / LEARN_EVERY and statistic < GATE:
-                self._learn(self._waiting.popleft(), self._since)
+                before, its = self._waiting.popleft()
+                self._learn(before, self._since)
+                # of a shaft at rest stiction hides the errors
+                rate = self._since / TRUST_TIME * float(before.moving.min())
+                size = self.size + rate * (MARGIN * its / len(before.residual) - self.size)
+                self.size = min(max(size, 1.0), LARGEST)
         self._since = 0.0
 
     def _grow(self, span: float) -> None:

@@ -25,6 +25,7 @@ from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 SETTLED = 2.0  # time constants from the first sample until the estimate is ready
+UNTRACKED = 2.0  # of `motor_torque_fraction`: for torques of a contact, whose error no free motion shows
 
 
 class MomentumObserver:
@@ -289,6 +290,11 @@ class MomentumObserver:
             self._followed = self.age
 
     @property
+    def size(self) -> float:
+        """How much larger the variances of the torques are in free motion than stated; of joint sensors not known."""
+        return 1.0 if self._link_side else self._errors.size
+
+    @property
     def model_errors(self) -> dict[str, float]:
         """The errors of the model that are tracked, by name: per torque of the model, the payload in kg."""
         return {} if self._link_side else self._errors.by_name
@@ -328,6 +334,8 @@ class MomentumObserver:
         less, least = self._times[0] / self._times[which], given.motor_torque_sd**2
         sds = [given.motor_torque_fraction * torque for torque in self._map.motor_torques(model)]
         variance[:n] += [less * (least + sd * sd) for sd in sds]
+        untracked = UNTRACKED * given.motor_torque_fraction
+        variance[:n] += [(untracked * torque) ** 2 / self.size for torque in self._map.motor_torques(residual.tolist())]
         rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
         momentum = self._inertia.dot(speed)

@@ -14,16 +14,27 @@ from wam_cli.commands import (
     writable_file,
 )
 from wam_experiments.contact_robustness import degradations
-from wam_experiments.contact_robustness.evaluation import drives, evaluate, page, report_text
+from wam_experiments.contact_robustness.evaluation import (
+    SHORTEST,
+    RobustnessResult,
+    average_update,
+    bounds_of,
+    drives,
+    evaluate,
+    friction_trials,
+    page,
+    report_text,
+)
+from wam_experiments.identification.evaluation import run_trial
+from wam_sim.batch import results
 
 SEEDS = (1, 2, 3)
-SHORTEST = 10.0  # s, with one contact
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_seeds(parser, SEEDS, "arms and contacts")
-    parser.add_argument("--seconds", type=float, default=26.0, help="length of a recording, default 26")
+    parser.add_argument("--seconds", type=float, default=110.0, help="length of a recording, default 110")
     parser.add_argument(
         "--only", nargs="+", default=list(degradations.NAMES), metavar="DEGRADATION", help="default: all"
     )
@@ -43,9 +54,14 @@ def run(given: argparse.Namespace) -> int:
     if given.write:
         writable_file("--write", given.write)
     before = given.before.read_text(encoding="utf-8") if given.before else ""
-    chosen = drives(configuration_of(given), given.seed, given.only, given.seconds)
+    configuration = configuration_of(given)
+    chosen = drives(configuration, given.seed, given.only, given.seconds)
     with batch_of(given) as batch:
-        text = report_text(*(evaluate(each, *batch, recordings=given.recordings) for each in chosen))
+        groups = [evaluate(each, *batch, recordings=given.recordings) for each in chosen]
+        identifications = results(run_trial, friction_trials(configuration, given.seed), *batch)
+    wide, second, level, identified = groups
+    average, bounds = average_update(configuration, given.seed[0]), bounds_of(configuration, given.seed[0], identified)
+    text = report_text(RobustnessResult(wide, second, level, identified, identifications, average, bounds))
     print(text)
     if given.write:
         seeds = " ".join(map(str, given.seed))

@@ -33,25 +33,25 @@ def holds(value: float, bound: Bound) -> bool:
     return low - 1e-12 <= value <= high + 1e-12
 
 
-def mark(metric: Metric, found: Interval) -> str:
+def mark(required: Bound, target: Bound, found: Interval) -> str:
     """Comparison with the required and the target values, '' without any."""
-    if metric.required == ANY and metric.target == ANY:
+    if required == ANY and target == ANY:
         return ""
     if math.isnan(found.value):
         return "no data"
-    counts = metric.required == (0.0, 0.0)  # a count that must be zero: the interval of a count never is
+    counts = required == (0.0, 0.0)  # a count that must be zero: the interval of a count never is
     if counts and found.observed < FREE_REQUIRED and found.value == 0.0:
         return FEW
     if math.isnan(found.low) or math.isnan(found.high):
         return FEW
-    if metric.target != ANY and holds(found.value, metric.target) and not (counts and found.observed < FREE_TARGET):
+    if target != ANY and holds(found.value, target) and not (counts and found.observed < FREE_TARGET):
         return TARGET_MET
-    if metric.required == ANY:
+    if required == ANY:
         return TARGET_MISSED
-    if not holds(found.value, metric.required):
-        low, high = metric.required
+    if not holds(found.value, required):
+        low, high = required
         return MISSED if counts or found.high < low or found.low > high else MISSED_MARGINAL
-    clear = counts or (holds(found.low, metric.required) and holds(found.high, metric.required))
+    clear = counts or (holds(found.low, required) and holds(found.high, required))
     return MET if clear else MARGINAL
 
 
@@ -59,7 +59,9 @@ def missed(result: BenchmarkResult, arm: Arm) -> list[str]:
     """Metrics whose required value is missed by all seeds together."""
     total = result.total
     return [
-        metric.name for metric in required_metrics(arm) if mark(metric, metric.of(total)) in (MISSED, MISSED_MARGINAL)
+        metric.name
+        for metric in required_metrics(arm)
+        if mark(metric.required, metric.target, metric.of(total)) in (MISSED, MISSED_MARGINAL)
     ]
 
 
@@ -81,11 +83,11 @@ def table(result: BenchmarkResult, arm: Arm, metrics: Sequence[Metric]) -> str:
         found = metric.of(result.total)
         if found.observed == 0 and metric.required == ANY == metric.target:
             continue
-        single = [_number(metric, metric.of(result.scores[seed]).value) for seed in result.seeds]
-        span = f"{_number(metric, found.low)} to {_number(metric, found.high)}"
-        bounds = [_bound(metric, metric.required), _bound(metric, metric.target)]
-        value, count = _number(metric, found.value), str(found.observed)
-        rows.append([metric.name, metric.unit, *bounds, *single, value, span, count, mark(metric, found)])
+        single = [number(metric.of(result.scores[seed]).value, metric.scale) for seed in result.seeds]
+        span = f"{number(found.low, metric.scale)} to {number(found.high, metric.scale)}"
+        bounds = [bound_text(metric.required, metric.scale), bound_text(metric.target, metric.scale)]
+        value, judged = number(found.value, metric.scale), mark(metric.required, metric.target, found)
+        rows.append([metric.name, metric.unit, *bounds, *single, value, span, str(found.observed), judged])
     return markdown(head, rows)
 
 
@@ -108,21 +110,23 @@ def report(result: BenchmarkResult, arm: Arm) -> str:
     return "\n".join([extent(result.total), "", *tables])
 
 
-def _number(metric: Metric, value: float) -> str:
+def number(value: float, scale: float) -> str:
+    """A measured value as text; none is infinite or could not be measured."""
     if math.isnan(value):
         return "–"
     if math.isinf(value):
         return "none"
-    return f"{metric.scale * value:.3g}"
+    return f"{scale * value:.3g}"
 
 
-def _bound(metric: Metric, bound: Bound) -> str:
-    low, high = (f"{metric.scale * end:.3g}" for end in bound)
+def bound_text(bound: Bound, scale: float) -> str:
+    """Allowed values as text, '' for any."""
+    low, high = (f"{scale * end:.3g}" for end in bound)
     if bound == ANY:
         return ""
     if bound[0] <= 0.0:
         return high
-    return f"at least {low}" if bound[1] >= 1.0 else f"{low} to {high}"
+    return f"at least {low}" if bound[1] == 1.0 else f"{low} to {high}"
 
 
 def page(result: BenchmarkResult, arm: Arm, command: str, times: str, picture: str) -> str:

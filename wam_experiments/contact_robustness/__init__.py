@@ -4,6 +4,8 @@ degradations   how the true arm and its signals differ from what the estimator s
 touches        contacts: strong, rough, on the ends, sliding, two at once, impacts
 recording      play one drawn arm without ROS; keep the motors' signals and the truth
 replay         the estimator on a recording
-rows           the table, by degradation and by kind of contact
+bounds         what exact torques, and torques with the errors of the identified arms, leave open
+requirements   what is required, and what was measured
+rows           the tables, by degradation and by kind of contact
 evaluation     all degradations of some seeds on an executor, and the page
 """

@@ -148,7 +148,7 @@ NAMES = (
     "realistic mix",
 )
 
-IDENTIFIED = ("friction 0.8 to 1.3", "realistic mix")  # of which arms are also identified before
+IDENTIFIED = ("realistic mix",)  # of which arms are also identified before
 
 
 def drawn(name: str, arm: Arm, random: Random) -> Degradation:

@@ -15,7 +15,7 @@ from wam_driver.safety import Mode
 from wam_experiments.contact_benchmark.moves import MoveGenerator
 from wam_experiments.contact_benchmark.scenarios import RELEASE, SETTLE, base_values
 from wam_experiments.contact_robustness.degradations import Degradation, Values, drawn
-from wam_experiments.contact_robustness.touches import KINDS, SECOND_KINDS, Touch, axis_of, touches
+from wam_experiments.contact_robustness.touches import KINDS, LEVEL_KINDS, SECOND_KINDS, Touch, axis_of, touches
 from wam_experiments.identification.evaluation import play
 from wam_sim.simulation import Simulation
 
@@ -24,6 +24,7 @@ WARM_UP = 6.0  # s of free motion before the first contact
 SPACING = 1.9  # s from one contact to the next
 EXCITATION = 20.0  # s of motion for an identification
 DRIFT_STEPS = 20  # of friction, over a recording
+CONTACTS = {"wide": KINDS, "second": SECOND_KINDS, "level": LEVEL_KINDS}
 
 
 class Drive(NamedTuple):
@@ -32,7 +33,7 @@ class Drive(NamedTuple):
     Attributes
     ----------
     configuration, degradation, seed, seconds : the arm, the degradation by name, what is drawn, the length in s.
-    second : whether with many second contacts.
+    contacts : which of `CONTACTS` are drawn.
     is_identified : whether the arm's model is identified before, from a motion of its own.
     """
 
@@ -40,7 +41,7 @@ class Drive(NamedTuple):
     degradation: str
     seed: int
     seconds: float
-    second: bool = False
+    contacts: str = "wide"
     is_identified: bool = False
 
 
@@ -88,7 +89,7 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
     times = np.arange(WARM_UP, drive.seconds - SPACING, SPACING) + random.uniform(0.0, 0.4)
     return (
         degradation,
-        touches(arm, random, times.tolist(), SECOND_KINDS if drive.second else KINDS),
+        touches(arm, random, times.tolist(), CONTACTS[drive.contacts]),
         steps,
         list(start),
     )
@@ -110,16 +111,21 @@ def record(drive: Drive) -> DriveRecording:
     rows: list[tuple[list[float], list[float], list[float], float]] = []
     nominal = np.array(arm.joints.dynamic_friction)
     drift_every = max(1, round(drive.seconds / period / DRIFT_STEPS))
+
+    def push(*_: Any) -> None:
+        _push(run, arm, contacts, (len(rows) - 1) * period)
+
+    run.listen("sim/disturbance", push)  # the scenario, which knows of no push, has just released every one
     done = False
     while not done:
         k = len(rows)
-        _push(run, arm, contacts, k * period)
         if degradation.drift and k % drift_every == 0:
             run.driver.set_added_friction((degradation.drift * k * period / drive.seconds * nominal).tolist())
         state = run.driver.motor_state
         rows.append(
             (list(state.position), list(state.velocity), list(state.effort), max(map(abs, run.driver.plant.qd)))
         )
+        push()
         done = run.step() or run.driver.safety.mode is Mode.FAULT
     theta, thetad, torque, speed = (np.array([row[i] for row in rows]) for i in range(4))
     failure = run.driver.safety.fault or run.scenario.failure

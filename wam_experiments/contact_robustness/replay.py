@@ -21,6 +21,7 @@ SECOND_WITHIN = 0.25  # s
 HIT = 0.1  # s after the start of a contact in which a change is its own
 START_AFTER = 0.1  # s, of an estimator that starts in contact
 START_WITHIN = 0.3  # s
+SLIDING = 0.3  # rad/s, slowest motor
 
 
 class TouchOutcome(NamedTuple):
@@ -73,6 +74,7 @@ class ReplayScore(NamedTuple):
     free_seconds, alarms : time without contact; detections that start in it.
     warnings : share of that time with a warning that the model is off.
     torque_z : rms of error over stated sd of the external torques in free motion.
+    torque_errors : (2, n), rms errors of the external torques in free motion, N m: with all motors sliding, and of all.
     steady_seconds, changes : time with one contact; second contacts that are reported in it.
     second : of each second contact.
     started : whether a contact in which the estimator starts is detected: (warm, cold) of each.
@@ -85,6 +87,7 @@ class ReplayScore(NamedTuple):
     alarms: int
     warnings: float
     torque_z: float
+    torque_errors: list[list[float]]
     steady_seconds: float
     changes: int
     second: list[SecondOutcome]
@@ -177,11 +180,9 @@ def _scored(
     # a detection that continues from a true contact ends late, and is no new alarm
     alarms = int((alarm[1:] & ~alarm[:-1] & ~busy[1:]).sum())
     free = ~busy & moving & (np.array([row.time for row in rows]) > 1.0)
-    z = [
-        np.array(row.estimate.external_torques) / np.array(row.estimate.torque_sd)
-        for row, take in zip(rows, free, strict=True)
-        if take
-    ]
+    found = np.array([row.estimate.external_torques for row in rows])
+    z = (found / np.array([row.estimate.torque_sd for row in rows]))[free]
+    sliding = free & (np.abs(recording.thetad[[row.sample for row in rows]]).min(axis=1) > SLIDING)
     warned = [bool(getattr(row.estimate, "warning", "")) for row, take in zip(rows, ~busy, strict=True) if take]
     reported = np.array([row.estimate.contacts > 1 for row in rows])
     reported[1:] &= ~reported[:-1]
@@ -202,7 +203,8 @@ def _scored(
         free_seconds=step * int((~busy).sum()),
         alarms=alarms,
         warnings=sum(warned) / max(1, len(warned)),
-        torque_z=float(np.sqrt(np.mean(np.square(z)))) if z else math.nan,
+        torque_z=float(np.sqrt(np.mean(np.square(z)))) if len(z) else math.nan,
+        torque_errors=[np.sqrt(np.mean(np.square(found[which]), axis=0)).tolist() for which in (sliding, free)],
         steady_seconds=steady,
         changes=changes,
         second=second,

@@ -37,13 +37,14 @@ def alarms(scores: Scores) -> str:
     return f"{60.0 * sum(score.alarms for score in scores) / seconds:.1f}" if seconds else "none"
 
 
-def _near(found: Sequence[TouchOutcome], force: float) -> list[TouchOutcome]:
+def near(found: Sequence[TouchOutcome], force: float) -> list[TouchOutcome]:
+    """Contacts of about this force, N."""
     return [one for one in found if abs(one.force - force) <= NEAR * force]
 
 
 def fast(scores: Scores) -> str:
     """Contacts of 5 N on the outer link that are detected within 30 ms."""
-    times = [one.latency for one in _near(outcomes(scores, "outer"), 5.0) if not math.isnan(one.latency)]
+    times = [one.latency for one in near(outcomes(scores, "outer"), 5.0) if not math.isnan(one.latency)]
     return percent(sum(time <= 0.03 + 1e-9 for time in times), len(times))
 
 
@@ -52,7 +53,7 @@ def position(level: float, forces: Sequence[float] = (5.0, 10.0, 20.0)) -> Calla
 
     def of(scores: Scores) -> str:
         values = [
-            quantile([one.error for one in _near(outcomes(scores, "outer"), force)], level).value for force in forces
+            quantile([one.error for one in near(outcomes(scores, "outer"), force)], level).value for force in forces
         ]
         return " / ".join("-" if math.isnan(value) else f"{100.0 * value:.1f}" for value in values)
 
@@ -100,7 +101,7 @@ def wrong(least: float, *kinds: str) -> Callable[[Scores], str]:
 
 def inner(scores: Scores) -> str:
     """Contacts of 10 N on the inner link that are detected within 200 ms."""
-    found = _near(outcomes(scores, "inner"), 10.0)
+    found = near(outcomes(scores, "inner"), 10.0)
     return percent(sum(one.latency <= 0.2 + 1e-9 or math.isnan(one.latency) for one in found), len(found))
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from wam_description.arm import Arm
 
-LEVELS = (5.0, 10.0, 20.0)  # N, half of all contacts
-WEAKEST, STRONGEST = 1.0, 60.0  # N, the other half, uniform in the logarithm
+LEVELS = (5.0, 10.0, 20.0)  # N, half of the contacts of most recordings
+WEAKEST, STRONGEST = 1.0, 60.0  # N, the others, uniform in the logarithm
 ROUGHEST = 0.8  # coefficient of friction
 RISE = 0.005  # s
 MARGIN, NEAR_ELBOW = 0.02, 0.01  # m
@@ -41,6 +41,8 @@ SECOND_KINDS = {
     "second on the same link": 0.2,
     "second on the other link": 0.2,
 }
+# how often in the recordings of an arm that was identified, whose forces are all of `LEVELS`
+LEVEL_KINDS = {"outer": 0.75, "inner": 0.25}
 HOLD, HOLD_OF_FIRST, IMPACT = 0.5, 1.0, 0.03  # s
 HARDER, HARDER_AFTER, HARDER_WITHIN = (1.5, 3.0), 0.4, (0.05, 0.4)  # times the force, s after the start, s
 SECOND_AFTER, SECOND_HOLD = 0.5, 0.4  # s, of the second contact after the first
@@ -109,7 +111,7 @@ def touches(
     found: list[Touch] = []
     for begin in times:
         kind = str(random.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
-        drawn = _drawn(arm, random, kind, begin)
+        drawn = _drawn(arm, random, kind, begin, 1.0 if kinds is LEVEL_KINDS else 0.5)
         lasting = kinds is SECOND_KINDS and len(drawn) == 1
         found += [drawn[0]._replace(end=begin + HOLD_OF_FIRST)] if lasting else drawn
     return found
@@ -122,15 +124,15 @@ def _neighbours(arm: Arm, random: np.random.Generator) -> tuple[str, str]:
     return names[i], names[i + 1]
 
 
-def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float) -> list[Touch]:
+def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_levels: float) -> list[Touch]:
     inner, outer = _neighbours(arm, random)
-    size = _size(random)
+    size = _size(random, of_levels)
     if kind.startswith("second"):
         first_cover = str(random.choice((inner, outer)))
         same = kind.endswith("same link")
         second_cover = first_cover if same else outer if first_cover == inner else inner
         first = _side(arm, random, first_cover, max(size, 4.0), begin, HOLD_OF_FIRST)._replace(kind=kind)
-        second = _side(arm, random, second_cover, max(_size(random), 4.0), begin + SECOND_AFTER, SECOND_HOLD)
+        second = _side(arm, random, second_cover, max(_size(random, of_levels), 4.0), begin + SECOND_AFTER, SECOND_HOLD)
         return [first, second._replace(kind="second")]
     if kind in ("tip along the tube", "end cap, oblique"):
         lean = 0.0 if kind == "tip along the tube" else float(random.uniform(0.1, 1.0))
@@ -171,8 +173,8 @@ def _length(arm: Arm, cover: str) -> float:
     return arm.covers.length_of(cover)
 
 
-def _size(random: np.random.Generator) -> float:
-    if random.random() < 0.5:
+def _size(random: np.random.Generator, of_levels: float) -> float:
+    if random.random() < of_levels:
         return float(random.choice(LEVELS)) * float(random.uniform(0.95, 1.05))
     return float(np.exp(random.uniform(math.log(WEAKEST), math.log(STRONGEST))))
 
