@@ -18,16 +18,15 @@ UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the com
 CONFLICT = 0.1  # s, after which another contact counts
 DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
-DETECTED = 0.04  # s, until a touch is detected there
+DETECTED, FELT = 0.04, 0.1  # s, until a touch is detected there by the joint sensors, by the motors
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
 KEPT = 1.25  # settling times, up to which a force off the tolerance is remembered
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
-FINE = 4e-4  # m, way of the whole force below which jerks of friction are as large as what is left to correct
+FINE = 1e-3  # m, way of the whole force below which jerks of friction are as large as what is left to correct
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which such a force is kept, and up to which it is
-STATED = 1.6  # sd of the force that is stated at a pinned position, per error that was found: friction is mostly less
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
@@ -87,7 +86,7 @@ class ForceHold:
             self._has_settled
         ) = False
         self._other = ""
-        self._travel = self._conflict = self._assumed = self._strange = 0.0
+        self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = 0.0
         self._forget_swings()
 
@@ -116,7 +115,8 @@ class ForceHold:
             whole = desired * yielding / axis.speed_fraction
             return max(whole / (LATE if is_known else IDENTIFIED), slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
-        fastest = fastest if is_known else min(fastest, max(desired * yielding / DETECTED, slowest))
+        delay = FELT if parameters.feedback == "contact_estimate" else DETECTED
+        fastest = fastest if is_known else min(fastest, max(desired * yielding / delay, slowest))
         return fastest / axis.speed_fraction
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
@@ -206,7 +206,9 @@ class ForceHold:
         held = self._held(axis, point, desired, limit, signal, parameters)
         if held[0].holds:
             return held
-        if not point.is_single and (is_strange or not point.is_pinned):
+        is_double = not point.is_single and (is_strange or not point.is_pinned)
+        self._double = self._double + dt if is_double else 0.0
+        if self._double > CONFLICT:  # an impact looks like one for a moment, and a sudden hold is a jerk
             return ForceReaction.SECOND_CONTACT, (
                 f"a second contact is nearly certain besides that on {point.cover}: the torques are not those of the "
                 "commanded force alone; the arm holds its position until the second contact has gone"
@@ -215,7 +217,7 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        is_uncertain = axis.force_sd > (STATED if point.is_pinned else 1.0) * known
+        is_uncertain = axis.force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
