@@ -55,6 +55,15 @@ def test_a_pinned_force_that_is_known_badly_is_reported_with_its_uncertainty() -
     assert loop.reaction is ForceReaction.NONE
 
 
+def test_an_error_of_the_measured_force_leaves_less_to_what_is_not_known() -> None:
+    """8 % are measured, and 7 % are not known: the true force may well be off by more than 10 %."""
+    loop = force_loop(ARM, PINNED)
+    for measured, reaction in ((2.5, ForceReaction.NONE), (2.7, ForceReaction.UNCERTAIN)):
+        for _ in range(420):
+            ask(loop, World(400.0, force=measured), down(2.5))
+        assert loop.reaction is reaction
+
+
 def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_commanded() -> None:
     """The motion is watched before the arm moves: what it touches then does not count as shaking."""
     own = replace(OWN, feedback="contact_estimate", contact_source="pinned")

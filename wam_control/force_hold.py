@@ -25,8 +25,8 @@ CREEP = 3e-3  # m, least way towards a surface within the settling time: slower,
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
 KEPT = 1.25  # settling times, up to which a force off the tolerance is remembered
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
-FINE = 1e-3  # m, way of the whole force below which jerks of friction are as large as what is left to correct
-SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which such a force is kept, and up to which it is
+FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
+SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
@@ -126,8 +126,8 @@ class ForceHold:
         changes the force by more than that error.
         """
         whole = desired * (1.0 / parameters.guard.contact_stiffness + axis.compliance)
-        band = (LEAVE if self._is_kept else SETTLE) * desired
-        self._is_kept = self.is_touching and whole < FINE and abs(desired - measured) < band
+        band = (LEAVE if self._is_kept else SETTLE) * desired * min(FINE / whole, 1.0)
+        self._is_kept = self.is_touching and whole < COARSE and abs(desired - measured) < band
         return self._is_kept
 
     def travel(self, distance: float) -> None:
@@ -213,7 +213,9 @@ class ForceHold:
                 f"a second contact is nearly certain besides that on {point.cover}: the torques are not those of the "
                 "commanded force alone; the arm holds its position until the second contact has gone"
             )
-        is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired
+        # what is off already leaves less of the tolerance to what is not known
+        left = max(1.0 - abs(desired - measured) / (TOLERANCE * desired), 0.0)
+        is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired * left
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
