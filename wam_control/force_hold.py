@@ -18,8 +18,9 @@ UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the com
 CONFLICT = 0.1  # s, after which another contact counts
 DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
-DETECTED, FELT = 0.04, 0.1  # s, until a touch is detected there by the joint sensors, by the motors
+DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
+FELT = 0.2  # s, the same for the motors, before and after the touch: they detect most of a small force at once, and late
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -28,6 +29,8 @@ SWING = 0.5  # of the settling time, within which a force that swings is off to 
 FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
+FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
+SLOWED = 0.5  # of the speed along the force, from then on
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
@@ -72,6 +75,7 @@ class ForceHold:
     Attributes
     ----------
     is_touching : whether the measured force shows that something is touched.
+    share : of the speed along the force: less where the late force of the motors was seen to swing.
     """
 
     def __init__(self) -> None:
@@ -81,6 +85,7 @@ class ForceHold:
     def reset(self) -> None:
         """Another force is commanded."""
         self._shake.reset()
+        self.share = 1.0
         self._way = self._watched = self._shaking = self._blocked = 0.0
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
             self._has_settled
@@ -101,22 +106,22 @@ class ForceHold:
     ) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
 
-        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, unless friction would
-        move the arm in jerks.  At a position that is not known, slower: what is touched has to be identified before the
-        force is too large.
+        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, `FELT` from the motors,
+        unless friction would move the arm in jerks.  At a position that is not known, slower: what is touched has to be
+        identified before the force is too large.
         """
         if not parameters.limits.impact:
             return math.inf
         stiffness = parameters.guard.contact_stiffness
         yielding = 1.0 / stiffness + axis.compliance
-        is_known = point.is_pinned or point.is_certain
+        is_known, is_felt = point.is_pinned or point.is_certain, parameters.feedback == "contact_estimate"
         slowest = CREEP / parameters.limits.settling_time
         if self.is_touching:
             whole = desired * yielding / axis.speed_fraction
-            return max(whole / (LATE if is_known else IDENTIFIED), slowest)
+            return max(whole / (IDENTIFIED if not is_known else FELT if is_felt else LATE), slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
-        delay = FELT if parameters.feedback == "contact_estimate" else DETECTED
-        fastest = fastest if is_known else min(fastest, max(desired * yielding / delay, slowest))
+        if is_felt or not is_known:
+            fastest = min(fastest, max(desired * yielding / (FELT if is_felt else DETECTED), slowest))
         return fastest / axis.speed_fraction
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
@@ -224,7 +229,11 @@ class ForceHold:
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
         missed = self._not_reached(axis, measured, desired, parameters, dt)
-        if is_cycling:
+        is_late = parameters.feedback == "contact_estimate" and self.share > SLOWED
+        if is_late and is_touching and self._turns.count > FEW:
+            self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
+            self._turns.reset()
+        elif is_cycling:
             return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
         if missed:
             return ForceReaction.NOT_REACHED, missed

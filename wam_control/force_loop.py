@@ -340,6 +340,7 @@ class ForceLoop:
             error, held = 0.0, self._at_rest(held)
         speeds = self._delay.step(scalar.velocities([error], [desired - before], dt), own.delay_samples)
         speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
+        speed *= self._hold.share
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
