@@ -335,7 +335,8 @@ class ForceHold:
             return ForceReaction.UNCERTAIN, (
                 f"the force is known to +-{axis.force_sd:.2g} N, {axis.force_sd / desired:.0%} of the commanded "
                 f"{desired:.3g} N; sensing.reported_fraction, {parameters.sensing.reported_fraction:.0%}, is to be "
-                "known: tare in free space, command more force, or another direction or pose"
+                "known, less where it is measured off: tare in free space, command more force, or another direction "
+                "or pose"
             )
         return ForceReaction.NONE, ""
 
