@@ -197,15 +197,13 @@ class ForceAxes:
         point += covers.radius_of(cover) * (self._body.cover_pose(q, cover).rotation.T @ normal)
         return self._body.point_jacobian(q, cover, point), point
 
-    def _push(self, q: Sequence[float], cover: str, position: float, direction: Array) -> Array:
-        """What the surface gives back in all (3,) per force along a direction, apart from friction that is not known.
+    def _push(self, q: Sequence[float], cover: str, direction: Array) -> Array:
+        """What a surface at the side of a link gives back in all (3,) per force along a direction, friction apart.
 
         Friction up to `friction` holds the link, and the force is along the direction.  Where this leans further off
         the normal of the link's side, the link slides, and the force turns to the normal; beyond `STEEPEST` only what
         holds the link gives such a force.
         """
-        if position >= self._covers.length_of(cover) - self._covers.radius_of(cover):
-            return direction  # the end of a link is round
         along = self._body.cover_pose(q, cover).rotation[:, 0]
         aside = along * float(along @ direction)
         across: Array = direction - aside
@@ -244,8 +242,11 @@ class ForceAxes:
             zero = np.zeros(n)
             return ForceAxis(lever, zero, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n)))
         size = max(force, SMALLEST_FORCE)
-        # other forces at the same place press the surface as well
-        push = direction if others else self._push(q, cover, position, direction)
+        length = self._covers.length_of(cover)
+        aside = self._push(q, cover, direction)
+        # the end of a link is round, and other forces at the same place press the surface as well
+        is_side = position + 2.0 * position_sd < length - self._covers.radius_of(cover) and not others
+        push = aside if is_side else direction
         friction = parameters.friction * size * _across(direction, push)
         tangential = friction @ jacobian
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
@@ -267,8 +268,10 @@ class ForceAxes:
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        length = self._covers.length_of(cover)
         anywhere = spread + max(length * length / 12.0, position_sd**2) * moved
+        if position_sd:
+            other = (aside - direction) @ jacobian * size  # the side or the end: the same torques do not tell
+            anywhere += np.outer(other, other)
         sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ np.linalg.solve(anywhere, press))))
         yielding = float(lever @ self._compliance @ lever)
         return ForceAxis(lever, press, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse)
