@@ -240,7 +240,9 @@ class ForceAxes:
         square = float(lever @ lever)
         if square <= REACH * REACH:
             zero = np.zeros(n)
-            return ForceAxis(lever, zero, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n)))
+            return ForceAxis(
+                lever, zero, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n))
+            )
         size = max(force, SMALLEST_FORCE)
         length = self._covers.length_of(cover)
         aside = self._push(q, cover, direction)
@@ -274,7 +276,9 @@ class ForceAxes:
             anywhere += np.outer(other, other)
         sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ np.linalg.solve(anywhere, press))))
         yielding = float(lever @ self._compliance @ lever)
-        return ForceAxis(lever, press, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse)
+        return ForceAxis(
+            lever, press, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse
+        )
 
 
 def _across(direction: Array, push: Array) -> Array:

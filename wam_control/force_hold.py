@@ -20,7 +20,9 @@ DOUBTED = 0.5  # s, after which a contact counts of which it is not known on whi
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
 DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
-FELT = 0.2  # s, the same for the motors, before and after the touch: they detect most of a small force at once, and late
+FELT = (
+    0.2  # s, the same for the motors, before and after the touch: they detect most of a small force at once, and late
+)
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -106,9 +108,9 @@ class ForceHold:
     ) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
 
-        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, `FELT` from the motors,
-        unless friction would move the arm in jerks.  At a position that is not known, slower: what is touched has to be
-        identified before the force is too large.
+        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, `FELT` from the
+        motors, unless friction would move the arm in jerks.  At a position that is not known, slower: what is touched
+        has to be identified before the force is too large.
         """
         if not parameters.limits.impact:
             return math.inf
