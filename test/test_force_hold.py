@@ -357,7 +357,7 @@ def test_on_the_side_of_a_link_that_slides_the_force_is_taken_to_be_across_it(le
 
 
 def test_what_is_touched_is_pressed_on_slowly() -> None:
-    """The force rises on the stiffest surface in no less than 0.1 s, 0.2 s from the motors, 0.3 s where it is unknown."""
+    """The force rises on the stiffest surface in 0.1 s or more, 0.2 s from the motors, 0.3 s where it is unknown."""
     sure = Contact("outer_link", 0.28, (0.0, 1.0, 0.0), 0.01, 1.0)
     speeds = {}
     for name, contact, feedback in (
