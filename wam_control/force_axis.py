@@ -200,8 +200,8 @@ class ForceAxes:
     def _push(self, q: Sequence[float], cover: str, direction: Array) -> Array:
         """What a surface at the side of a link gives back in all (3,) per force along a direction, friction apart.
 
-        Friction up to `friction` holds the link, and the force is along the direction.  Where this leans further off
-        the normal of the link's side, the link slides, and the force turns to the normal; beyond `STEEPEST` only what
+        Friction up to `friction` holds the link, and the force is along the direction.  Where this is inclined further
+        to the normal of the link's side, the link slides, and the force turns to the normal; beyond `STEEPEST` only what
         holds the link gives such a force.
         """
         along = self._body.cover_pose(q, cover).rotation[:, 0]
@@ -271,7 +271,7 @@ class ForceAxes:
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
         anywhere = spread + max(length * length / 12.0, position_sd**2) * moved
-        if position_sd:
+        if position_sd and not is_side:
             other = (aside - direction) @ jacobian * size  # the side or the end: the same torques do not tell
             anywhere += np.outer(other, other)
         sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ np.linalg.solve(anywhere, press))))
