@@ -296,8 +296,11 @@ def test_a_force_is_not_controlled_while_a_second_contact_is_suspected() -> None
         command = ForceCommand("base", down(5.0))
         for is_single in (True, False, True):
             sensed = State(POSE, STILL, (pushed + (0.0 if is_single else more)).tolist())
-            for _ in range(60):
-                contact = one._replace(is_single=is_single)
+            contact = one._replace(is_single=is_single)
+            for _ in range(15):
+                loop.step(State(POSE, STILL, DRIVEN), sensed, contact, None, command, None, None, DT)
+            assert loop.reaction is not ForceReaction.SECOND_CONTACT or is_single, "an impact looks like one"
+            for _ in range(45):
                 loop.step(State(POSE, STILL, DRIVEN), sensed, contact, None, command, None, None, DT)
             assert loop.reaction is (ForceReaction.NONE if is_single else reaction)
 
@@ -339,8 +342,22 @@ def test_friction_at_an_unknown_position_makes_the_force_as_uncertain_as_it_is()
     assert found.force_sd > 1.0
 
 
+@pytest.mark.parametrize(("lean", "follows"), [(0.25, False), (0.6, True), (1.2, False)])
+def test_on_the_side_of_a_link_that_slides_the_force_is_taken_to_be_across_it(lean: float, follows: bool) -> None:
+    """A press straight down on a link that lies at a slope was 15 to 25 % too small, measured as exactly right."""
+    axes, pose = ForceAxes(ARM, BODY, GIVEN.sensing), BODY.cover_pose(POSE, "outer_link").rotation
+    normal = pose[:, 2]
+    u = math.cos(lean) * normal + math.sin(lean) * pose[:, 0]
+    for place, is_side in ((0.2, True), (TIP, False)):
+        found = axes.axis(POSE, "outer_link", place, 0.0, u, 10.0)
+        jacobian, _ = axes._jacobian(POSE, "outer_link", place, u)
+        along = normal if follows and is_side else u
+        assert found.sense @ (10.0 * along @ jacobian) == pytest.approx(10.0 * along @ u)
+        assert found.press == pytest.approx(along @ jacobian / (along @ u))
+
+
 def test_what_is_touched_is_pressed_on_slowly() -> None:
-    """The force rises to the commanded one in no less than 0.1 s on the stiffest surface, 0.3 s where it is unknown."""
+    """The force rises on the stiffest surface in 0.1 s or more, 0.2 s from the motors, 0.3 s where it is unknown."""
     sure = Contact("outer_link", 0.28, (0.0, 1.0, 0.0), 0.01, 1.0)
     speeds = {}
     for name, contact, feedback in (
@@ -355,7 +372,7 @@ def test_what_is_touched_is_pressed_on_slowly() -> None:
             out = ask(loop, world, down(8.0), contact=contact, external=torques)
         speeds[name] = float(lever(POSE) @ out.velocity)
         whole = 8.0 * (5e-5 + out.axis.compliance)  # m
-    for name, rise in (("known", 0.1), ("unknown", 0.3), ("late", 0.1)):
+    for name, rise in (("known", 0.1), ("unknown", 0.3), ("late", 0.2)):
         assert 0.5 * whole / rise < speeds[name] < 1.05 * whole / rise, name
 
 
@@ -673,7 +690,7 @@ def test_a_stiff_surface_is_pressed_no_slower_where_the_position_is_unknown() ->
     assert lever(POSE) @ out.velocity == pytest.approx(SLOWEST)
 
 
-@pytest.mark.parametrize(("stiffness", "is_kept"), [(2e5, True), (4e3, False)])
+@pytest.mark.parametrize(("stiffness", "is_kept"), [(2e5, True), (1e4, True), (2e3, False)])
 def test_on_a_stiff_surface_a_force_is_kept_that_is_nearly_the_commanded_one(stiffness: float, is_kept: bool) -> None:
     """Or the velocity loop winds up until friction lets go, and the force jumps by more than the error."""
     loop = force_loop(ARM, replace(STIFF, guard=replace(QUIET.guard, contact_stiffness=stiffness), force_filter=0.0))
@@ -682,8 +699,9 @@ def test_on_a_stiff_surface_a_force_is_kept_that_is_nearly_the_commanded_one(sti
         return any(abs(v) > 1e-9 for v in ask(loop, World(400.0, force=force), down(4.0)).velocity)
 
     assert moves(4.16), "4 % off, not yet reached"
-    assert moves(4.08) is not is_kept
-    assert moves(4.16) is not is_kept, "it is kept up to 6 %"
+    assert moves(4.06) is not is_kept
+    assert moves(4.12) is not is_kept, "it is kept up to twice the error with which it was reached"
+    assert moves(4.22) is not (stiffness > 1e5), "the softer the surface, the less"
     assert moves(4.28)
 
 
@@ -752,11 +770,12 @@ def test_a_pinned_point_stays_on_what_is_touched_while_the_link_slides(pinned_at
     assert out.point.position == pytest.approx(expected, abs=3e-4)
 
 
-def test_until_the_link_is_identified_no_link_is_pressed_harder_than_commanded() -> None:
-    """A force on the inner link, measured as one on the outer link, reads too small."""
+@pytest.mark.parametrize("pushed", [6.0, 4.0])
+def test_until_the_link_is_identified_no_link_is_pressed_harder_than_commanded(pushed: float) -> None:
+    """A force on the inner link, measured as one on the outer link, reads too small; near the shoulder it is larger."""
     vague = Contact("inner_link", math.nan, (0.0, 1.0, 0.0), math.nan, 0.6)
     loop = force_loop(ARM, replace(QUIET, force_filter=0.0))
-    torques = BODY.gravity_torque(POSE) + 6.0 * lever(POSE, DOWNWARDS, "inner_link", 0.3)
+    torques = BODY.gravity_torque(POSE) + pushed * lever(POSE, DOWNWARDS, "inner_link", 0.3)
     sensors = State(POSE, STILL, torques.tolist())
     speeds = []
     for contact in (NO_CONTACT, vague):
@@ -765,4 +784,5 @@ def test_until_the_link_is_identified_no_link_is_pressed_harder_than_commanded()
         )
         speeds.append(float(out.axis.lever @ out.velocity))
     assert math.hypot(*out.measured) < 4.0
-    assert speeds[0] > 0.0 > speeds[1]
+    assert speeds[0] > 0.0
+    assert (speeds[1] < 0.0) if pushed > 5.0 else speeds[1] == pytest.approx(0.0, abs=1e-12)

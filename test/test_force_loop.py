@@ -24,6 +24,7 @@ GIVEN = replace(
     sensing=replace(
         PACKAGED.sensing,
         torque_sd=0.1,
+        torque_fraction=0.0,
         zero_limit=0.0,
         force_sd_limit=1.5,
         force_sd_fraction=0.15,

@@ -10,8 +10,10 @@ from test_force_loop import ARM, CONFIGURATION, DT, GIVEN, OWN, POSE, STILL, Wor
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceLoop, ForceOutput
 from wam_control.force_swing import Reversals, Shake
+from wam_description.signals import Contact
 
 LIMITS = replace(GIVEN.limits, settling_time=0.5)
+TOUCHED = Contact("outer_link", OWN.contact_position, (0.0, 1.0, 0.0), 0.001, 1.0)
 PINNED = replace(OWN, limits=LIMITS, sensing=GIVEN.sensing, contact_source="pinned")
 
 
@@ -44,6 +46,21 @@ def test_a_force_that_cycles_is_reported_by_name_with_its_size() -> None:
     assert loop.reaction is ForceReaction.NONE
 
 
+@pytest.mark.parametrize(("feedback", "share"), [("contact_estimate", 0.5), ("joint_sensors", 1.0)])
+def test_where_the_late_force_of_the_motors_swings_the_arm_is_slowed_down(feedback: str, share: float) -> None:
+    """The swing dies then; slower still, the motors would not show how the force creeps away."""
+    speeds = []
+    for swing in (0.0, 0.8):
+        loop = force_loop(ARM, replace(PINNED, feedback=feedback))
+        for k in range(321):
+            force = 5.0 + swing * math.sin(2.0 * math.pi * k * DT / 0.2) - 0.2 * (k == 320)
+            world = World(400.0, force=force)
+            torques = (-force * lever(world.q)).tolist()
+            out = ask(loop, world, down(5.0), contact=TOUCHED, external=torques)
+        speeds.append(float(out.axis.lever @ out.velocity))
+    assert speeds[1] == pytest.approx(share * speeds[0], rel=0.1)
+
+
 def test_a_pinned_force_that_is_known_badly_is_reported_with_its_uncertainty() -> None:
     loop = force_loop(ARM, PINNED)
     for _ in range(200):
@@ -53,6 +70,15 @@ def test_a_pinned_force_that_is_known_badly_is_reported_with_its_uncertainty() -
     for _ in range(200):
         ask(loop, World(400.0, force=15.0), down(15.0))
     assert loop.reaction is ForceReaction.NONE
+
+
+def test_an_error_of_the_measured_force_leaves_less_to_what_is_not_known() -> None:
+    """8 % are measured, and 7 % are not known: the true force may well be off by more than 10 %."""
+    loop = force_loop(ARM, PINNED)
+    for measured, reaction in ((2.5, ForceReaction.NONE), (2.7, ForceReaction.UNCERTAIN)):
+        for _ in range(420):
+            ask(loop, World(400.0, force=measured), down(2.5))
+        assert loop.reaction is reaction
 
 
 def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_commanded() -> None:

@@ -21,6 +21,7 @@ from wam_description.rigid_body import RigidBody
 Array = NDArray[np.float64]
 REACH = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
 ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
+STEEPEST = 0.5  # cosine of the lean of a force from the normal of the side of a link
 SMALLEST_FORCE = 1.0  # N, for the size of tangential forces
 
 
@@ -119,8 +120,9 @@ class ForceAxis(NamedTuple):
 
     Attributes
     ----------
-    lever : torque on each joint per force (n,), m.
-    sense : force per torque on each joint (n,), 1/m; sense @ lever is 1.
+    lever : way along the direction per angle of each joint (n,), m.
+    press : torque on each joint per force (n,), m, of all that the surface does to the link, without friction.
+    sense : force per torque on each joint (n,), 1/m; sense @ press is 1.
     move : joint velocity per commanded velocity along the direction (n,), 1/m.
     force_sd : standard deviation of the sensed force, N; infinite where the force has no lever.
     free_sd : the same if its position along the cover has to be known from the same torques, N.
@@ -132,6 +134,7 @@ class ForceAxis(NamedTuple):
     """
 
     lever: Array
+    press: Array
     sense: Array
     move: Array
     force_sd: float
@@ -144,7 +147,7 @@ class ForceAxis(NamedTuple):
 
     def signal(self, force: float, torque_sd: Sequence[float]) -> float:
         """Size of the torques of a force, N, in standard deviations of the estimated torques (n,), N m."""
-        return force * float(np.linalg.norm(self.lever / np.array(torque_sd)))
+        return force * float(np.linalg.norm(self.press / np.array(torque_sd)))
 
     def unexplained(self, torques: Array) -> float:
         """chi^2 of torques of the world on the joints (n,), N m, that no force along the direction explains."""
@@ -187,13 +190,29 @@ class ForceAxes:
         along = self._body.cover_pose(q, cover).rotation[:, 0]
         return float(along @ self._body.point_jacobian(q, cover, point) @ moved)
 
-    def _jacobian(self, q: Sequence[float], cover: str, position: float, direction: Array) -> tuple[Array, Array]:
+    def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""
         covers = self._covers
-        normal = self._body.cover_pose(q, cover).rotation.T @ direction
         point = np.array([position, *covers.aside(cover, position)])
-        point += covers.radius_of(cover) * normal
+        point += covers.radius_of(cover) * (self._body.cover_pose(q, cover).rotation.T @ normal)
         return self._body.point_jacobian(q, cover, point), point
+
+    def _push(self, q: Sequence[float], cover: str, direction: Array) -> Array:
+        """What a surface at the side of a link gives back in all (3,) per force along a direction, friction apart.
+
+        Friction up to `friction` holds the link, and the force is along the direction.  Where this is inclined further
+        to the normal of the link's side, the link slides, and the force turns to the normal; beyond `STEEPEST` only what
+        holds the link gives such a force.
+        """
+        along = self._body.cover_pose(q, cover).rotation[:, 0]
+        aside = along * float(along @ direction)
+        across: Array = direction - aside
+        size, most = float(np.linalg.norm(across)), self._parameters.friction
+        slope = math.sqrt(max(1.0 - size * size, 0.0)) / max(size, STEEPEST)
+        if slope <= most or size < STEEPEST:
+            return direction
+        force: Array = across + max(2.0 * most / slope - 1.0, 0.0) * aside
+        return force / float(force @ direction)
 
     def axis(
         self,
@@ -221,21 +240,29 @@ class ForceAxes:
         square = float(lever @ lever)
         if square <= REACH * REACH:
             zero = np.zeros(n)
-            return ForceAxis(lever, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n)))
+            return ForceAxis(
+                lever, zero, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n))
+            )
         size = max(force, SMALLEST_FORCE)
-        tangential = parameters.friction * size * (jacobian - np.outer(direction, lever))
+        length = self._covers.length_of(cover)
+        aside = self._push(q, cover, direction)
+        # the end of a link is round, and other forces at the same place press the surface as well
+        is_side = position + 2.0 * position_sd < length - self._covers.radius_of(cover) and not others
+        push = aside if is_side else direction
+        friction = parameters.friction * size * _across(direction, push)
+        tangential = friction @ jacobian
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
-        shift = direction @ slide * size
-        # friction at another position has another lever
-        turned = parameters.friction * size * (slide - np.outer(direction, direction @ slide))
+        press: Array = push @ jacobian
+        shift = push @ slide * size
+        turned = friction @ slide  # friction at another position has another lever
         moved = np.outer(shift, shift) + turned.T @ turned
-        spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * lever) ** 2)
+        spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * press) ** 2)
         spread += tangential.T @ tangential
         for torque in others:
             spread += np.outer(torque, torque)
         inverse = np.asarray(np.linalg.inv(spread + position_sd**2 * moved), np.float64)
-        weighted = inverse @ lever
-        precision = float(lever @ weighted)
+        weighted = inverse @ press
+        precision = float(press @ weighted)
         sense: Array = weighted / precision
         inertia = self.inertia(q)
         mass = float(sense @ inertia @ lever) / square
@@ -243,8 +270,20 @@ class ForceAxes:
         damped = square
         if parameters.apparent_mass_limit:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
-        length = self._covers.length_of(cover)
         anywhere = spread + max(length * length / 12.0, position_sd**2) * moved
-        sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(lever @ np.linalg.solve(anywhere, lever))))
+        if position_sd and not is_side:
+            other = (aside - direction) @ jacobian * size  # the side or the end: the same torques do not tell
+            anywhere += np.outer(other, other)
+        sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ np.linalg.solve(anywhere, press))))
         yielding = float(lever @ self._compliance @ lever)
-        return ForceAxis(lever, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse)
+        return ForceAxis(
+            lever, press, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse
+        )
+
+
+def _across(direction: Array, push: Array) -> Array:
+    """Rows (3, 3) of forces across a push that leave its part along the direction as it is, each as large as 1 N/N."""
+    square = float(push @ push)
+    across = math.sqrt(square) * (np.eye(3) - np.outer(push, push) / square)
+    result: Array = across - np.outer(across @ direction, push)
+    return result

@@ -20,15 +20,19 @@ DOUBTED = 0.5  # s, after which a contact counts of which it is not known on whi
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
 DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
+FELT = (
+    0.2  # s, the same for the motors, before and after the touch: they detect most of a small force at once, and late
+)
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
 KEPT = 1.25  # settling times, up to which a force off the tolerance is remembered
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
-FINE = 4e-4  # m, way of the whole force below which jerks of friction are as large as what is left to correct
-SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which such a force is kept, and up to which it is
-STATED = 1.6  # sd of the force that is stated at a pinned position, per error that was found: friction is mostly less
+FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
+SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
+FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
+SLOWED = 0.5  # of the speed along the force, from then on
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
@@ -73,6 +77,7 @@ class ForceHold:
     Attributes
     ----------
     is_touching : whether the measured force shows that something is touched.
+    share : of the speed along the force: less where the late force of the motors was seen to swing.
     """
 
     def __init__(self) -> None:
@@ -82,12 +87,13 @@ class ForceHold:
     def reset(self) -> None:
         """Another force is commanded."""
         self._shake.reset()
+        self.share = 1.0
         self._way = self._watched = self._shaking = self._blocked = 0.0
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
             self._has_settled
         ) = False
         self._other = ""
-        self._travel = self._conflict = self._assumed = self._strange = 0.0
+        self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = 0.0
         self._forget_swings()
 
@@ -102,21 +108,22 @@ class ForceHold:
     ) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
 
-        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, unless friction would
-        move the arm in jerks.  At a position that is not known, slower: what is touched has to be identified before the
-        force is too large.
+        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, `FELT` from the
+        motors, unless friction would move the arm in jerks.  At a position that is not known, slower: what is touched
+        has to be identified before the force is too large.
         """
         if not parameters.limits.impact:
             return math.inf
         stiffness = parameters.guard.contact_stiffness
         yielding = 1.0 / stiffness + axis.compliance
-        is_known = point.is_pinned or point.is_certain
+        is_known, is_felt = point.is_pinned or point.is_certain, parameters.feedback == "contact_estimate"
         slowest = CREEP / parameters.limits.settling_time
         if self.is_touching:
             whole = desired * yielding / axis.speed_fraction
-            return max(whole / (LATE if is_known else IDENTIFIED), slowest)
+            return max(whole / (IDENTIFIED if not is_known else FELT if is_felt else LATE), slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
-        fastest = fastest if is_known else min(fastest, max(desired * yielding / DETECTED, slowest))
+        if is_felt or not is_known:
+            fastest = min(fastest, max(desired * yielding / (FELT if is_felt else DETECTED), slowest))
         return fastest / axis.speed_fraction
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
@@ -126,8 +133,8 @@ class ForceHold:
         changes the force by more than that error.
         """
         whole = desired * (1.0 / parameters.guard.contact_stiffness + axis.compliance)
-        band = (LEAVE if self._is_kept else SETTLE) * desired
-        self._is_kept = self.is_touching and whole < FINE and abs(desired - measured) < band
+        band = (LEAVE if self._is_kept else SETTLE) * desired * min(FINE / whole, 1.0)
+        self._is_kept = self.is_touching and whole < COARSE and abs(desired - measured) < band
         return self._is_kept
 
     def travel(self, distance: float) -> None:
@@ -206,21 +213,29 @@ class ForceHold:
         held = self._held(axis, point, desired, limit, signal, parameters)
         if held[0].holds:
             return held
-        if not point.is_single and (is_strange or not point.is_pinned):
+        is_double = not point.is_single and (is_strange or not point.is_pinned)
+        self._double = self._double + dt if is_double else 0.0
+        if self._double > CONFLICT:  # an impact looks like one for a moment, and a sudden hold is a jerk
             return ForceReaction.SECOND_CONTACT, (
                 f"a second contact is nearly certain besides that on {point.cover}: the torques are not those of the "
                 "commanded force alone; the arm holds its position until the second contact has gone"
             )
-        is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired
+        # what is off already leaves less of the tolerance to what is not known
+        left = max(1.0 - abs(desired - measured) / (TOLERANCE * desired), 0.0)
+        is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired * left
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        is_uncertain = axis.force_sd > (STATED if point.is_pinned else 1.0) * known
+        is_uncertain = axis.force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
         missed = self._not_reached(axis, measured, desired, parameters, dt)
-        if is_cycling:
+        is_late = parameters.feedback == "contact_estimate" and self.share > SLOWED
+        if is_late and is_touching and self._turns.count > FEW:
+            self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
+            self._turns.reset()
+        elif is_cycling:
             return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
         if missed:
             return ForceReaction.NOT_REACHED, missed
@@ -322,7 +337,8 @@ class ForceHold:
             return ForceReaction.UNCERTAIN, (
                 f"the force is known to +-{axis.force_sd:.2g} N, {axis.force_sd / desired:.0%} of the commanded "
                 f"{desired:.3g} N; sensing.reported_fraction, {parameters.sensing.reported_fraction:.0%}, is to be "
-                "known: tare in free space, command more force, or another direction or pose"
+                "known, less where it is measured off: tare in free space, command more force, or another direction "
+                "or pose"
             )
         return ForceReaction.NONE, ""
 

@@ -40,6 +40,8 @@ TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
 SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
+NEAR, MIDDLE = 0.25, 0.5  # of a link that is perhaps touched: where its force is taken to be
+VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
@@ -333,11 +335,12 @@ class ForceLoop:
         if is_open:
             return out._replace(effort=effort)
         if contact.cover and not point.is_identified:
-            error = min(error, desired - self._largest_force(q, point, direction, desired))
+            error = min(error, self._shortfall(q, point, direction, desired))
         if self._hold.keeps(force_axis, measured, desired, own):
             error, held = 0.0, self._at_rest(held)
         speeds = self._delay.step(scalar.velocities([error], [desired - before], dt), own.delay_samples)
         speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
+        speed *= self._hold.share
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
@@ -370,13 +373,22 @@ class ForceLoop:
         away = axis.lever * (BACK / float(axis.lever @ axis.lever))
         return [a - b for a, b in zip(self._free_at, away.tolist(), strict=True)]
 
-    def _largest_force(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
-        """Largest force along a direction, N, that the torques would be of in the middle of any other cover."""
+    def _shortfall(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
+        """Force that is missing, N, if another cover is touched: below 0 in its middle, 0 if nearer to the base."""
+        middle = self._largest_force(q, point, direction, desired, MIDDLE)
+        if self.parameters.feedback == "contact_estimate":
+            return desired - middle  # the motors identify a link only by a large force
+        return max(desired - self._largest_force(q, point, direction, desired, NEAR), min(desired - middle, 0.0))
+
+    def _largest_force(
+        self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float, part: float
+    ) -> float:
+        """Largest force along a direction, N, that the torques would be of at a part of the length of other covers."""
         covers, found = self._arm.covers, -math.inf
         for cover, length in zip(covers.names, covers.length, strict=True):
             if cover != point.cover:
-                axis = self._force_axes.axis(q, cover, 0.5 * length, 0.0, direction, desired)
-                if axis.force_sd <= self.parameters.sensing.sd_limit(desired):
+                axis = self._force_axes.axis(q, cover, part * length, 0.0, direction, desired)
+                if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired):
                     found = max(found, -float(axis.sense @ self._external[0]))
         return found
 

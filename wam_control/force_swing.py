@@ -35,6 +35,11 @@ class Reversals:
         return len(self._turns) > 2 * CYCLES
 
     @property
+    def count(self) -> int:
+        """Number of turns within the window."""
+        return len(self._turns)
+
+    @property
     def cycle(self) -> tuple[float, float]:
         """Mean peak to peak, in the unit of the signal, and period, s; zeros before two turns."""
         if len(self._turns) < 2:
