@@ -201,8 +201,8 @@ class ForceAxes:
         """What a surface at the side of a link gives back in all (3,) per force along a direction, friction apart.
 
         Friction up to `friction` holds the link, and the force is along the direction.  Where this is inclined further
-        to the normal of the link's side, the link slides, and the force turns to the normal; beyond `STEEPEST` only what
-        holds the link gives such a force.
+        to the normal of the link's side, the link slides, and the force turns to the normal; beyond `STEEPEST` only
+        what holds the link gives such a force.
         """
         along = self._body.cover_pose(q, cover).rotation[:, 0]
         aside = along * float(along @ direction)
