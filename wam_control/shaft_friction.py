@@ -12,7 +12,6 @@ SLOW = 12.0  # rest velocities: speed up to which the shape of the friction coun
 REVERSAL = ((2.0, 0.6), (3.2, 0.2))
 LONGEST = 6.0 * max(length for _, length in REVERSAL)
 FULL = 3.0  # sd of the measured velocity that the rest velocity is at least
-SIGN = 1.0 / FULL  # of the rest velocity, above which the direction of a motion is known
 
 
 class ShaftMotion(NamedTuple):
@@ -67,9 +66,9 @@ class ShaftFriction:
         friction, sliding, resting, shape, held, travel = [], [], [], [], self._held, self._travel
         for i, v in enumerate(velocity):
             share = min(1.0, max(-1.0, v / self._rest[i]))
-            if abs(share) > SIGN:  # counted in the direction of the motion
-                travel[i] = travel[i] + v * dt if travel[i] * v >= 0.0 else v * dt
             if share * share == 1.0:
+                # counted in the direction of the motion
+                travel[i] = travel[i] + v * dt if travel[i] * v >= 0.0 else v * dt
                 held[i] = share
             else:
                 held[i] *= keep
