@@ -5,16 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from wam_theory.backlash_cycle import TorqueLoop, dead_zone_gain, exact_cycle, predicted_cycle
+from wam_theory.backlash_cycle import GearedTorqueLoop, dead_zone_gain, exact_cycle, predicted_cycle
 
 
-def loop(critical: float, damping: float = 0.0) -> TorqueLoop:
+def loop(critical: float, damping: float = 0.0) -> GearedTorqueLoop:
     """J = k = 1, G = 2; a play of 0.1."""
     derivative = 0.5
-    return TorqueLoop(1.0, 0.1, 1.0, damping, 2.0, 3.0 * (critical * derivative + damping), derivative)
+    return GearedTorqueLoop(1.0, 0.1, 1.0, damping, 2.0, 3.0 * (critical * derivative + damping), derivative)
 
 
-def stepped(case: TorqueLoop, cycles: float) -> tuple[float, float]:
+def stepped(case: GearedTorqueLoop, cycles: float) -> tuple[float, float]:
     """Peak to peak of the torque and frequency, rad/s, by the classical method of Runge and Kutta."""
 
     def torque(x: float) -> float:

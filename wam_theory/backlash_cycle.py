@@ -19,7 +19,7 @@ MOST = 5000  # half cycles
 STEPS = 200  # per time constant of the loop, in the search of the end of a contact
 
 
-class TorqueLoop(NamedTuple):
+class GearedTorqueLoop(NamedTuple):
     """The gear, the motor and the gains.
 
     Attributes
@@ -68,7 +68,7 @@ def dead_zone_gain(amplitude: ArrayLike) -> Array:
     return np.asarray(1.0 - 2.0 / math.pi * (np.arcsin(r) + r * np.sqrt(1.0 - r * r)))
 
 
-def predicted_cycle(loop: TorqueLoop) -> BacklashCycle:
+def predicted_cycle(loop: GearedTorqueLoop) -> BacklashCycle:
     """The cycle by the describing function: its gain is the critical one, omega^2 = N k (1 + G)/J.
 
     Parameters
@@ -86,7 +86,7 @@ def predicted_cycle(loop: TorqueLoop) -> BacklashCycle:
     return BacklashCycle(loop.stiffness * loop.play * (low - 1.0), frequency)
 
 
-def exact_cycle(loop: TorqueLoop) -> BacklashCycle:
+def exact_cycle(loop: GearedTorqueLoop) -> BacklashCycle:
     """The cycle by exact motion over play and flank in turn, until a half cycle repeats itself.
 
     Parameters
@@ -114,7 +114,7 @@ def exact_cycle(loop: TorqueLoop) -> BacklashCycle:
     raise ValueError(f"no cycle of {loop} has settled after {MOST} half cycles")
 
 
-def _flank(loop: TorqueLoop, speed: float, wound: float) -> tuple[float, float, float, float]:
+def _flank(loop: GearedTorqueLoop, speed: float, wound: float) -> tuple[float, float, float, float]:
     """From contact to its end: its time, s, greatest torque, N m, speed at the end, rad/s, and G_I integral of tau."""
     k, j = loop.stiffness, loop.inertia
     rate = np.array(
@@ -146,7 +146,7 @@ def _until(rate: Array, state: Array, dt: float, which: int) -> tuple[Array, flo
     return zero_order_hold(rate, np.zeros((3, 1)), high)[0] @ state, high
 
 
-def _play(loop: TorqueLoop, speed: float, wound: float) -> tuple[float, float]:
+def _play(loop: GearedTorqueLoop, speed: float, wound: float) -> tuple[float, float]:
     """Across the play from a flank: time, s, and speed towards the other one, rad/s; NaN if it does not arrive.
 
     The motor leaves with a speed below zero, under the constant torque -G_I integral of tau.

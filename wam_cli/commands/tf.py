@@ -22,7 +22,7 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()
     die_with_parent()
     try:
-        from wam_cli.frames_node import FramesNode
+        from wam_cli.frame_publisher import FramesNode
     except ModuleNotFoundError as error:
         if error.name != "tf2_msgs":
             raise

@@ -27,7 +27,7 @@ from wam_experiments.plant.ideal_testbed import (
     one_step_map,
     released_plant,
 )
-from wam_theory.backlash_cycle import TorqueLoop, exact_cycle
+from wam_theory.backlash_cycle import GearedTorqueLoop, exact_cycle
 from wam_theory.cable import circuit_torque, creep, eccentric_ripple, efficiency, play_torque, stage_loss
 from wam_theory.resonance import force_resonances
 from wam_theory.stick_slip import IntegralLoop, simulate
@@ -294,7 +294,7 @@ def actuator_cycle_with_backlash(desired: float = 5.0) -> PlantCurve:
     return PlantCurve(play, travel, 2.0 * friction / found[0].node.transmission_stiffness + crossed)
 
 
-def torque_loop(hertz: float, damping: float = 0.0) -> TorqueLoop:
+def torque_loop(hertz: float, damping: float = 0.0) -> GearedTorqueLoop:
     """A torque loop on the testbed's motor and shaft whose cycle by backlash has about this frequency (2.2).
 
     The critical gain is 0.8, the integral a third of the frequency.
@@ -309,7 +309,7 @@ def torque_loop(hertz: float, damping: float = 0.0) -> TorqueLoop:
     proportional = omega**2 * inertia / (CRITICAL * stiffness) - 1.0
     needed = inertia * omega / 3.0
     integral, derivative = omega / 3.0 * (1.0 + proportional), needed / (CRITICAL * stiffness)
-    return TorqueLoop(stiffness, 0.01, inertia, damping * needed, proportional, integral, derivative)
+    return GearedTorqueLoop(stiffness, 0.01, inertia, damping * needed, proportional, integral, derivative)
 
 
 def torque_loop_response(hertz: float, damping: float = 0.0) -> tuple[Numbers, Numbers]:
