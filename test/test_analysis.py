@@ -596,7 +596,7 @@ def test_the_look_sees_what_runs_over_what_is_missing_and_what_is_fetched(tmp_pa
 
 SAMPLES = Path(__file__).parents[1] / "bags" / "sample"
 CYCLES = {"actuator-limit-cycle", "quantised-force", "stiction-limit-cycle"}
-DIVERGES = {"testbed-5.6", "testbed-own-servo"}
+DIVERGES = {"testbed-5.6", "testbed-5.6-as-described", "testbed-own-servo"}
 LARGEST = {"N": 2000.0, "N m": 1000.0, "%": 100.0, "J": 1000.0}  # that an arm of this size can have
 
 
