@@ -20,9 +20,7 @@ DOUBTED = 0.5  # s, after which a contact counts of which it is not known on whi
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
 DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
-FELT = (
-    0.2  # s, the same for the motors, before and after the touch: they detect most of a small force at once, and late
-)
+FELT = 0.2  # s, the same for the motors, which detect most of a small force at once, and late
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -122,8 +120,8 @@ class ForceHold:
             whole = desired * yielding / axis.speed_fraction
             return max(whole / (IDENTIFIED if not is_known else FELT if is_felt else LATE), slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
-        if is_felt or not is_known:
-            fastest = min(fastest, max(desired * yielding / (FELT if is_felt else DETECTED), slowest))
+        if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
+            fastest = min(fastest, max(desired * yielding / DETECTED, slowest))
         return fastest / axis.speed_fraction
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
