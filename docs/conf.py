@@ -58,7 +58,7 @@ autodoc_default_options = {"members": True, "show-inheritance": True, "member-or
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 # a mock has no `|`, so what is installed is imported
-OPTIONAL = ("rclpy", "control_msgs", "rerun", "viser", "trimesh", "distributed", "websockets")
+OPTIONAL = ("rclpy", "control_msgs", "tf2_msgs", "rerun", "viser", "trimesh", "distributed", "websockets")
 autodoc_mock_imports = [name for name in OPTIONAL if find_spec(name) is None]
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
