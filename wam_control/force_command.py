@@ -76,10 +76,10 @@ class CommandAdmission:
     ) -> Commands:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
         refusals = {}
-        if force is not None and _size(force) < NOTHING:
-            force = ForceCommand(force.frame, ZERO, force.torque)
         pressed = self._force is not None and any(self._force.force)
         commanded = _size(force)
+        if force is not None and commanded < NOTHING:
+            force = force._replace(force=ZERO)
         if commanded > parameters.force_limit:
             refusals["force_command"] = _refusal(commanded, "force_limit", parameters.force_limit, "N")
         elif force is not None and (unpinned := self._unpinned(force)):

@@ -20,7 +20,7 @@ DOUBTED = 0.5  # s, after which a contact counts of which it is not known on whi
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
 DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
-FELT = 0.2  # s, the same for the motors, which detect most of a small force at once, and late
+BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -106,19 +106,19 @@ class ForceHold:
     ) -> float:
         """Largest speed along the force, m/s: until something is touched, v = F_max/sqrt(m k_c) after (3.1).
 
-        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, `FELT` from the
-        motors, unless friction would move the arm in jerks.  At a position that is not known, slower: what is touched
-        has to be identified before the force is too large.
+        Then the force rises to the commanded one in no less than `LATE` on the stiffest surface, `BY_MOTORS`
+        from these, unless friction would move the arm in jerks.  At a position that is not known, slower: what is
+        touched has to be identified before the force is too large.
         """
         if not parameters.limits.impact:
             return math.inf
         stiffness = parameters.guard.contact_stiffness
         yielding = 1.0 / stiffness + axis.compliance
-        is_known, is_felt = point.is_pinned or point.is_certain, parameters.feedback == "contact_estimate"
+        is_known = point.is_pinned or point.is_certain
         slowest = CREEP / parameters.limits.settling_time
         if self.is_touching:
-            whole = desired * yielding / axis.speed_fraction
-            return max(whole / (IDENTIFIED if not is_known else FELT if is_felt else LATE), slowest)
+            rise = IDENTIFIED if not is_known else BY_MOTORS if parameters.is_estimated else LATE
+            return max(desired * yielding / axis.speed_fraction / rise, slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
         if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
             fastest = min(fastest, max(desired * yielding / DETECTED, slowest))
@@ -229,7 +229,7 @@ class ForceHold:
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
         missed = self._not_reached(axis, measured, desired, parameters, dt)
-        is_late = parameters.feedback == "contact_estimate" and self.share > SLOWED
+        is_late = parameters.is_estimated and self.share > SLOWED
         if is_late and is_touching and self._turns.count > FEW:
             self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
             self._turns.reset()

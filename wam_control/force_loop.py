@@ -219,11 +219,11 @@ class ForceLoop:
         external_sd : standard deviations of `external` (n,), N m; None where they are not published.
         """
         own = self.parameters
-        self._external_sd = external_sd if own.feedback == "contact_estimate" else None
+        self._external_sd = external_sd if own.is_estimated else None
         if not self._joints or not any(joints.effort):
             self._reset(joints.position)
         self._joints = tuple(joints.position)
-        if (contact if own.feedback == "contact_estimate" else sensors) is None:
+        if (contact if own.is_estimated else sensors) is None:
             task = None
             if own.mode != "open_loop":
                 command = torque = None  # a force that is not measured would grow without bounds
@@ -238,7 +238,7 @@ class ForceLoop:
         self.refusals, self.fallback = commands.refusals, ""
         self.reaction, self.reason = ForceReaction.NONE, ""
         self._measurement.step(own, sensors, external, dt)
-        is_touched = own.feedback != "contact_estimate" or bool(contact.cover) or self._hold.is_touching
+        is_touched = not own.is_estimated or bool(contact.cover) or self._hold.is_touching
         present = self._measurement.external if is_touched else np.zeros(self._n)
         self._external = self._filter.step(present, own.force_filter, dt)
         if task is not None:
@@ -349,7 +349,7 @@ class ForceLoop:
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
         cycle = self._timing.dither_cycle
-        if self.parameters.feedback != "contact_estimate" or not cycle:
+        if not self.parameters.is_estimated or not cycle:
             return False
         return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
 
@@ -376,7 +376,7 @@ class ForceLoop:
     def _shortfall(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
         """Force that is missing, N, if another cover is touched: below 0 in its middle, 0 if nearer to the base."""
         middle = self._largest_force(q, point, direction, desired, MIDDLE)
-        if self.parameters.feedback == "contact_estimate":
+        if self.parameters.is_estimated:
             return desired - middle  # the motors identify a link only by a large force
         return max(desired - self._largest_force(q, point, direction, desired, NEAR), min(desired - middle, 0.0))
 
@@ -432,7 +432,7 @@ class ForceLoop:
             lean = math.asin(min(abs(float(direction @ along)), 1.0))
         point = self._position.step(contact, command, lean, self.parameters)
         self.fallback = point.rejection
-        if point.rejection and self.parameters.feedback == "contact_estimate":
+        if point.rejection and self.parameters.is_estimated:
             self.refused += not self._contact_rejected
             self.refusals["contact/hypotheses"] = point.rejection
         self._contact_rejected = bool(point.rejection)

@@ -113,7 +113,7 @@ class ForceLoopNode:
     @property
     def needs(self) -> frozenset[str]:
         """The estimate, where the force is controlled by it."""
-        is_fed_back = self._loop.parameters.feedback == "contact_estimate"
+        is_fed_back = self._loop.parameters.is_estimated
         return frozenset({"external_joint_torques", "contact/hypotheses"} if is_fed_back else ())
 
     def _force_axis(self, out: ForceOutput, stamp: int) -> Outputs:

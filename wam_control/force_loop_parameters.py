@@ -124,11 +124,15 @@ class ForceLoopParameters:
         "least probability of the estimated link with which its contact position is used", low=0.0, high=1.0, live=True
     )
 
+    @property
+    def is_estimated(self) -> bool:
+        """Whether the estimated torques are fed back, in place of those of sensors."""
+        return self.feedback == "contact_estimate"
+
 
 def sensing_of(parameters: ForceLoopParameters) -> SensingParameters:
     """How the force is sensed with the feedback of a parameter set."""
-    is_estimated = parameters.feedback == "contact_estimate"
-    return parameters.sensing.of_estimate if is_estimated else parameters.sensing
+    return parameters.sensing.of_estimate if parameters.is_estimated else parameters.sensing
 
 
 def require_fit(parameters: ForceLoopParameters, arm: Arm) -> None:
@@ -144,7 +148,7 @@ def require_fit(parameters: ForceLoopParameters, arm: Arm) -> None:
         parameters.contact_cover in covers,
         f"contact_cover is '{parameters.contact_cover}'; allowed: {', '.join(covers)}",
     )
-    length = arm.covers.length[covers.index(parameters.contact_cover)]
+    length = arm.covers.length_of(parameters.contact_cover)
     require(
         parameters.contact_position <= length,
         f"contact_position is {parameters.contact_position:g} m; allowed: 0 to {length:g}, "
@@ -157,7 +161,7 @@ def require_fit(parameters: ForceLoopParameters, arm: Arm) -> None:
         f"arm.joints.speed_limit; allowed: 0 to {slowest:g}",
     )
     require(
-        parameters.feedback == "contact_estimate" or arm.joint_sensors,
+        parameters.is_estimated or arm.joint_sensors,
         f"feedback is '{parameters.feedback}' but arm.joint_sensors is false; use 'contact_estimate'",
     )
     springs = {"spring_stiffness": parameters.spring_stiffness, "spring_rest": parameters.spring_rest}

@@ -64,7 +64,7 @@ class ForceMeasurement:
     def _torque(
         self, parameters: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None
     ) -> Array:
-        if parameters.feedback == "contact_estimate":
+        if parameters.is_estimated:
             return np.zeros(self._n) if estimated is None else np.array(estimated)
         if sensors is None:
             return np.zeros(self._n)

@@ -157,14 +157,15 @@ class AdaptedNode(TolerantNode):
         ages = {topic: age for topic, age in synchroniser.ages().items() if topic in needed}
         if not self._is_enabled or max(ages.values(), default=0.0) <= 1.0:
             self._ports.set_problem("inputs", "")
-        elif not self._ports.problems.get("inputs") or self._ports.counts["steps"] % REPEATED == 0:
+        elif not (known := self._ports.problems.get("inputs")) or self._ports.counts["steps"] % REPEATED == 0:
             lost, stopped = self._interface.silent(ages)  # on a busy machine another node may just have been late
             silent = ", ".join(stopped)
             self._ports.set_problem(
                 "inputs",
                 f"{silent} has stopped: {' and '.join(lost)} too old; start {silent} again, then reset_fault",
             )
-            self._ports.repeat_status()
+            if known:
+                self._ports.repeat_status()
 
     def _take_status(self, status: NodeStatus) -> None:
         """Follow the driver: forget what came before its session, and commands from before the brakes were switched."""

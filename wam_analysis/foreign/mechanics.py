@@ -173,16 +173,17 @@ def friction(source: Source) -> FoundFriction | None:
         columns[WEIGHT] = np.column_stack([np.sin(joined["position"]), np.cos(joined["position"])])
     rest = max(_rest(piece) for piece in some)
     trial = _Trial(velocity, joined["effort"], columns, rest, window, period)
-    moves, width, per_lag = np.abs(velocity) > rest, round(window / period), math.nan
-    one_frequency = WEIGHT in columns and _own_part(velocity, columns[WEIGHT], moves, sd, period, width) < APART
+    width, per_lag = round(window / period), math.nan
+    acceleration = _Acceleration.of(velocity, sd, rest, width, period)
+    one_frequency = WEIGHT in columns and acceleration.own_part(columns[WEIGHT], width) < APART
     found, also, shift = _best(trial, not one_frequency)
     if (shift or FILTER in also) and {"position", "velocity"} <= source.values.keys():  # or the velocity is filtered
         rates = [part for piece in some for part in (differentiated(piece.time, piece.values["position"])[0], blank)]
         rate = np.concatenate(rates)
         other = trial._replace(velocity=rate, columns=columns | {DRAG: (rate * np.abs(rate))[:, np.newaxis]})
         found, also, shift = min((found, also, shift), _best(other, True), key=lambda one: one[0].residual)
-    size = _size_of_noise(velocity, sd, moves, period, width)
-    found = found._replace(inertia_error=math.hypot(found.inertia_error, size * found.inertia))
+    by_noise = acceleration.share_of_noise() * found.inertia
+    found = found._replace(inertia_error=math.hypot(found.inertia_error, by_noise))
     if one_frequency:
         per_lag = (found.viscous - trial.fit(also, 1).viscous) / period
         found = found._replace(inertia=math.nan, inertia_error=math.nan)
@@ -206,7 +207,9 @@ class _Trial(NamedTuple):
     def fit(self, also: Sequence[str], shift: int) -> Friction:
         """Friction with the columns of these names, and the effort of `shift` samples later."""
         effort = np.roll(self.effort, -shift)
-        every = self.columns | {FILTER: np.nan_to_num(-np.gradient(effort, self.period))[:, np.newaxis]}
+        every = dict(self.columns)
+        if FILTER in also:
+            every[FILTER] = np.nan_to_num(-np.gradient(effort, self.period))[:, np.newaxis]
         time = self.period * np.arange(len(effort), dtype=np.float64)
         load = np.hstack([every[name] for name in also]) if also else None
         return identify_friction(time, self.velocity, effort, self.rest, self.window, load=load)
@@ -256,29 +259,35 @@ def _best(trial: _Trial, lags: bool) -> tuple[Friction, tuple[str, ...], int]:
     return found, also, shift
 
 
-def _size_of_noise(velocity: Numbers, sd: float, moves: NDArray[np.bool_], period: float, width: int) -> float:
-    """Share of the power of the acceleration that is noise of the velocity: so much too small is the inertia."""
-    kernel = np.repeat([1.0, -1.0], width) / (width**2 * period)
-    acceleration = np.convolve(velocity, kernel, "same")
-    whole = float(np.var(acceleration[moves & np.isfinite(acceleration)])) if np.any(moves) else 0.0
-    return min(sd**2 * float(kernel @ kernel) / whole, 1.0) if whole > 0.0 else 1.0
+class _Acceleration(NamedTuple):
+    """Averaged acceleration, the variance of its noise, and where the joint moves so that it is complete."""
 
+    value: Numbers
+    noise: float
+    rows: NDArray[np.bool_]
 
-def _own_part(
-    velocity: Numbers, weight: Numbers, moves: NDArray[np.bool_], sd: float, period: float, width: int
-) -> float:
-    """Share of the acceleration, rms, that is not alike the columns of a weight, without the noise of the velocity."""
-    kernel = np.repeat([1.0, -1.0], width) / (width**2 * period)
-    acceleration = np.convolve(velocity, kernel, "same")
-    rows = moves & np.isfinite(acceleration) & np.all(np.isfinite(weight), axis=1)
-    rows[:width] = rows[-width:] = False  # the mean is incomplete
-    if int(np.sum(rows)) < FEWEST:
-        return 0.0
-    columns, wanted = np.column_stack([np.ones(int(np.sum(rows))), weight[rows]]), acceleration[rows]
-    rest = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
-    by_noise = sd**2 * float(kernel @ kernel)
-    own, whole = float(np.mean(rest**2)) - by_noise, float(np.var(wanted)) - by_noise
-    return math.sqrt(own / whole) if 0.0 < own < whole else 0.0
+    @classmethod
+    def of(cls, velocity: Numbers, sd: float, rest: float, width: int, period: float) -> "_Acceleration":
+        """That of a velocity with noise of a standard deviation, over two means of `width` samples."""
+        kernel = np.repeat([1.0, -1.0], width) / (width**2 * period)
+        value = np.convolve(velocity, kernel, "same")
+        return cls(value, sd**2 * float(kernel @ kernel), (np.abs(velocity) > rest) & np.isfinite(value))
+
+    def share_of_noise(self) -> float:
+        """Share of the power that is noise of the velocity: so much too small is the inertia."""
+        whole = float(np.var(self.value[self.rows])) if np.any(self.rows) else 0.0
+        return min(self.noise / whole, 1.0) if whole > 0.0 else 1.0
+
+    def own_part(self, weight: Numbers, width: int) -> float:
+        """Share, rms, that is not alike the columns of a weight, without the noise of the velocity."""
+        rows = self.rows & np.all(np.isfinite(weight), axis=1)
+        rows[:width] = rows[-width:] = False  # the mean is incomplete
+        if int(np.sum(rows)) < FEWEST:
+            return 0.0
+        columns, wanted = np.column_stack([np.ones(int(np.sum(rows))), weight[rows]]), self.value[rows]
+        rest = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
+        own, whole = float(np.mean(rest**2)) - self.noise, float(np.var(wanted)) - self.noise
+        return math.sqrt(own / whole) if 0.0 < own < whole else 0.0
 
 
 def is_sure(value: float, error: float) -> bool:

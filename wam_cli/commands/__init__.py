@@ -42,6 +42,24 @@ def namespace(text: str) -> str:
     return inner
 
 
+@contextmanager
+def of_installation(package: str) -> Iterator[None]:
+    """Imports of a package that only an installation of ROS has; says so where it is missing.
+
+    Raises
+    ------
+    ValueError
+        with the package and how to install it.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name != package:
+            raise
+        install = f"apt install ros-jazzy-{package.replace('_', '-')}"
+        raise ValueError(f"it needs {package}, of a ROS installation: {install}") from None
+
+
 def port(text: str) -> int:
     """A port of this machine, as an option takes it.
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from wam_cli.commands import namespace
+from wam_cli.commands import namespace, of_installation
 from wam_ros.program import Stop, end_at_once_on_signals
 from wam_ros.run import NAMESPACE, die_with_parent
 
@@ -17,12 +17,8 @@ def run(given: argparse.Namespace) -> int:
     """Serve the action until Ctrl-C."""
     end_at_once_on_signals()
     die_with_parent()
-    try:
+    with of_installation("control_msgs"):
         from wam_cli.trajectory_action import serve
-    except ModuleNotFoundError as error:
-        if error.name != "control_msgs":
-            raise
-        raise ValueError("it needs control_msgs, of a ROS installation: apt install ros-jazzy-control-msgs") from None
     stop = Stop()
     serve(given.namespace, lambda: stop.is_set, lambda line: print(line, flush=True))
     return 0

@@ -2,7 +2,7 @@
 
 import argparse
 
-from wam_cli.commands import namespace
+from wam_cli.commands import namespace, of_installation
 from wam_ros.program import Stop, end_at_once_on_signals
 from wam_ros.run import NAMESPACE, die_with_parent
 
@@ -21,12 +21,8 @@ def run(given: argparse.Namespace) -> int:
     """Publish until Ctrl-C."""
     end_at_once_on_signals()
     die_with_parent()
-    try:
+    with of_installation("tf2_msgs"):
         from wam_cli.frame_publisher import FramesNode
-    except ModuleNotFoundError as error:
-        if error.name != "tf2_msgs":
-            raise
-        raise ValueError("it needs tf2_msgs, of a ROS installation: apt install ros-jazzy-tf2-msgs") from None
     from wam_cli.stack_client import run_next_to
 
     stop = Stop()

@@ -23,6 +23,7 @@ from wam_experiments.contact_robustness.requirements import (
     contacts_needed,
     required_rows,
     required_table,
+    seconds_needed,
 )
 from wam_experiments.contact_robustness.rows import DETECTION, POSITION, SECOND, kinds_table, table
 from wam_experiments.identification import plants
@@ -167,9 +168,10 @@ def report_text(result: RobustnessResult) -> str:
         for how, own in (("as configured", result.level[name]), ("identified", result.identified[name]))
     }
     seconds = {**result.second, "all": [score for own in result.second.values() for score in own]}
+    size = SIZE.format(needed=contacts_needed(), quiet=seconds_needed())
     parts = [
         ("Required", required_table(rows)),
-        ("Each degradation", SIZE.format(needed=contacts_needed()) + "\n\n" + alone_table(result.wide)),
+        ("Each degradation", f"{size}\n\n{alone_table(result.wide)}"),
         ("Detection", table(DETECTION, result.wide)),
         ("Position on the outer link, and the link", table(POSITION, result.wide)),
         ("By kind of contact, all degradations", kinds_table(every)),
@@ -205,8 +207,8 @@ brackets are counts."""
 
 SIZE = """With {needed} contacts or more the 95 % interval (Wilson) of a share of 91 % lies within 85 to 97 %; with
 fewer a row can only be marginal. Contacts of one arm share its errors, so these intervals are rather too narrow. No
-false alarm in 221 s or more shows less than 1 a minute (Poisson). Of the rows with a fitting share one of twenty is
-outside its interval by chance: the worst of many rows is no measure of all."""
+false alarm in {quiet:.0f} s or more shows less than 1 a minute (Poisson). Of the rows with a fitting share one of
+twenty is outside its interval by chance: the worst of many rows is no measure of all."""
 
 BOUNDS = """The inference alone, in poses and on contacts drawn as after an identification, with torques that have these
 errors and no others, and with just their covariance. The rows of the requirement lie between the last two: the last

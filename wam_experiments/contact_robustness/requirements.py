@@ -74,6 +74,11 @@ def contacts_needed() -> int:
     return next(n for n, span in spans if span.low >= COVERAGE[0] and span.high <= COVERAGE[1])
 
 
+def seconds_needed() -> float:
+    """Seconds without contact and without an alarm that show fewer than one alarm a minute."""
+    return 60.0 * events(0, 1.0).high
+
+
 def required_rows(
     wide: Mapping[str, Scores],
     second: Mapping[str, Scores],

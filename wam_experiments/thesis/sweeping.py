@@ -42,7 +42,7 @@ def points(experiment: Experiment, axes: Sequence[Axis], sets: Sequence[Sequence
     base = Configuration.load(packaged(experiment.configuration))
     named = [{axis.name: value for axis, value in zip(axes, values, strict=True)} for values in sets]
     for values in named:
-        base.with_values(values)
+        base.with_values(values)  # refuses unknown names before anything runs
     return [ExperimentPoint(experiment, tuple(values.items())) for values in named]
 
 
