@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import gc
 import os
 import signal
 import sys
@@ -182,6 +183,7 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
             connection.add(nodes[name])
         for node in nodes.values():  # all threads are there
             getattr(node, "raise_priority", lambda: None)()
+        gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
         spin(connection.executor, is_over, end)
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
