@@ -72,7 +72,7 @@ def breakaway(q: float) -> float:
 
 
 def test_configured_rotor_breaks_away_at_the_measured_torque_where_cogging_is_against_it() -> None:
-    """And a double cogging below it where cogging helps."""
+    """And a twice the cogging below it where cogging helps."""
     turn = 2.0 * np.pi / 24 * WAM.joint_from_motor[0]
     torques = [breakaway(turn * k / 12) for k in range(12)]
     assert max(torques) == pytest.approx(WAM.motors.static_friction[0], rel=0.01)

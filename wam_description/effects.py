@@ -56,8 +56,8 @@ class Effects:
         high=1.0,
     )
     included_in_friction: bool = parameter(
-        "true if the friction of arm.motors is a measured breakaway torque, of which friction by tension and ripples of "
-        "the motor are a part (7.2.2): the plant's dry friction is what they leave; otherwise they are added",
+        "true if the friction of arm.motors is a measured breakaway torque, of which friction by tension and ripples "
+        "of the motor are a part (7.2.2): the plant's dry friction is what they leave; otherwise they are added",
         before=False,
     )
     added_coulomb_friction: tuple[float, ...] = parameter(
@@ -107,20 +107,18 @@ class Effects:
         if not self.included_in_friction:
             return motors
         left = []
-        for i, (name, static) in enumerate(zip(motors.names, motors.static_friction, strict=True)):
+        for i, (name, whole) in enumerate(zip(motors.names, motors.static_friction, strict=True)):
             waves = zip(self.ripples.shafts, self.ripples.ratio, self.ripples.amplitude, strict=True)
             others = 2.0 * arm.cables.pretension[i] * self.tension_friction[i]
             others += sum(abs(ratio * amplitude) for shaft, ratio, amplitude in waves if shaft == name)
             require(
-                others <= static,
+                others <= whole,
                 f"friction by tension and ripples of {name} are {others:.4g} N m; allowed: up to its static friction, "
-                f"{static:.4g} N m, which includes them, or set driver: effects.included_in_friction: false",
+                f"{whole:.4g} N m, which includes them, or set driver: effects.included_in_friction: false",
             )
-            left.append(1.0 - others / static if others else 1.0)
-        static, dynamic = (
-            tuple(value * share for value, share in zip(values, left, strict=True))
-            for values in (motors.static_friction, motors.dynamic_friction)
-        )
+            left.append(1.0 - others / whole if others else 1.0)
+        static = tuple(value * share for value, share in zip(motors.static_friction, left, strict=True))
+        dynamic = tuple(value * share for value, share in zip(motors.dynamic_friction, left, strict=True))
         return replace(motors, static_friction=static, dynamic_friction=dynamic)
 
     def play(self, motor: int) -> float:
