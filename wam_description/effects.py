@@ -108,9 +108,7 @@ class Effects:
             return motors
         left = []
         for i, (name, whole) in enumerate(zip(motors.names, motors.static_friction, strict=True)):
-            waves = zip(self.ripples.shafts, self.ripples.ratio, self.ripples.amplitude, strict=True)
-            others = 2.0 * arm.cables.pretension[i] * self.tension_friction[i]
-            others += sum(abs(ratio * amplitude) for shaft, ratio, amplitude in waves if shaft == name)
+            others = 2.0 * arm.cables.pretension[i] * self.tension_friction[i] + self.ripple(name)
             require(
                 others <= whole,
                 f"friction by tension and ripples of {name} are {others:.4g} N m; allowed: up to its static friction, "
@@ -120,6 +118,20 @@ class Effects:
         static = tuple(value * share for value, share in zip(motors.static_friction, left, strict=True))
         dynamic = tuple(value * share for value, share in zip(motors.dynamic_friction, left, strict=True))
         return replace(motors, static_friction=static, dynamic_friction=dynamic)
+
+    def smooth(self, arm: Arm) -> Motors:
+        """The motors with the friction that does not depend on their angle: dry, and by the pretension."""
+        motors = self.dry(arm)
+        tensions = [2.0 * tension * self.tightened(i) for i, tension in enumerate(arm.cables.pretension)]
+        by_tension = [sum_ * each for sum_, each in zip(tensions, self.tension_friction, strict=True)]
+        static = tuple(value + more for value, more in zip(motors.static_friction, by_tension, strict=True))
+        dynamic = tuple(value + more for value, more in zip(motors.dynamic_friction, by_tension, strict=True))
+        return replace(motors, static_friction=static, dynamic_friction=dynamic)
+
+    def ripple(self, shaft: str) -> float:
+        """Largest torque of the ripples on a motor or joint, N m."""
+        waves = zip(self.ripples.shafts, self.ripples.ratio, self.ripples.amplitude, strict=True)
+        return sum(abs(ratio * amplitude) for name, ratio, amplitude in waves if name == shaft)
 
     def play(self, motor: int) -> float:
         """Backlash of the circuit of this motor, rad."""

@@ -87,10 +87,9 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(n)]
     lean, joint_lean = _each(law.motor_asymmetry, n), _each(law.joint_asymmetry, n)
     load, joint_load = _each(law.motor_load_factor, n), _each(law.joint_load_factor, n)
-    dry, joint_coulomb = driver.effects.dry(arm), np.array(arm.joints.dynamic_friction)
-    # ripples average out in motion
-    coulomb = dry.dynamic_friction + 2.0 * np.multiply(driver.effects.tension_friction, arm.cables.pretension)
-    drop = np.subtract(dry.static_friction, dry.dynamic_friction) * (law.law == "stribeck")
+    motors = driver.effects.smooth(arm)  # ripples average out in motion
+    coulomb, joint_coulomb = np.array(motors.dynamic_friction), np.array(arm.joints.dynamic_friction)
+    drop = np.subtract(motors.static_friction, coulomb) * (law.law == "stribeck")
     signs = np.array([1.0, -1.0])[:, None]
     # of an asymmetric joint: a torque that does not change with its direction, in each direction of the motor
     constant = matrix.T @ (joint_lean * joint_coulomb)
