@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arms import CONFIGURATION, WAM
+from arms import WAM
 
-from wam_description.configuration import Configuration
+from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_driver.amplifier import Amplifier
 from wam_driver.driver import DriverParameters
@@ -18,7 +18,7 @@ THERMAL_TIME = 2.0
 PEAK = WAM.motors.peak_torque[0] / WAM.motors.torque_constant[0]
 CONTINUOUS = WAM.motors.continuous_torque[0] / WAM.motors.torque_constant[0]
 REST = [0.0, 0.0, 0.0]
-PERFECT = CONFIGURATION.node("driver", DriverParameters).amplifier
+PERFECT = Configuration.load(packaged("plain-motors")).node("driver", DriverParameters).amplifier
 
 
 def amplifier(seed: int = 0, **parameters: tuple[float, ...]) -> Amplifier:

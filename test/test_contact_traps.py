@@ -119,7 +119,7 @@ def test_dither_feels_5_newton_at_rest() -> None:
     assert np.linalg.norm(np.subtract(found.force, (0.0, 4.0, 3.0))) < 1.0
     tip = [row.values[:4] for row in run.rows["sim/joint_states"][60:100]]
     moved = np.ptp([RigidBody(ARM).tool_pose(q).position for q in tip], axis=0)
-    assert 0.0 < np.linalg.norm(moved) < 0.5e-3
+    assert 0.0 < np.linalg.norm(moved) < 0.6e-3
 
 
 @pytest.mark.slow

@@ -623,6 +623,7 @@ EVERYTHING = Effects(
     backlash=(0.0, 0.0, 0.0, 0.02),
     pretension_share=(0.8,),
     tension_friction=(1e-5,) * 4,
+    included_in_friction=True,
     added_coulomb_friction=(0.05,) * 4,
 )
 

@@ -548,17 +548,20 @@ def test_arm_under_nine_tenths_of_its_static_friction_stays_for_a_minute(signs: 
     plant = released(WAM, World(NOWHERE, NO_SPRINGS), STEP, WAM_DRIVER.effects)
     q = np.array(WAM.joints.start)
     carried = BODY.gravity_torque(q) + 0.9 * np.array(signs) * WAM.joints.static_friction
-    cables, rotors = by_power(carried), np.array(signs[::-1]) * WAM.motors.static_friction
+    cables, cogging = by_power(carried), WAM_DRIVER.effects.ripples
+    rotors = np.array(signs[::-1]) * np.subtract(WAM.motors.static_friction, cogging.amplitude)
     stiffness = np.array([cable_stiffness(WAM, i) for i in range(4)])
     plant.data.qpos[:] = [*(motor_from_joint(q) + cables / stiffness), *q]
     before = np.array(plant.theta + plant.q)
-    torque = (cables + 0.9 * rotors).tolist()
+    angles = np.multiply(cogging.cycles, plant.theta) + cogging.phase
+    held = cables - cogging.amplitude * np.sin(angles)
+    torque = (held + 0.9 * rotors).tolist()
     for _ in range(round(60.0 / STEP)):
         plant.step(torque)
     drift = np.abs(np.array(plant.theta + plant.q) - before)
     assert drift.max() < 1e-6
     for _ in range(200):
-        plant.step((cables + 1.05 * rotors).tolist())
+        plant.step((held + 1.05 * rotors).tolist())
     assert np.abs(np.array(plant.theta) - before[:4]).min() > 1e-4
 
 

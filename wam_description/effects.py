@@ -1,9 +1,9 @@
 """Effects of the transmission besides its stiffness; each can be switched off."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from wam_description.arm import Arm
+from wam_description.arm import Arm, Motors
 from wam_description.parameters import lengths, parameter, require
 
 
@@ -55,6 +55,11 @@ class Effects:
         low=0.0,
         high=1.0,
     )
+    included_in_friction: bool = parameter(
+        "true if the friction of arm.motors is a measured breakaway torque, of which friction by tension and ripples "
+        "of the motor are a part (7.2.2): the plant's dry friction is what they leave; otherwise they are added",
+        before=False,
+    )
     added_coulomb_friction: tuple[float, ...] = parameter(
         "added Coulomb friction at each joint, like the Teflon rod of section 5.6",
         "N m",
@@ -90,6 +95,44 @@ class Effects:
                 f"torque its cable would be above its breaking strength, {strength:g} N",
             )
 
+    def dry(self, arm: Arm) -> Motors:
+        """The motors with the friction that is neither by tension nor a ripple.
+
+        Raises
+        ------
+        ParameterError
+            if `included_in_friction` and they are more than the friction of a motor.
+        """
+        motors = arm.motors
+        if not self.included_in_friction:
+            return motors
+        left = []
+        for i, (name, whole) in enumerate(zip(motors.names, motors.static_friction, strict=True)):
+            others = 2.0 * arm.cables.pretension[i] * self.tension_friction[i] + self.ripple(name)
+            require(
+                others <= whole,
+                f"friction by tension and ripples of {name} are {others:.4g} N m; allowed: up to its static friction, "
+                f"{whole:.4g} N m, which includes them, or set driver: effects.included_in_friction: false",
+            )
+            left.append(1.0 - others / whole if others else 1.0)
+        static = tuple(value * share for value, share in zip(motors.static_friction, left, strict=True))
+        dynamic = tuple(value * share for value, share in zip(motors.dynamic_friction, left, strict=True))
+        return replace(motors, static_friction=static, dynamic_friction=dynamic)
+
+    def smooth(self, arm: Arm) -> Motors:
+        """The motors with the friction that does not depend on their angle: dry, and by the pretension."""
+        motors = self.dry(arm)
+        tensions = [2.0 * tension * self.tightened(i) for i, tension in enumerate(arm.cables.pretension)]
+        by_tension = [sum_ * each for sum_, each in zip(tensions, self.tension_friction, strict=True)]
+        static = tuple(value + more for value, more in zip(motors.static_friction, by_tension, strict=True))
+        dynamic = tuple(value + more for value, more in zip(motors.dynamic_friction, by_tension, strict=True))
+        return replace(motors, static_friction=static, dynamic_friction=dynamic)
+
+    def ripple(self, shaft: str) -> float:
+        """Largest torque of the ripples on a motor or joint, N m."""
+        waves = zip(self.ripples.shafts, self.ripples.ratio, self.ripples.amplitude, strict=True)
+        return sum(abs(ratio * amplitude) for name, ratio, amplitude in waves if name == shaft)
+
     def play(self, motor: int) -> float:
         """Backlash of the circuit of this motor, rad."""
         return self.backlash[motor if len(self.backlash) > 1 else 0]
@@ -104,5 +147,6 @@ def no_effects(arm: Arm) -> Effects:
         slack=False,
         pretension_share=(1.0,),
         tension_friction=(0.0,) * len(arm.motors.names),
+        included_in_friction=False,
         added_coulomb_friction=(0.0,) * len(arm.joints.names),
     )

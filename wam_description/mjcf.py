@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from wam_description.arm import Arm, Links
+from wam_description.arm import Arm, Links, Motors
 from wam_description.contact_pairs import ContactPair, contact_pairs
 from wam_description.effects import Effects, Ripples
 from wam_description.mjcf_objects import add_bodies, add_doors, require_names
@@ -52,7 +52,7 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     _add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", eulerseq="XYZ")
     _add_solver(root, arm, step)
     bodies = _add(root, "worldbody")
-    _add_rotors(bodies, arm)
+    _add_rotors(bodies, effects.dry(arm))
     _add_links(bodies, arm)
     for i, name in enumerate(world.obstacles.names):
         _add_obstacle(bodies, world.obstacles, i, name, name in world.moving)
@@ -135,8 +135,7 @@ def _add_solver(root: ElementTree.Element, arm: Arm, step: float) -> None:
     _add(default, "geom", contype="0", conaffinity="0")
 
 
-def _add_rotors(world: ElementTree.Element, arm: Arm) -> None:
-    motors = arm.motors
+def _add_rotors(world: ElementTree.Element, motors: Motors) -> None:
     for i, name in enumerate(motors.names):
         body = _add(world, "body", name=f"{name}_rotor", pos=_numbers((-0.3, 0.15 * i, -0.3)))
         inertia = motors.inertia[i]

@@ -218,7 +218,7 @@ class DryFriction:
     def __init__(
         self, arm: Arm, effects: Effects, parameters: FrictionParameters, step: float, compliance: Sequence[float]
     ) -> None:
-        motors, joints = arm.motors, arm.joints
+        motors, joints = effects.dry(arm), arm.joints
         size = 2 * len(motors.names)
         _refuse_wrong_lengths(parameters, size // 2)
         static = [*motors.static_friction, *joints.static_friction]

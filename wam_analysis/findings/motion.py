@@ -1,6 +1,7 @@
 """Sections about the transmission: stick and slip, friction, ripple."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +44,9 @@ class MotionFindings(NamedTuple):
 
 def motion_sections(recording: AnalysedRun) -> MotionFindings:
     """All sections about motors and joints."""
-    arm = recording.parameters.arm
+    arm, effects = recording.parameters.arm, recording.parameters.effects
+    if arm is not None and effects is not None:
+        arm = replace(arm, motors=effects.smooth(arm))  # cogging is a ripple, below
     lacking = recording.lacking("motor_states", "joint_sensors", "sim/joint_states", "gravity_effort")
     signals = None if arm is None else transmission_signals(recording, arm)
     stick = _stick_section(recording)
@@ -175,8 +178,10 @@ def _friction_section(
         else f"with the joint's friction; load from the {signals.load_from}"
     )
     findings = []
+    effects = recording.parameters.effects
     for i, (name, found) in enumerate(friction.items()):
-        findings += _friction_findings(name, found, _of_motor(arm, i, alone), note)
+        cogging = effects.ripple(name) / math.sqrt(2.0) if effects else 0.0
+        findings += _friction_findings(name, found, _of_motor(arm, i, alone), note, cogging)
     for i, (name, found) in enumerate(joints.items()):
         bearing = arm.joints
         configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
@@ -229,8 +234,12 @@ def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
     return own[0], own[1], own[2]
 
 
-def _friction_findings(name: str, found: Friction, configured: tuple[float, float, float], note: str) -> list[Finding]:
+def _friction_findings(
+    name: str, found: Friction, configured: tuple[float, float, float], note: str, cogging: float = 0.0
+) -> list[Finding]:
+    """Of one shaft; cogging of this rms, N m, may be part of what was measured at some angles."""
     static, dynamic, viscous = configured
+    errors = math.hypot(found.static_error, cogging), math.hypot(found.dynamic_error, cogging)
 
     def one(kind: str, unit: str, value: float, error: float, predicted: float, first: str = "") -> Finding:
         identified = _is_identified(value, error)
@@ -242,8 +251,8 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
         return Finding(f"{name}: {kind} friction", unit, measured, predicted, text, error if identified else math.nan)
 
     return [
-        one("static", "N m", found.static, found.static_error, static, f"{found.breakaways} breakaways"),
-        one("dynamic", "N m", found.dynamic, found.dynamic_error, dynamic),
+        one("static", "N m", found.static, errors[0], static, f"{found.breakaways} breakaways"),
+        one("dynamic", "N m", found.dynamic, errors[1], dynamic),
         one("viscous", "N m s/rad", found.viscous, found.viscous_error, viscous),
     ]
 

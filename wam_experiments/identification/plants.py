@@ -87,8 +87,11 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(n)]
     lean, joint_lean = _each(law.motor_asymmetry, n), _each(law.joint_asymmetry, n)
     load, joint_load = _each(law.motor_load_factor, n), _each(law.joint_load_factor, n)
-    coulomb, joint_coulomb = np.array(arm.motors.dynamic_friction), np.array(arm.joints.dynamic_friction)
-    drop = np.subtract(arm.motors.static_friction, coulomb) * (law.law == "stribeck")
+    motors = driver.effects.dry(arm)
+    coulomb, joint_coulomb = np.array(motors.dynamic_friction), np.array(arm.joints.dynamic_friction)
+    drop = np.subtract(motors.static_friction, coulomb) * (law.law == "stribeck")
+    # alike in both directions; ripples average out in motion
+    by_tension = np.subtract(driver.effects.smooth(arm).dynamic_friction, coulomb)
     signs = np.array([1.0, -1.0])[:, None]
     # of an asymmetric joint: a torque that does not change with its direction, in each direction of the motor
     constant = matrix.T @ (joint_lean * joint_coulomb)
@@ -97,7 +100,7 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     factor += signs * (np.sign(own.T * matrix.T) @ (joint_lean * joint_load))
     return TrueFriction(
         # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
-        coulomb * (1.0 + signs * lean) + own.T @ joint_coulomb + signs * constant + factor * at_joint,
+        coulomb * (1.0 + signs * lean) + by_tension + own.T @ joint_coulomb + signs * constant + factor * at_joint,
         at_joint,
         drop * (1.0 + signs * lean),
         factor,
