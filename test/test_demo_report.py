@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture
-from wam_analysis.demo_figure import draw_forces, save
+from wam_analysis.demo_figure import draw_arm, draw_forces, save
 from wam_analysis.demo_report import report, text, verdict
-from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summarize
-from wam_analysis.demo_traces import RECORDED, TOPICS_READ
+from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summarize, summary_of
+from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_cli.commands.demo import _report
@@ -32,6 +33,7 @@ from wam_description.signals import Contact
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
 from wam_experiments.thesis.definition import load
 from wam_sim.recorded_parameters import recorded_parameters
+from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record
 
 MS = 1_000_000
@@ -438,6 +440,32 @@ def test_view_keeps_lengths_across_and_shows_everything():
         for end in view.project(np.array([tube.start, tube.end])):
             assert abs(end[0]) + tube.radius < view.width / 2
             assert abs(end[1]) + tube.radius < view.height / 2
+
+
+def test_a_force_that_points_out_of_the_view_of_the_arm_is_drawn_whole_with_its_label():
+    run = recorded_run(read(Path(__file__).parents[1] / "bags" / "sample" / "wam-touch", TOPICS_READ, may_lack=True))
+    figure = Figure(figsize=(5.6, 4.2))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    draw_arm(axes, summary_of(run), recorded_arm(run.parameters), gl=(), letter=None)
+    labels = {text.get_text(): text for text in axes.texts}
+    assert "true 12.0 N" in labels
+    renderer, box = FigureCanvasAgg(figure).get_renderer(), axes.get_window_extent()
+    for label in labels.values():
+        assert box.contains(*label.get_window_extent(renderer).min)
+        assert box.contains(*label.get_window_extent(renderer).max)
+
+
+def test_a_recording_that_begins_later_than_its_scenario_is_drawn_from_its_begin():
+    recording = Recording()
+    summary = recording.summary()
+    later = summary.traces.stamp >= START + 6_000 * MS
+    part = [ForceSignal(*(column[later] for column in signal)) for signal in summary.traces[1:]]
+    axes = Figure().add_subplot()
+    draw_forces(axes, summary._replace(traces=Traces(summary.traces.stamp[later], *part)))
+    assert axes.get_xlim() == pytest.approx((6.0, 10.0))
+    shown = [text.get_text().replace("\n", " ") for text in axes.texts]
+    assert "press 4 N" in shown
+    assert "push outer" not in shown
 
 
 def test_box_has_six_faces_that_look_outwards():
