@@ -90,7 +90,8 @@ def draw_arm(
     box = axes.get_window_extent()
     forces = _contact_forces(summary, arm, q)
     tips = [
-        point + force * (METRES_PER_NEWTON + LABELS / max(np.linalg.norm(force), 1e-9)) for point, force, *_ in forces
+        point + force * (METRES_PER_NEWTON + LABELS / max(float(np.linalg.norm(force)), 1e-9))
+        for point, force, *_ in forces
     ]
     view = arm_picture.side_view(arm, q, obstacles, aspect=float(box.width / box.height), more=tips)
     axes.set_xlim(-view.width / 2.0, view.width / 2.0)
