@@ -32,7 +32,8 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
-from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, ObjectState, Wrench
+from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, ObjectState, Point, State, Wrench
+from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
@@ -45,11 +46,15 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
-from wam_live.panel import FORCES, NO_PRESS, POINTS, Bend, Controls, Play, Press, sample, status_page  # noqa: E402
+from wam_live.panel import FORCES, NO_PRESS, POINTS, Bend, Controls, Play, Press, dot, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
+from wam_live.stack_source import RunningStack  # noqa: E402
 from wam_ros.display import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
+from wam_ros.messages import message_type  # noqa: E402
+from wam_ros.qos import qos  # noqa: E402
+from wam_ros.wire import encoder  # noqa: E402
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm
@@ -178,6 +183,16 @@ def test_a_force_that_is_not_done_is_not_shown_as_done() -> None:
     assert "commanded 5.0 N, not done: another link is touched" in page
     loop = loop._replace(facts={"reaction": "none"})
     assert "measured 4.8 N" in status_page(Snapshot(measured=4.8, statuses={"force_loop": loop}), pressing=5.0)
+
+
+def test_an_arm_that_is_not_heard_of_is_not_shown_as_enabled() -> None:
+    driver = NodeStatus(Level.OK, "enabled", node="driver", mode="enabled")
+    shown = lambda silent, status=driver: status_page(Snapshot(silent=silent, statuses={"driver": status}))  # noqa: E731
+    assert "no state" not in shown(0.5)
+    assert "no state of the arm for 5 s" in shown(5.0)
+    assert dot(Level.OK) in shown(0.5)
+    assert dot(Level.OK) not in shown(5.0)
+    assert "no state" not in shown(5.0, driver._replace(facts={PAUSED: "paused"}))
 
 
 def test_buttons_are_above_all_that_changes_its_height(server: Any) -> None:
@@ -396,6 +411,27 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
     assert not hold.is_on
     assert "another program publishes sim/disturbance" in hold.send(1, push)
     del other
+
+
+def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: RosWorld) -> None:
+    node, shared = ros.node("driver"), CONFIGURATION.shared
+    stack = RunningStack(ros.context, "wam", shared)
+    rows = {name: BY_NAME[name] for name in ("sim/contact/wrench", "sim/contact/point", "sim/joint_states")}
+    publishers = {name: node.create_publisher(message_type(row), name, qos(row)) for name, row in rows.items()}
+    values = (
+        Wrench("outer_link", (0.0, 9.0, 0.0), (0.0, 0.0, 0.0)), Point("outer_link", (0.2, 0.0, 0.0)),
+        State([0.0] * 4, [0.0] * 4, [0.0] * 4),
+    )  # fmt: skip
+
+    def shown(number: int, stamp: int) -> Snapshot:
+        for (name, row), value in list(zip(rows.items(), values, strict=True))[-number:]:
+            publishers[name].publish(encoder(row, shared)(stamp, value))
+        return stack.snapshot()
+
+    ros.wait(lambda: shown(3, 1_000_000_000).true.cover == "outer_link")
+    ros.wait(lambda: shown(1, 3_000_000_000).stamp == 3_000_000_000)
+    assert stack.snapshot().true.cover == ""
+    stack.node.destroy_node()
 
 
 def test_copies_for_the_page_are_few_and_newest_first(ros: RosWorld) -> None:

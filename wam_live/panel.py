@@ -14,6 +14,7 @@ from viser import uplot
 from wam_analysis.drawing import COLOURS, HAND, LIKELY
 from wam_description.arm import Arm
 from wam_description.signals import BASE, Contact, Level, NodeStatus, Triple
+from wam_description.status import PAUSED
 from wam_description.wiring import Call, SetParameters
 from wam_live.snapshot import Snapshot, size
 
@@ -23,6 +24,7 @@ FORCES: Final = ("commanded", "measured", "estimated", "at least", "true")  # of
 RANGES: Final = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)  # N, upper ends of its axis
 STATUS_HEIGHT: Final = 150  # px
 SAID_HEIGHT: Final = 40  # px
+SILENT: Final = 2.0  # s without a state, after which the page says so
 MARK: Final = 0.5  # s between the rings of a lower bound
 LEGEND: Final = (  # of the arrows and the range in the scene
     ("&#10145;", "true", "true (simulator)"),
@@ -283,13 +285,17 @@ def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0)
     """Status as HTML: the driver first, then what is done by hand, the nodes that warn, the contact."""
     driver = snapshot.statuses.get("driver")
     mode = mode_of(snapshot.statuses) or "waiting for the stack"
+    lost = driver is not None and PAUSED not in driver.facts and snapshot.silent > SILENT
     factor = f" · {snapshot.real_time_factor:.2f} × real time" if math.isfinite(snapshot.real_time_factor) else ""
     lines = [
         paragraph(
-            f'<b style="font-size:18px">{dot(driver.level if driver else None)} {mode}</b>'
+            f'<b style="font-size:18px">{dot(driver.level if driver and not lost else None)} {mode}</b>'
             f" · {snapshot.seconds:.1f} s{factor}"
         )
     ]
+    if lost:
+        text = f"no state of the arm for {snapshot.silent:.0f} s: the stack has ended, or waits for a node"
+        lines.append(paragraph(text, DOTS[Level.ERROR]))
     if driver and driver.fault:
         lines.append(paragraph(html.escape(driver.fault), DOTS[Level.ERROR]))
     if pressing:
