@@ -162,6 +162,7 @@ def test_the_status_escapes_what_comes_from_topics() -> None:
 
 def test_a_lower_bound_of_the_force_is_no_estimate_and_an_unknown_position_a_gap(server: Any) -> None:
     panel = Controls(server, ARM, {})
+    first = panel._force_plot
     bound, known = (Contact("inner_link", place, (0.0, 6.0, 8.0)) for place in (math.nan, 0.3))
     for i in range(40):
         panel.take(Snapshot(i * 100_000_000, POSE, estimated=bound if i < 20 else known))
@@ -172,9 +173,11 @@ def test_a_lower_bound_of_the_force_is_no_estimate_and_an_unknown_position_a_gap
     assert lines["estimated"][20:40] == pytest.approx(10.0)
     assert np.nanmax(lines["at least"][:20]) == pytest.approx(10.0)
     assert np.isnan(lines["at least"][20:40]).all()
-    assert np.isnan(panel._place_plot.data[1][:20]).all()
-    assert panel._place_plot.data[1][20:40] == pytest.approx(0.3)
+    assert np.isnan(panel._place_plot.data[2][:20]).all()
+    assert panel._place_plot.data[2][20:40] == pytest.approx(0.3)
     assert panel._force_plot.scales["y"]["range"] == (0.0, 20.0)
+    assert first.scales["y"]["range"] == (0.0, 5.0)  # the browser would leave a plot whose scales change empty
+    assert panel._force_plot.order == first.order
 
 
 def test_a_force_that_is_not_done_is_not_shown_as_done() -> None:
@@ -192,7 +195,9 @@ def test_an_arm_that_is_not_heard_of_is_not_shown_as_enabled() -> None:
     assert "no state of the arm for 5 s" in shown(5.0)
     assert dot(Level.OK) in shown(0.5)
     assert dot(Level.OK) not in shown(5.0)
-    assert "no state" not in shown(5.0, driver._replace(facts={PAUSED: "paused"}))
+    paused = shown(5.0, driver._replace(facts={PAUSED: "paused"}))
+    assert "no state" not in paused
+    assert " · paused" in paused
 
 
 def test_buttons_are_above_all_that_changes_its_height(server: Any) -> None:
