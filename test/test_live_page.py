@@ -394,6 +394,8 @@ def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
     assert pushed.estimated.position_sd > 0.0
     assert source.snapshot(300_000_000).statuses["driver"].mode == "enabled"
     assert len(list(source.past(400_000_000))) == POINTS
+    levels = [source.snapshot(at).statuses["force_loop"].level for at in (400_000_000, 650_000_000)]
+    assert levels == [Level.OK, Level.WARN]  # of the press at 0.6 s, whose status has no stamp
 
 
 def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: RosWorld) -> None:

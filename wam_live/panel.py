@@ -104,7 +104,7 @@ class Controls:
             self._add_buttons()  # above all that changes its height
         self._status = gui.add_html(boxed(status_page(Snapshot()), STATUS_HEIGHT))
         self._said = gui.add_html(boxed(paragraph(HINT), SAID_HEIGHT) if live is not None else "")
-        gui.add_html(legend())
+        gui.add_html(legend(LEGEND if live is not None else LEGEND[:-1]))
         if live is not None:
             self._add_press(arm)
             self._add_scenario()
@@ -271,10 +271,10 @@ def is_lower_bound(estimated: Contact) -> bool:
     return bool(estimated.cover) and not math.isfinite(estimated.place)
 
 
-def legend() -> str:
+def legend(parts: Sequence[tuple[str, str, str]]) -> str:
     """What the colours of the scene mean, as HTML."""
     colours = {**COLOURS, "likely": LIKELY, "hand": HAND}
-    marks = (f'<span style="color:{colours[name]}">{mark}</span> {text}' for mark, name, text in LEGEND)
+    marks = (f'<span style="color:{colours[name]}">{mark}</span> {text}' for mark, name, text in parts)
     return paragraph(" &nbsp; ".join(f'<span style="white-space:nowrap">{mark}</span>' for mark in marks))
 
 
