@@ -478,7 +478,7 @@ def test_box_has_six_faces_that_look_outwards():
         assert face.normal @ outwards == pytest.approx(np.linalg.norm(outwards))
 
 
-def test_report_reads_a_bag_from_disk_and_puts_the_picture_beside_it(tmp_path):
+def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
     store = get_typestore(Stores.ROS2_JAZZY)
     kinds = {kind: store.types[f"diagnostic_msgs/msg/{kind}"] for kind in ("DiagnosticStatus", "KeyValue")}
     kind = "diagnostic_msgs/msg/DiagnosticStatus"
@@ -489,8 +489,12 @@ def test_report_reads_a_bag_from_disk_and_puts_the_picture_beside_it(tmp_path):
             message = kinds["DiagnosticStatus"](0, "scenario", said, "", values)
             for connection in connections:
                 writer.write(connection, stamp, store.serialize_cdr(message, kind))
-    assert "Demonstration of /wam: 1 steps, 1.0 s, unknown, done" in report(tmp_path / "bag")
-    assert (tmp_path / "bag" / "demo.png").is_file()
+    before = sorted((tmp_path / "bag").iterdir())
+    first = "Demonstration of /wam: 1 steps, 1.0 s, unknown, done"
+    assert first in report(tmp_path / "bag")
+    assert sorted((tmp_path / "bag").iterdir()) == before
+    assert str(tmp_path / "drawn.png") in report(tmp_path / "bag", tmp_path / "drawn.png")
+    assert (tmp_path / "drawn.png").is_file()
     assert list(read(tmp_path / "bag", TOPICS_READ, may_lack=True).topics) == ["/wam/status"]
 
 
