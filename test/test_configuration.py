@@ -83,7 +83,7 @@ def test_sections_cannot_be_written(file: Path) -> None:
     [
         (
             "timing.mod",
-            r"mine\.yaml: section '/\*\*' has no parameter 'timing.mod' to set to 1; did you mean 'timing.mode'.*timing.mode",
+            r"section '/\*\*' has no parameter 'timing.mod' to set to 1; did you mean 'timing.mode'.*timing.mode",
         ),
         (
             "loop:gian",
