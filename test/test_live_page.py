@@ -24,6 +24,7 @@ from browser import browser
 from conftest import LONG, RosWorld
 from test_lockstep import STEPS, configuration, record_composed
 
+from wam_analysis.drawing import TRUE, channels
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
 from wam_cli.commands import take_page
@@ -46,7 +47,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
-from wam_live.panel import FORCES, NO_PRESS, POINTS, Bend, Controls, Play, Press, dot, sample, status_page  # noqa: E402
+from wam_live.panel import FORCES, NO_PRESS, POINTS, RANGES, Bend, Controls, Play, Press, dot, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
@@ -621,6 +622,17 @@ class Tab:
         found = self.ask("Runtime.evaluate", expression=count, awaitPromise=True, returnByValue=True)
         return float(found["result"]["value"])
 
+    def drawn(self, colour: str) -> list[int]:
+        """How many pixels of each plot have a colour."""
+        near = " && ".join(f"Math.abs(d[i + {i}] - {part}) < 25" for i, part in enumerate(channels(colour)))
+        count = (
+            "[...document.querySelectorAll('.uplot canvas')].map(c => {"
+            " const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
+            f" for (let i = 0; i < d.length; i += 4) if ({near}) n++; return n; }})"
+        )
+        found = self.ask("Runtime.evaluate", expression=count, returnByValue=True)
+        return list(found["result"].get("value", ()))
+
     def picture(self) -> bytes:
         """PNG of the window."""
         return base64.b64decode(self.ask("Page.captureScreenshot")["data"])
@@ -695,6 +707,8 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
                 until(lambda: panel.snapshot.true.cover == "outer_link")
                 until(lambda: math.dist(panel.snapshot.q, start) > MOVED)
                 until(lambda: "you push with" in tab.text())
+                until(lambda: panel._force_plot.scales["y"]["range"][1] > RANGES[0])
+                until(lambda: all(count > 20 for count in tab.drawn(TRUE)))  # also the plot whose range has changed
                 tab.mouse("mouseReleased", x + 144.0, y, False)
                 until(lambda: panel.snapshot.true.cover == "")
                 before = panel.snapshot.stamp
