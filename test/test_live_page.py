@@ -627,6 +627,7 @@ class Tab:
         near = " && ".join(f"Math.abs(d[i + {i}] - {part}) < 25" for i, part in enumerate(channels(colour)))
         count = (
             "[...document.querySelectorAll('.uplot canvas')].map(c => {"
+            " if (!c.width) return 0;"
             " const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
             f" for (let i = 0; i < d.length; i += 4) if ({near}) n++; return n; }})"
         )
