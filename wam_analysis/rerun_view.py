@@ -41,7 +41,7 @@ PROGRAM = "rerun"
 TIMELINE = "time"
 # plots, each with the corner in which its legend covers no curve of the demonstration
 LEGENDS = {"force": "RightTop", "position": "RightTop", "joints": "LeftBottom"}
-SHARES = (2.0, 1.2, 1.8, 0.8)  # heights of the plots and of the status: a legend has up to four lines
+SHARES = (1.9, 1.0, 1.5, 0.9)  # heights of the plots and of the status: a legend has up to four lines
 DISTANCE = 1.3  # of the eye, in heights of what it sees
 POSES = 100.0  # poses of the arm in a second at most
 
