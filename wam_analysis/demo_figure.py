@@ -293,7 +293,9 @@ def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:
     for step in summary.steps:
         room = round(letters * (step.end - step.begin) / 1e9 / (last - first))
         if room >= 6 and first <= _middle(summary, step) <= last:
-            lines = textwrap.wrap(step.name, room, break_long_words=False)[:NAME_LINES]
+            lines = textwrap.wrap(step.name, room, break_long_words=False)
+            if len(lines) > NAME_LINES:
+                lines = [*lines[: NAME_LINES - 1], f"{lines[NAME_LINES - 1]}…"[:room]]
             axes.text(
                 _middle(summary, step), 0.985, "\n".join(lines), transform=axes.get_xaxis_transform(), ha="center",
                 va="top", fontsize=7.5, linespacing=1.1, color="#555555", zorder=7,
