@@ -296,7 +296,7 @@ def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:
             lines = textwrap.wrap(step.name, room, break_long_words=False)
             if len(lines) > NAME_LINES:
                 word = lines[NAME_LINES - 1]
-                lines = [*lines[: NAME_LINES - 1], f"{word}…" if len(word) < room else word]
+                lines = [*lines[: NAME_LINES - 1], f"{word}…" if len(word) < room - 1 else word]
             axes.text(
                 _middle(summary, step), 0.985, "\n".join(lines), transform=axes.get_xaxis_transform(), ha="center",
                 va="top", fontsize=7.5, linespacing=1.1, color="#555555", zorder=7,
