@@ -40,10 +40,10 @@ def motor_space(file: Path) -> None:
             axes.add_patch(Polygon(corners, fill=False, edgecolor=colour, linewidth=1.6))
             box = np.abs(corners).max(axis=0)
             axes.add_patch(Polygon(square * box, fill=False, edgecolor=GREY, linewidth=0.9, linestyle="--"))
-            for i in (0, 1):
+            for i, side in ((0, "right"), (1, "left")):
                 tip = change @ (np.eye(2)[i] * limits[i])
                 axes.annotate("", tip, (0.0, 0.0), arrowprops={"arrowstyle": "-|>", "color": INK})
-                axes.annotate(f"motor {i + 2}", tip, (0, -11), textcoords="offset points", fontsize=8, ha="center")
+                axes.annotate(f"motor {i + 2}", tip, (0, -12), textcoords="offset points", fontsize=8, ha=side)
             axes.set(xlim=(-1.35 * box[0], 1.35 * box[0]), ylim=(-1.35 * box[1], 1.35 * box[1]), title=name)
             axes.set(xlabel="torque at joint 2 [N m]", ylabel="torque at joint 3 [N m]")
 
@@ -84,7 +84,7 @@ def loops(file: Path) -> None:
         axes.text(5.5, 2.45, "torque", fontsize=8, ha="center")
         axes.text(10.0, 2.05, "force", fontsize=8, ha="center")
         arrow(axes, (7.1, 1.57), (7.1, 1.0), (4.4, 1.0), (4.4, 1.57), colour=INNER)
-        axes.text(5.75, 1.08, "motor velocity, measured at the shaft", fontsize=7.5, color=INNER, ha="center")
+        axes.text(5.75, 0.74, "motor velocity, measured at the shaft", fontsize=8, color=INNER, ha="center")
         arrow(axes, (9.9, 1.9), (9.9, 0.3), (2.2, 0.3), (2.2, 1.57), colour=OUTER)
         axes.text(
             6.0, 0.38, "measured force: from the far end of the transmission", fontsize=8, color=OUTER, ha="center"

@@ -38,7 +38,7 @@ def frames(summary: DemoSummary, recorded: RecordedArm, joints: JointColumns) ->
     with mpl.rc_context({**STYLE, "font.size": 11.0}):
         figure = Figure(figsize=SIZE, dpi=DPI)
         FigureCanvasAgg(figure)
-        grid = figure.add_gridspec(2, 1, height_ratios=(1.7, 1.0), left=0.1, right=0.98, bottom=0.08, top=0.95)
+        grid = figure.add_gridspec(2, 1, height_ratios=(1.7, 1.0), left=0.13, right=0.98, bottom=0.08, top=0.95)
         scene, forces = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
         draw_forces(forces, summary, letter="", room=0)
         forces.tick_params(labelbottom=True)

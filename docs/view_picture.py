@@ -23,8 +23,8 @@ from urllib.parse import quote
 from websockets.sync.client import connect
 
 WEB, GRPC, DEBUG = 9490, 9491, 9492  # ports on this machine alone
-SIZE = (1400, 800)
-SLIDER = (268, 1191, 643)  # px: from x to x of the time slider, and its y, at that size
+SIZE = (1400, 900)
+SLIDER = (268, 1191, 743)  # px: from x to x of the time slider, and its y, at that size
 FLAGS = (
     "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
     "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update",

@@ -87,7 +87,7 @@ def draw(found: list[Press], limit: float, file: str) -> None:
     )
     axes.axvline(limit, color=PREDICTED, linestyle=":", label="largest gain that the guard accepts")
     axes.set(xlabel="force gain [m/s/N]", ylabel="over the commanded force")
-    axes.legend(loc="center left")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     figure.savefig(file, dpi=150)
     print(file)
 

@@ -209,6 +209,11 @@ def test_every_number_of_a_section_stands_in_its_tables_within_the_width(moving:
                 assert shown(finding.predicted) in found
 
 
+def test_no_name_of_a_column_is_broken_within_a_word() -> None:
+    lines = text(analyse(SAMPLES / "wam-press", lambda doing: None), 60)
+    assert "force_measured" in lines.partition("Timing of the loop")[2].partition("not in this")[0]
+
+
 def test_predictions_stand_beside_what_they_predict_and_nowhere_else() -> None:
     findings = (
         Finding("press: rise", "s", 0.1, 0.2), Finding("press: ripple", "N", 0.3), Finding("hold: rise", "s", 0.4),

@@ -45,6 +45,8 @@ def test_a_misspelt_command_is_answered_with_the_one_that_was_meant(capsys: pyte
     assert (code, out) == (2, "")
     assert "no command 'anlyse'; did you mean 'analyse'?" in err
     assert "choose from demo" in said(capsys, "xyzzy")[2]
+    assert "no 'enabel'; did you mean 'enable'?" in said(capsys, "call", "enabel")[2]
+    assert "no 'contct'; did you mean 'contact'?" in said(capsys, "evaluate", "contct")[2]
 
 
 def test_the_american_spelling_is_the_same_command(capsys: pytest.CaptureFixture[str]) -> None:
@@ -65,7 +67,7 @@ def test_one_number_is_changed_in_one_word(capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("arm.links.mas=[2.5]", "has no parameter 'arm.links.mas'"),
+        ("arm.links.mas=[2.5]", "to set to [2.5]; did you mean 'arm.links.mass'? it has"),
         ("nothing", "write [node:]parameter=value"),
         ("timing.period=[", "is no value of YAML"),
         ("drivr:seed=1", "no section '/**/drivr'"),
@@ -78,6 +80,16 @@ def test_a_number_that_cannot_be_changed_is_named(
     assert (code, out) == (1, "")
     assert message in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["plant FILE", "sweep t.csv --vary seed=1:2:2 --picture FILE"])
+def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
+    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = command.replace("FILE", str(tmp_path / "x.foo")).replace("t.csv", str(tmp_path / "t.csv")).split()
+    code, out, err = said(capsys, *words)
+    assert (code, out) == (1, "")
+    assert "there is no format '.foo'; give a .png" in err
 
 
 def test_a_scenario_that_does_not_exist_is_refused_before_any_node_starts(

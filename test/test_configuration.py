@@ -83,9 +83,12 @@ def test_sections_cannot_be_written(file: Path) -> None:
     [
         (
             "timing.mod",
-            r"mine\.yaml: section '/\*\*' has no parameter 'timing.mod' to set to 1; it has: .*timing.mode",
+            r"section '/\*\*' has no parameter 'timing.mod' to set to 1; did you mean 'timing.mode'.*timing.mode",
         ),
-        ("loop:gian", r"mine\.yaml: node 'loop' has no parameter 'gian' to set to 1; it has: gain, names"),
+        (
+            "loop:gian",
+            r"mine\.yaml: node 'loop' has no parameter 'gian' to set to 1; did you mean 'gain'. it has: gain, names",
+        ),
         ("lop:gain", r"mine\.yaml: no section '/\*\*/lop' for node 'lop'; sections: .*loop"),
     ],
 )

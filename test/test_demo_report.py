@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture
-from wam_analysis.demo_figure import draw_forces, save
+from wam_analysis.demo_figure import draw_arm, draw_forces, save
 from wam_analysis.demo_report import report, text, verdict
-from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summarize
-from wam_analysis.demo_traces import RECORDED, TOPICS_READ
+from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summarize, summary_of
+from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_cli.commands.demo import _report
@@ -32,6 +33,7 @@ from wam_description.signals import Contact
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
 from wam_experiments.thesis.definition import load
 from wam_sim.recorded_parameters import recorded_parameters
+from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record
 
 MS = 1_000_000
@@ -440,6 +442,32 @@ def test_view_keeps_lengths_across_and_shows_everything():
             assert abs(end[1]) + tube.radius < view.height / 2
 
 
+def test_a_force_that_points_out_of_the_view_of_the_arm_is_drawn_whole_with_its_label():
+    run = recorded_run(read(Path(__file__).parents[1] / "bags" / "sample" / "wam-touch", TOPICS_READ, may_lack=True))
+    figure = Figure(figsize=(5.6, 4.2))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    draw_arm(axes, summary_of(run), recorded_arm(run.parameters), gl=(), letter=None)
+    labels = {text.get_text(): text for text in axes.texts}
+    assert "true 12.0 N" in labels
+    renderer, box = FigureCanvasAgg(figure).get_renderer(), axes.get_window_extent()
+    for label in labels.values():
+        assert box.contains(*axes.transData.transform(label.xy))  # else nothing of it is drawn
+        assert box.contains(*label.get_window_extent(renderer).max)
+
+
+def test_a_recording_that_begins_later_than_its_scenario_is_drawn_from_its_begin():
+    recording = Recording()
+    summary = recording.summary()
+    later = summary.traces.stamp >= START + 6_000 * MS
+    part = [ForceSignal(*(column[later] for column in signal)) for signal in summary.traces[1:]]
+    axes = Figure().add_subplot()
+    draw_forces(axes, summary._replace(traces=Traces(summary.traces.stamp[later], *part)))
+    assert axes.get_xlim() == pytest.approx((6.0, 10.0))
+    shown = [text.get_text().replace("\n", " ") for text in axes.texts]
+    assert "press 4 N" in shown
+    assert "push outer" not in shown
+
+
 def test_box_has_six_faces_that_look_outwards():
     obstacles = arm_of(Recording().bag()).obstacles
     faces = list(arm_picture.faces(obstacles))
@@ -450,7 +478,7 @@ def test_box_has_six_faces_that_look_outwards():
         assert face.normal @ outwards == pytest.approx(np.linalg.norm(outwards))
 
 
-def test_report_reads_a_bag_from_disk_and_puts_the_picture_beside_it(tmp_path):
+def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
     store = get_typestore(Stores.ROS2_JAZZY)
     kinds = {kind: store.types[f"diagnostic_msgs/msg/{kind}"] for kind in ("DiagnosticStatus", "KeyValue")}
     kind = "diagnostic_msgs/msg/DiagnosticStatus"
@@ -461,8 +489,12 @@ def test_report_reads_a_bag_from_disk_and_puts_the_picture_beside_it(tmp_path):
             message = kinds["DiagnosticStatus"](0, "scenario", said, "", values)
             for connection in connections:
                 writer.write(connection, stamp, store.serialize_cdr(message, kind))
-    assert "Demonstration of /wam: 1 steps, 1.0 s, unknown, done" in report(tmp_path / "bag")
-    assert (tmp_path / "bag" / "demo.png").is_file()
+    before = sorted((tmp_path / "bag").iterdir())
+    first = "Demonstration of /wam: 1 steps, 1.0 s, unknown, done"
+    assert first in report(tmp_path / "bag")
+    assert sorted((tmp_path / "bag").iterdir()) == before
+    assert str(tmp_path / "drawn.png") in report(tmp_path / "bag", tmp_path / "drawn.png")
+    assert (tmp_path / "drawn.png").is_file()
     assert list(read(tmp_path / "bag", TOPICS_READ, may_lack=True).topics) == ["/wam/status"]
 
 

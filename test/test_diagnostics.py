@@ -79,12 +79,12 @@ def test_the_console_says_the_state_and_what_to_call_next(hand: Hand, capfd: pyt
         hand.ask(request, data)
     hand.wait_periods(1)
     release = (
-        "braked, all nodes are connected; to release the brakes: ros2 service call /wam/driver/enable "
-        "std_srvs/srv/SetBool '{data: true}' (or: wam call enable)"
+        "braked, all nodes are connected; to release the brakes: wam call enable "
+        "(or: ros2 service call /wam/driver/enable std_srvs/srv/SetBool '{data: true}')"
     )
     fault = (
-        "fault, the brakes are on; when its cause is gone: ros2 service call /wam/driver/reset_fault "
-        "std_srvs/srv/Trigger (or: wam call reset_fault), then enable"
+        "fault, the brakes are on; when its cause is gone: wam call reset_fault "
+        "(or: ros2 service call /wam/driver/reset_fault std_srvs/srv/Trigger), then enable"
     )
     released = "enabled: the brakes are released"
     lines = [line.split("]: ")[1] for line in capfd.readouterr().err.splitlines() if "[INFO]" in line]
@@ -95,8 +95,8 @@ def test_the_console_says_the_state_and_what_to_call_next(hand: Hand, capfd: pyt
 def test_the_console_names_the_nodes_that_are_missing_and_the_arm_that_is_called() -> None:
     assert guidance("braked", "", ["gravity"], [], "/wam", False) == "braked; not connected yet: gravity"
     assert guidance("braked", "", [], [], "/left", False).endswith(
-        "ros2 service call /left/driver/enable std_srvs/srv/SetBool '{data: true}' "
-        "(or: wam call enable --namespace left)"
+        "wam call enable --namespace left "
+        "(or: ros2 service call /left/driver/enable std_srvs/srv/SetBool '{data: true}')"
     )
     assert guidance("braked", "fault", [], ["gravity"], "/wam", False) == (
         "braked; enable is refused until the fault is over that is reported by gravity"

@@ -24,6 +24,7 @@ from browser import browser
 from conftest import LONG, RosWorld
 from test_lockstep import STEPS, configuration, record_composed
 
+from wam_analysis.drawing import TRUE, channels
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
 from wam_cli.commands import take_page
@@ -32,7 +33,8 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
-from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, ObjectState, Wrench
+from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, ObjectState, Point, State, Wrench
+from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_live.page import HOST, NoPageError, port_is_free, serve
@@ -45,11 +47,15 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
-from wam_live.panel import FORCES, NO_PRESS, POINTS, Bend, Controls, Play, Press, sample, status_page  # noqa: E402
+from wam_live.panel import FORCES, NO_PRESS, POINTS, RANGES, Bend, Controls, Play, Press, dot, sample, status_page  # noqa: E402
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
+from wam_live.stack_source import RunningStack  # noqa: E402
 from wam_ros.display import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
+from wam_ros.messages import message_type  # noqa: E402
+from wam_ros.qos import qos  # noqa: E402
+from wam_ros.wire import encoder  # noqa: E402
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm
@@ -157,6 +163,7 @@ def test_the_status_escapes_what_comes_from_topics() -> None:
 
 def test_a_lower_bound_of_the_force_is_no_estimate_and_an_unknown_position_a_gap(server: Any) -> None:
     panel = Controls(server, ARM, {})
+    first = panel._force_plot
     bound, known = (Contact("inner_link", place, (0.0, 6.0, 8.0)) for place in (math.nan, 0.3))
     for i in range(40):
         panel.take(Snapshot(i * 100_000_000, POSE, estimated=bound if i < 20 else known))
@@ -167,9 +174,11 @@ def test_a_lower_bound_of_the_force_is_no_estimate_and_an_unknown_position_a_gap
     assert lines["estimated"][20:40] == pytest.approx(10.0)
     assert np.nanmax(lines["at least"][:20]) == pytest.approx(10.0)
     assert np.isnan(lines["at least"][20:40]).all()
-    assert np.isnan(panel._place_plot.data[1][:20]).all()
-    assert panel._place_plot.data[1][20:40] == pytest.approx(0.3)
+    assert np.isnan(panel._place_plot.data[2][:20]).all()
+    assert panel._place_plot.data[2][20:40] == pytest.approx(0.3)
     assert panel._force_plot.scales["y"]["range"] == (0.0, 20.0)
+    assert first.scales["y"]["range"] == (0.0, 5.0)  # the browser would leave a plot whose scales change empty
+    assert panel._force_plot.order == first.order
 
 
 def test_a_force_that_is_not_done_is_not_shown_as_done() -> None:
@@ -178,6 +187,18 @@ def test_a_force_that_is_not_done_is_not_shown_as_done() -> None:
     assert "commanded 5.0 N, not done: another link is touched" in page
     loop = loop._replace(facts={"reaction": "none"})
     assert "measured 4.8 N" in status_page(Snapshot(measured=4.8, statuses={"force_loop": loop}), pressing=5.0)
+
+
+def test_an_arm_that_is_not_heard_of_is_not_shown_as_enabled() -> None:
+    driver = NodeStatus(Level.OK, "enabled", node="driver", mode="enabled")
+    shown = lambda silent, status=driver: status_page(Snapshot(silent=silent, statuses={"driver": status}))  # noqa: E731
+    assert "no state" not in shown(0.5)
+    assert "no state of the arm for 5 s" in shown(5.0)
+    assert dot(Level.OK) in shown(0.5)
+    assert dot(Level.OK) not in shown(5.0)
+    paused = shown(5.0, driver._replace(facts={PAUSED: "paused"}))
+    assert "no state" not in paused
+    assert " · paused" in paused
 
 
 def test_buttons_are_above_all_that_changes_its_height(server: Any) -> None:
@@ -374,6 +395,8 @@ def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
     assert pushed.estimated.position_sd > 0.0
     assert source.snapshot(300_000_000).statuses["driver"].mode == "enabled"
     assert len(list(source.past(400_000_000))) == POINTS
+    levels = [source.snapshot(at).statuses["force_loop"].level for at in (400_000_000, 650_000_000)]
+    assert levels == [Level.OK, Level.WARN]  # of the press at 0.6 s, whose status has no stamp
 
 
 def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: RosWorld) -> None:
@@ -396,6 +419,27 @@ def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_anothe
     assert not hold.is_on
     assert "another program publishes sim/disturbance" in hold.send(1, push)
     del other
+
+
+def test_a_contact_of_which_nothing_comes_any_more_is_not_shown(ros: RosWorld) -> None:
+    node, shared = ros.node("driver"), CONFIGURATION.shared
+    stack = RunningStack(ros.context, "wam", shared)
+    rows = {name: BY_NAME[name] for name in ("sim/contact/wrench", "sim/contact/point", "sim/joint_states")}
+    publishers = {name: node.create_publisher(message_type(row), name, qos(row)) for name, row in rows.items()}
+    values = (
+        Wrench("outer_link", (0.0, 9.0, 0.0), (0.0, 0.0, 0.0)), Point("outer_link", (0.2, 0.0, 0.0)),
+        State([0.0] * 4, [0.0] * 4, [0.0] * 4),
+    )  # fmt: skip
+
+    def shown(number: int, stamp: int) -> Snapshot:
+        for (name, row), value in list(zip(rows.items(), values, strict=True))[-number:]:
+            publishers[name].publish(encoder(row, shared)(stamp, value))
+        return stack.snapshot()
+
+    ros.wait(lambda: shown(3, 1_000_000_000).true.cover == "outer_link")
+    ros.wait(lambda: shown(1, 3_000_000_000).stamp == 3_000_000_000)
+    assert stack.snapshot().true.cover == ""
+    stack.node.destroy_node()
 
 
 def test_copies_for_the_page_are_few_and_newest_first(ros: RosWorld) -> None:
@@ -578,6 +622,18 @@ class Tab:
         found = self.ask("Runtime.evaluate", expression=count, awaitPromise=True, returnByValue=True)
         return float(found["result"]["value"])
 
+    def drawn(self, colour: str) -> list[int]:
+        """How many pixels of each plot have a colour."""
+        near = " && ".join(f"Math.abs(d[i + {i}] - {part}) < 25" for i, part in enumerate(channels(colour)))
+        count = (
+            "[...document.querySelectorAll('.uplot canvas')].map(c => {"
+            " if (!c.width) return 0;"
+            " const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
+            f" for (let i = 0; i < d.length; i += 4) if ({near}) n++; return n; }})"
+        )
+        found = self.ask("Runtime.evaluate", expression=count, returnByValue=True)
+        return list(found["result"].get("value", ()))
+
     def picture(self) -> bytes:
         """PNG of the window."""
         return base64.b64decode(self.ask("Page.captureScreenshot")["data"])
@@ -652,6 +708,8 @@ def test_in_a_browser_a_link_is_dragged_and_a_button_brakes(domain_id: int, tmp_
                 until(lambda: panel.snapshot.true.cover == "outer_link")
                 until(lambda: math.dist(panel.snapshot.q, start) > MOVED)
                 until(lambda: "you push with" in tab.text())
+                until(lambda: panel._force_plot.scales["y"]["range"][1] > RANGES[0])
+                until(lambda: all(count > 20 for count in tab.drawn(TRUE)))  # also the plot whose range has changed
                 tab.mouse("mouseReleased", x + 144.0, y, False)
                 until(lambda: panel.snapshot.true.cover == "")
                 before = panel.snapshot.stamp

@@ -159,11 +159,12 @@ def side_view(
     margin: float = 0.08,
     azimuth: float = 112.0,
     elevation: float = -14.0,
+    more: Sequence[Array] = (),
 ) -> View:
-    """A view from the side and a little from above that shows arm and obstacles; aspect is width by height."""
+    """A view from the side and a little from above that shows arm, obstacles and points; aspect: width by height."""
     points = [point for tube in tubes(arm, q) for point in (tube.start, tube.end)]
     points += [corner for face in faces(obstacles) for corner in face.corners if face.shape != "plane"]
-    points += [np.array([0.0, 0.0, floor_height(obstacles)])]
+    points += [np.array([0.0, 0.0, floor_height(obstacles)]), *more]
     view = View(azimuth=azimuth, elevation=elevation, centre=np.zeros(3), width=1.0, height=1.0)
     projected = view.project(np.array(points))
     low, high = projected.min(axis=0), projected.max(axis=0)

@@ -24,6 +24,8 @@ from wam_sim.recording import RecordedStep
 
 DPI = 200
 SIZE = (9.0, 4.0)  # inches
+LABELS = 0.08  # m, for the labels beyond the tips of the arrows
+NAME_LINES = 3  # of the name of a step: more would cover the forces
 
 
 def save(path: Path, summary: DemoSummary, recorded: RecordedArm, gl: Sequence[str] | None = None) -> tuple[str, ...]:
@@ -86,7 +88,12 @@ def draw_arm(
         axes.text(0.5, 0.5, "the recorded pose is not finite", ha="center", transform=axes.transAxes)
         return
     box = axes.get_window_extent()
-    view = arm_picture.side_view(arm, q, obstacles, aspect=float(box.width / box.height))
+    forces = _contact_forces(summary, arm, q)
+    tips = [
+        point + force * (METRES_PER_NEWTON + LABELS / max(float(np.linalg.norm(force)), 1e-9))
+        for point, force, *_ in forces
+    ]
+    view = arm_picture.side_view(arm, q, obstacles, aspect=float(box.width / box.height), more=tips)
     axes.set_xlim(-view.width / 2.0, view.width / 2.0)
     axes.set_ylim(-view.height / 2.0, view.height / 2.0)
     axes.set_aspect("equal")
@@ -95,23 +102,30 @@ def draw_arm(
         arm_picture.draw(axes, arm, q, obstacles, view)
     else:
         axes.imshow(pixels, extent=(*axes.get_xlim(), *axes.get_ylim()), interpolation="lanczos", zorder=0)
-    _draw_contacts(axes, summary, arm, q, view)
+    _draw_contacts(axes, forces, view)
     if letter is not None:
         title = f"{letter}the arm at {seconds_at(summary, moment.stamp):.1f} s, magnitude of the force on it"
         axes.text(0.02, 1.0, title, va="bottom", transform=axes.transAxes, fontsize=10)
 
 
-def _draw_contacts(axes: Axes, summary: DemoSummary, arm: Arm, q: Sequence[float], view: arm_picture.View) -> None:
-    """Arrows of the contact force on the arm, labelled with its magnitude."""
+def _contact_forces(summary: DemoSummary, arm: Arm, q: Sequence[float]) -> list[tuple[Numbers, Numbers, str, str]]:
+    """Of each known contact: point and force on the arm, base frame, m and N; colour; label."""
     assert summary.moment is not None
-    traces, row = summary.traces, summary.moment.row
-    arrows = []
+    traces, found = summary.traces, []
     for signal, colour, label in ((traces.true, TRUE, "true"), (traces.estimated, ESTIMATED, "estimated")):
-        contact = _contact(signal, row)
+        contact = _contact(signal, summary.moment.row)
         if contact.cover in arm.covers.names and math.isfinite(contact.place):
             point, force = arm_picture.contact_on_surface(arm, q, contact)
-            start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
-            arrows.append((start, end, colour, f"{label} {np.linalg.norm(force):.1f} N"))
+            found.append((point, force, colour, f"{label} {np.linalg.norm(force):.1f} N"))
+    return found
+
+
+def _draw_contacts(axes: Axes, forces: Sequence[tuple[Numbers, Numbers, str, str]], view: arm_picture.View) -> None:
+    """Arrows of the contact force on the arm, labelled with its magnitude."""
+    arrows = []
+    for point, force, colour, label in forces:
+        start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
+        arrows.append((start, end, colour, label))
     for i, (start, end, colour, _) in enumerate(arrows):
         width = 4.2 if colour is TRUE else 1.3  # so that the true force is visible under a correct estimate
         head = f"-|>,head_width={0.14 + 0.05 * width:.2f},head_length={0.4 + 0.07 * width:.2f}"
@@ -256,7 +270,9 @@ def _thinned(summary: DemoSummary, most: int) -> DemoSummary:
 def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
     zero = _zero(summary)
     if summary.steps:
-        axes.set_xlim(0.0, max((summary.steps[-1].end - zero) / 1e9, 1e-3))
+        first = int(summary.traces.stamp[0]) if len(summary.traces.stamp) else zero
+        begin = max(first - zero, 0) / 1e9  # a recording may begin later than its scenario
+        axes.set_xlim(begin, max((summary.steps[-1].end - zero) / 1e9, begin + 1e-3))
     busy = {touch.begin: "#e7f0f7" for touch in summary.touches}
     busy |= {step.begin: "#faeee2" for step in summary.steps for press in summary.presses if press.end == step.end}
     for step in summary.steps:
@@ -273,11 +289,14 @@ def _middle(summary: DemoSummary, step: RecordedStep | StepContact) -> float:
 
 def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:
     """Names of the steps at the top, wrapped to the width of each; narrow steps get none."""
-    whole = summary.steps[-1].end - summary.steps[0].begin if summary.steps else 0
+    first, last = axes.get_xlim()
     for step in summary.steps:
-        room = round(letters * (step.end - step.begin) / max(whole, 1))
-        if room >= 6:
+        room = round(letters * (step.end - step.begin) / 1e9 / (last - first))
+        if room >= 6 and first <= _middle(summary, step) <= last:
             lines = textwrap.wrap(step.name, room, break_long_words=False)
+            if len(lines) > NAME_LINES:
+                word = lines[NAME_LINES - 1]
+                lines = [*lines[: NAME_LINES - 1], f"{word}…" if len(word) < room - 1 else word]
             axes.text(
                 _middle(summary, step), 0.985, "\n".join(lines), transform=axes.get_xaxis_transform(), ha="center",
                 va="top", fontsize=7.5, linespacing=1.1, color="#555555", zorder=7,

@@ -27,12 +27,13 @@ POSITION_TOLERANCE = 0.04  # m
 WIDTH, STEP = 100, 24  # columns of the report, and of the name of a step
 
 
-def report(bag: Path) -> str:
-    """Evaluate a recorded demonstration and draw it.
+def report(bag: Path, picture: Path | None = None) -> str:
+    """Evaluate a recorded demonstration, and draw it.
 
     Parameters
     ----------
-    bag : directory of the bag, or its .mcap file; the picture ``demo.png`` is written into the directory.
+    bag : directory of the bag, or its .mcap file.
+    picture : PNG file to write, None for no picture.
 
     Returns
     -------
@@ -52,12 +53,13 @@ def report(bag: Path) -> str:
             f"{bag} is not a recording of the demonstration: it has no step of a scenario; its topics: "
             f"{', '.join(run.bag.counts) or 'none'}. 'wam analyse {bag}' analyses any recording"
         )
-    picture = (bag if bag.is_dir() else bag.parent) / "demo.png"
-    try:
-        notes = save(picture, summary, recorded_arm(run.parameters))
-    except OSError as error:
-        notes = (f"the picture was not written: {error}",)
-    files = [f"bag      {bag}", *([f"picture  {picture}"] if picture.is_file() else [])]
+    notes: tuple[str, ...] = ()
+    if picture is not None:
+        try:
+            notes = save(picture, summary, recorded_arm(run.parameters))
+        except OSError as error:
+            notes = (f"the picture was not written: {error}",)
+    files = [f"bag      {bag}", *([f"picture  {picture}"] if picture is not None and picture.is_file() else [])]
     return "\n".join([text(summary, notes), "", *files])
 
 

@@ -46,10 +46,11 @@ STYLE: Any = {
 
 def widen_flat(axes: Any) -> None:
     """Show a quantity that does not change as a line, not its rounding errors."""
-    low, high = axes.get_ylim()
-    least = max(STILL, FLAT * abs(low + high) / 2.0)
-    if high - low < least:
-        axes.set_ylim((low + high - least) / 2.0, (low + high + least) / 2.0)
+    for limits, widen in ((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim)):
+        low, high = limits
+        least = max(STILL, FLAT * abs(low + high) / 2.0)
+        if high - low < least:
+            widen((low + high - least) / 2.0, (low + high + least) / 2.0)
 
 
 def channels(colour: str) -> tuple[int, int, int]:

@@ -40,7 +40,8 @@ APPLICATION = "wam_stack"
 PROGRAM = "rerun"
 TIMELINE = "time"
 # plots, each with the corner in which its legend covers no curve of the demonstration
-LEGENDS = {"force": "LeftTop", "position": "RightTop", "joints": "LeftBottom"}
+LEGENDS = {"force": "RightTop", "position": "RightTop", "joints": "LeftBottom"}
+SHARES = (1.9, 1.0, 1.5, 0.9)  # heights of the plots and of the status: a legend has up to four lines
 DISTANCE = 1.3  # of the eye, in heights of what it sees
 POSES = 100.0  # poses of the arm in a second at most
 
@@ -160,7 +161,7 @@ def _blueprint(rerun: Any, recorded: RecordedArm, joints: tuple[Times, Numbers] 
         show.TimeSeriesView(origin=f"/plots/{name}", name=name, plot_legend=show.PlotLegend(corner))
         for name, corner in LEGENDS.items()
     ]
-    right = show.Vertical(*plots, show.TextLogView(origin="/status", name="status"))
+    right = show.Vertical(*plots, show.TextLogView(origin="/status", name="status"), row_shares=SHARES)
     left = show.Spatial3DView(origin="/arm", name="arm", eye_controls=eye)
     return show.Blueprint(
         show.Horizontal(left, right), show.TimePanel(expanded=False, timeline=TIMELINE), collapse_panels=True
@@ -277,9 +278,9 @@ def _series(recording: AnalysedRun) -> Iterator[tuple[str, Times, Numbers]]:
 
 
 def _log_status(rerun: Any, stream: Any, recording: AnalysedRun, zero: int) -> None:
-    for status in recording.run.statuses:
-        if status.stamp:
-            stream.set_time(TIMELINE, duration=max((status.stamp - zero) / 1e9, 0.0))
+    for stamp, status in recording.run.stamped_statuses():
+        if stamp:
+            stream.set_time(TIMELINE, duration=max((stamp - zero) / 1e9, 0.0))
             stream.log(f"status/{status.node}", rerun.TextLog(status.message))
 
 

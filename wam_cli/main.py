@@ -180,6 +180,18 @@ def _check_name(parser: argparse.ArgumentParser, words: list[str]) -> None:
         sys.exit(0)
     if words[0] not in COMMANDS and not words[0].startswith("-"):
         parser.error(_unknown(words[0]))
+    for action in parser._actions:
+        if words[1:] and isinstance(action, argparse._SubParsersAction):
+            _check_request(action.choices[words[0]], words[1])
+
+
+def _check_request(parser: argparse.ArgumentParser, word: str) -> None:
+    """End with what was meant where a command of requests has none of that name."""
+    names = [
+        name for action in parser._actions if isinstance(action, argparse._SubParsersAction) for name in action.choices
+    ]
+    if near := difflib.get_close_matches(word, names, n=1) if word not in names else []:
+        parser.error(f"no '{word}'; did you mean '{near[0]}'?")
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> int:

@@ -1,5 +1,6 @@
 """Configurations: one ROS parameter file with the values of every node, read without ROS."""
 
+import difflib
 import hashlib
 import os
 import sys
@@ -103,9 +104,11 @@ class Configuration(NamedTuple):
             flat = sections[self._section(node) if colon else SHARED]
             if parameter not in flat and (colon or parameter not in _DERIVED):
                 where = f"node '{node}'" if colon else "section '/**'"
+                near = difflib.get_close_matches(parameter, flat, n=1)
+                meant = f"did you mean '{near[0]}'? " if near else ""
                 raise ParameterError(
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
-                    f"it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
+                    f"{meant}it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
                 )
             flat[parameter] = _like(flat.get(parameter), value)
         return Configuration(self.path, _text(sections), _frozen(sections))

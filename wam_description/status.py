@@ -59,7 +59,7 @@ def guidance(
 def _call(namespace: str, service: str, request: str) -> str:
     name = namespace.strip("/")
     where = "" if name == "wam" else f" --namespace {name}"
-    return f"ros2 service call /{name}/driver/{service} std_srvs/srv/{request} (or: wam call {service}{where})"
+    return f"wam call {service}{where} (or: ros2 service call /{name}/driver/{service} std_srvs/srv/{request})"
 
 
 def parse(node: str, level: int, message: str, given: Iterable[tuple[str, str]]) -> NodeStatus:

@@ -272,4 +272,4 @@ def dither_text(timing: Timing) -> str:
     """What the page says of the dither, which cannot be switched while the arm runs: the estimator relies on it."""
     if timing.dither_cycle:
         return f"dither: {1.0 / (timing.dither_cycle * timing.period):.0f} Hz"
-    return "dither: off; contacts at rest need it: wam up --live --set timing.dither_cycle=40"
+    return "dither: off; contacts at rest need timing.dither_cycle=40 from the start"

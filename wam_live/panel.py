@@ -14,16 +14,21 @@ from viser import uplot
 from wam_analysis.drawing import COLOURS, HAND, LIKELY
 from wam_description.arm import Arm
 from wam_description.signals import BASE, Contact, Level, NodeStatus, Triple
+from wam_description.status import PAUSED
 from wam_description.wiring import Call, SetParameters
 from wam_live.snapshot import Snapshot, size
 
 WINDOW: Final = 15.0  # s of the arm's time in the plots
 POINTS: Final = 300  # of a line at most
-FORCES: Final = ("commanded", "measured", "estimated", "at least", "true")  # of the plot
+FORCES: Final = ("true", "commanded", "measured", "estimated", "at least")  # of the plot, the last one in front
+PLACES: Final = ("true", "estimated")
+FORCE_TITLE: Final = "force [N]"
 RANGES: Final = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)  # N, upper ends of its axis
 STATUS_HEIGHT: Final = 150  # px
 SAID_HEIGHT: Final = 40  # px
+SILENT: Final = 2.0  # s without a state, after which the page says so
 MARK: Final = 0.5  # s between the rings of a lower bound
+HINT: Final = "Enable releases the brakes; then drag a link to push it."  # until there is an answer
 LEGEND: Final = (  # of the arrows and the range in the scene
     ("&#10145;", "true", "true (simulator)"),
     ("&#10145;", "estimated", "estimated"),
@@ -98,13 +103,13 @@ class Controls:
         if live is not None:
             self._add_buttons()  # above all that changes its height
         self._status = gui.add_html(boxed(status_page(Snapshot()), STATUS_HEIGHT))
-        self._said = gui.add_html(boxed("", SAID_HEIGHT) if live is not None else "")
-        gui.add_html(legend())
+        self._said = gui.add_html(boxed(paragraph(HINT), SAID_HEIGHT) if live is not None else "")
+        gui.add_html(legend(LEGEND if live is not None else LEGEND[:-1]))
         if live is not None:
             self._add_press(arm)
             self._add_scenario()
-        self._force_plot = self._add_plot("force [N]", FORCES, RANGES[0])
-        self._place_plot = self._add_plot("position along the link [m]", ("estimated", "true"), max(arm.covers.end))
+        self._force_plot = self._add_plot(FORCE_TITLE, FORCES, RANGES[0])
+        self._place_plot = self._add_plot("position along the link [m]", PLACES, max(arm.covers.end))
         if live:
             self._add_sliders(live)
         if dither:
@@ -201,7 +206,7 @@ class Controls:
         values = value if isinstance(like, float) else [value] * len(like)
         self.requests.put(SetParameters(key[0], {key[1]: values}))
 
-    def _add_plot(self, title: str, names: tuple[str, ...], high: float) -> Any:
+    def _add_plot(self, title: str, names: tuple[str, ...], high: float, order: float | None = None) -> Any:
         empty = tuple(np.zeros(1) for _ in range(1 + len(names)))
         return self._gui.add_uplot(
             empty,
@@ -211,6 +216,7 @@ class Controls:
             height=170,
             padding=(8, 24, 0, 0),
             legend=uplot.Legend(live=False),
+            order=order,
         )
 
     def _draw(self) -> None:
@@ -221,7 +227,10 @@ class Controls:
         force[between, FORCES.index("at least")] = math.nan
         high = next((one for one in RANGES if one > np.nanmax(force, initial=0.0)), RANGES[-1])
         if high != self._high:
-            self._high, self._force_plot.scales = high, scales(high)
+            # a plot whose scales are changed stays at its old range of time, and empty: another takes its place
+            old, self._high = self._force_plot, high
+            self._force_plot = self._add_plot(FORCE_TITLE, FORCES, high, old.order)
+            old.remove()
         for plot, values in ((self._force_plot, force), (self._place_plot, place)):
             plot.data = tuple(np.ascontiguousarray(column) for column in np.hstack([time, values]).T)
 
@@ -230,7 +239,8 @@ def line(name: str) -> uplot.Series:
     """How a quantity is plotted: in points, as a line goes on where a NaN is; a lower bound in rings."""
     colour = COLOURS["estimated" if name == "at least" else name]
     is_bound = name == "at least"
-    points = {"show": True, "size": 7 if is_bound else 2.5, "width": 1, "stroke": colour}
+    sizes = {"at least": 7.0, "true": 5.0}  # so that it is seen under a correct estimate
+    points = {"show": True, "size": sizes.get(name, 2.5), "width": 1, "stroke": colour}
     points["fill"] = "white" if is_bound else colour
     return uplot.Series(label="at least (rings)" if is_bound else name, stroke=colour, width=0, points=points)
 
@@ -241,18 +251,18 @@ def scales(high: float) -> dict[str, uplot.Scale]:
 
 
 def sample(snapshot: Snapshot) -> tuple[float, ...]:
-    """Row of the plots: time; `FORCES`; position estimated, true.  NaN is a gap."""
+    """Row of the plots: time; `FORCES`; `PLACES`.  NaN is a gap."""
     estimated, true = snapshot.estimated, snapshot.true
     newtons, is_bound = size(estimated.force), is_lower_bound(estimated)
     return (
         snapshot.seconds,
+        size(true.force) if true.cover else 0.0,
         snapshot.commanded,
         snapshot.measured,
         math.nan if is_bound else newtons if estimated.cover else 0.0,
         newtons if is_bound else math.nan,
-        size(true.force) if true.cover else 0.0,
-        estimated.place,
         true.place,
+        estimated.place,
     )
 
 
@@ -261,10 +271,10 @@ def is_lower_bound(estimated: Contact) -> bool:
     return bool(estimated.cover) and not math.isfinite(estimated.place)
 
 
-def legend() -> str:
+def legend(parts: Sequence[tuple[str, str, str]]) -> str:
     """What the colours of the scene mean, as HTML."""
     colours = {**COLOURS, "likely": LIKELY, "hand": HAND}
-    marks = (f'<span style="color:{colours[name]}">{mark}</span> {text}' for mark, name, text in LEGEND)
+    marks = (f'<span style="color:{colours[name]}">{mark}</span> {text}' for mark, name, text in parts)
     return paragraph(" &nbsp; ".join(f'<span style="white-space:nowrap">{mark}</span>' for mark in marks))
 
 
@@ -283,13 +293,19 @@ def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0)
     """Status as HTML: the driver first, then what is done by hand, the nodes that warn, the contact."""
     driver = snapshot.statuses.get("driver")
     mode = mode_of(snapshot.statuses) or "waiting for the stack"
+    is_paused = driver is not None and PAUSED in driver.facts
+    lost = driver is not None and not is_paused and snapshot.silent > SILENT
     factor = f" · {snapshot.real_time_factor:.2f} × real time" if math.isfinite(snapshot.real_time_factor) else ""
+    factor = " · paused" if is_paused else factor
     lines = [
         paragraph(
-            f'<b style="font-size:18px">{dot(driver.level if driver else None)} {mode}</b>'
+            f'<b style="font-size:18px">{dot(driver.level if driver and not lost else None)} {mode}</b>'
             f" · {snapshot.seconds:.1f} s{factor}"
         )
     ]
+    if lost:
+        text = f"no state of the arm for {snapshot.silent:.0f} s: the stack has ended, or waits for a node"
+        lines.append(paragraph(text, DOTS[Level.ERROR]))
     if driver and driver.fault:
         lines.append(paragraph(html.escape(driver.fault), DOTS[Level.ERROR]))
     if pressing:

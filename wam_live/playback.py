@@ -14,7 +14,7 @@ from wam_analysis.recorded import recorded_arm
 from wam_analysis.rerun_view import joint_motion
 from wam_bag.bag import BagError, TableColumns
 from wam_control.contact_table import contact_of, likely_of
-from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, NodeStatus, ObjectState
+from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, ObjectState
 from wam_description.world import NO_SPRINGS, World
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
@@ -53,9 +53,9 @@ class BagSource:
         self._stamps, self._angles = joints
         self._traces = recording.summary.traces
         self._covers = self.recorded.arm.covers.names
-        statuses = sorted((status for status in recording.run.statuses), key=lambda status: status.stamp)
-        self._statuses: list[NodeStatus] = statuses
-        self._status_stamps = [status.stamp for status in statuses]
+        statuses = sorted(recording.run.stamped_statuses(), key=lambda one: one[0])
+        self._statuses = [status for _, status in statuses]
+        self._status_stamps = [stamp for stamp, _ in statuses]
         columns = recording.bag.topics.get(f"{recording.namespace}/contact/hypotheses")
         self._likely: list[tuple[LikelyRange, ...]] = []
         self._estimated: list[Contact] = []

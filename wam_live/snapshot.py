@@ -20,6 +20,7 @@ class Snapshot(NamedTuple):
     commanded, measured : size of the force of the arm on the world, N, NaN where there is none.
     statuses : of the nodes, by name.
     real_time_factor : simulated time per wall time, NaN where it is not known.
+    silent : time of the wall clock since the newest state of the arm came, s.
     objects : of the world, in the order of `World.objects`; none where they are not known.
     """
 
@@ -32,6 +33,7 @@ class Snapshot(NamedTuple):
     measured: float = NAN
     statuses: dict[str, NodeStatus] = {}  # noqa: RUF012 - never changed
     real_time_factor: float = NAN
+    silent: float = 0.0
     objects: tuple[ObjectState, ...] = ()
 
     @property

@@ -20,6 +20,7 @@ from wam_ros.display import COPIED, NEWEST, copy_name
 from wam_ros.messages import Refused, message_type, read_status
 from wam_ros.wire import decoder, stamp_of
 
+OLD: Final = 500_000_000  # ns of the arm's time, after which a force or a contact is not shown
 TOPICS: Final = (*sorted(COPIED), "force_command")  # of which everybody may be the publisher
 LATCHED: Final = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
@@ -58,6 +59,7 @@ class RunningStack:
         self.statuses: dict[str, NodeStatus] = {}
         self._pace: tuple[float, int] = (time.monotonic(), 0)
         self._factor = NAN
+        self._heard = self._pace
 
     def snapshot(self) -> Snapshot:
         """What the stack shows now."""
@@ -72,7 +74,7 @@ class RunningStack:
             self.statuses[status.node] = status
         truth = self._newest.get("sim/joint_states")
         joints: State | None = truth or self._newest.get("joint_states")
-        table: Table | None = self._newest.get("contact/hypotheses")
+        table: Table | None = self._fresh("contact/hypotheses")
         return Snapshot(
             stamp=self.stamp,
             q=tuple(joints.position) if joints else (),
@@ -83,6 +85,7 @@ class RunningStack:
             measured=self._force("force_measured"),
             statuses=self.statuses,
             real_time_factor=self._real_time_factor(),
+            silent=self._silent(),
             objects=objects_of(self._newest.get("sim/objects")),
         )
 
@@ -92,14 +95,25 @@ class RunningStack:
         return max(self._stamps.get("joint_states", 0), self._stamps.get("sim/joint_states", 0))
 
     def _true(self) -> Contact:
-        wrench, point = self._newest.get("sim/contact/wrench"), self._newest.get("sim/contact/point")
+        wrench, point = self._fresh("sim/contact/wrench"), self._fresh("sim/contact/point")
         if wrench is None or point is None or wrench.frame == BASE or wrench.frame != point.frame:
             return NO_CONTACT
         return Contact(wrench.frame, point.position[0], wrench.force)
 
     def _force(self, topic: str) -> float:
-        wrench = self._newest.get(topic)
-        return size(wrench.force) if wrench is not None and self.stamp - self._stamps[topic] < 500_000_000 else NAN
+        wrench = self._fresh(topic)
+        return NAN if wrench is None else size(wrench.force)
+
+    def _fresh(self, topic: str) -> Any:
+        """The newest of a topic, None where it is old: its node may be gone."""
+        is_old = self.stamp - self._stamps.get(topic, 0) >= OLD
+        return None if is_old else self._newest.get(topic)
+
+    def _silent(self) -> float:
+        now = time.monotonic()
+        if self.stamp != self._heard[1]:
+            self._heard = now, self.stamp
+        return now - self._heard[0]
 
     def _real_time_factor(self) -> float:
         now, (then, stamp) = time.monotonic(), self._pace

@@ -5,6 +5,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from wam_bag.bag import Bag, JointColumns, Messages, PointColumns, WrenchColumns
 from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
@@ -80,6 +82,15 @@ class RecordedRun(NamedTuple):
                     found.pop()
                 found.append(RecordedChange(status.stamp, _settings(status), int(number[:9])))
         return found
+
+    def stamped_statuses(self) -> list[tuple[int, NodeStatus]]:
+        """Each status and when it was published, ns: where it has no stamp, at the last joint state before it."""
+        columns, states = self.bag.topics.get(f"{self.namespace}/status"), self.joints("joint_states")
+        if columns is None or states is None:
+            return [(status.stamp, status) for status in self.statuses]
+        before = np.searchsorted(states.log_time_ns, columns.log_time_ns, side="right")
+        newest = np.concatenate(([0], states.stamp_ns))[before].tolist()
+        return [(status.stamp or stamp, status) for stamp, status in zip(newest, self.statuses, strict=True)]
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""

@@ -5,15 +5,24 @@
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const drawn = [];
-  const short = (value, step) => value.toFixed(Math.min(9, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9))));
   const decade = (value) => (Math.abs(Math.log10(value) % 1) < 1e-9 ? value.toExponential(0) : "");
+  function short(value, step, largest) {
+    if (largest < 1e-3) return value ? value.toExponential(1) : "0";
+    let digits = 0;  // 2.5 has one more than 2
+    while (digits < 9 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits++;
+    return value.toFixed(digits);
+  }
   function axis(label, size, logarithmic) {
     const text = logarithmic ? decade : short;
-    return { values: (plot, values, index, space, step) => values.map((value) => (value === null ? "" : text(value, step))), label, size, stroke: style("--ink"), grid: { stroke: style("--line"), width: 1 }, ticks: { stroke: style("--line") } };
+    const labels = (plot, values, index, space, step) => {
+      const largest = Math.max(...values.map(Math.abs));  // null counts as 0
+      return values.map((value) => (value === null ? "" : text(value, step, largest)));
+    };
+    return { values: labels, label, size, stroke: style("--ink"), grid: { stroke: style("--line"), width: 1 }, ticks: { stroke: style("--line") } };
   }
   function range(plot, low, high) {
     const least = 1e-4 * Math.max(Math.abs(low), Math.abs(high));  // a flat line is no row of rounding errors
-    const room = Math.max(0.05 * (high - low), high - low < least ? least : 1e-6);
+    const room = Math.max(0.05 * (high - low), high - low < least ? least : 1e-5);
     return [low - room, high + room];
   }
   function draw(chart, figure) {

@@ -32,6 +32,7 @@ Numbers = NDArray[np.float64]
 WIDE, NARROW = 9.6, 4.1  # inches
 MOST = {WIDE: 3000, NARROW: 1200}  # points of a line
 PNG_DPI = 130
+TICKS = 5  # at most, across a small picture
 PAGE_STYLE: Any = {
     **STYLE,
     "font.size": 10.0,
@@ -176,6 +177,7 @@ def _phases(figure: Figure, width: float, columns: JointColumns) -> None:
         axes.plot(position, velocity, color=SHAFTS[i % len(SHAFTS)], lw=0.8)
         axes.set(xlabel=f"{name} [rad]", ylabel="velocity [rad/s]")
         widen_flat(axes)
+        axes.locator_params(axis="x", nbins=TICKS)
     for axes in list(grid.flat)[n:]:
         axes.set_axis_off()
 
@@ -240,6 +242,7 @@ def _friction(figure: Figure, width: float, analysis: Analysis) -> None:
         axes.set_ylim(-limit, limit)
         axes.set_title(name)
         axes.set_xlabel("speed [rad/s]")
+        axes.locator_params(axis="x", nbins=TICKS)
     for row in grid:
         row[0].set_ylabel("torque [mN m]")
     for axes in list(grid.flat)[n:]:

@@ -11,7 +11,7 @@ from wam_analysis.findings.finding import Finding, Section
 from wam_analysis.findings.tabulated import LEGEND, MARK, Tabulated, tabulated
 
 WIDTH, NARROWEST = 100, 40  # columns of text, at most and at least
-NAME, COLUMN = 0.4, 12  # widths in a table: of a name at most, of all; of a number, columns
+NAME, COLUMN = 0.4, 12  # widths in a table: of a name at most, of all; of a number at least, columns
 SCHEMA = 3  # of the JSON; incremented when a key changes its name or meaning
 
 
@@ -55,7 +55,9 @@ def _tables(section: Section, wide: int) -> list[str]:
 def _blocks(table: Tabulated, wide: int) -> list[list[str]]:
     """The table in blocks that fit, each with the names of the rows; a prediction stays with what it predicts."""
     names = max(COLUMN, min(int(NAME * wide), max(map(len, (table.columns[0], *(row[0] for row in table.rows))))))
-    fits = max(1, (wide - 2 - names) // (COLUMN + 2))
+    column = max(COLUMN, *(len(word) for name in table.columns[1:] for word in name.split()))  # no word is broken
+    column = min(column, wide - 4 - names)
+    fits = max(1, (wide - 2 - names) // (column + 2))
     groups: list[list[int]] = []
     for j in range(1, len(table.columns)):
         with_last = table.predicted[j] or (groups and j + 1 < len(table.columns) and not table.predicted[j + 1])
@@ -64,20 +66,20 @@ def _blocks(table: Tabulated, wide: int) -> list[list[str]]:
             groups[-1].append(j)
         else:
             groups.append([j])
-    return [_block(table, names, group) for group in groups]
+    return [_block(table, names, column, group) for group in groups]
 
 
-def _block(table: Tabulated, names: int, columns: list[int]) -> list[str]:
+def _block(table: Tabulated, names: int, column: int, columns: list[int]) -> list[str]:
     lines = []
     for k, row in enumerate((table.columns, *table.rows)):
         cells = [textwrap.wrap(row[0], names, subsequent_indent="  ") or [""]]
-        cells += [textwrap.wrap(row[j], COLUMN) or [""] for j in columns]
+        cells += [textwrap.wrap(row[j], column) or [""] for j in columns]
         height = max(map(len, cells))
         pad = (lambda cell, height=height: [""] * (height - len(cell)) + cell) if k == 0 else None
         cells = [cells[0], *cells[1:]] if pad is None else [pad(cell) for cell in cells]
         for i in range(height):
             words = [cell[i] if i < len(cell) else "" for cell in cells]
-            lines.append(words[0].ljust(names) + "".join(f"  {word:>{COLUMN}}" for word in words[1:]))
+            lines.append(words[0].ljust(names) + "".join(f"  {word:>{column}}" for word in words[1:]))
     return [line.rstrip() for line in lines]
 
 

@@ -281,6 +281,17 @@ def writable_file(option: str, file: Path) -> None:
     raise ValueError(f"cannot write {file}: {why}; give another file as {option}")
 
 
+def writable_picture(option: str, file: Path) -> None:
+    """Refuse, before the work, a picture that could not be written after it, as `writable_file` does."""
+    from matplotlib.backend_bases import FigureCanvasBase  # slow, and for pictures alone
+
+    writable_file(option, file)
+    if file.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
+        raise ValueError(
+            f"cannot draw {file}: there is no format '{file.suffix}'; give a .png, .pdf or .svg as {option}"
+        )
+
+
 def writable_directory(option: str, directory: Path) -> None:
     """Refuse, before the work, a directory that could not be made or written into.
 

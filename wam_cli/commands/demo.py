@@ -116,7 +116,7 @@ def _report(bag: Path, failed: bool, task: Experiment | None) -> bool:
 def _report_of_demonstration(bag: Path) -> str:
     from wam_analysis.demo_report import report  # imports matplotlib: not before the nodes
 
-    return report(bag)
+    return report(bag, bag / "demo.png")
 
 
 def _report_of_task(task: Experiment, bag: Path) -> str:

@@ -13,7 +13,7 @@ from wam_cli.commands import (
     take_configuration,
     take_topic_map,
     topic_map_of,
-    writable_file,
+    writable_picture,
 )
 from wam_control.force_loop import ForceLoop
 from wam_control.force_loop_parameters import ForceLoopParameters
@@ -96,7 +96,7 @@ def _assess_configuration(configuration: Configuration) -> int:
 
 def _assess(given: argparse.Namespace) -> int:
     if given.picture:
-        writable_file("--picture", given.picture)
+        writable_picture("--picture", given.picture)
     recorded = recorded_loop(given.bag, topic_map_of(given)) if given.bag else RecordedLoop({}, "")
     known = recorded.numbers | {
         name: LoopNumber(value, "given") for name in NUMBERS if (value := getattr(given, name)) is not None

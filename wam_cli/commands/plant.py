@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from wam_cli.commands import writable_file
+from wam_cli.commands import writable_picture
 from wam_experiments.plant.figure import figure
 
 
@@ -14,6 +14,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Draw the picture, print the differences."""
-    writable_file("FILE", given.file)
+    writable_picture("FILE", given.file)
     print(figure(given.file))
     return 0

@@ -4,14 +4,18 @@ import argparse
 from pathlib import Path
 
 from wam_analysis.demo_report import report
+from wam_cli.commands import writable_picture
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("bag", type=Path, help="directory of the bag")
+    parser.add_argument("--picture", type=Path, help="also draw the arm, the forces and the contact positions, PNG")
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the report; a bag without a demonstration is an error, and nothing is written into its directory."""
-    print(report(given.bag))
+    """Print the report; nothing is written into the directory of the bag."""
+    if given.picture:
+        writable_picture("--picture", given.picture)
+    print(report(given.bag, given.picture))
     return 0

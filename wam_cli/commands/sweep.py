@@ -18,6 +18,7 @@ from wam_cli.commands import (
     take_batch,
     take_configuration,
     writable_file,
+    writable_picture,
 )
 from wam_control.scenario import load
 from wam_description.configuration import packaged
@@ -71,7 +72,7 @@ def run(given: argparse.Namespace) -> int:
     at_least("--seed", given.seed, 0)
     writable_file("FILE", given.file)
     if given.picture:
-        writable_file("--picture", given.picture)
+        writable_picture("--picture", given.picture)
     axes: list[Axis] = given.vary
     sets = drawn(axes, given.runs, given.seed) if given.random else listed(axes) if given.list else grid(axes)
     failed = sum((_of_experiment if given.experiment else _of_scenario)(given, axes, sets))
