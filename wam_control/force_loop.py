@@ -331,9 +331,8 @@ class ForceLoop:
         if self._held_at is not None:
             self._held_at = None
             self._transfer.restart()
-        effort = (force_axis.lever * desired).tolist()
         if is_open:
-            return out._replace(effort=effort)
+            return out._replace(effort=(force_axis.lever * desired).tolist())
         if contact.cover and not point.is_identified:
             error = min(error, self._shortfall(q, point, direction, desired))
         if self._hold.keeps(force_axis, measured, desired, own):
@@ -344,7 +343,7 @@ class ForceLoop:
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
-        return out._replace(velocity=velocity, effort=effort)
+        return out._replace(velocity=velocity)
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
