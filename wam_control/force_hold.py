@@ -180,6 +180,7 @@ class ForceHold:
         parameters: ForceLoopParameters,
         dt: float,
         signal: float = math.inf,
+        elsewhere: float = math.inf,
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
@@ -192,6 +193,7 @@ class ForceHold:
         parameters : of the force loop.
         dt : outer period, s.
         signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
+        elsewhere : the same if another link is touched.
         """
         limit = parameters.sensing.sd_limit(desired)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
@@ -208,7 +210,8 @@ class ForceHold:
         if self._conflict > CONFLICT and not self._other:
             touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
             self._other = f"{touched}; the arm goes back to where it was free until the command ends"
-        held = self._held(axis, point, desired, limit, signal, parameters)
+        weak = self._too_weak(point, desired, signal, elsewhere, parameters)
+        held = self._held(axis, point, desired, limit, weak, parameters)
         if held[0].holds:
             return held
         is_double = not point.is_single and (is_strange or not point.is_pinned)
@@ -239,15 +242,26 @@ class ForceHold:
             return ForceReaction.NOT_REACHED, missed
         return self._doubted(axis, point, desired, unexplained, parameters)
 
-    def _too_weak(self, point: ForcePoint, desired: float, signal: float, parameters: ForceLoopParameters) -> str:
+    def _too_weak(
+        self, point: ForcePoint, desired: float, signal: float, elsewhere: float, parameters: ForceLoopParameters
+    ) -> str:
         """Why the contact estimator would not detect the commanded force, '' where it would or something is touched."""
         sensing = parameters.sensing
         name, least = ("least_signal", sensing.least_signal)
         if not point.is_pinned:
             name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
-        self._is_detectable = self._has_touched or signal >= (RESUME * least if self._is_detectable else least)
+        begins = RESUME if self._is_detectable else 1.0
+        is_detected = elsewhere >= begins * sensing.least_signal
+        self._is_detectable = self._has_touched or (is_detected and signal >= begins * least)
         if self._is_detectable:
             return ""
+        if not is_detected:
+            return (
+                f"{desired:.3g} N on another link than {point.cover} may be {elsewhere:.2g} times the standard deviation "
+                f"with which the motors show torques; allowed: sensing.least_signal, {sensing.least_signal:g}, and "
+                "above, or the link would be pressed harder than commanded before that is detected; the arm holds its "
+                "position: pin the place, command more force, or use joint sensors"
+            )
         return (
             f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
             f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, or "
@@ -260,7 +274,7 @@ class ForceHold:
         # at a pinned position the estimated link counts only where the torques are not those of the force
         if point.conflict and (is_strange or not point.is_pinned):
             return 1.0
-        return CONFLICT / DOUBTED if self.is_touching and point.is_doubtful else -FADING
+        return CONFLICT / DOUBTED if point.is_doubtful else -FADING
 
     def _held(
         self,
@@ -268,10 +282,10 @@ class ForceHold:
         point: ForcePoint,
         desired: float,
         limit: float,
-        signal: float,
+        weak: str,
         parameters: ForceLoopParameters,
     ) -> tuple[ForceReaction, str]:
-        """Why the arm is held instead; `limit` of the standard deviation, N."""
+        """Why the arm is held instead; `limit` of the standard deviation, N; `weak`: why the force is not detected."""
         if self._other:
             return ForceReaction.OTHER_LINK, self._other
         if not self._is_sensed:
@@ -282,7 +296,7 @@ class ForceHold:
                 "direction or place"
                 f"{'' if point.is_pinned else ', or pin the place'}"
             )
-        if weak := self._too_weak(point, desired, signal, parameters):
+        if weak:
             return ForceReaction.NOT_SENSED, weak
         if self._travel > parameters.limits.free_travel:
             return ForceReaction.NOTHING_TOUCHED, (
@@ -303,7 +317,7 @@ class ForceHold:
                 "limits.settling_time is allowed; the arm holds its position: bend the arm, or command another "
                 "direction or place"
             )
-        speed = self.approach_speed(axis, point, desired, parameters)
+        speed = axis.speed_fraction * self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < CREEP:
             return ForceReaction.TOO_SLOW, (
                 f"a surface of {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness) may be approached "

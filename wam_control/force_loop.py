@@ -280,6 +280,7 @@ class ForceLoop:
         limit = self.parameters.sensing.zero_limit
         if axes and limit and self._is_free and self._is_at_rest and self._has_left and self._measurement.zero(limit):
             self._filter.reset()
+            self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
 
     def _force(
         self, q: Sequence[float], contact: Contact, command: ForceCommand | None, posture: list[float], dt: float
@@ -317,7 +318,10 @@ class ForceLoop:
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
         signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
-        reaction, reason = self._hold.step(force_axis, point, self._external[0], measured, desired, own, dt, signal)
+        elsewhere = math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired)
+        reaction, reason = self._hold.step(
+            force_axis, point, self._external[0], measured, desired, own, dt, signal, elsewhere
+        )
         self._react(reaction, reason)
         self._remember(q, moved, contact, point)
         if reaction.holds:
@@ -371,6 +375,18 @@ class ForceLoop:
         """Where the arm was free, and `BACK` further against the force: friction would hold it in less."""
         away = axis.lever * (BACK / float(axis.lever @ axis.lever))
         return [a - b for a, b in zip(self._free_at, away.tolist(), strict=True)]
+
+    def _signal_elsewhere(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
+        """Torques of the commanded force, N, on another cover, `NEAR` its base, in sd of the estimated torques."""
+        if not self._external_sd:
+            return math.inf
+        covers, sd = self._arm.covers, np.array(self._external_sd)
+        found = [
+            desired * float(np.linalg.norm(self._force_axes.lever(q, cover, NEAR * length, direction) / sd))
+            for cover, length in zip(covers.names, covers.length, strict=True)
+            if cover != point.cover
+        ]
+        return min(found, default=math.inf)
 
     def _shortfall(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
         """Force that is missing, N, if another cover is touched: below 0 in its middle, 0 if nearer to the base."""
