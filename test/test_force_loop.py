@@ -237,12 +237,9 @@ def test_open_loop_feeds_the_torque_of_the_force_forward_and_no_velocity() -> No
     assert ask(loop, World(400.0), None).velocity == []
 
 
-def test_the_feedback_loop_feeds_the_same_torque_forward() -> None:
-    outs = [
-        ask(force_loop(ARM, replace(OWN, mode=mode)), World(400.0, force=2.0), (1.0, 2.0, 3.0))
-        for mode in ("hybrid", "open_loop")
-    ]
-    assert outs[0].effort == outs[1].effort
+def test_the_feedback_loop_feeds_no_torque_forward() -> None:
+    """On a free arm the velocity loop would have to take it back, and until then it throws the arm at the surface."""
+    assert not any(ask(force_loop(ARM, OWN), World(400.0, force=2.0), (1.0, 2.0, 3.0)).effort)
 
 
 def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
@@ -327,9 +324,9 @@ def test_tare_acts_on_the_estimate_too() -> None:
 def test_the_force_acts_where_contact_is_detected() -> None:
     loop = force_loop(ARM, OWN)
     out = ask(loop, World(400.0), down(2.0), contact=Contact("inner_link", 0.4, (0.0, 0.0, 1.0)))
-    assert out.effort == pytest.approx(2.0 * lever(POSE, DOWN, "inner_link", 0.4), abs=1e-6)
+    assert out.axis.lever == pytest.approx(lever(POSE, DOWN, "inner_link", 0.4), abs=1e-6)
     elsewhere = ask(loop, World(400.0), down(2.0))
-    assert elsewhere.effort == pytest.approx(2.0 * lever(POSE), abs=1e-6)
+    assert elsewhere.axis.lever == pytest.approx(lever(POSE), abs=1e-6)
 
 
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])
@@ -345,7 +342,7 @@ def test_an_uncertain_contact_position_is_replaced_by_the_configured_one(
     for _ in range(2):
         out = ask(loop, World(400.0), down(2.0), contact=contact)
     there = lever(POSE, DOWN, "inner_link", 0.4) if is_used else lever(POSE)
-    assert out.effort == pytest.approx(2.0 * there, abs=1e-6)
+    assert out.axis.lever == pytest.approx(there, abs=1e-6)
     assert ("contact_cover and contact_position are used" in loop.fallback) is not is_used
     is_refused = not is_used and feedback == "contact_estimate"
     assert ("contact/hypotheses" in loop.refusals) is is_refused
@@ -369,7 +366,7 @@ def test_a_certain_contact_position_is_kept_as_long_as_the_contact_lasts() -> No
         (uncertain, configured),
     ):
         out = ask(loop, World(400.0), down(2.0), contact=contact)
-        assert out.effort == pytest.approx(2.0 * expected, abs=1e-6)
+        assert out.axis.lever == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize("feedback", ["joint_sensors", "contact_estimate"])

@@ -105,3 +105,18 @@ def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_c
     assert loop.reaction is ForceReaction.NONE
     press(3.0, 1e-4)
     assert loop.reaction is ForceReaction.NONE, "the motion that was there before counts"
+
+
+def test_an_arm_that_would_swing_on_the_surface_in_resonance_with_the_dither_holds() -> None:
+    """A softer surface is followed; where mass, cables and surface swing alike, 2 N became 12 N in every cycle."""
+    timing = replace(CONFIGURATION.shared.timing, dither_cycle=40)
+    own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
+    free = ask(force_loop(ARM, own), World(1e-9), down(5.0), external=STILL).axis
+    alike = 1.0 / (1.0 / (free.impact_mass * (2.0 * math.pi / (40 * timing.period)) ** 2) - free.compliance)
+    for part, reaction in ((0.2, ForceReaction.NONE), (1.0, ForceReaction.SHAKEN)):
+        stiff = replace(own, guard=replace(own.guard, contact_stiffness=part * alike))
+        loop, world, axis = ForceLoop(ARM, CONFIGURATION.shared.servo, stiff, timing), World(1e-9), lever(POSE)
+        for k in range(60):
+            world.q = (POSE + 3e-5 * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
+            ask(loop, world, down(2.5), external=STILL)
+        assert loop.reaction is reaction

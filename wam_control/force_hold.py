@@ -32,6 +32,7 @@ LEFT = 0.25  # of the settling time, after which a force that is too large, or h
 FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
 SLOWED = 0.5  # of the speed along the force, from then on
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
+RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
@@ -152,15 +153,21 @@ class ForceHold:
         self._blocked = axis.impact_mass * frequency * frequency * self._shaking
         return True
 
-    def _shaken(self, desired: float, parameters: ForceLoopParameters) -> str:
+    def _shaken(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> str:
         """Why the arm shakes too much for the surface, '' where it does not.
 
-        A soft surface follows the swing of the position, and the force swings by k_c times its size; a hard one stops
-        the swing with the force that moved the mass of the arm.  Above twice the commanded force the contact is lost
-        and hit again in every cycle of the dither.
+        A soft surface, in series with the cables, follows the swing of the position, and the force swings by k times
+        its size; a hard one stops the swing with the force that moved the mass of the arm.  Where the two are alike,
+        the arm swings on the surface in resonance, 1/F = |1/F_stopped - 1/F_followed|, and friction limits it.  Above
+        twice the commanded force the contact is lost and hit again in every cycle of the dither.
         """
-        force = min(parameters.guard.contact_stiffness * self._shaking, self._blocked)
-        if self.is_touching or force <= parameters.limits.shake_force * desired:
+        yielding = 1.0 / parameters.guard.contact_stiffness + axis.compliance
+        least = min(self._shaking / yielding, self._blocked)
+        if self.is_touching or least <= 0.0:
+            return ""
+        apart = 1.0 / self._blocked - yielding / self._shaking
+        force = 1.0 / math.hypot(apart, 1.0 / (RESONANCE * least))
+        if force <= parameters.limits.shake_force * desired:
             return ""
         return (
             f"the arm shakes by {self._shaking:.2g} m along the force (dither): on "
@@ -251,22 +258,22 @@ class ForceHold:
         if not point.is_pinned:
             name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
         begins = RESUME if self._is_detectable else 1.0
-        is_detected = elsewhere >= begins * sensing.least_signal
-        self._is_detectable = self._has_touched or (is_detected and signal >= begins * least)
+        is_weak, is_unseen = signal < begins * least, elsewhere < begins * sensing.least_signal
+        self._is_detectable = self._has_touched or not (is_weak or is_unseen)
         if self._is_detectable:
             return ""
-        if not is_detected:
+        if is_weak:
             return (
-                f"{desired:.3g} N on another link than {point.cover} may be {elsewhere:.2g} times the standard deviation "
-                f"with which the motors show torques; allowed: sensing.least_signal, {sensing.least_signal:g}, and "
-                "above, or the link would be pressed harder than commanded before that is detected; the arm holds its "
-                "position: pin the place, command more force, or use joint sensors"
+                f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
+                f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, "
+                "or the force is detected late or on the wrong link; the arm holds its position: command more force, "
+                f"another direction or place, or use joint sensors{'' if point.is_pinned else ', or pin the place'}"
             )
         return (
-            f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
-            f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, or "
-            "the force is detected late or on the wrong link; the arm holds its position: command more force, another "
-            f"direction or place, or use joint sensors{'' if point.is_pinned else ', or pin the place'}"
+            f"the torques of {desired:.3g} N on another link than {point.cover} are {elsewhere:.2g} times the standard "
+            f"deviation with which the motors show them; allowed: sensing.least_signal, {sensing.least_signal:g}, and "
+            "above, or that link is pressed harder than commanded before it is detected; the arm holds its position: "
+            "pin the place, command more force, or use joint sensors"
         )
 
     def _against(self, point: ForcePoint, is_strange: bool) -> float:
@@ -304,7 +311,7 @@ class ForceHold:
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
-        if shaken := self._shaken(desired, parameters):
+        if shaken := self._shaken(axis, desired, parameters):
             return ForceReaction.SHAKEN, shaken
         if self.is_touching:
             return ForceReaction.NONE, ""
@@ -317,7 +324,7 @@ class ForceHold:
                 "limits.settling_time is allowed; the arm holds its position: bend the arm, or command another "
                 "direction or place"
             )
-        speed = axis.speed_fraction * self.approach_speed(axis, point, desired, parameters)
+        speed = self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < CREEP:
             return ForceReaction.TOO_SLOW, (
                 f"a surface of {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness) may be approached "
