@@ -422,9 +422,9 @@ def test_what_a_free_arm_at_rest_measures_counts_as_zero_when_a_force_is_command
     loop, wrong = force_loop(ARM, own), World(400.0, force=0.4)
     for _ in range(100):
         ask(loop, wrong, None)
-    for _ in range(20):
+    for _ in range(20):  # from the first period on, or it would be a touch
         measured = ask(loop, wrong, down(5.0)).measured
-    assert measured == pytest.approx(down(0.0 if limit else 0.4), abs=1e-6)
+        assert measured == pytest.approx(down(0.0 if limit else 0.4), abs=1e-6)
 
 
 @pytest.mark.parametrize("case", ["touched", "pressed here before", "moving", "too large", "nobody estimates contacts"])
