@@ -21,6 +21,7 @@ IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to th
 DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
 BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
+FED = 0.3  # s, in which the torque of the force is fed forward after the touch
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -77,6 +78,7 @@ class ForceHold:
     ----------
     is_touching : whether the measured force shows that something is touched.
     share : of the speed along the force: less where the late force of the motors was seen to swing.
+    fed : share of the torque of the commanded force that is fed forward, which is in the motors' feedback alone.
     """
 
     def __init__(self) -> None:
@@ -86,7 +88,7 @@ class ForceHold:
     def reset(self) -> None:
         """Another force is commanded."""
         self._shake.reset()
-        self.share = 1.0
+        self.share, self.fed = 1.0, 0.0
         self._way = self._watched = self._shaking = self._blocked = 0.0
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
             self._has_settled
@@ -98,8 +100,9 @@ class ForceHold:
 
     def _forget_swings(self) -> None:
         """What the force was before something was touched says nothing of how it is held."""
-        self._swings = self._off = 0.0
+        self._swings = self._off = self._within = 0.0
         self._above = self._below = math.inf
+        self._report = ""
         self._turns.reset()
 
     def approach_speed(
@@ -124,6 +127,16 @@ class ForceHold:
         if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
             fastest = min(fastest, max(desired * yielding / DETECTED, slowest))
         return fastest / axis.speed_fraction
+
+    def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
+        """Share of the torque of the commanded force that is fed forward in this period.
+
+        On a free arm it would be a throw.  From the motors it rises after the touch: the velocity loop would take
+        seconds to wind up to it on a stiff surface.  Without dither it would only wind up the friction of the arm.
+        """
+        is_fed = parameters.is_estimated and point.is_pinned and self.is_touching
+        self.fed = min(self.fed + dt / FED, 1.0) if is_fed else 0.0
+        return self.fed
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
         """Whether the arm is to keep a force, N, that is nearly the commanded one.
@@ -238,7 +251,7 @@ class ForceHold:
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
-        missed = self._not_reached(axis, measured, desired, parameters, dt)
+        missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
         is_late = parameters.is_estimated and self.share > SLOWED
         if is_late and is_touching and self._turns.count > FEW:
             self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
@@ -361,12 +374,19 @@ class ForceHold:
             )
         return ForceReaction.NONE, ""
 
+    def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
+        """A reason, or the last one until the force has been within the tolerance for as long as it may be off."""
+        if missed or self._within >= LEFT * parameters.limits.settling_time:
+            self._report = missed
+        return self._report
+
     def _not_reached(
         self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters, dt: float
     ) -> str:
         """Why the force counts as not reached, '' where it does not: it is off on one side, or swings."""
         error, lasting = desired - measured, parameters.limits.settling_time
         is_off = abs(error) > tolerance(desired, parameters)
+        self._within = 0.0 if is_off else self._within + dt
         self._has_settled = self._has_settled or (self._has_touched and not is_off)
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0

@@ -347,7 +347,8 @@ class ForceLoop:
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
-        return out._replace(velocity=velocity)
+        fed = self._hold.feed(point, own, dt)
+        return out._replace(velocity=velocity, effort=(force_axis.lever * (fed * desired)).tolist())
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
