@@ -237,9 +237,26 @@ def test_open_loop_feeds_the_torque_of_the_force_forward_and_no_velocity() -> No
     assert ask(loop, World(400.0), None).velocity == []
 
 
-def test_the_feedback_loop_feeds_no_torque_forward() -> None:
+def test_the_feedback_loop_feeds_no_torque_of_the_force_forward() -> None:
     """On a free arm the velocity loop would have to take it back, and until then it throws the arm at the surface."""
-    assert not any(ask(force_loop(ARM, OWN), World(400.0, force=2.0), (1.0, 2.0, 3.0)).effort)
+    own = replace(OWN, friction_feedforward=0.0)
+    assert not any(ask(force_loop(ARM, own), World(400.0, force=2.0), (1.0, 2.0, 3.0)).effort)
+
+
+@pytest.mark.parametrize("share", [0.7, 0.3])
+def test_a_share_of_the_dry_friction_is_fed_forward_along_the_commanded_motion(share: float) -> None:
+    """Or the velocity loop winds up through twice the friction before an error of the force changes it."""
+    own = replace(OWN, friction_feedforward=share, posture_gain=0.0)
+    ratio = np.linalg.inv(np.reshape(ARM.joint_from_motor, (4, 4)))
+    for commanded in (8.0, -8.0):
+        out = ask(force_loop(ARM, own), World(400.0), down(commanded))
+        velocity = np.array(out.velocity)
+        motors = ratio.T @ (np.array(ARM.motors.dynamic_friction) * np.tanh(ratio @ velocity / 0.04))
+        joints = np.array(ARM.joints.dynamic_friction) * np.tanh(velocity / 0.002)
+        assert out.effort == pytest.approx(share * (motors + joints))
+        assert np.abs(out.effort).max() > 0.5, "N m"
+    dithered = replace(own, feedback="contact_estimate")
+    assert not any(ask(force_loop(ARM, dithered), World(400.0), down(8.0), external=STILL).effort)
 
 
 def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:

@@ -145,7 +145,7 @@ def test_from_the_motors_the_torque_of_a_force_is_fed_forward_after_the_touch(
     source: str, feedback: str, is_fed: bool
 ) -> None:
     """The velocity loop would wind up to it in seconds."""
-    own = replace(OWN, feedback=feedback, contact_source=source)
+    own = replace(OWN, feedback=feedback, contact_source=source, friction_feedforward=0.0)
     loop, torques = force_loop(ARM, own), 4.0 * lever(POSE)
     efforts = []
     for force in (0.0, 4.0):

@@ -32,6 +32,7 @@ from wam_control.task_control import AxisRow, TaskControl
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
+from wam_description.transmission_map import TransmissionMap
 
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
@@ -42,6 +43,7 @@ SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a fo
 BACK = 3e-3  # m, way back from another link than commanded
 NEAR, MIDDLE = 0.25, 0.5  # of a link that is perhaps touched: where its force is taken to be
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
+SLOW_MOTOR, SLOW_JOINT = 0.04, 0.002  # rad/s, below which less of the dry friction is fed forward
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
@@ -93,7 +95,7 @@ class ForceLoop:
         command_age: float = math.inf,
     ) -> None:
         self._arm, self._timing = arm, timing
-        self._body = RigidBody(arm)
+        self._body, self._map = RigidBody(arm), TransmissionMap.of(arm)
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
@@ -348,7 +350,22 @@ class ForceLoop:
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
         fed = self._hold.feed(point, own, dt)
-        return out._replace(velocity=velocity, effort=(force_axis.lever * (fed * desired)).tolist())
+        effort = force_axis.lever * (fed * desired)
+        if own.friction_feedforward and not own.is_estimated:
+            effort = effort + own.friction_feedforward * self._friction(velocity)
+        return out._replace(velocity=velocity, effort=effort.tolist())
+
+    def _friction(self, velocity: Sequence[float]) -> Array:
+        """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
+
+        Less than all of it moves nothing.  Where the force is off to the other side, the velocity loops need not wind
+        up through twice the friction, which takes them seconds.
+        """
+        motors, joints = self._arm.motors.dynamic_friction, self._arm.joints.dynamic_friction
+        turning = zip(motors, self._map.motor_velocities(velocity), strict=True)
+        turned = self._map.joint_torques([friction * math.tanh(speed / SLOW_MOTOR) for friction, speed in turning])
+        moved = zip(joints, velocity, turned, strict=True)
+        return np.array([torque + friction * math.tanh(speed / SLOW_JOINT) for friction, speed, torque in moved])
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
