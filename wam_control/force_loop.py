@@ -43,6 +43,7 @@ SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a fo
 BACK = 3e-3  # m, way back from another link than commanded
 NEAR, MIDDLE = 0.25, 0.5  # of a link that is perhaps touched: where its force is taken to be
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
+COUNTERED = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters where the lever is short
 SLOW_MOTOR, SLOW_JOINT = 0.04, 0.002  # rad/s, below which less of the dry friction is fed forward
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
@@ -105,6 +106,7 @@ class ForceLoop:
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
+        self._countered = LowPass()
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
         self._is_free = False
@@ -275,6 +277,7 @@ class ForceLoop:
         self._hold.reset()
         self._position.touch_again()
         self._delay.reset()
+        self._countered.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
         self._axes = axes
         self._held_at = None
@@ -352,7 +355,8 @@ class ForceLoop:
         fed = self._hold.feed(point, own, dt)
         effort = force_axis.lever * (fed * desired)
         if own.friction_feedforward and not own.is_estimated:
-            effort = effort + own.friction_feedforward * self._friction(velocity)
+            friction, _ = self._countered.step(self._friction(velocity), COUNTERED, dt)
+            effort = effort + own.friction_feedforward * friction
         return out._replace(velocity=velocity, effort=effort.tolist())
 
     def _friction(self, velocity: Sequence[float]) -> Array:
