@@ -78,7 +78,7 @@ class ForceHold:
     ----------
     is_touching : whether the measured force shows that something is touched.
     share : of the speed along the force: less where the late force of the motors was seen to swing.
-    fed : share of the torque of the commanded force that is fed forward, which is in the motors' feedback alone.
+    fed : share of the torque of the commanded force that is fed forward.
     """
 
     def __init__(self) -> None:

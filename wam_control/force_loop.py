@@ -331,6 +331,7 @@ class ForceLoop:
         self._remember(q, moved, contact, point)
         if reaction.holds:
             self.refusals["force_command"] = reason
+            self._hold.fed = 0.0
             if self._held_at is None:
                 self._held_at = self._free_of(force_axis) if reaction is ForceReaction.OTHER_LINK else list(q)
                 self._transfer.restart()
