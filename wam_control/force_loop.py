@@ -353,12 +353,19 @@ class ForceLoop:
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
-        fed = self._hold.feed(point, own, dt)
-        effort = force_axis.lever * (fed * desired)
+        return out._replace(velocity=velocity, effort=self._fed_forward(force_axis, point, desired, velocity, dt))
+
+    def _fed_forward(
+        self, axis: ForceAxis, point: ForcePoint, desired: float, velocity: list[float], dt: float
+    ) -> list[float]:
+        """Torque of the joints (n,), N m: of the force, from the motors, or of friction, with sensors."""
+        own = self.parameters
+        effort = axis.lever * (self._hold.feed(point, own, dt) * desired)
         if own.friction_feedforward and not own.is_estimated:
             friction, _ = self._countered.step(self._friction(velocity), COUNTERED, dt)
             effort = effort + own.friction_feedforward * friction
-        return out._replace(velocity=velocity, effort=effort.tolist())
+        result: list[float] = effort.tolist()
+        return result
 
     def _friction(self, velocity: Sequence[float]) -> Array:
         """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
