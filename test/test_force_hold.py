@@ -223,7 +223,7 @@ def test_a_command_pins_its_place_by_its_torque() -> None:
     out = ask(loop, World(400.0), None, command=command, contact=sure)
     size = float(np.linalg.norm(force))
     direction = BODY.cover_pose(POSE, "outer_link").rotation @ np.array(force) / size
-    assert out.effort == pytest.approx(size * lever(POSE, direction, "outer_link", 0.35), abs=1e-6)
+    assert out.axis.lever == pytest.approx(lever(POSE, direction, "outer_link", 0.35), abs=1e-6)
     assert loop.fallback == ""
 
 
@@ -231,7 +231,7 @@ def test_a_pinned_place_is_not_overridden_by_a_sure_estimate() -> None:
     sure = Contact("outer_link", 0.1, (0.0, 1.0, 0.0), 0.001, 1.0)
     for source, place in (("pinned", OWN.contact_position), ("estimated", 0.1)):
         out = ask(force_loop(ARM, replace(OWN, contact_source=source)), World(400.0), down(2.0), contact=sure)
-        assert out.effort == pytest.approx(2.0 * lever(POSE, place=place), abs=1e-6)
+        assert out.axis.lever == pytest.approx(lever(POSE, place=place), abs=1e-6)
 
 
 @pytest.mark.parametrize(("angle", "is_used"), [(0.0, True), (25.0, True), (35.0, False), (89.0, False)])
@@ -309,11 +309,12 @@ def test_a_contact_of_which_the_link_stays_unknown_ends_the_command() -> None:
     """Pressed on, the force could be many times the commanded one."""
     vague = Contact("outer_link", 0.0, (0.0, 1.0, 0.0), 0.001, 0.55)
     for source, reaction in (("estimated", ForceReaction.OTHER_LINK), ("pinned", ForceReaction.NONE)):
-        loop, world = force_loop(ARM, replace(QUIET, contact_source=source)), World(400.0, force=2.0)
-        for _ in range(120):
-            ask(loop, world, down(5.0), contact=vague)
-        assert loop.reaction is reaction
-        assert ("not known whether on outer_link" in loop.reason) is bool(reaction)
+        for force in (2.0, 0.5):  # N; as one on this link it would be small
+            loop, world = force_loop(ARM, replace(QUIET, contact_source=source)), World(400.0, force=force)
+            for _ in range(120):
+                ask(loop, world, down(5.0), contact=vague)
+            assert loop.reaction is reaction
+            assert ("not known whether on outer_link" in loop.reason) is bool(reaction)
 
 
 def test_a_force_at_an_unknown_position_is_sensed_whatever_the_position_is() -> None:
@@ -499,7 +500,7 @@ def test_a_torque_that_pins_no_place_of_a_cover_is_refused_by_name(command: Forc
     out = ask(loop, World(400.0), None, command=command)
     assert re.search(rf"torque \(.*\) N m .*{expected}.*; the last good", loop.refusals["force_command"])
     assert out.frame == "base"
-    assert any(out.effort), "the last good command"
+    assert out.axis, "the last good command"
 
 
 def test_a_pinned_place_stays_while_the_force_rises() -> None:
@@ -641,9 +642,9 @@ def test_a_slow_swing_is_reported_too() -> None:
 
 def test_a_limit_that_is_lowered_counts_for_the_command_in_force() -> None:
     loop = force_loop(ARM, OWN)
-    assert any(ask(loop, World(400.0), down(40.0)).effort)
+    assert ask(loop, World(400.0), down(40.0)).axis
     loop.tune(replace(OWN, force_limit=20.0))
-    assert ask(loop, World(400.0), down(40.0)).effort == STILL
+    assert not ask(loop, World(400.0), down(40.0)).axis
     loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
     ask(loop, World(1e-9), None, torque=[9.0, 0.0, 0.0, 0.0])
     loop.tune(replace(OWN, mode="joint_torque", torque_limit=4.0))
@@ -656,11 +657,11 @@ def test_refused_commands_do_not_keep_an_old_one_alive_nor_name_its_frame() -> N
     ask(loop, World(400.0), down(10.0))
     refused = ForceCommand("outer_link", (0.0, 99.0, 0.0))
     out = ask(loop, World(400.0), None, command=refused)
-    assert any(out.effort)
+    assert out.axis
     assert out.frame == "base", "of the command in force, not of the refused one"
     for _ in range(round(age / DT) + 1):
         out = ask(loop, World(400.0), None, command=refused)
-    assert out.effort == STILL
+    assert not out.axis
 
 
 def test_a_command_does_not_survive_a_fault() -> None:
@@ -669,7 +670,7 @@ def test_a_command_does_not_survive_a_fault() -> None:
     refused = ForceCommand("base", down(99.0))
     loop.step(State(POSE, STILL, STILL), None, NO_CONTACT, None, refused, None, None, DT)
     out = loop.step(State(POSE, STILL, DRIVEN), None, NO_CONTACT, None, refused, None, None, DT)
-    assert out.effort == STILL
+    assert not out.axis
 
 
 def test_a_position_off_the_cover_is_refused() -> None:
@@ -741,7 +742,7 @@ def test_a_force_that_the_motors_would_not_show_is_refused_before_the_arm_moves(
     source: str, least: float, name: str
 ) -> None:
     own = replace(QUIET, feedback="contact_estimate", contact_source=source, sensing=FULL)
-    for share, is_refused in ((0.9, True), (2.0, False)):
+    for share, is_refused in ((0.9, True), (4.0, False)):
         loop, sd = force_loop(ARM, own), 2.0 * float(np.linalg.norm(lever(POSE))) / (share * least)
         out = ask(loop, World(1e-9), down(2.0), external=[0.0] * 4, external_sd=[sd] * 4)
         assert (loop.reaction is ForceReaction.NOT_SENSED) is is_refused
@@ -749,6 +750,17 @@ def test_a_force_that_the_motors_would_not_show_is_refused_before_the_arm_moves(
         if is_refused:
             assert f"are {share * least:.2g} times the standard deviation" in loop.reason
             assert f"allowed: sensing.{name}, and above" in loop.reason
+
+
+def test_from_the_motors_a_link_that_would_be_pressed_too_hard_before_it_is_detected_is_a_reason_to_hold() -> None:
+    """At an estimated position: another link, touched at a quarter of its length, has to be detected at that force."""
+    elsewhere = 8.0 * lever(POSE, DOWNWARDS, "inner_link", 0.25 * ARM.covers.length[0])
+    for source, share, is_refused in (("estimated", 0.9, True), ("estimated", 1.1, False), ("pinned", 0.9, False)):
+        own = replace(QUIET, feedback="contact_estimate", contact_source=source, sensing=FULL)
+        loop, sd = force_loop(ARM, own), float(np.linalg.norm(elsewhere)) / (share * FULL.least_signal)
+        ask(loop, World(1e-9), down(8.0), external=[0.0] * 4, external_sd=[sd] * 4)
+        assert (loop.reaction is ForceReaction.NOT_SENSED) is is_refused
+        assert ("another link than outer_link are 4.5 times" in loop.reason) is is_refused
 
 
 @pytest.mark.parametrize(("pinned_at", "expected"), [(0.2, 0.19), (TIP, TIP)])

@@ -233,10 +233,10 @@ def test_the_posture_to_hold_is_that_of_the_enabling() -> None:
 def test_a_force_above_the_limit_is_refused_and_the_last_good_one_remains_in_force() -> None:
     loop = force_loop(ARM, replace(OWN, force_limit=30.0))
     free = force_loop(ARM, OWN)
-    for controller, effort in ((loop, 10.0), (free, 31.0)):
+    for controller, force in ((loop, 10.0), (free, 31.0)):
         for newtons in (10.0, 31.0):
             out = ask(controller, World(400.0), down(newtons))
-        assert out.effort == pytest.approx(effort * lever(POSE), abs=1e-6)
+        assert -out.error[2] == pytest.approx(force)
     reason = "31 N is commanded; allowed: up to force_limit, 30 N; the last good command remains in force"
     assert loop.refusals == {"force_command": reason}
     assert (loop.refused, free.refused, free.refusals) == (1, 0, {})

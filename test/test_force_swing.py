@@ -10,7 +10,7 @@ from test_force_loop import ARM, CONFIGURATION, DT, GIVEN, OWN, POSE, STILL, Wor
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceLoop, ForceOutput
 from wam_control.force_swing import Reversals, Shake
-from wam_description.signals import Contact
+from wam_description.signals import NO_CONTACT, Contact
 
 LIMITS = replace(GIVEN.limits, settling_time=0.5)
 TOUCHED = Contact("outer_link", OWN.contact_position, (0.0, 1.0, 0.0), 0.001, 1.0)
@@ -105,3 +105,54 @@ def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_c
     assert loop.reaction is ForceReaction.NONE
     press(3.0, 1e-4)
     assert loop.reaction is ForceReaction.NONE, "the motion that was there before counts"
+
+
+def test_an_arm_that_would_swing_on_the_surface_in_resonance_with_the_dither_holds() -> None:
+    """A softer surface is followed; where mass, cables and surface swing alike, 2 N became 12 N in every cycle."""
+    timing = replace(CONFIGURATION.shared.timing, dither_cycle=40)
+    own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
+    free = ask(force_loop(ARM, own), World(1e-9), down(5.0), external=STILL).axis
+    alike = 1.0 / (1.0 / (free.impact_mass * (2.0 * math.pi / (40 * timing.period)) ** 2) - free.compliance)
+    for part, reaction in ((0.2, ForceReaction.NONE), (1.0, ForceReaction.SHAKEN)):
+        stiff = replace(own, guard=replace(own.guard, contact_stiffness=part * alike))
+        loop, world, axis = ForceLoop(ARM, CONFIGURATION.shared.servo, stiff, timing), World(1e-9), lever(POSE)
+        for k in range(60):
+            world.q = (POSE + 3e-5 * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
+            ask(loop, world, down(2.5), external=STILL)
+        assert loop.reaction is reaction
+
+
+def test_a_reported_force_stays_so_until_it_has_been_right_for_some_time() -> None:
+    loop = force_loop(ARM, PINNED)
+    reactions = []
+    for force, periods in ((5.0, 20), (4.0, 110), (5.0, 20), (5.0, 10)):
+        for _ in range(periods):
+            ask(loop, World(400.0, force=force), down(5.0))
+        reactions.append(loop.reaction)
+    late, now = ForceReaction.NOT_REACHED, ForceReaction.NONE
+    assert reactions == [now, late, late, now]
+
+
+@pytest.mark.parametrize(
+    ("source", "feedback", "is_fed"),
+    [
+        ("pinned", "contact_estimate", True),
+        ("estimated", "contact_estimate", False),
+        ("pinned", "joint_sensors", False),
+    ],
+)
+def test_from_the_motors_the_torque_of_a_force_is_fed_forward_after_the_touch(
+    source: str, feedback: str, is_fed: bool
+) -> None:
+    """The velocity loop would wind up to it in seconds."""
+    own = replace(OWN, feedback=feedback, contact_source=source, friction_feedforward=0.0)
+    loop, torques = force_loop(ARM, own), 4.0 * lever(POSE)
+    efforts = []
+    for force in (0.0, 4.0):
+        for _ in range(30):
+            touch = TOUCHED if force else NO_CONTACT
+            external = (-torques * force / 4.0).tolist()
+            efforts.append(ask(loop, World(400.0, force=force), down(4.0), contact=touch, external=external).effort)
+    assert not np.any(efforts[:30]), "a free arm would be thrown"
+    assert efforts[45] == pytest.approx(is_fed * 16 / 60 * torques, abs=1e-6)
+    assert efforts[59] == pytest.approx(is_fed * 0.5 * torques, abs=1e-6)

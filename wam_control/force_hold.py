@@ -21,6 +21,7 @@ IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to th
 DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
 BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
+FED = 0.3  # s, in which the torque of the force is fed forward after the touch
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -32,6 +33,7 @@ LEFT = 0.25  # of the settling time, after which a force that is too large, or h
 FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
 SLOWED = 0.5  # of the speed along the force, from then on
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
+RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
@@ -76,6 +78,7 @@ class ForceHold:
     ----------
     is_touching : whether the measured force shows that something is touched.
     share : of the speed along the force: less where the late force of the motors was seen to swing.
+    fed : share of the torque of the commanded force that is fed forward.
     """
 
     def __init__(self) -> None:
@@ -85,7 +88,7 @@ class ForceHold:
     def reset(self) -> None:
         """Another force is commanded."""
         self._shake.reset()
-        self.share = 1.0
+        self.share, self.fed = 1.0, 0.0
         self._way = self._watched = self._shaking = self._blocked = 0.0
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
             self._has_settled
@@ -97,8 +100,9 @@ class ForceHold:
 
     def _forget_swings(self) -> None:
         """What the force was before something was touched says nothing of how it is held."""
-        self._swings = self._off = 0.0
+        self._swings = self._off = self._within = 0.0
         self._above = self._below = math.inf
+        self._report = ""
         self._turns.reset()
 
     def approach_speed(
@@ -123,6 +127,16 @@ class ForceHold:
         if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
             fastest = min(fastest, max(desired * yielding / DETECTED, slowest))
         return fastest / axis.speed_fraction
+
+    def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
+        """Share of the torque of the commanded force that is fed forward in this period.
+
+        On a free arm it would be a throw.  From the motors it rises after the touch: the velocity loop would take
+        seconds to wind up to it on a stiff surface.  Without dither it would only wind up the friction of the arm.
+        """
+        is_fed = parameters.is_estimated and point.is_pinned and self.is_touching
+        self.fed = min(self.fed + dt / FED, 1.0) if is_fed else 0.0
+        return self.fed
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
         """Whether the arm is to keep a force, N, that is nearly the commanded one.
@@ -152,15 +166,21 @@ class ForceHold:
         self._blocked = axis.impact_mass * frequency * frequency * self._shaking
         return True
 
-    def _shaken(self, desired: float, parameters: ForceLoopParameters) -> str:
+    def _shaken(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> str:
         """Why the arm shakes too much for the surface, '' where it does not.
 
-        A soft surface follows the swing of the position, and the force swings by k_c times its size; a hard one stops
-        the swing with the force that moved the mass of the arm.  Above twice the commanded force the contact is lost
-        and hit again in every cycle of the dither.
+        A soft surface, in series with the cables, follows the swing of the position, and the force swings by k times
+        its size; a hard one stops the swing with the force that moved the mass of the arm.  Where the two are alike,
+        the arm swings on the surface in resonance, 1/F = |1/F_stopped - 1/F_followed|, and friction limits it.  Above
+        twice the commanded force the contact is lost and hit again in every cycle of the dither.
         """
-        force = min(parameters.guard.contact_stiffness * self._shaking, self._blocked)
-        if self.is_touching or force <= parameters.limits.shake_force * desired:
+        yielding = 1.0 / parameters.guard.contact_stiffness + axis.compliance
+        least = min(self._shaking / yielding, self._blocked)
+        if self.is_touching or least <= 0.0:
+            return ""
+        apart = 1.0 / self._blocked - yielding / self._shaking
+        force = 1.0 / math.hypot(apart, 1.0 / (RESONANCE * least))
+        if force <= parameters.limits.shake_force * desired:
             return ""
         return (
             f"the arm shakes by {self._shaking:.2g} m along the force (dither): on "
@@ -180,6 +200,7 @@ class ForceHold:
         parameters: ForceLoopParameters,
         dt: float,
         signal: float = math.inf,
+        elsewhere: float = math.inf,
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
@@ -192,6 +213,7 @@ class ForceHold:
         parameters : of the force loop.
         dt : outer period, s.
         signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
+        elsewhere : the same if another link is touched.
         """
         limit = parameters.sensing.sd_limit(desired)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
@@ -208,7 +230,8 @@ class ForceHold:
         if self._conflict > CONFLICT and not self._other:
             touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
             self._other = f"{touched}; the arm goes back to where it was free until the command ends"
-        held = self._held(axis, point, desired, limit, signal, parameters)
+        weak = self._too_weak(point, desired, signal, elsewhere, parameters)
+        held = self._held(axis, point, desired, limit, weak, parameters)
         if held[0].holds:
             return held
         is_double = not point.is_single and (is_strange or not point.is_pinned)
@@ -228,7 +251,7 @@ class ForceHold:
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
-        missed = self._not_reached(axis, measured, desired, parameters, dt)
+        missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
         is_late = parameters.is_estimated and self.share > SLOWED
         if is_late and is_touching and self._turns.count > FEW:
             self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
@@ -239,20 +262,31 @@ class ForceHold:
             return ForceReaction.NOT_REACHED, missed
         return self._doubted(axis, point, desired, unexplained, parameters)
 
-    def _too_weak(self, point: ForcePoint, desired: float, signal: float, parameters: ForceLoopParameters) -> str:
+    def _too_weak(
+        self, point: ForcePoint, desired: float, signal: float, elsewhere: float, parameters: ForceLoopParameters
+    ) -> str:
         """Why the contact estimator would not detect the commanded force, '' where it would or something is touched."""
         sensing = parameters.sensing
         name, least = ("least_signal", sensing.least_signal)
         if not point.is_pinned:
             name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
-        self._is_detectable = self._has_touched or signal >= (RESUME * least if self._is_detectable else least)
+        begins = RESUME if self._is_detectable else 1.0
+        is_weak, is_unseen = signal < begins * least, elsewhere < begins * sensing.least_signal
+        self._is_detectable = self._has_touched or not (is_weak or is_unseen)
         if self._is_detectable:
             return ""
+        if is_weak:
+            return (
+                f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
+                f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, "
+                "or the force is detected late or on the wrong link; the arm holds its position: command more force, "
+                f"another direction or place, or use joint sensors{'' if point.is_pinned else ', or pin the place'}"
+            )
         return (
-            f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
-            f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, or "
-            "the force is detected late or on the wrong link; the arm holds its position: command more force, another "
-            f"direction or place, or use joint sensors{'' if point.is_pinned else ', or pin the place'}"
+            f"the torques of {desired:.3g} N on another link than {point.cover} are {elsewhere:.2g} times the standard "
+            f"deviation with which the motors show them; allowed: sensing.least_signal, {sensing.least_signal:g}, and "
+            "above, or that link is pressed harder than commanded before it is detected; the arm holds its position: "
+            "pin the place, command more force, or use joint sensors"
         )
 
     def _against(self, point: ForcePoint, is_strange: bool) -> float:
@@ -260,7 +294,7 @@ class ForceHold:
         # at a pinned position the estimated link counts only where the torques are not those of the force
         if point.conflict and (is_strange or not point.is_pinned):
             return 1.0
-        return CONFLICT / DOUBTED if self.is_touching and point.is_doubtful else -FADING
+        return CONFLICT / DOUBTED if point.is_doubtful else -FADING
 
     def _held(
         self,
@@ -268,10 +302,10 @@ class ForceHold:
         point: ForcePoint,
         desired: float,
         limit: float,
-        signal: float,
+        weak: str,
         parameters: ForceLoopParameters,
     ) -> tuple[ForceReaction, str]:
-        """Why the arm is held instead; `limit` of the standard deviation, N."""
+        """Why the arm is held instead; `limit` of the standard deviation, N; `weak`: why the force is not detected."""
         if self._other:
             return ForceReaction.OTHER_LINK, self._other
         if not self._is_sensed:
@@ -282,7 +316,7 @@ class ForceHold:
                 "direction or place"
                 f"{'' if point.is_pinned else ', or pin the place'}"
             )
-        if weak := self._too_weak(point, desired, signal, parameters):
+        if weak:
             return ForceReaction.NOT_SENSED, weak
         if self._travel > parameters.limits.free_travel:
             return ForceReaction.NOTHING_TOUCHED, (
@@ -290,7 +324,7 @@ class ForceHold:
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
-        if shaken := self._shaken(desired, parameters):
+        if shaken := self._shaken(axis, desired, parameters):
             return ForceReaction.SHAKEN, shaken
         if self.is_touching:
             return ForceReaction.NONE, ""
@@ -340,12 +374,19 @@ class ForceHold:
             )
         return ForceReaction.NONE, ""
 
+    def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
+        """A reason, or the last one until the force has been within the tolerance for as long as it may be off."""
+        if missed or self._within >= LEFT * parameters.limits.settling_time:
+            self._report = missed
+        return self._report
+
     def _not_reached(
         self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters, dt: float
     ) -> str:
         """Why the force counts as not reached, '' where it does not: it is off on one side, or swings."""
         error, lasting = desired - measured, parameters.limits.settling_time
         is_off = abs(error) > tolerance(desired, parameters)
+        self._within = 0.0 if is_off else self._within + dt
         self._has_settled = self._has_settled or (self._has_touched and not is_off)
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0

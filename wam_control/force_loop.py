@@ -32,6 +32,7 @@ from wam_control.task_control import AxisRow, TaskControl
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
+from wam_description.transmission_map import TransmissionMap
 
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
@@ -42,6 +43,8 @@ SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a fo
 BACK = 3e-3  # m, way back from another link than commanded
 NEAR, MIDDLE = 0.25, 0.5  # of a link that is perhaps touched: where its force is taken to be
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
+COUNTERED = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters where the lever is short
+SLOW_MOTOR, SLOW_JOINT = 0.04, 0.002  # rad/s, below which less of the dry friction is fed forward
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
@@ -93,7 +96,7 @@ class ForceLoop:
         command_age: float = math.inf,
     ) -> None:
         self._arm, self._timing = arm, timing
-        self._body = RigidBody(arm)
+        self._body, self._map = RigidBody(arm), TransmissionMap.of(arm)
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
@@ -103,6 +106,7 @@ class ForceLoop:
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
+        self._countered = LowPass()
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
         self._is_free = False
@@ -273,6 +277,7 @@ class ForceLoop:
         self._hold.reset()
         self._position.touch_again()
         self._delay.reset()
+        self._countered.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
         self._axes = axes
         self._held_at = None
@@ -280,6 +285,7 @@ class ForceLoop:
         limit = self.parameters.sensing.zero_limit
         if axes and limit and self._is_free and self._is_at_rest and self._has_left and self._measurement.zero(limit):
             self._filter.reset()
+            self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
 
     def _force(
         self, q: Sequence[float], contact: Contact, command: ForceCommand | None, posture: list[float], dt: float
@@ -317,11 +323,15 @@ class ForceLoop:
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
         signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
-        reaction, reason = self._hold.step(force_axis, point, self._external[0], measured, desired, own, dt, signal)
+        elsewhere = math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired)
+        reaction, reason = self._hold.step(
+            force_axis, point, self._external[0], measured, desired, own, dt, signal, elsewhere
+        )
         self._react(reaction, reason)
         self._remember(q, moved, contact, point)
         if reaction.holds:
             self.refusals["force_command"] = reason
+            self._hold.fed = 0.0
             if self._held_at is None:
                 self._held_at = self._free_of(force_axis) if reaction is ForceReaction.OTHER_LINK else list(q)
                 self._transfer.restart()
@@ -331,9 +341,8 @@ class ForceLoop:
         if self._held_at is not None:
             self._held_at = None
             self._transfer.restart()
-        effort = (force_axis.lever * desired).tolist()
         if is_open:
-            return out._replace(effort=effort)
+            return out._replace(effort=(force_axis.lever * desired).tolist())
         if contact.cover and not point.is_identified:
             error = min(error, self._shortfall(q, point, direction, desired))
         if self._hold.keeps(force_axis, measured, desired, own):
@@ -344,7 +353,31 @@ class ForceLoop:
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
-        return out._replace(velocity=velocity, effort=effort)
+        return out._replace(velocity=velocity, effort=self._fed_forward(force_axis, point, desired, velocity, dt))
+
+    def _fed_forward(
+        self, axis: ForceAxis, point: ForcePoint, desired: float, velocity: list[float], dt: float
+    ) -> list[float]:
+        """Torque of the joints (n,), N m: of the force, from the motors, or of friction, with sensors."""
+        own = self.parameters
+        effort = axis.lever * (self._hold.feed(point, own, dt) * desired)
+        if own.friction_feedforward and not own.is_estimated:
+            friction, _ = self._countered.step(self._friction(velocity), COUNTERED, dt)
+            effort = effort + own.friction_feedforward * friction
+        result: list[float] = effort.tolist()
+        return result
+
+    def _friction(self, velocity: Sequence[float]) -> Array:
+        """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
+
+        Less than all of it moves nothing.  Where the force is off to the other side, the velocity loops need not wind
+        up through twice the friction, which takes them seconds.
+        """
+        motors, joints = self._arm.motors.dynamic_friction, self._arm.joints.dynamic_friction
+        turning = zip(motors, self._map.motor_velocities(velocity), strict=True)
+        turned = self._map.joint_torques([friction * math.tanh(speed / SLOW_MOTOR) for friction, speed in turning])
+        moved = zip(joints, velocity, turned, strict=True)
+        return np.array([torque + friction * math.tanh(speed / SLOW_JOINT) for friction, speed, torque in moved])
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
@@ -372,6 +405,18 @@ class ForceLoop:
         """Where the arm was free, and `BACK` further against the force: friction would hold it in less."""
         away = axis.lever * (BACK / float(axis.lever @ axis.lever))
         return [a - b for a, b in zip(self._free_at, away.tolist(), strict=True)]
+
+    def _signal_elsewhere(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
+        """Torques of the commanded force, N, on another cover, `NEAR` its base, in sd of the estimated torques."""
+        if not self._external_sd:
+            return math.inf
+        covers, sd = self._arm.covers, np.array(self._external_sd)
+        found = [
+            desired * float(np.linalg.norm(self._force_axes.lever(q, cover, NEAR * length, direction) / sd))
+            for cover, length in zip(covers.names, covers.length, strict=True)
+            if cover != point.cover
+        ]
+        return min(found, default=math.inf)
 
     def _shortfall(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
         """Force that is missing, N, if another cover is touched: below 0 in its middle, 0 if nearer to the base."""

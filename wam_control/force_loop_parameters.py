@@ -85,6 +85,14 @@ class ForceLoopParameters:
         high=60.0,
         live=True,
     )
+    friction_feedforward: float = parameter(
+        "share of the dry friction of the model that is fed forward along the commanded motion while a force is "
+        "controlled; with feedback contact_estimate none, as a dither does the same",
+        low=0.0,
+        high=1.0,
+        live=True,
+        before=0.0,
+    )
     posture_gain: float = parameter("joint velocity per posture error", "1/s", low=0.0, high=1e3, live=True)
     joint_speed_limit: float = parameter(
         "largest joint speed due to the posture and to the force", "rad/s", low=0.0, high=1e3, live=True
