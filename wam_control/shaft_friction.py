@@ -63,7 +63,10 @@ class ShaftFriction:
         self._rest = [max(self._rest_velocity, FULL * sd) for sd in velocity_sd]
 
     def of(self, velocity: Sequence[float], keep: float, dt: float) -> ShaftMotion:
-        """Friction at velocities, (n,), rad/s; `keep` is the decay of the memory in one period of `dt` seconds."""
+        """Friction at velocities, (n,), rad/s, of a period of `dt` seconds.
+
+        `keep` is the decay of the memory in it, 0 for none: with a dither.
+        """
         friction, sliding, resting, shape, held, travel = [], [], [], [], self._held, self._travel
         slowest = self._rest_velocity
         for i, v in enumerate(velocity):
@@ -80,6 +83,8 @@ class ShaftFriction:
             sliding.append(share)
             resting.append(rests)
             slow, since = abs(v) / (SLOW * slowest), abs(travel[i]) / slowest
+            if travel[i] * v < 0.0 < keep:
+                since = 0.0  # it turns back; a dither ends each of its swings in that way
             uncertain = math.exp(-slow) if slow < LONGEST else 0.0
             if since < LONGEST:
                 uncertain = max(uncertain, STEEP * math.exp(-since / NEAR) + SHALLOW * math.exp(-since / FAR))
