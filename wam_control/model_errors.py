@@ -62,7 +62,6 @@ class ModelErrors:
     ----------
     size : squared errors of the torques in free motion, with a margin, over the variances that are stated for them;
         at least 1.
-    beyond : names of the errors that are certainly larger than tolerable, the largest first.
     """
 
     def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array) -> None:
@@ -73,12 +72,19 @@ class ModelErrors:
         self.noise, self.size = noise.copy(), 1.0
         self._waiting: deque[tuple[Observation, float]] = deque()
         self._since = self._contact = self._hold = 0.0
-        self.beyond = self._beyond()
 
     @property
     def by_name(self) -> dict[str, float]:
         """The errors by name."""
         return dict(zip(self._prior.names, self.errors.tolist(), strict=True))
+
+    @property
+    def beyond(self) -> list[str]:
+        """Names of the errors that are certainly larger than tolerable, the largest first."""
+        excess = np.abs(self.errors) - SURE * np.sqrt(self.covariance.diagonal())
+        ratio = excess / self._prior.tolerable
+        found = np.flatnonzero(ratio > 1.0)
+        return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []
 
     def reset(self) -> None:
         """Forget the samples that wait, not the errors."""
@@ -126,13 +132,6 @@ class ModelErrors:
                 size = self.size + rate * (MARGIN * its / len(before.residual) - self.size)
                 self.size = min(max(size, 1.0), LARGEST)
         self._since = 0.0
-        self.beyond = self._beyond()
-
-    def _beyond(self) -> list[str]:
-        excess = np.abs(self.errors) - SURE * np.sqrt(self.covariance.diagonal())
-        ratio = excess / self._prior.tolerable
-        found = np.flatnonzero(ratio > 1.0)
-        return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []
 
     def _grow(self, span: float) -> None:
         covariance = self.covariance
