@@ -21,9 +21,6 @@ Array = NDArray[np.float64]
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
-BEYOND = (
-    2.0  # prior sd of a force, per smallest force, at least: no contact is sure because it needs a little less force
-)
 LEAST_FORCE = 1e-6  # N, avoids a division by zero where there is no force
 REACH = 8.0  # of the log of probability; positions further below the maximum are neglected
 FEW = 6  # positions in a peak; with fewer, it is refined
@@ -82,7 +79,7 @@ class ContactFit:
     start, end : (links,), m, ends of each link along x.
     radius : (links,), m, of the tubes.
     weights : (links,), relative frequency of contacts on each.
-    force_scale : N, prior sd of each component of the force, if the torques do not call for more.
+    force_scale : N, prior sd of each component of the force.
     moment_arm_offset : sd of the distance between the line of the force and the axis of the tube, per radius.
     friction : sd of the friction force along the link, per force.
     positions : number of positions tried on each link, at least 3.
@@ -109,7 +106,7 @@ class ContactFit:
         self._offset = [moment_arm_offset * r for r in radius]
         # logs of the metres over which a contact is distributed
         self._log_length = [math.log((b - a) / weight) for (a, b), weight in zip(self._ends, weights, strict=True)]
-        self._force_scale, self._precision, self._friction = force_scale, force_scale**-2, friction
+        self._precision, self._friction = force_scale**-2, friction
         self._end_weight, self._along_weight = end_weight, along_weight
         self._widths = [(b - a) / positions for a, b in self._ends]
         steps = (np.arange(positions) + 0.5) / positions  # the middle of each
@@ -117,16 +114,14 @@ class ContactFit:
         self._row = row.tolist()
         self._powers = np.stack((np.ones_like(row), row, row * row), axis=1)
 
-    def __call__(self, gram: Array, least_force: float) -> list[Fit]:
+    def __call__(self, gram: Array) -> list[Fit]:
         """Fit a contact to each link.
 
         Parameters
         ----------
         gram : (links, 7, 7), Z^T S^-1 Z for each link.
-        least_force : N, about the smallest force with these torques; the prior sd of forces is at least twice that.
         """
         full = gram.tolist()
-        self._precision = max(self._force_scale, BEYOND * least_force) ** -2
         links = [
             _Link(*_with_tangential_force(one, self._precision, 0.5 * (start + end), offset, self._friction, radius))
             for one, (start, end), offset, radius in zip(full, self._ends, self._offset, self._radius, strict=True)

@@ -49,9 +49,7 @@ class InferenceParameters:
     weights: tuple[float, ...] = parameter(
         "relative frequency of contacts on each cover; the outer one sweeps more", low=1e-3, high=1e3
     )
-    force_scale: float = parameter(
-        "prior sd of each component of a contact's force, more where the torques need more", "N", low=0.1, high=1e4
-    )
+    force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
     moment_arm_offset: float = parameter(
         "sd of the distance between the line of the force and the tube's axis, per radius", low=0.0, high=2.0
     )
@@ -164,7 +162,6 @@ class ContactInference:
         self._covers = [_cover(arm, body, i) for i in range(len(arm.covers.names))]
         covers = self._covers
         lengths("inference", arm.covers.names, {"weights": parameters.weights})
-        self._reach = sum(arm.covers.length)  # m, about the longest lever
         self._fit = ContactFit(
             [cover.start[0] for cover in covers],
             [cover.end[0] for cover in covers],
@@ -202,7 +199,7 @@ class ContactInference:
             jacobian = self._body.cover_jacobian(at, cover.name)
             self._jacobians[i] = jacobian
             np.matmul(cover.wrenches, jacobian, out=rows[i, 1:])
-        fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1), math.hypot(*torques) / self._reach)
+        fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1))
         ambiguity = (
             self._ambiguity(q, fits)
             if max(fit.probability for fit in fits) < self._parameters.identification_threshold
