@@ -71,6 +71,30 @@ def at_rest(cover: str, x: float, force: tuple[float, float, float]) -> ContactE
     return estimator.estimate()
 
 
+def test_a_single_period_just_above_the_threshold_is_noise_and_the_second_one_a_contact() -> None:
+    arm = plant((0.0, -1.05, 0.0, 0.5))
+    rest = State(arm.q, arm.qd, arm.strain_torque)
+
+    def play(torque: float) -> list[ContactEstimate]:
+        estimator, found = ContactEstimator(ARM, TIMING, SENSORS), []
+        for tick in range(300):
+            strain = list(rest.effort)
+            strain[3] += torque * (tick >= 100)
+            assert estimator.observe(rest, State(rest.position, rest.velocity, strain), DT)
+            if tick % OUTER == 0:
+                found.append(estimator.estimate())
+        return found
+
+    size = play(-1.0)[-1].statistic ** -0.5  # of statistic 1
+    weak = play(-size * math.sqrt(1.1 * SENSORS.detect))
+    above = [i for i, one in enumerate(weak) if one.statistic > SENSORS.detect]
+    assert not weak[above[0]].in_contact
+    assert all(weak[i].in_contact for i in above[1:])
+    strong = next(one for one in play(-size * math.sqrt(9.0 * SENSORS.detect)) if one.statistic > SENSORS.detect)
+    assert strong.statistic > 1.3 * SENSORS.detect
+    assert strong.in_contact
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [5.0, 10.0])
 @pytest.mark.parametrize("phi", [0.0, 60.0, 90.0, 180.0, -90.0])

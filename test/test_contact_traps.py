@@ -11,6 +11,7 @@ from wam_control.contact_estimator import ContactEstimate, ContactEstimatorParam
 from wam_control.contact_inference import ContactInference
 from wam_control.momentum_observer import MomentumObserver
 from wam_control.scenario import Push, ScenarioStep
+from wam_control.shaft_friction import ShaftFriction
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
@@ -148,3 +149,18 @@ def test_friction_along_the_tube_makes_the_place_a_set_that_holds_the_truth(lean
     wide = ContactInference(ARM, RigidBody(ARM), PARAMETERS.inference).infer(q, tau, precision)[0]
     assert not sure.low <= place <= sure.high
     assert wide.low <= place <= wide.high
+
+
+def test_the_friction_of_a_shaft_that_creeps_back_is_uncertain_before_it_reaches_its_rest_velocity() -> None:
+    """Presliding: it still acts in the direction before. A dither, which keeps nothing, swings back in every cycle."""
+    rest = OWN.motor_rest_velocity
+    sizes = {}
+    for keep in (0.97, 0.0):
+        shafts = ShaftFriction(ARM.motors, OWN, rest)
+        for _ in range(400):
+            shafts.of([40.0 * rest] * 4, keep, DT)
+        sizes[keep] = [shafts.of([speed * rest] * 4, keep, DT).shape[0] for speed in (0.9, -0.9)]
+    ahead, back = sizes[0.97]
+    assert ahead < 1.0
+    assert back > 4.0
+    assert sizes[0.0] == [ahead, ahead]

@@ -13,7 +13,7 @@ from wam_control.force_command import CommandAdmission
 from wam_control.force_loop_parameters import ForceLoopParameters, require_fit
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
-from wam_description.signals import ForceCommand
+from wam_description.signals import BASE, ForceCommand, Wrench
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.limit_watch import LimitWatch, WatchedLimit
 from wam_driver.safety import Mode
@@ -107,6 +107,16 @@ def test_a_push_beyond_the_limit_is_refused_by_name_and_the_last_one_remains() -
             hardware.push("outer_link", force, torque)
     (load,) = hardware.plant.loads()
     assert load.force == (0.0, 5.0, 0.0)
+
+
+def test_a_message_without_a_push_ends_those_of_messages_and_not_that_of_the_program() -> None:
+    hardware = driver()
+    none, force = (0.0, 0.0, 0.0), (0.0, 5.0, 0.0)
+    hardware.disturb(Wrench("inner_link", force, none))
+    hardware.push("outer_link", force, none)
+    assert [load.cover for load in hardware.plant.loads()] == ["inner_link", "outer_link"]
+    hardware.disturb(Wrench(BASE, none, none))
+    assert [load.cover for load in hardware.plant.loads()] == ["outer_link"]
 
 
 def test_a_push_that_nobody_repeats_ends_after_the_age_of_a_command() -> None:

@@ -32,7 +32,11 @@ class ContactEstimatorParameters:
     observer: ObserverParameters
     inference: InferenceParameters
     use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
-    detect: float = parameter("r^T S^-1 r of the external torques above which a contact is detected", low=0.0, high=1e6)
+    detect: float = parameter(
+        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or 1.3 times it in one",
+        low=0.0,
+        high=1e6,
+    )
     release: float = parameter("the same, below which the contact has ended", low=0.0, high=1e6)
     second: float = parameter(
         "chi^2 of a change of the torques that the contact does not explain, above which a second one is suspected; "
@@ -91,6 +95,7 @@ class ContactEstimate(NamedTuple):
 
 NOTHING = (0.0, 0.0, 0.0)
 SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
+ALONE = 1.3  # times the threshold: detected in one period; below that in two, because noise exceeds it now and then
 TOO_EARLY = "too few samples yet"
 
 
@@ -129,7 +134,7 @@ class ContactEstimator:
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
         self._second = SecondContact(parameters.second)
-        self._in_contact = self._is_blind = False
+        self._in_contact = self._is_above = self._is_blind = False
         self.refused = 0
 
     def brake(self, on: bool) -> None:
@@ -144,7 +149,7 @@ class ContactEstimator:
         """Forget all samples."""
         self._observer.reset()
         self._second.reset()
-        self._in_contact = False
+        self._in_contact = self._is_above = False
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
         """Take the signals of one inner period.
@@ -177,7 +182,7 @@ class ContactEstimator:
         torques = tuple(residual)
         sd = tuple(math.sqrt(variance) for variance in covariance.diagonal().tolist())
         if not observer.is_ready:
-            self._in_contact = False
+            self._in_contact = self._is_above = False
             self._second.reset()
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
         precision = np.asarray(np.linalg.inv(covariance), np.float64)
@@ -186,7 +191,7 @@ class ContactEstimator:
         if fast is not None:
             quick = detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64))
             statistic = max(statistic, quick / SUDDEN)
-        self._in_contact = statistic > (parameters.release if self._in_contact else parameters.detect)
+        self._in_contact = self._is_detected(statistic)
         observer.follow(statistic, self._in_contact)
         if not self._in_contact:
             self._second.reset()
@@ -214,6 +219,13 @@ class ContactEstimator:
             reason=best.reason,
             warning=observer.warning,
         )
+
+    def _is_detected(self, statistic: float) -> bool:
+        detect, was_above = self._parameters.detect, self._is_above
+        self._is_above = statistic > detect
+        if self._in_contact:
+            return statistic > self._parameters.release
+        return statistic > ALONE * detect or (self._is_above and was_above)
 
     @property
     def model_errors(self) -> dict[str, float]:

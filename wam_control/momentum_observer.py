@@ -118,9 +118,8 @@ class MomentumObserver:
         """Forget all samples."""
         n = self._n
         self.q: list[float] = [0.0] * n
-        # of each filter the residual and the torque of the model, (2 n,), N m, and the signals of the shafts, (9 n,)
-        self._torques = [[0.0] * (2 * n) for _ in self._times]
-        self._signals = np.zeros((len(self._times), 9 * n))
+        # of each filter the residual and the torque of the model, (2 n,), N m, then the signals of the shafts, (9 n,)
+        self._filtered = np.zeros((len(self._times), 11 * n))
         self._decay = _Decay.over(math.inf, self._times)
         self._ring = np.zeros((max(1, self._cycle), 10 * n))
         self._filled = 0
@@ -199,9 +198,8 @@ class MomentumObserver:
         momentum = inertia.dot(speed).tolist()
         bias = (body.coriolis_transpose_times_velocity(at, speed) - body.gravity_torque(at)).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)]
-        before, span = self._momentum, dt + self._gap
-        n, torques = self._n, self._torques
-        external = model = [0.0] * n
+        before, span, n = self._momentum, dt + self._gap, self._n
+        external, model = [0.0] * n, [-torque for torque in bias]
         if before is not None:
             rate = [(now - then) / span for now, then in zip(momentum, before, strict=True)]
             model = [p - 0.5 * (new + old) for p, new, old in zip(rate, bias, self._bias, strict=True)]
@@ -214,26 +212,23 @@ class MomentumObserver:
             return False
         if span != self._decay.span:
             self._decay = _Decay.over(span, self._times)
+        present = np.array(external + model + signals)  # strain gauges lie behind the friction: no signals
+        filtered = self._filtered[:, : len(present)]
         if before is None:
-            torques = [[0.0] * n + [-torque for torque in bias] for _ in self._times]
-            self._signals[:] = signals or 0.0
-        elif span <= self._parameters.time_constant:  # the torques in so long a gap are unknown: continue from here
-            present = external + model
-            torques = [
-                [keep * old + take * new for old, new in zip(each, present, strict=True)]
-                for each, keep, take in zip(torques, self._decay.keep, self._decay.take, strict=True)
-            ]
-        if before is not None and signals:  # strain gauges lie behind the friction
-            self._signals *= self._decay.keeps
-            self._signals += self._decay.takes * np.array(signals)
+            filtered[:] = present
+        else:
+            if span > self._parameters.time_constant:  # the torques in so long a gap are unknown: continue from here
+                filtered, present = filtered[:, 2 * n :], present[2 * n :]
+            filtered *= self._decay.keeps
+            filtered += self._decay.takes * present
         if self._load is not None:
-            keep = 0.0 if before is None else self._decay.keep[0]
+            keep = 0.0 if before is None else self._decay.keep
             self._load.observe(q, qd, span, keep)
-        self.q, self._torques, self._inertia = q, torques, inertia
+        self.q, self._inertia = q, inertia
         self._momentum, self._known, self._bias, self._gap = momentum, known, bias, 0.0
         if self._cycle:
             kept = self._ring[self._filled % self._cycle]
-            kept[:n], kept[n:] = torques[0][:n], self._signals[0]
+            kept[:n], kept[n:] = self._filtered[0, :n], self._filtered[0, 2 * n :]
             self._filled += 1
         # releasing the brakes gives a jolt that a model with rigid cables does not predict;
         # half a cycle of a dither would look like a push
@@ -254,7 +249,7 @@ class MomentumObserver:
             torques, covariance = self._errors.corrected(self.seen)
             return torques.tolist(), covariance
         uncertainty, load = self._parameters.mass_uncertainty, self._load
-        residual, model = self._torques[0][: self._n], self._torques[0][self._n :]
+        residual, model = self._filtered[0, : 2 * self._n].reshape(2, -1).tolist()
         sizes = [uncertainty * torque for torque in model]
         covariance, effects = np.zeros((self._n, self._n)), np.zeros((self._n, self._n))
         covariance.flat[:: self._n + 1] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
@@ -313,8 +308,8 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        n, given, torques = self._n, self._parameters, self._torques[which]
-        residual, model, signals = np.array(torques[:n]), torques[n:], self._signals[which]
+        n, given, filtered = self._n, self._parameters, self._filtered[which]
+        residual, model, signals = filtered[:n].copy(), filtered[n : 2 * n].tolist(), filtered[2 * n :]
         if self._cycle and self._filled:
             mean = self._ring[: self._filled].mean(axis=0)
             residual, signals = mean[:n], mean[n:]
@@ -352,11 +347,10 @@ class MomentumObserver:
 
 
 class _Decay(NamedTuple):
-    """Of each filter, over a period of `span` seconds, what it keeps and what it takes of a sample; as columns, too."""
+    """What the filters keep and take of a sample over a period of `span` seconds, as columns; what the first keeps."""
 
     span: float
-    keep: list[float]
-    take: list[float]
+    keep: float
     keeps: Array
     takes: Array
 
@@ -364,8 +358,8 @@ class _Decay(NamedTuple):
     def over(cls, span: float, times: Sequence[float]) -> "_Decay":
         """The decay of filters with these time constants, s."""
         keep = [math.exp(-span / time) for time in times]
-        take = [1.0 - each for each in keep]
-        return cls(span, keep, take, np.array(keep)[:, None], np.array(take)[:, None])
+        keeps = np.array(keep)[:, None]
+        return cls(span, keep[0], keeps, 1.0 - keeps)
 
 
 class _Sample(NamedTuple):

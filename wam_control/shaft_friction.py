@@ -9,8 +9,9 @@ from wam_description.arm import Joints, Motors
 
 SLOW = 12.0  # rest velocities: speed up to which the shape of the friction counts (Stribeck)
 # of `shape_uncertainty`, and seconds at the rest velocity: angle after a reversal over which it counts (presliding)
-REVERSAL = ((2.0, 0.6), (3.2, 0.2))
-LONGEST = 6.0 * max(length for _, length in REVERSAL)
+STEEP, NEAR = 2.0, 0.6
+SHALLOW, FAR = 3.2, 0.2
+LONGEST = 6.0 * NEAR
 FULL = 3.0  # sd of the measured velocity that the rest velocity is at least
 
 
@@ -62,21 +63,30 @@ class ShaftFriction:
         self._rest = [max(self._rest_velocity, FULL * sd) for sd in velocity_sd]
 
     def of(self, velocity: Sequence[float], keep: float, dt: float) -> ShaftMotion:
-        """Friction at velocities, (n,), rad/s; `keep` is the decay of the memory in one period of `dt` seconds."""
+        """Friction at velocities, (n,), rad/s, of a period of `dt` seconds.
+
+        `keep` is the decay of the memory in it, 0 for none: with a dither.
+        """
         friction, sliding, resting, shape, held, travel = [], [], [], [], self._held, self._travel
+        slowest = self._rest_velocity
         for i, v in enumerate(velocity):
-            share = min(1.0, max(-1.0, v / self._rest[i]))
-            if share * share == 1.0:
+            share, fraction, rests = v / self._rest[i], 1.0, 0.0
+            if share >= 1.0 or share <= -1.0:
+                held[i] = acting = share = 1.0 if share > 0.0 else -1.0
                 # counted in the direction of the motion
                 travel[i] = travel[i] + v * dt if travel[i] * v >= 0.0 else v * dt
-                held[i] = share
             else:
                 held[i] *= keep
-            friction.append(self.dynamic[i] * (share + (1.0 - abs(share)) * held[i]) + self._viscous[i] * v)
+                fraction = abs(share)
+                acting, rests = share + (1.0 - fraction) * held[i], 1.0 - share * share
+            friction.append(self.dynamic[i] * acting + self._viscous[i] * v)
             sliding.append(share)
-            resting.append(1.0 - share * share)
-            since = abs(travel[i]) / self._rest_velocity
-            reversed_ = sum(size * math.exp(-since / length) for size, length in REVERSAL) if since < LONGEST else 0.0
-            slow = abs(v) / (SLOW * self._rest_velocity)
-            shape.append(abs(share) * max(math.exp(-slow) if slow < LONGEST else 0.0, reversed_))
+            resting.append(rests)
+            slow, since = abs(v) / (SLOW * slowest), abs(travel[i]) / slowest
+            if travel[i] * v < 0.0 < keep:
+                since = 0.0  # it turns back; a dither ends each of its swings in that way
+            uncertain = math.exp(-slow) if slow < LONGEST else 0.0
+            if since < LONGEST:
+                uncertain = max(uncertain, STEEP * math.exp(-since / NEAR) + SHALLOW * math.exp(-since / FAR))
+            shape.append(fraction * uncertain)
         return ShaftMotion(friction, sliding, resting, shape)

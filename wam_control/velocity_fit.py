@@ -49,7 +49,7 @@ class VelocityFit:
         """Forget the samples, not the error of the angles."""
         self._samples: deque[tuple[float, State]] = deque(maxlen=2 * HALF_WINDOWS[-1] + 1)
         self._time, self._middle = 0.0, math.nan
-        self._scale = self.delay = 0.0
+        self._period = self._scale = self.delay = 0.0
 
     @property
     def sd(self) -> list[float]:
@@ -91,18 +91,21 @@ class VelocityFit:
         """Follow the error of the angles, and take a longer window where it calls for one."""
         samples = self._samples
         if len(samples) > 3 and abs(self._time - samples[-4][0] - 3.0 * dt) < UNIFORM * dt:
-            (_, a), (_, b), (_, c), (_, d) = samples[-4], samples[-3], samples[-2], samples[-1]
-            for i, mean in enumerate(self._third):
-                moved = d.position[i] - a.position[i]
-                if abs(moved) > 3.0 * dt * self._rest:
-                    size = abs(moved + 3.0 * (b.position[i] - c.position[i]))
+            least, third = 3.0 * dt * self._rest, self._third
+            positions = [samples[i][1].position for i in (-4, -3, -2, -1)]
+            for i, (a, b, c, d) in enumerate(zip(*positions, strict=True)):
+                moved = d - a
+                if moved > least or moved < -least:
+                    size, mean = abs(moved + 3.0 * (b - c)), third[i]
                     if not size < LARGEST:
                         continue
-                    self._third[i] += (UP if size > mean else DOWN) * (size - mean)
-        self._scale = self._sd_per_mean(dt)
+                    third[i] = mean + (UP if size > mean else DOWN) * (size - mean)
+        if dt != self._period:
+            self._period, self._scale = dt, self._sd_per_mean(dt)
         longer = self._choice + 1
-        largest = self._scale * max(self._third)
-        if longer < len(HALF_WINDOWS) and largest > VELOCITY_SD and 2 * HALF_WINDOWS[longer] * dt < LONGEST:
+        if longer == len(HALF_WINDOWS):
+            return
+        if self._scale * max(self._third) > VELOCITY_SD and 2 * HALF_WINDOWS[longer] * dt < LONGEST:
             if self._choice == 0:
                 self._middle = self._time
             self._choice = longer

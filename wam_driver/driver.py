@@ -12,7 +12,7 @@ from wam_description.arm import Shared
 from wam_description.effects import Effects
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import lengths, parameter
-from wam_description.signals import BASE, NO_LOAD, Answer, Load, State, Table
+from wam_description.signals import BASE, NO_LOAD, Answer, Load, State, Table, Wrench
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier, AmplifierParameters
 from wam_driver.friction import FrictionParameters
@@ -106,6 +106,7 @@ class Driver:
         self._zero = [0.0] * len(arm.motors.names)
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
         self._push_end = 0  # last tick of the present push
+        self._disturbed: set[str] = set()  # covers that are pushed by messages
         self._pretension_share = parameters.effects.pretension_share
         self._tick = 1
         self._release()
@@ -149,7 +150,7 @@ class Driver:
         """
         enabled = self.safety.mode is Mode.ENABLED
         if self._push_end and self._tick > self._push_end:
-            self.release_push()
+            self._end_pushes()
         if enabled:
             age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
             if age >= self._parameters.watchdog:
@@ -235,8 +236,23 @@ class Driver:
         self.plant.push(cover, np.array(force), np.array(torque))
         self._push_end = self._tick + self._push_ticks
 
-    def release_push(self) -> None:
-        """End every push."""
+    def disturb(self, wrench: Wrench) -> None:
+        """Take a message of `sim/disturbance`; one in the base frame ends the pushes of messages, and no others.
+
+        Raises
+        ------
+        ValueError
+            as `push`.
+        """
+        if wrench.frame != BASE:
+            self.push(wrench.frame, wrench.force, wrench.torque)
+            self._disturbed.add(wrench.frame)
+            return
+        for cover in self._disturbed:
+            self.plant.push(cover, np.zeros(3), np.zeros(3))
+        self._disturbed.clear()
+
+    def _end_pushes(self) -> None:
         self._push_end = 0
         self.plant.release()
 

@@ -146,16 +146,13 @@ class DriverNode(TolerantNode):
         self._announce()
 
     def _take_push(self, stamp: int, wrench: Wrench) -> None:
-        if wrench.frame == BASE:
-            if any(wrench.force):
-                raise Refused(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
-            self.driver.release_push()
+        if wrench.frame == BASE and any(wrench.force):
+            raise Refused(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
         refusal = ""
-        if wrench.frame != BASE:
-            try:
-                self.driver.push(wrench.frame, wrench.force, wrench.torque)
-            except ValueError as error:
-                refusal = str(error)
+        try:
+            self.driver.disturb(wrench)
+        except ValueError as error:
+            refusal = str(error)
         self.time.take_push(stamp)  # also after a refused push: the state has its answer
         if refusal:
             raise Refused(refusal)

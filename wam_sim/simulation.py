@@ -63,7 +63,7 @@ class Simulation:
         self._settings = {"driver": dict(configuration.sections["driver"])}
         self._bus = Bus(self._interface.topics)
         self._bus.listen("motor_current_command", self._command)
-        self._bus.listen("sim/disturbance", self._push)
+        self._bus.listen("sim/disturbance", lambda _, wrench: self.driver.disturb(wrench))
         self._publish = self._bus.publish
         self._currents: tuple[int, list[float]] = (0, [])
         self._fault = ""
@@ -174,12 +174,6 @@ class Simulation:
                 f"motor_current_command of {stamp} ns is {currents}; it needs {self._motors} finite numbers, A"
             )
         self._currents = (stamp, currents)
-
-    def _push(self, stamp: int, wrench: Wrench) -> None:
-        if wrench.frame == BASE:
-            self.driver.release_push()
-        else:
-            self.driver.push(wrench.frame, wrench.force, wrench.torque)
 
     def _make_all(self, requests: list[Call | SetParameters]) -> str:
         """Carry out what a node requests of others; returns why one is refused, '' where none is."""

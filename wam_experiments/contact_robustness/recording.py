@@ -111,11 +111,6 @@ def record(drive: Drive) -> DriveRecording:
     rows: list[tuple[list[float], list[float], list[float], float]] = []
     nominal = np.array(arm.joints.dynamic_friction)
     drift_every = max(1, round(drive.seconds / period / DRIFT_STEPS))
-
-    def push(*_: Any) -> None:
-        _push(run, arm, contacts, (len(rows) - 1) * period)
-
-    run.listen("sim/disturbance", push)  # the scenario, which knows of no push, has just released every one
     done = False
     while not done:
         k = len(rows)
@@ -125,7 +120,7 @@ def record(drive: Drive) -> DriveRecording:
         rows.append(
             (list(state.position), list(state.velocity), list(state.effort), max(map(abs, run.driver.plant.qd)))
         )
-        push()
+        _push(run, arm, contacts, k * period)
         done = run.step() or run.driver.safety.mode is Mode.FAULT
     theta, thetad, torque, speed = (np.array([row[i] for row in rows]) for i in range(4))
     failure = run.driver.safety.fault or run.scenario.failure
