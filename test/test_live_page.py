@@ -47,7 +47,20 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 from wam_live.hold import HeldTopic  # noqa: E402
 from wam_live.live_page import LivePage  # noqa: E402
 from wam_live.object_meshes import ObjectMeshes  # noqa: E402
-from wam_live.panel import FORCES, NO_PRESS, POINTS, RANGES, Bend, Controls, Play, Press, dot, sample, status_page  # noqa: E402
+from wam_live.panel import (  # noqa: E402
+    DITHER,
+    FORCES,
+    NO_PRESS,
+    POINTS,
+    RANGES,
+    Bend,
+    Controls,
+    Play,
+    Press,
+    dot,
+    sample,
+    status_page,
+)
 from wam_live.playback import BagSource  # noqa: E402
 from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
@@ -288,11 +301,12 @@ class Shown:
 
 
 @contextmanager
-def running(domain_id: int, factor: float = 0.0) -> Iterator[tuple[Any, Shown]]:
+def running(domain_id: int, factor: float = 0.0, **values: Any) -> Iterator[tuple[Any, Shown]]:
     """A stack in lockstep and its page; a browser beside them wants a slow one."""
     from wam_ros.bring_up import Composition
 
-    configuration = CONFIGURATION.with_values({"timing.real_time_factor": factor, "timing.timeout": LONG})
+    own = {name.replace("__", "."): value for name, value in values.items()}
+    configuration = CONFIGURATION.with_values({"timing.real_time_factor": factor, "timing.timeout": LONG, **own})
     with Composition(configuration, domain_id=domain_id) as composition:
         shown = Shown(domain_id)
         try:
@@ -306,6 +320,25 @@ def mode_of(shown: Shown) -> str:
     panel = shown.page.panel
     driver = panel.snapshot.statuses.get("driver") if panel else None
     return driver.mode if driver else ""
+
+
+def test_the_dither_has_a_slider_where_there_is_one(domain_id: int) -> None:
+    from wam_description.wiring import SetParameters
+
+    with running(domain_id) as (composition, shown):
+        shown.wait(lambda: mode_of(shown) == "braked", lambda: composition.executor.spin_once(timeout_sec=0.01))
+        assert DITHER not in shown.page.panel._sliders
+    with running(domain_id, timing__dither_cycle=40) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked", spin)
+        assert shown.page.panel._sliders[DITHER].value == 1.4
+        loop = composition.nodes["velocity_loop"].node
+        before = loop._dither.amplitude
+        shown.page.panel.requests.put(SetParameters(DITHER[0], {DITHER[1]: 0.7}))
+        shown.wait(lambda: loop._dither.amplitude == pytest.approx([0.5 * each for each in before]), spin)
+        shown.page.panel.requests.put(SetParameters(DITHER[0], {DITHER[1]: 4.0}))
+        shown.wait(lambda: "refused" in shown.page.panel._said.content, spin)
+        assert shown.page.panel._sliders[DITHER].value == 0.7
 
 
 def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> None:

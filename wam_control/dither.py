@@ -22,7 +22,10 @@ class DitherParameters:
     """Size and shape of the dither; its period is `timing.dither_cycle`."""
 
     level: float = parameter(
-        "amplitude per static friction of motor and joints, reflected to the motor", low=0.0, high=3.0
+        "amplitude per static friction of motor and joints, reflected to the motor; 0: off",
+        low=0.0,
+        high=3.0,
+        live=True,
     )
     phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", low=-1.0, high=1.0)
 

@@ -22,8 +22,8 @@ class VelocityLoopNode:
         self._guard = ServoGuard(shared.model_arm, shared.timing, own.guard)
         self._guard.require_stable(shared.servo)
         self._loop = VelocityLoop(shared.arm.motors, shared.servo, own)
-        self._dither = Dither(shared.model_arm, shared.timing, own.dither)
-        self._cost = self._dither.cost(shared.arm.joints.start)
+        self._shared = shared
+        self._set_dither(own)
         zero = [0.0] * len(shared.arm.motors.names)
         self._motors = shared.arm.motors.names
         self._fastest = TransmissionMap.of(shared.arm).largest_motor_velocities(shared.arm.joints.speed_limit)
@@ -62,6 +62,16 @@ class VelocityLoopNode:
         if self.refusals:
             self.refusals.clear()
         return velocity
+
+    def _set_dither(self, own: VelocityLoopParameters) -> None:
+        dither = Dither(self._shared.model_arm, self._shared.timing, own.dither)
+        self._cost = dither.cost(self._shared.arm.joints.start)
+        self._dither = dither
+
+    def tune(self, own: VelocityLoopParameters) -> None:
+        """Take another level of the dither while the arm moves; the other parameters need a new start."""
+        self._set_dither(own)
+        self._own = own
 
     def retune(self, servo: Servo) -> None:
         """Take new gains while the arm moves, or refuse them."""

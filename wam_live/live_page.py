@@ -18,7 +18,7 @@ from wam_description.world import World
 from wam_live.hold import HeldTopic
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
-from wam_live.panel import NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, mode_of
+from wam_live.panel import DITHER, NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, mode_of
 from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import RELEASE, LinkPush, Scene
 from wam_live.snapshot import size
@@ -87,6 +87,8 @@ class LivePage:
             self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
             self.objects = objects = ObjectMeshes(self._server, world)
             self._live = {key: flat[key[0]][key[1]] for key in SLIDERS if key[1] in flat.get(key[0], {})}
+            if not shared.timing.dither_cycle:
+                self._live.pop(DITHER, None)
             self._bent = tuple(flat.get("force_loop", {}).get("guard.posture", ()))
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)
@@ -269,7 +271,7 @@ class LivePage:
 
 
 def dither_text(timing: Timing) -> str:
-    """What the page says of the dither, which cannot be switched while the arm runs: the estimator relies on it."""
+    """What the page says of the dither, whose period is chosen when the nodes start: the estimator averages over it."""
     if timing.dither_cycle:
         return f"dither: {1.0 / (timing.dither_cycle * timing.period):.0f} Hz"
     return "dither: off; contacts at rest need timing.dither_cycle=40 from the start"

@@ -45,10 +45,12 @@ BUTTONS: Final[dict[str, dict[str, tuple[Call, ...]]]] = {  # by row: label and 
     "reset": {"Fault": (Call("driver", "reset_fault"),), "Arm": (Call("driver", "reset"),)},
 }
 DOTS: Final = {Level.OK: "#2f9e44", Level.WARN: "#f08c00", Level.ERROR: "#e03131", None: "#adb5bd"}
+DITHER: Final = ("velocity_loop", "dither.level")  # 0 switches it off
 SLIDERS: Final = {  # live parameters of nodes; value at the right end of the slider, step
     ("force_loop", "force_gain"): (0.2, 0.001),
     ("force_loop", "posture_gain"): (20.0, 0.1),
     ("force_loop", "force_error_limit"): (40.0, 0.5),
+    DITHER: (2.0, 0.1),
 }
 
 
@@ -82,7 +84,7 @@ class Controls:
     server : that shows them.
     arm : names of the covers.
     live : present values of live parameters by (node, name), for those of `SLIDERS`; None where the page plays a bag.
-    dither : about the dither, which is chosen when the nodes start.
+    dither : about the dither, whose period is chosen when the nodes start.
 
     Attributes
     ----------
