@@ -111,7 +111,7 @@ def _mix(random: Random, arm: Arm) -> Degradation:
         **_asymmetric(random, arm, 0.1),
         **_load(0.03),
         **_encoder(arm, 16384),
-        **_cogging(random, arm, 0.005),
+        **_cogging(random, arm, 0.003),
         **_masses(random, arm, 0.02),
         **_noise(arm, 0.02, 0.02),
     }
@@ -167,7 +167,7 @@ def drawn(name: str, arm: Arm, random: Random) -> Degradation:
         "driver:friction.motor_presliding_stiffness": [4.0],
         "driver:friction.joint_presliding_stiffness": [500.0],
     }
-    noisy = {**stated, **_cogging(random, arm, 0.0075), **_noise(arm, 0.04, 0.04)}
+    noisy = {**stated, **_cogging(random, arm, 0.004), **_noise(arm, 0.04, 0.04)}
     heavy = {**stated, **_masses(random, arm, 0.05)}
     of = {
         "as stated": _degraded(stated),
