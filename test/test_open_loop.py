@@ -84,7 +84,7 @@ def test_more_cogging_than_friction_that_includes_it_is_refused_with_what_to_do(
         {"arm.motors.static_friction": [0.004] * 4, "arm.motors.dynamic_friction": [0.0] * 4}
     )
     with pytest.raises(
-        ParameterError, match=r"motor1 are 0\.0089.*up to its static friction, 0\.004.*included_in_friction: false"
+        ParameterError, match=r"motor1 are 0\.00508.*up to its static friction, 0\.004.*included_in_friction: false"
     ):
         Driver(smooth.shared, smooth.node("driver", DriverParameters))
     added = smooth.with_values({"driver:effects.included_in_friction": False})
