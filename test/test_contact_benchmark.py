@@ -15,6 +15,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.signals import NO_LOAD, Load
 from wam_experiments.contact_benchmark.contacts import EvaluatedContact, credibility, evaluate_contacts, spans
 from wam_experiments.contact_benchmark.evaluation import BenchmarkExtent, BenchmarkResult, evaluate, scenarios
+from wam_experiments.contact_benchmark.figure import figure
 from wam_experiments.contact_benchmark.free_motion import ContactFreeTime, contact_free_time, torque_errors
 from wam_experiments.contact_benchmark.over_topics import script
 from wam_experiments.contact_benchmark.page import (
@@ -357,6 +358,11 @@ def test_scenes_are_the_same_for_the_same_seed_and_others_for_another() -> None:
 
 
 @pytest.mark.slow
+def test_the_scores_have_a_picture(tmp_path: Path) -> None:
+    figure(synthetic(error=-0.025, latency=0.04, right=0.93), ARM, tmp_path / "page" / "benchmark.png")
+    assert (tmp_path / "page" / "benchmark.png").stat().st_size > 20_000
+
+
 def test_a_seed_gives_the_same_scores_in_one_process_and_in_two() -> None:
     drawn = scenarios(CONFIGURATION, 4, BenchmarkExtent(contacts=4, resting=0, free=0.0))
     with ThreadPoolExecutor(1) as one, processes(2) as two:

@@ -21,7 +21,6 @@ from wam_experiments.contact_benchmark.score import (
 )
 from wam_experiments.figures.style import panels
 
-COLOURS = SHAFTS
 NO_POSITION = 60.0  # cm, at which contacts without a position are drawn
 BINS = 6
 
@@ -40,7 +39,7 @@ def figure(scores: Sequence[ScenarioScore], arm: Arm, file: Path) -> None:
 
 
 def _errors(axes: Axes, found: Sequence[EvaluatedContact]) -> None:
-    for kind, colour in zip(KINDS, COLOURS, strict=True):
+    for kind, colour in zip(KINDS, SHAFTS, strict=False):
         own = [contact for contact in found if contact.kind == kind]
         error = [min(100.0 * abs(contact.error), NO_POSITION) for contact in own]
         axes.plot([contact.force for contact in own], error, "o", color=colour, ms=3, alpha=0.5, label=kind)
@@ -64,13 +63,13 @@ def _standard_deviations(axes: Axes, found: Sequence[EvaluatedContact]) -> None:
     ]
     sd = 100.0 * np.array([contact.position_sd for contact in given])
     error = 100.0 * np.abs([contact.error for contact in given])
-    axes.loglog(sd, np.maximum(error, 0.02), "o", color=COLOURS[0], ms=2.5, alpha=0.35)
+    axes.loglog(sd, np.maximum(error, 0.02), "o", color=SHAFTS[0], ms=2.5, alpha=0.35)
     ends = (0.3, 15.0)
     axes.loglog(ends, ends, color="black", lw=1, label="one reported sd")
     groups = np.array_split(np.argsort(sd), BINS) if len(sd) >= BINS else []
     middle = [float(np.median(sd[group])) for group in groups]
     inner = [float(np.quantile(error[group], 0.683)) for group in groups]
-    axes.loglog(middle, inner, "s-", color=COLOURS[1], label="68 % quantile of the error")
+    axes.loglog(middle, inner, "s-", color=SHAFTS[1], label="68 % quantile of the error")
     axes.set(
         title="reported standard deviation and error", xlabel="reported sd of the position [cm]", ylabel="error [cm]"
     )
@@ -89,8 +88,8 @@ def _reliability(axes: Axes, every: Sequence[EvaluatedContact], found: Sequence[
         float(np.mean([contact.credibility <= level for contact in outer])) if outer else math.nan for level in levels
     ]
     axes.plot((0, 1), (0, 1), color="black", lw=1)
-    axes.plot(levels, held, color=COLOURS[0], label="credible sets that contain the position")
-    axes.plot(reported, right, "s", color=COLOURS[1], label="links identified correctly")
+    axes.plot(levels, held, color=SHAFTS[0], label="credible sets that contain the position")
+    axes.plot(reported, right, "s", color=SHAFTS[1], label="links identified correctly")
     axes.set(
         title="calibration", xlabel="reported probability", ylabel="share of contacts", xlim=(0, 1), ylim=(0, 1.02)
     )
@@ -108,7 +107,7 @@ def _torques(axes: Axes, scores: Sequence[ScenarioScore], arm: Arm) -> None:
         if count:
             squares = np.sum([getattr(part, state) for part in own], axis=0)
             axes.bar(
-                np.arange(len(names)) + 0.2 * (k - 1.5), np.sqrt(squares / count), 0.18, color=COLOURS[k], label=label
+                np.arange(len(names)) + 0.2 * (k - 1.5), np.sqrt(squares / count), 0.18, color=SHAFTS[k], label=label
             )
     required, _ = TORQUE_LIMITS.get(arm.name, ((), ()))
     for i, limit in enumerate(required):
@@ -120,7 +119,7 @@ def _torques(axes: Axes, scores: Sequence[ScenarioScore], arm: Arm) -> None:
 
 def _latency(axes: Axes, found: Sequence[EvaluatedContact], links: str) -> None:
     times = sorted(1e3 * contact.latency for contact in found if not math.isnan(contact.latency))
-    axes.step(times, (np.arange(len(times)) + 1.0) / max(len(times), 1), color=COLOURS[0], where="post")
+    axes.step(times, (np.arange(len(times)) + 1.0) / max(len(times), 1), color=SHAFTS[0], where="post")
     axes.plot(60.0, 0.95, "_", color="black", ms=14, mew=2)
     axes.set(
         title=f"detection latency, 5 N on the {links}; mark: required",
