@@ -112,7 +112,7 @@ def _torques(axes: Axes, scores: Sequence[ScenarioScore], arm: Arm) -> None:
     required, _ = TORQUE_LIMITS.get(arm.name, ((), ()))
     for i, limit in enumerate(required):
         axes.plot([i - 0.4, i + 0.4], [limit, limit], color="black", lw=2)
-    axes.set(title="external torque, rms error; bars: required in motion or dithered", ylabel="[N m]")
+    axes.set(title="external torque, rms error; bars: required", ylabel="[N m]")
     axes.set_xticks(range(len(names)), names)
     axes.legend(frameon=False, fontsize=8)
 
