@@ -514,7 +514,8 @@ def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypat
     from wam_description.wiring import Call
 
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
-    with running(domain_id, 1.0) as (composition, shown):
+    far = {"force_loop:limits.free_travel": 0.3}  # m; it is 0.15 m to the box
+    with running(domain_id, 1.0, **far) as (composition, shown):
         spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
         shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
         panel = shown.page.panel
