@@ -117,7 +117,7 @@ def test_either_loop_presses_in_the_stack_and_is_replayed_bit_for_bit(name: str,
     assert record(configuration, steps, tmp_path / "bag") == ""
     true = read(tmp_path / "bag").topics["/wam/sim/contact/wrench"]
     assert isinstance(true, WrenchColumns)
-    assert np.linalg.norm(true.force[-1]) == pytest.approx({"torque-loop": 10.0, "position-loop": 5.0}[name], abs=0.5)
+    assert np.linalg.norm(true.force[-1]) == pytest.approx({"torque-loop": 10.0, "position-loop": 8.1}[name], abs=0.5)
     (entry,) = (each for each in configuration.shared.nodes if ":" in each)
     found = replay(tmp_path / "bag", entry)
     assert found.is_same

@@ -38,7 +38,7 @@ def test_stack_presses_with_every_transmission(name: str) -> None:
     values = yaml.safe_load(packaged(f"experiments/sets/{name}").read_text(encoding="utf-8"))
     testbed = Configuration.load(packaged("testbed")).with_values(values)
     press = ForceCommand("link", (0.0, -20.0, 0.0))
-    run = Simulation(testbed, [ScenarioStep("press", 9.0, request="enable", force=press)])
+    run = Simulation(testbed, [ScenarioStep("press", 6.0, request="enable", force=press)])
     assert not run.play()
     q = np.array([row.values[0] for row in run.rows["sim/joint_states"]])
     force = -1464.28 / 0.9144 * q[-200:]

@@ -360,7 +360,7 @@ class ForceLoop:
     ) -> list[float]:
         """Torque of the joints (n,), N m: of the force, from the motors, or of friction, with sensors."""
         own = self.parameters
-        effort = axis.lever * (self._hold.feed(point, own, dt) * desired)
+        effort = axis.lever * (max(own.force_feedforward, self._hold.feed(point, own, dt)) * desired)
         if own.friction_feedforward and not own.is_estimated:
             friction, _ = self._countered.step(self._friction(velocity), COUNTERED, dt)
             effort = effort + own.friction_feedforward * friction

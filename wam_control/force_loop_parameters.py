@@ -85,6 +85,14 @@ class ForceLoopParameters:
         high=60.0,
         live=True,
     )
+    force_feedforward: float = parameter(
+        "share of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free arm at "
+        "the surface",
+        low=0.0,
+        high=1.0,
+        live=True,
+        before=1.0,
+    )
     friction_feedforward: float = parameter(
         "share of the dry friction of the model that is fed forward along the commanded motion while a force is "
         "controlled; with feedback contact_estimate none, as a dither does the same",
