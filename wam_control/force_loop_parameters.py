@@ -86,8 +86,8 @@ class ForceLoopParameters:
         live=True,
     )
     force_feedforward: float = parameter(
-        "share of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free arm "
-        "at the surface",
+        "share of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
+        "arm at the surface",
         low=0.0,
         high=1.0,
         live=True,
