@@ -1,6 +1,5 @@
 """What an enabled arm does where a node of the chain stops, another one speaks for it, or the driver starts again."""
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +35,7 @@ class Stack:
 
     def start_driver(self) -> None:
         """In realtime a period passes with each answer, so that no node is late on a busy machine."""
-        is_realtime = self.values["timing__mode"] == "realtime"
-        with self._clock.of_new_nodes() if is_realtime else nullcontext():
+        with self._clock.of_new_nodes(self.values["timing__mode"]):
             self.nodes["driver"] = make(self.ros, self.folder, "driver", "/wam", changed(SIX, **self.values))
 
     def _take_answer(self, command: Any) -> None:

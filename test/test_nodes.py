@@ -4,7 +4,7 @@ import math
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import closing, nullcontext
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -117,7 +117,7 @@ class Hand:
         }
         nodes = ["driver", "velocity_loop"]
         configured = changed(nodes, timing__mode=mode, **{"timing__real_time_factor": 0.0, **values})
-        with self._clock.of_new_nodes() if mode == "realtime" else nullcontext():
+        with self._clock.of_new_nodes(mode):
             self.node = make(ros, folder, "driver", "/wam", configured)
         self.driver = self.node.driver
         ros.wait(lambda: self.publisher.get_subscription_count() and node.count_publishers("motor_states"))

@@ -410,11 +410,10 @@ class ForceLoop:
         """Torques of the commanded force, N, on another cover, `NEAR` its base, in sd of the estimated torques."""
         if not self._external_sd:
             return math.inf
-        covers, sd = self._arm.covers, np.array(self._external_sd)
+        sd = np.array(self._external_sd)
         found = [
             desired * float(np.linalg.norm(self._force_axes.lever(q, cover, NEAR * length, direction) / sd))
-            for cover, length in zip(covers.names, covers.length, strict=True)
-            if cover != point.cover
+            for cover, length in self._other_covers(point)
         ]
         return min(found, default=math.inf)
 
@@ -429,13 +428,17 @@ class ForceLoop:
         self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float, part: float
     ) -> float:
         """Largest force along a direction, N, that the torques would be of at a part of the length of other covers."""
-        covers, found = self._arm.covers, -math.inf
-        for cover, length in zip(covers.names, covers.length, strict=True):
-            if cover != point.cover:
-                axis = self._force_axes.axis(q, cover, part * length, 0.0, direction, desired)
-                if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired):
-                    found = max(found, -float(axis.sense @ self._external[0]))
+        found = -math.inf
+        for cover, length in self._other_covers(point):
+            axis = self._force_axes.axis(q, cover, part * length, 0.0, direction, desired)
+            if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired):
+                found = max(found, -float(axis.sense @ self._external[0]))
         return found
+
+    def _other_covers(self, point: ForcePoint) -> list[tuple[str, float]]:
+        """Names and lengths, m, of the covers on which the force is not commanded."""
+        covers = self._arm.covers
+        return [one for one in zip(covers.names, covers.length, strict=True) if one[0] != point.cover]
 
     def _task(
         self, q: Sequence[float], contact: Contact, task: TaskCommand, posture: list[float], dt: float

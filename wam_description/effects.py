@@ -1,6 +1,7 @@
 """Effects of the transmission besides its stiffness; each can be switched off."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from wam_description.arm import Arm, Motors
@@ -108,25 +109,24 @@ class Effects:
             return motors
         left = []
         for i, (name, whole) in enumerate(zip(motors.names, motors.static_friction, strict=True)):
-            others = 2.0 * arm.cables.pretension[i] * self.tension_friction[i] + self.ripple(name)
+            others = self._tension_torque(arm, i) + self.ripple(name)
             require(
                 others <= whole,
                 f"friction by tension and ripples of {name} are {others:.4g} N m; allowed: up to its static friction, "
                 f"{whole:.4g} N m, which includes them, or set driver: effects.included_in_friction: false",
             )
             left.append(1.0 - others / whole if others else 1.0)
-        static = tuple(value * share for value, share in zip(motors.static_friction, left, strict=True))
-        dynamic = tuple(value * share for value, share in zip(motors.dynamic_friction, left, strict=True))
-        return replace(motors, static_friction=static, dynamic_friction=dynamic)
+        return _with_friction(motors, left, [0.0] * len(left))
 
     def smooth(self, arm: Arm) -> Motors:
         """The motors with the friction that does not depend on their angle: dry, and by the pretension."""
         motors = self.dry(arm)
-        tensions = [2.0 * tension * self.tightened(i) for i, tension in enumerate(arm.cables.pretension)]
-        by_tension = [sum_ * each for sum_, each in zip(tensions, self.tension_friction, strict=True)]
-        static = tuple(value + more for value, more in zip(motors.static_friction, by_tension, strict=True))
-        dynamic = tuple(value + more for value, more in zip(motors.dynamic_friction, by_tension, strict=True))
-        return replace(motors, static_friction=static, dynamic_friction=dynamic)
+        by_tension = [self._tension_torque(arm, i) * self.tightened(i) for i in range(len(motors.names))]
+        return _with_friction(motors, [1.0] * len(by_tension), by_tension)
+
+    def _tension_torque(self, arm: Arm, motor: int) -> float:
+        """Friction of a motor, N m, by the whole pretension of both strands of its circuit."""
+        return 2.0 * arm.cables.pretension[motor] * self.tension_friction[motor]
 
     def ripple(self, shaft: str) -> float:
         """Largest torque of the ripples on a motor or joint, N m."""
@@ -136,6 +136,15 @@ class Effects:
     def play(self, motor: int) -> float:
         """Backlash of the circuit of this motor, rad."""
         return self.backlash[motor if len(self.backlash) > 1 else 0]
+
+
+def _with_friction(motors: Motors, shares: Sequence[float], more: Sequence[float]) -> Motors:
+    """Motors with these shares of their dry friction, and more of it, N m, each (n,)."""
+    static, dynamic = (
+        tuple(value * share + added for value, share, added in zip(values, shares, more, strict=True))
+        for values in (motors.static_friction, motors.dynamic_friction)
+    )
+    return replace(motors, static_friction=static, dynamic_friction=dynamic)
 
 
 def no_effects(arm: Arm) -> Effects:

@@ -86,9 +86,8 @@ class LivePage:
             self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
             self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
             self.objects = objects = ObjectMeshes(self._server, world)
-            self._live = {key: flat[key[0]][key[1]] for key in SLIDERS if key[1] in flat.get(key[0], {})}
-            if not shared.timing.dither_cycle:
-                self._live.pop(DITHER, None)
+            sliders = [key for key in SLIDERS if key != DITHER or shared.timing.dither_cycle]
+            self._live = {key: flat[key[0]][key[1]] for key in sliders if key[1] in flat.get(key[0], {})}
             self._bent = tuple(flat.get("force_loop", {}).get("guard.posture", ()))
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)

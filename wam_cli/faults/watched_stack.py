@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Callable, Collection
-from contextlib import nullcontext
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -70,8 +69,7 @@ class WatchedStack:
         paced = {"timing.real_time_factor": 0.0} if hasattr(shared.timing, "real_time_factor") else {}
         configuration = configuration.with_values({"timing.timeout": 2.0, **paced})
         self._clock = AnsweredClock(shared.timing.period)
-        is_realtime = configuration.shared.timing.mode == "realtime"
-        with self._clock.of_new_nodes() if is_realtime else nullcontext():
+        with self._clock.of_new_nodes(configuration.shared.timing.mode):
             self._composition = Composition(configuration, domain_id=domain_id)
         self.nodes = self._composition.nodes
         self.executor, self.context = self._composition.executor, self._composition.context
