@@ -113,22 +113,19 @@ class Synchroniser:
         self._period = timing.outer_period_ns if outer else timing.period_ns
         waits = timing.mode == "lockstep"
         waited = {topic: spec for topic, spec in inputs.items() if waits and spec.streamed}
-        self._limits = {topic: spec.limit_ns for topic, spec in waited.items()}
         self._longest_jump = max(LONGEST_JUMP, 3 * self._period)
-        self._kept: dict[str, dict[int, Any]] = {topic: {} for topic in waited}
         self._newest = {topic: _Newest(spec) for topic, spec in inputs.items() if topic not in waited}
-        self._groups = [
-            _Group(
-                spec.outer,
-                spec.delay * timing.period_ns,
-                spec.outer == outer and not spec.delay,
-                [(t, self._kept[t]) for t in waited if waited[t][:2] == spec[:2]],
-            )
-            for spec in {spec[:2]: spec for spec in waited.values()}.values()
-        ]
+        self._groups: list[_Group] = []
+        self._waited: dict[str, tuple[_Group, int]] = {}  # of an input its group, and its limit, ns
+        for outer_rate, delay in dict.fromkeys(spec[:2] for spec in waited.values()):
+            limits = {topic: spec.limit_ns for topic, spec in waited.items() if spec[:2] == (outer_rate, delay)}
+            repeats = timing.outer_period_ns if outer_rate else 1
+            group = _Group(outer_rate, delay * timing.period_ns, repeats, tuple(limits))
+            self._groups.append(group)
+            self._waited.update({topic: (group, limit) for topic, limit in limits.items()})
         self._is_alone = not inputs  # a trigger is all there is to a step
         self._outer_period, self._outer_phase = timing.outer_period_ns, timing.period_ns % timing.outer_period_ns
-        self._lacks: tuple[dict[int, Any], int, int] | None = None  # see `_taken`
+        self._lacks: tuple[_Group, int, int] | None = None  # see `_taken`
         self._triggers: deque[tuple[int, Any]] = deque()
         self._announced: int | None = None  # first state of a session that none of its states has confirmed yet, ns
         self._early: deque[tuple[str, int, Any]] = deque(maxlen=MOST_EARLY)
@@ -147,10 +144,8 @@ class Synchroniser:
         self._last = self._last_done = self._suspect = 0
         self._triggers.clear()
         self._lacks = None
-        for kept in self._kept.values():
-            kept.clear()
         for group in self._groups:
-            group.cause = 0
+            group.clear()
         for newest in self._newest.values():
             newest.clear()
 
@@ -195,8 +190,8 @@ class Synchroniser:
         if not self._triggers:
             return ()
         if self._lacks is not None:
-            kept, cause, earliest = self._lacks
-            if cause not in kept and stamp <= earliest:
+            group, cause, earliest = self._lacks
+            if stamp <= earliest and not group.has(cause):
                 return ()  # nothing that the first step waits for, or shows that it waits in vain
         return self._complete()
 
@@ -240,19 +235,20 @@ class Synchroniser:
 
     def inlet(self, topic: str) -> Inlet:
         """What `put` does with the inputs of one topic, as a function of stamp and value."""
-        return partial(self.put, topic)
+        return self._start if topic == self._trigger else partial(self.put, topic)
 
     def _keep(self, topic: str, stamp: int, value: Any) -> None:
         """Keep an input that is not the trigger."""
         newest = self._newest.get(topic)
         if newest is None:
-            if 0 < self._last < stamp - self._limits[topic]:
-                self._require_present(stamp, self._limits[topic])
-            kept = self._kept[topic]
-            if stamp in kept:
+            group, limit = self._waited[topic]
+            if 0 < self._last < stamp - limit:
+                self._require_present(stamp, limit)
+            slot = group.kept.setdefault(stamp, {})
+            if topic in slot:
                 self.strays += 1
             else:
-                kept[stamp] = value
+                slot[topic] = stamp, value
             return
         if newest.is_command and not stamp:
             stamp = self._last
@@ -292,12 +288,7 @@ class Synchroniser:
 
     def _has_missed(self, stamp: int) -> bool:
         """Whether an input of this step can no longer come, as a later one is there: the node began too late for it."""
-        for group in self._groups:
-            cause = self._cause(group, stamp)
-            for _, kept in group.members:
-                if kept and cause not in kept and 0 < cause < max(kept):
-                    return True
-        return False
+        return any((cause := self._cause(group, stamp)) and group.has_missed(cause) for group in self._groups)
 
     def _step(self, stamp: int, taken: Mapping[str, tuple[int, Any] | None]) -> Inputs:
         """The inputs of a step that is complete, with the time since the one before."""
@@ -311,8 +302,8 @@ class Synchroniser:
             topic
             for group in self._groups
             if (cause := self._cause(group, stamp))
-            for topic, kept in group.members
-            if cause not in kept
+            for topic in group.topics
+            if topic not in group.kept.get(cause, ())
         ]
 
     def awaited(self, now: int) -> list[str]:
@@ -342,23 +333,21 @@ class Synchroniser:
     def _taken(self, stamp: int) -> dict[str, tuple[int, Any] | None] | None:
         """The inputs of a step, None where it still waits for one; older ones are forgotten.
 
-        Where it waits, `_lacks` is where that input will be, its stamp, and the earliest stamp of all inputs of the
+        Where it waits, `_lacks` is the group that lacks one, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
         taken: dict[str, tuple[int, Any] | None] = {}
         for topic, newest in self._newest.items():
             taken[topic] = newest.taken(stamp)
         for group in self._groups:
-            cause = self._cause(group, stamp)
-            if not cause:
-                continue
-            if cause != group.cause and not group.find(cause):
-                lacking = next(kept for _, kept in group.members if cause not in kept)
-                self._lacks = lacking, cause, min(self._cause(each, stamp) for each in self._groups)
-                return None
+            if stamp >= group.until:
+                cause = self._cause(group, stamp)
+                if not cause:
+                    continue
+                if not group.find(cause):
+                    self._lacks = group, cause, min(self._cause(each, stamp) for each in self._groups)
+                    return None
             taken.update(group.found)
-        for group in self._groups:
-            group.forget(stamp)
         return taken
 
 
@@ -409,36 +398,48 @@ class _Newest:
 class _Group:
     """Inputs that belong to a step by the same rule.
 
-    Attributes
+    Parameters
     ----------
     outer : whether they come once per outer period.
     delay_ns : time after which they are used, ns.
-    once : whether each value is used by one step, that of its own stamp.
-    members : each with the values kept by stamp.
-    cause, found : stamp of those of the last step, 0 where there are none, and the inputs.
+    repeats_ns : time for which steps use the same ones, ns.
+    topics : of the inputs.
+
+    Attributes
+    ----------
+    kept : the inputs by stamp and topic.
+    found : those of the last step, by topic.
+    until : stamp from which a step needs others, ns.
     """
 
-    __slots__ = ("cause", "delay_ns", "found", "members", "once", "outer")
+    __slots__ = ("_repeats_ns", "delay_ns", "found", "kept", "outer", "topics", "until")
 
-    def __init__(self, outer: bool, delay_ns: int, once: bool, members: list[tuple[str, dict[int, Any]]]) -> None:
-        self.outer, self.delay_ns, self.once, self.members = outer, delay_ns, once, members
-        self.cause = 0
+    def __init__(self, outer: bool, delay_ns: int, repeats_ns: int, topics: tuple[str, ...]) -> None:
+        self.outer, self.delay_ns, self._repeats_ns, self.topics = outer, delay_ns, repeats_ns, topics
+        self.kept: dict[int, dict[str, tuple[int, Any]]] = {}
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self.kept.clear()
+        self.until = 0
         self.found: dict[str, tuple[int, Any]] = {}
 
-    def find(self, cause: int) -> bool:
-        """Look for the inputs of this stamp, ns; whether all are there."""
-        for _, kept in self.members:
-            if cause not in kept:
-                return False
-        self.cause, self.found = cause, {topic: (cause, kept[cause]) for topic, kept in self.members}
-        return True
+    def has(self, cause: int) -> bool:
+        """Whether all inputs of this stamp, ns, are there."""
+        return len(self.kept.get(cause, ())) == len(self.topics)
 
-    def forget(self, stamp: int) -> None:
-        """Forget what no step after that of this stamp, ns, will use."""
-        cause = self.cause
-        for _, kept in self.members:
-            if len(kept) > 1:
-                for old in [known for known in kept if known < cause]:
-                    del kept[old]
-            if self.once:
-                kept.pop(stamp, None)
+    def has_missed(self, cause: int) -> bool:
+        """Whether an input of this stamp, ns, is not there, and a later one of its topic is."""
+        here = self.kept.get(cause, {}).keys()
+        return any(later > cause and not there.keys() <= here for later, there in self.kept.items())
+
+    def find(self, cause: int) -> bool:
+        """Take the inputs of this stamp, ns, if all are there, and forget those before; returns whether they are."""
+        if not self.has(cause):
+            return False
+        self.found, self.until = self.kept[cause], cause + self.delay_ns + self._repeats_ns
+        if len(self.kept) > 1:
+            for old in [stamp for stamp in self.kept if stamp < cause]:
+                del self.kept[old]
+        return True

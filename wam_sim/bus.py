@@ -20,7 +20,6 @@ class TopicValue(NamedTuple):
 
 
 Rows = dict[str, list[TopicValue]]
-Write = Callable[[list[float], Any], str]  # appends the numbers of a value, returns its frame
 
 
 class Bus:
@@ -32,8 +31,7 @@ class Bus:
     """
 
     def __init__(self, topics: Mapping[str, Topic]) -> None:
-        writes = {name: _WRITES.get(topic.type) for name, topic in topics.items()}
-        self._routes = {name: _Route(_Log(write) if write else None, [], None) for name, write in writes.items()}
+        self._routes = {name: _Route(_Log(), [], _WRITES.get(topic.type)) for name, topic in topics.items()}
         self._rows: Rows = {}
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
@@ -43,7 +41,7 @@ class Bus:
             take(stamp, value)
             return ()
 
-        self._routes[topic].takers.append(_Taker(inlet, None, _nothing, {}))
+        self._routes[topic].takers.append((inlet, _nothing, {}))
 
     def connect(
         self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]], checks: Mapping[str, Check]
@@ -58,38 +56,36 @@ class Bus:
         """
         outlets = _Outlets(declaration)
         for name in declaration.outputs:
-            route = self._routes.setdefault(name, _Route(None, [], None))
-            outlets[name] = route._replace(check=checks.get(name))
+            outlets[name] = self._routes.setdefault(name, _Route(_Log(), []))
         for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
-            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(None, [], None))
+            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(_Log(), []))
         for topic, found in feeds.items():
-            reactions = [(feed.synchroniser.inlet(topic), mask(feed.arrays), feed.work) for feed in found]
+            reactions = [
+                (_masked(feed.synchroniser.inlet(topic), mask(feed.arrays)), _checked(feed.work, checks))
+                for feed in found
+            ]
             if len(reactions) > 1:
-                self._routes[topic].takers.append(_Taker(_together(reactions), None, _outputs, outlets))
+                self._routes[topic].takers.append((_together(reactions), _outputs, outlets))
             else:
-                self._routes[topic].takers.extend(_Taker(*reaction, outlets) for reaction in reactions)
+                self._routes[topic].takers.extend((*reaction, outlets) for reaction in reactions)
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value of a stamp, ns, and what the nodes publish in turn."""
         self._deliver(self._routes[topic], stamp, value)
 
     def _deliver(self, route: "_Route", stamp: int, value: Any) -> None:
-        log, takers, _ = route
-        if log is not None:
-            log.add(stamp, value)
-        for inlet, masked, work, outlets in takers:
-            for inputs in inlet(stamp, masked(value) if masked else value):
+        if (write := route.write) is not None:
+            write(route.log, stamp, value)
+        for inlet, work, outlets in route.takers:
+            for inputs in inlet(stamp, value):
                 for name, output in work(inputs).items():
-                    outlet = outlets[name]
-                    if outlet.check is not None:
-                        outlet.check(output)
-                    self._deliver(outlet, inputs.stamp, output)
+                    self._deliver(outlets[name], inputs.stamp, output)
 
     @property
     def rows(self) -> Rows:
         """What was published on each topic of numbers so far; a JointState as position, velocity and effort."""
-        for name, (log, *_) in self._routes.items():
-            if log is not None and (new := log.take()):
+        for name, route in self._routes.items():
+            if new := route.log.take():
                 self._rows.setdefault(name, []).extend(new)
         return self._rows
 
@@ -102,54 +98,48 @@ def of_node(node: str, topic: str) -> str:
 class _Log:
     """The numbers of a topic, one after the other: a tuple for each message would keep the garbage collector busy.
 
-    Parameters
+    Attributes
     ----------
-    write : of the type of the topic.
+    stamps, frames : of the messages.
+    numbers : of all of them.
+    ends : of the numbers of each message.
     """
 
-    __slots__ = ("_ends", "_frames", "_numbers", "_stamps", "_write")
+    __slots__ = ("ends", "frames", "numbers", "stamps")
 
-    def __init__(self, write: Write) -> None:
-        self._write = write
-        self._clear()
+    def __init__(self) -> None:
+        self.stamps: list[int] = []
+        self.frames: list[str] = []
+        self.numbers: list[float] = []
+        self.ends: list[int] = []
 
-    def _clear(self) -> None:
-        self._stamps: list[int] = []
-        self._frames: list[str] = []
-        self._numbers: list[float] = []
-        self._ends: list[int] = []  # of the numbers of each message
-
-    def add(self, stamp: int, value: Any) -> None:
-        """Keep the numbers of one message."""
-        numbers = self._numbers
-        self._frames.append(self._write(numbers, value))
-        self._stamps.append(stamp)
-        self._ends.append(len(numbers))
+    def close(self, stamp: int, frame: str) -> None:
+        """End a message, whose numbers are there."""
+        self.stamps.append(stamp)
+        self.frames.append(frame)
+        self.ends.append(len(self.numbers))
 
     def take(self) -> list[TopicValue]:
         """The messages since the last call."""
-        numbers, begins = tuple(self._numbers), [0, *self._ends]
-        each = zip(self._stamps, begins, self._ends, self._frames, strict=False)
+        numbers, begins = tuple(self.numbers), [0, *self.ends]
+        each = zip(self.stamps, begins, self.ends, self.frames, strict=False)
         rows = [TopicValue(stamp, numbers[begin:end], frame) for stamp, begin, end, frame in each]
-        self._clear()
+        for kept in (self.stamps, self.frames, self.numbers, self.ends):
+            kept.clear()
         return rows
 
 
 class _Route(NamedTuple):
-    """One topic: its numbers, where it carries any, who takes it, and what refuses an unusable output."""
+    """One topic: its messages, who takes them, and what keeps their numbers, where it carries any."""
 
-    log: _Log | None
+    log: _Log
     takers: list["_Taker"]
-    check: Check | None
+    write: Callable[[_Log, int, Any], None] | None = None
 
 
-class _Taker(NamedTuple):
-    """A reaction: where its inputs go, what it takes of a JointState, its step, the topics that it may publish."""
-
-    inlet: Callable[[int, Any], Sequence[Any]]
-    masked: Callable[[State], State] | None
-    work: Callable[[Any], Outputs]
-    outlets: Mapping[str, _Route]
+Work = Callable[[Any], Outputs]
+# where its inputs go, its step, the topics that it may publish
+_Taker = tuple[Callable[[int, Any], Sequence[Any]], Work, Mapping[str, _Route]]
 
 
 class _Outlets(dict[str, _Route]):
@@ -171,13 +161,29 @@ class _Done(NamedTuple):
     outputs: Outputs
 
 
-def _together(
-    reactions: Sequence[tuple[Inlet, Callable[[State], State] | None, Callable[[Inputs], Outputs]]],
-) -> Callable[[int, Any], list[_Done]]:
+def _masked(inlet: Inlet, masked: Callable[[State], State] | None) -> Inlet:
+    """What takes of a JointState only what an input needs."""
+    return inlet if masked is None else lambda stamp, value: inlet(stamp, masked(value))
+
+
+def _checked(work: Work, checks: Mapping[str, Check]) -> Work:
+    """A step whose unusable outputs are refused."""
+    if not checks:
+        return work
+
+    def step(inputs: Inputs) -> Outputs:
+        outputs = work(inputs)
+        for name, output in outputs.items():
+            if name in checks:
+                checks[name](output)
+        return outputs
+
+    return step
+
+
+def _together(reactions: Sequence[tuple[Inlet, Work]]) -> Callable[[int, Any], list[_Done]]:
     return lambda stamp, value: [
-        _Done(inputs.stamp, work(inputs))
-        for inlet, masked, work in reactions
-        for inputs in inlet(stamp, masked(value) if masked else value)
+        _Done(inputs.stamp, work(inputs)) for inlet, work in reactions for inputs in inlet(stamp, value)
     ]
 
 
@@ -189,32 +195,33 @@ def _nothing(_: Any) -> Outputs:
     return {}
 
 
-def _write_state(numbers: list[float], value: State) -> str:
-    position, velocity, effort = value
-    numbers += position
-    numbers += velocity
-    numbers += effort
-    return ""
+def _write_state(log: _Log, stamp: int, value: State) -> None:
+    numbers = log.numbers
+    for array in value:
+        numbers += array
+    log.stamps.append(stamp)
+    log.frames.append("")
+    log.ends.append(len(numbers))
 
 
-def _write_wrench(numbers: list[float], value: Wrench) -> str:
-    numbers += value.force
-    numbers += value.torque
-    return value.frame
+def _write_wrench(log: _Log, stamp: int, value: Wrench) -> None:
+    log.numbers += value.force
+    log.numbers += value.torque
+    log.close(stamp, value.frame)
 
 
-def _write_point(numbers: list[float], value: Point) -> str:
-    numbers += value.position
-    return value.frame
+def _write_point(log: _Log, stamp: int, value: Point) -> None:
+    log.numbers += value.position
+    log.close(stamp, value.frame)
 
 
-def _write_table(numbers: list[float], value: Table) -> str:
+def _write_table(log: _Log, stamp: int, value: Table) -> None:
     for row in value.rows:
-        numbers += row
-    return value.frame
+        log.numbers += row
+    log.close(stamp, value.frame)
 
 
-_WRITES: dict[str, Write] = {
+_WRITES: dict[str, Callable[[_Log, int, Any], None]] = {
     JOINT_STATE: _write_state,
     WRENCH: _write_wrench,
     POINT: _write_point,
@@ -224,6 +231,6 @@ _WRITES: dict[str, Write] = {
 
 def flat(topic: Topic, stamp: int, value: Any) -> TopicValue:
     """A value of a topic of numbers as one row."""
-    numbers: list[float] = []
-    frame = _WRITES[topic.type](numbers, value)
-    return TopicValue(stamp, tuple(numbers), frame)
+    log = _Log()
+    _WRITES[topic.type](log, stamp, value)
+    return log.take()[0]
