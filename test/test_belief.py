@@ -237,9 +237,9 @@ class Intruder:
     def send(self, topic: str, stamp: int, value: Any) -> int:
         """Give a message to every listener; how many refused it."""
         refused = 0
-        for inlet, masked, work, _ in self.run._bus._routes[topic].takers:
+        for inlet, work, _ in self.run._bus._routes[topic].takers:
             try:
-                for inputs in inlet(stamp, masked(value) if masked else value):
+                for inputs in inlet(stamp, value):
                     for name, output in work(inputs).items():
                         self.run._bus.publish(name, inputs.stamp, output)
             except OutOfTime:
