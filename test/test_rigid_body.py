@@ -140,7 +140,7 @@ def test_momentum_rate_is_torque_plus_coriolis_transpose(body: RigidBody) -> Non
         step = 1e-5
         before, after = (body.mass_matrix(q + h * qd) @ (qd + h * qdd) for h in (-step, step))
         torque = body.inverse_dynamics(q, qd, qdd)
-        expected = torque - body.gravity_torque(q) + body.coriolis_transpose_times_velocity(q, qd)
+        expected = torque + body.momentum_bias(q, qd)
         assert np.allclose((after - before) / (2 * step), expected, atol=1e-6)
 
 

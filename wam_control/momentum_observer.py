@@ -119,8 +119,9 @@ class MomentumObserver:
         n = self._n
         self.q: list[float] = [0.0] * n
         # of each filter the residual and the torque of the model, (2 n,), N m, then the signals of the shafts, (9 n,)
-        self._filtered = np.zeros((len(self._times), 11 * n))
-        self._decay = _Decay.over(math.inf, self._times)
+        # strain gauges lie behind the friction: no signals
+        self._filtered = np.zeros((len(self._times), 2 * n if self._link_side else 11 * n))
+        self._decay = _Decay.over(math.inf, self._times, self._filtered.shape[1])
         self._ring = np.zeros((max(1, self._cycle), 10 * n))
         self._filled = 0
         if self._load is not None:
@@ -161,7 +162,7 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._link_side:
-            return self._update(_Sample(position, velocity, effort, [0.0] * n, []), dt)
+            return self._update(_Sample(position, velocity, effort, [], []), dt)
         if not any(effort) and max(map(abs, velocity)) < self._parameters.motor_rest_velocity:
             # at rest without current, brakes or stiction hold: motor torques carry no information
             self.reset()
@@ -195,32 +196,32 @@ class MomentumObserver:
         body, (q, qd, tau, friction, signals) = self._body, sample
         at, speed = np.array(q), np.array(qd)
         inertia = body.mass_matrix(at) + self._carried
-        momentum = inertia.dot(speed).tolist()
-        bias = (body.coriolis_transpose_times_velocity(at, speed) - body.gravity_torque(at)).tolist()
-        known = [b - f for b, f in zip(bias, friction, strict=True)]
+        momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
+        known = [b - f for b, f in zip(bias, friction, strict=True)] if friction else bias
         before, span, n = self._momentum, dt + self._gap, self._n
-        external, model = [0.0] * n, [-torque for torque in bias]
-        if before is not None:
-            rate = [(now - then) / span for now, then in zip(momentum, before, strict=True)]
-            model = [p - 0.5 * (new + old) for p, new, old in zip(rate, bias, self._bias, strict=True)]
-            external = [
-                p - 0.5 * (new + old) - torque
-                for p, new, old, torque in zip(rate, known, self._known, tau, strict=True)
-            ]
+        external, model = [], []
+        if before is None:
+            external, model = [0.0] * n, [-torque for torque in bias]
+        else:
+            pairs = zip(momentum, before, bias, self._bias, known, self._known, tau, strict=True)
+            for p, p_before, b, b_before, k, k_before, torque in pairs:
+                rate = (p - p_before) / span
+                model.append(rate - 0.5 * (b + b_before))
+                external.append(rate - 0.5 * (k + k_before) - torque)
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
+        filtered, present = self._filtered, np.array([external + model + signals])
         if span != self._decay.span:
-            self._decay = _Decay.over(span, self._times)
-        present = np.array(external + model + signals)  # strain gauges lie behind the friction: no signals
-        filtered = self._filtered[:, : len(present)]
+            self._decay = _Decay.over(span, self._times, present.size)
         if before is None:
             filtered[:] = present
         else:
-            if span > self._parameters.time_constant:  # the torques in so long a gap are unknown: continue from here
-                filtered, present = filtered[:, 2 * n :], present[2 * n :]
+            torques = filtered[:, : 2 * n].copy() if span > self._parameters.time_constant else None
             filtered *= self._decay.keeps
             filtered += self._decay.takes * present
+            if torques is not None:  # the torques in so long a gap are unknown: continue from here
+                filtered[:, : 2 * n] = torques
         if self._load is not None:
             keep = 0.0 if before is None else self._decay.keep
             self._load.observe(q, qd, span, keep)
@@ -347,7 +348,10 @@ class MomentumObserver:
 
 
 class _Decay(NamedTuple):
-    """What the filters keep and take of a sample over a period of `span` seconds, as columns; what the first keeps."""
+    """What the filters keep and take of a sample over a period of `span` seconds; what the first one keeps.
+
+    There is one for each number: numpy multiplies by a single one two to three times as slowly.
+    """
 
     span: float
     keep: float
@@ -355,10 +359,10 @@ class _Decay(NamedTuple):
     takes: Array
 
     @classmethod
-    def over(cls, span: float, times: Sequence[float]) -> "_Decay":
-        """The decay of filters with these time constants, s."""
+    def over(cls, span: float, times: Sequence[float], size: int) -> "_Decay":
+        """The decay of filters of `size` numbers with these time constants, s."""
         keep = [math.exp(-span / time) for time in times]
-        keeps = np.array(keep)[:, None]
+        keeps = np.repeat(np.array(keep)[:, None], size, axis=1)
         return cls(span, keep[0], keeps, 1.0 - keeps)
 
 

@@ -44,7 +44,7 @@ class ToolLoad:
         span, keep, body = self._span, self._keep, self._body
         self._span, self._keep, self._count = 0.0, 1.0, 0
         momentum = (body.mass_matrix(q) @ np.array(qd)).tolist()
-        bias = (body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)).tolist()
+        bias = body.momentum_bias(q, qd).tolist()
         if self._before is None:
             self._bias, keep = bias, 0.0
         # as an external torque: that of the motors on the load, with the opposite sign

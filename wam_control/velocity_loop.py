@@ -36,12 +36,9 @@ class VelocityLoop:
 
     def __init__(self, motors: Motors, servo: Servo, parameters: VelocityLoopParameters) -> None:
         self._motors = motors
-        self._peak = motors.peak_torque
-        self._constant = motors.torque_constant
-        self._integral = [0.0] * len(self._peak)
-        self._commanded = [0.0] * len(self._peak)
-        self._velocity = [0.0] * len(self._peak)
-        self._feedforward = [0.0] * len(self._peak)
+        self._limits = list(zip(motors.peak_torque, motors.torque_constant, strict=True))
+        n = len(self._limits)
+        self._integral, self._commanded, self._velocity, self._feedforward = ([0.0] * n for _ in range(4))
         self.tune(servo, parameters)
 
     def tune(self, servo: Servo, parameters: VelocityLoopParameters) -> None:
@@ -80,32 +77,32 @@ class VelocityLoop:
             currents (n,), A.
         """
         currents, integral, commanded = [], self._integral, self._commanded
+        velocities, carried, kp, ki = self._velocity, self._feedforward, self._kp, self._ki
         faster, stronger = self._acceleration * dt, self._torque_rate * dt
-        for i, peak in enumerate(self._peak):
-            carried = feedforward[i]
-            if not abs(carried - self._feedforward[i]) <= stronger:  # so that NaN goes no further
-                carried = _toward(carried, self._feedforward[i], stronger)
-            self._feedforward[i] = carried
+        for i, (peak, constant) in enumerate(self._limits):
+            added, speed = feedforward[i], thetad[i]
+            if not -stronger <= added - carried[i] <= stronger:  # so that NaN goes no further
+                added = _toward(added, carried[i], stronger)
+            carried[i] = torque = added
             if not command:
                 integral[i] = 0.0
-                self._velocity[i] = thetad[i]
-                torque = carried
+                velocities[i] = speed
             else:
                 if tau_motor[i] == 0.0 and commanded[i] != 0.0:
-                    self._velocity[i] = thetad[i]
+                    velocities[i] = speed
                     integral[i] *= abs(commanded[i]) <= DEAD * peak
                 velocity = command[i]
-                if not abs(velocity - self._velocity[i]) <= faster:
-                    velocity = _toward(velocity, self._velocity[i], faster)
-                self._velocity[i] = velocity
-                error = velocity - thetad[i]
-                torque = self._kp[i] * error + integral[i] + carried
-                growth = self._ki[i] * error * dt
-                if abs(torque) < peak or torque * growth < 0.0:
+                if not -faster <= velocity - velocities[i] <= faster:
+                    velocity = _toward(velocity, velocities[i], faster)
+                velocities[i] = velocity
+                error = velocity - speed
+                torque = kp[i] * error + integral[i] + added
+                growth = ki[i] * error * dt
+                if -peak < torque < peak or torque * growth < 0.0:
                     integral[i] += growth
                     torque += growth
-            commanded[i] = torque = min(max(torque, -peak), peak)
-            currents.append(torque / self._constant[i])
+            commanded[i] = torque = torque if -peak <= torque <= peak else min(max(torque, -peak), peak)
+            currents.append(torque / constant)
         return currents
 
 

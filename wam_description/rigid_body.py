@@ -145,11 +145,12 @@ class RigidBody:
         """Inertia of the links at the joints, (n, n), kg m^2, symmetric, without pulleys and rotors."""
         return pin.crba(self._model, self._data, _vector(q))
 
-    def coriolis_transpose_times_velocity(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """C(q, qd)^T qd, (n,), N m, with dM/dt = C + C^T: the term of a momentum observer."""
-        velocity = _vector(qd)
+    def momentum_bias(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """C(q, qd)^T qd - g(q), (n,), N m, with dM/dt = C + C^T: what changes the momentum M qd without torques."""
+        at, velocity = _vector(q), _vector(qd)
         # dot: of two small arrays three times as fast as @, the same bits
-        return velocity.dot(pin.computeCoriolisMatrix(self._model, self._data, _vector(q), velocity))
+        coriolis = velocity.dot(pin.computeCoriolisMatrix(self._model, self._data, at, velocity))
+        return coriolis - pin.computeGeneralizedGravity(self._model, self._data, at)
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Joint torques, (n,), N m, that give the links the acceleration qdd, (n,), rad/s^2."""

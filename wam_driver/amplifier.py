@@ -57,7 +57,9 @@ class Amplifier:
         self.continuous = [t / k for t, k in zip(motors.continuous_torque, motors.torque_constant, strict=True)]
         self.heat = [0.0] * len(self.peak)
         self._parameters = parameters
-        self._is_noisy, self._is_rippled = any(parameters.current_noise), any(parameters.torque_ripple)
+        self._is_noisy = any(parameters.current_noise)
+        ripples = zip(parameters.torque_ripple, parameters.ripple_cycles, strict=True)
+        self._ripples = [(i, ripple, cycles) for i, (ripple, cycles) in enumerate(ripples) if ripple]
         self._random = random
 
     def reset(self) -> None:
@@ -67,18 +69,19 @@ class Amplifier:
     def step(self, currents: Sequence[float], dt: float) -> list[float]:
         """Actual currents over `dt` seconds, A, (n,), for the commanded currents, A, (n,)."""
         parameters, continuous, heat = self._parameters, self.continuous, self.heat
+        time, deadband = parameters.thermal_time, parameters.deadband
         noise = self._random.standard_normal(len(self.peak)).tolist() if self._is_noisy else None
         actual = []
         for i, current in enumerate(currents):
             limit = continuous[i] if heat[i] >= 1.0 else self.peak[i]
-            if abs(current) < parameters.deadband[i]:
+            if -deadband[i] < current < deadband[i]:
                 current = 0.0  # noqa: PLW2901
             if noise and current:
                 current += parameters.current_noise[i] * noise[i]  # noqa: PLW2901
-            limited = min(max(current, -limit), limit)
+            limited = current if -limit <= current <= limit else min(max(current, -limit), limit)
             actual.append(limited)
             ratio = limited / continuous[i]
-            heat[i] += (ratio * ratio - heat[i]) * dt / parameters.thermal_time
+            heat[i] += (ratio * ratio - heat[i]) * dt / time
         return actual
 
     def nominal_torque(self, currents: Sequence[float]) -> list[float]:
@@ -87,12 +90,7 @@ class Amplifier:
 
     def torque(self, currents: Sequence[float], theta: Sequence[float]) -> list[float]:
         """Torque on the rotors at the angles theta, rad, with the ripple of the commutation, N m, (n,)."""
-        torque = [k * i for k, i in zip(self._true_constant, currents, strict=True)]
-        if not self._is_rippled:
-            return torque
-        for i, (ripple, cycles) in enumerate(
-            zip(self._parameters.torque_ripple, self._parameters.ripple_cycles, strict=True)
-        ):
-            if ripple:
-                torque[i] *= 1.0 + ripple * sin(cycles * theta[i])
+        torque = list(map(mul, self._true_constant, currents))
+        for i, ripple, cycles in self._ripples:
+            torque[i] *= 1.0 + ripple * sin(cycles * theta[i])
         return torque

@@ -162,8 +162,7 @@ class Driver:
         self.plant.brake(not enabled)
         self.currents = self.amplifier.step(self._command if enabled else self._zero, self._timing.period)
         torque = self.amplifier.torque(self.currents, self.plant.theta)
-        for _ in range(self._timing.substeps):
-            self.plant.step(torque)
+        self.plant.step(torque, self._timing.substeps)
         if trouble := self.plant.trouble:
             self.plant.recover()
             self._trip(

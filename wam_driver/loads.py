@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from mujoco import mj_applyFT
 
 from wam_description.arm import Arm
 from wam_description.signals import Load
@@ -74,10 +75,10 @@ class CoverLoads:
 
     def apply_pushes(self) -> None:
         """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""
+        model, data, applied = self._model, self._data, self._applied
         for cover, (force, torque) in self.pushes.items():
-            rotation, origin = self._rotation[cover], self._origin[cover]
-            force, torque = rotation.dot(force), rotation.dot(torque)  # noqa: PLW2901
-            mujoco.mj_applyFT(self._model, self._data, force, torque, origin, self._body[cover], self._applied)
+            turned = self._rotation[cover].dot
+            mj_applyFT(model, data, turned(force), turned(torque), self._origin[cover], self._body[cover], applied)
 
     def measure(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""

@@ -97,7 +97,7 @@ class Plant:
         )
         self._qdd = data.qacc[joints]
         self._joint_damping, self._armature = model.dof_damping[joints].tolist(), model.dof_armature[joints].tolist()
-        self._constraint = data.qfrc_constraint[: 2 * n]
+        self._constraint, self._applied = data.qfrc_constraint[: 2 * n], data.qfrc_applied
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
         self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
@@ -204,28 +204,30 @@ class Plant:
         self._kept[1][:] += self._plastic - before
         self._is_set = False
 
-    def step(self, torque: list[float]) -> None:
-        """Advance by one step.
+    def step(self, torque: list[float], count: int = 1) -> None:
+        """Advance by one step or several.
 
         Parameters
         ----------
         torque : torque of each motor on its rotor, N m.
+        count : number of steps with this torque.
         """
-        model, data, pushes = self.model, self.data, self._loads.pushes
+        model, data, pushes, circuits = self.model, self.data, self._loads.pushes, self._circuits
         self._write_torque(0, *torque)
-        self._set_friction()
-        for mover in self._movers:
-            mover.lead(data.time)
-        mj_step1(model, data)
-        if pushes:
-            self._loads.apply_pushes()
-        if data.ncon:
-            self._surfaces.apply()
-        mj_step2(model, data)
-        if pushes:
-            data.qfrc_applied[:] = 0.0
-        if self._circuits.depends_on_torque:
-            self._circuits.follow(self._friction.direction)
+        for _ in range(count):
+            self._set_friction()
+            for mover in self._movers:
+                mover.lead(data.time)
+            mj_step1(model, data)
+            if pushes:
+                self._loads.apply_pushes()
+            if data.ncon:
+                self._surfaces.apply()
+            mj_step2(model, data)
+            if pushes:
+                self._applied.fill(0.0)
+            if circuits.depends_on_torque:
+                circuits.follow(self._friction.direction)
 
     def _set_friction(self) -> None:
         """Give MuJoCo the level of friction of every shaft for the next step."""
@@ -236,7 +238,7 @@ class Plant:
         else:
             changed = friction.follow(self._velocity, self._transmitted_torque(), self._friction_torque())
             if friction.elastic:
-                self.data.qfrc_applied[:] = friction.elastic
+                self._applied[:] = friction.elastic
         if changed or circuits.is_slack or not self._is_set:
             levels = friction.levels_with_slack(circuits.elastic_torque) if circuits.is_slack else friction.levels
             self._is_set = not circuits.is_slack
