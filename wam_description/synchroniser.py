@@ -17,7 +17,6 @@ Nothing is used that is from the future, too old, or from before the driver's se
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 from wam_description.arm import Timing, seconds
@@ -114,19 +113,19 @@ class Synchroniser:
         waits = timing.mode == "lockstep"
         waited = {topic: spec for topic, spec in inputs.items() if waits and spec.streamed}
         self._longest_jump = max(LONGEST_JUMP, 3 * self._period)
+        self._outer_period, self._outer_phase = timing.outer_period_ns, timing.period_ns % timing.outer_period_ns
+        self._triggers: deque[tuple[int, Any]] = deque()
         self._newest = {topic: _Newest(spec) for topic, spec in inputs.items() if topic not in waited}
         self._groups: list[_Group] = []
-        self._waited: dict[str, tuple[_Group, int]] = {}  # of an input its group, and its limit, ns
+        self._inlets: dict[str, Inlet] = {trigger: self._start}
         for outer_rate, delay in dict.fromkeys(spec[:2] for spec in waited.values()):
             limits = {topic: spec.limit_ns for topic, spec in waited.items() if spec[:2] == (outer_rate, delay)}
             repeats = timing.outer_period_ns if outer_rate else 1
             group = _Group(outer_rate, delay * timing.period_ns, repeats, tuple(limits))
             self._groups.append(group)
-            self._waited.update({topic: (group, limit) for topic, limit in limits.items()})
-        self._is_alone = not inputs  # a trigger is all there is to a step
-        self._outer_period, self._outer_phase = timing.outer_period_ns, timing.period_ns % timing.outer_period_ns
+            self._inlets.update({topic: self._waited(topic, group, limit) for topic, limit in limits.items()})
+        self._inlets.update({topic: self._unwaited(topic, newest) for topic, newest in self._newest.items()})
         self._lacks: tuple[_Group, int, int] | None = None  # see `_taken`
-        self._triggers: deque[tuple[int, Any]] = deque()
         self._announced: int | None = None  # first state of a session that none of its states has confirmed yet, ns
         self._early: deque[tuple[str, int, Any]] = deque(maxlen=MOST_EARLY)
         self.strays = 0
@@ -181,19 +180,49 @@ class Synchroniser:
         OutOfTime
             where the stamp is ahead of the newest state, by more than the limit of the input.
         """
-        if topic == self._trigger:
-            return self._start(stamp, value)
-        if not self._outer or topic in self._newest or stamp % self._outer_period == self._outer_phase:
+        return self._inlets[topic](stamp, value)
+
+    def inlet(self, topic: str) -> Inlet:
+        """What `put` does with the inputs of one topic, as a function of stamp and value."""
+        return self._inlets[topic]
+
+    def _waited(self, topic: str, group: "_Group", limit_ns: int) -> Inlet:
+        """The inlet of an input that steps wait for."""
+        outer, period, phase = self._outer, self._outer_period, self._outer_phase
+        kept, triggers = group.kept, self._triggers
+
+        def take(stamp: int, value: Any) -> Sequence[Inputs]:
+            if outer and stamp % period != phase:
+                return ()
             if self._announced is not None:
                 self._early.append((topic, stamp, value))
-            self._keep(topic, stamp, value)
-        if not self._triggers:
-            return ()
-        if self._lacks is not None:
-            group, cause, earliest = self._lacks
-            if stamp <= earliest and not group.has(cause):
-                return ()  # nothing that the first step waits for, or shows that it waits in vain
-        return self._complete()
+            if 0 < self._last < stamp - limit_ns:
+                self._require_present(stamp, limit_ns)
+            slot = kept.get(stamp)
+            if slot is None:
+                kept[stamp] = {topic: (stamp, value)}
+            elif topic in slot:
+                self.strays += 1
+            else:
+                slot[topic] = stamp, value
+            return self._complete(stamp) if triggers else ()
+
+        return take
+
+    def _unwaited(self, topic: str, newest: "_Newest") -> Inlet:
+        """The inlet of an input of which a step takes the newest."""
+
+        def take(stamp: int, value: Any) -> Sequence[Inputs]:
+            if self._announced is not None:
+                self._early.append((topic, stamp, value))
+            if newest.is_command and not stamp:
+                stamp = self._last
+            self._require_present(stamp, newest.limit_ns)
+            if not newest.put(stamp, value, self._last):
+                self.strays += 1
+            return self._complete(stamp) if self._triggers else ()
+
+        return take
 
     def _start(self, stamp: int, value: Any) -> Sequence[Inputs]:
         """Take a trigger; returns the inputs of its step, where that is complete."""
@@ -207,20 +236,21 @@ class Synchroniser:
         ):
             return ()
         self._last, self._suspect = stamp, 0
-        if self._is_alone:
-            return (self._step(stamp, {self._trigger: (stamp, value)}),)
         if not self._triggers:  # most often: nothing waits, and all inputs are there
             if (taken := self._taken(stamp)) is not None:
-                taken[self._trigger] = (stamp, value)
-                return (self._step(stamp, taken),)
+                return (self._step(stamp, value, taken),)
             if self._has_missed(stamp):
                 self._lacks = None
                 return ()
         self._triggers.append((stamp, value))
         return ()
 
-    def _complete(self) -> list[Inputs]:
-        """The inputs of each step that is complete, in the order of their stamps."""
+    def _complete(self, newest: int) -> Sequence[Inputs]:
+        """The inputs of each step that is complete with an input of this stamp, ns, in the order of their stamps."""
+        if self._lacks is not None:
+            group, cause, earliest = self._lacks
+            if newest <= earliest and not group.has(cause):
+                return ()  # nothing that the first step waits for, or shows that it waits in vain
         complete: list[Inputs] = []
         while self._triggers:
             taken = self._taken(self._triggers[0][0])
@@ -229,32 +259,8 @@ class Synchroniser:
             stamp, value = self._triggers.popleft()
             self._lacks = None
             if taken is not None:
-                taken[self._trigger] = (stamp, value)
-                complete.append(self._step(stamp, taken))
+                complete.append(self._step(stamp, value, taken))
         return complete
-
-    def inlet(self, topic: str) -> Inlet:
-        """What `put` does with the inputs of one topic, as a function of stamp and value."""
-        return self._start if topic == self._trigger else partial(self.put, topic)
-
-    def _keep(self, topic: str, stamp: int, value: Any) -> None:
-        """Keep an input that is not the trigger."""
-        newest = self._newest.get(topic)
-        if newest is None:
-            group, limit = self._waited[topic]
-            if 0 < self._last < stamp - limit:
-                self._require_present(stamp, limit)
-            slot = group.kept.setdefault(stamp, {})
-            if topic in slot:
-                self.strays += 1
-            else:
-                slot[topic] = stamp, value
-            return
-        if newest.is_command and not stamp:
-            stamp = self._last
-        self._require_present(stamp, newest.limit_ns)
-        if not newest.put(stamp, value, self._last):
-            self.strays += 1
 
     def _require_present(self, stamp: int, limit_ns: int) -> None:
         """Refuse what is ahead of the clock; before the first state there is none."""
@@ -272,7 +278,7 @@ class Synchroniser:
         self.restart(begin)
         for topic, early, value in self._early:
             if begin <= early <= stamp:
-                self._keep(topic, early, value)
+                self._inlets[topic](early, value)
         self._early.clear()
         return True
 
@@ -290,8 +296,9 @@ class Synchroniser:
         """Whether an input of this step can no longer come, as a later one is there: the node began too late for it."""
         return any((cause := self._cause(group, stamp)) and group.has_missed(cause) for group in self._groups)
 
-    def _step(self, stamp: int, taken: Mapping[str, tuple[int, Any] | None]) -> Inputs:
+    def _step(self, stamp: int, value: Any, taken: dict[str, tuple[int, Any] | None]) -> Inputs:
         """The inputs of a step that is complete, with the time since the one before."""
+        taken[self._trigger] = stamp, value
         dt = stamp - self._last_done if self._last_done else self._period
         self._last_done = stamp
         return Inputs(stamp, seconds(dt), taken)
@@ -431,6 +438,8 @@ class _Group:
 
     def has_missed(self, cause: int) -> bool:
         """Whether an input of this stamp, ns, is not there, and a later one of its topic is."""
+        if not self.kept or max(self.kept) <= cause:
+            return False
         here = self.kept.get(cause, {}).keys()
         return any(later > cause and not there.keys() <= here for later, there in self.kept.items())
 

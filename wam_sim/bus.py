@@ -113,7 +113,7 @@ class _Log:
         self.numbers: list[float] = []
         self.ends: list[int] = []
 
-    def close(self, stamp: int, frame: str) -> None:
+    def end(self, stamp: int, frame: str) -> None:
         """End a message, whose numbers are there."""
         self.stamps.append(stamp)
         self.frames.append(frame)
@@ -207,18 +207,18 @@ def _write_state(log: _Log, stamp: int, value: State) -> None:
 def _write_wrench(log: _Log, stamp: int, value: Wrench) -> None:
     log.numbers += value.force
     log.numbers += value.torque
-    log.close(stamp, value.frame)
+    log.end(stamp, value.frame)
 
 
 def _write_point(log: _Log, stamp: int, value: Point) -> None:
     log.numbers += value.position
-    log.close(stamp, value.frame)
+    log.end(stamp, value.frame)
 
 
 def _write_table(log: _Log, stamp: int, value: Table) -> None:
     for row in value.rows:
         log.numbers += row
-    log.close(stamp, value.frame)
+    log.end(stamp, value.frame)
 
 
 _WRITES: dict[str, Callable[[_Log, int, Any], None]] = {
