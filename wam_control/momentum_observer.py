@@ -162,16 +162,16 @@ class MomentumObserver:
             self._gap += dt
             return False
         if self._link_side:
-            return self._update(_Sample(position, velocity, effort, [], []), dt)
+            return self._update(position, velocity, effort, [], [], dt)
         if not any(effort) and max(map(abs, velocity)) < self._parameters.motor_rest_velocity:
             # at rest without current, brakes or stiction hold: motor torques carry no information
             self.reset()
             return True
         fitted = self._velocity.take(state, dt + self._gap)
         self._gap = 0.0
-        return fitted is None or self._update(self._from_motors(fitted.state, fitted.dt), fitted.dt)
+        return fitted is None or self._update_from_motors(fitted.state, fitted.dt)
 
-    def _from_motors(self, state: State, dt: float) -> "_Sample":
+    def _update_from_motors(self, state: State, dt: float) -> bool:
         theta, thetad, tau_motor = state
         q, qd = self._map.joint_positions(theta), self._map.joint_velocities(thetad)
         # with dither a shaft stops at both ends of each swing, held there by the external torque
@@ -190,11 +190,13 @@ class MomentumObserver:
             *joint.shape,
             *loaded,
         ]
-        return _Sample(q, qd, self._map.joint_torques(tau_motor), friction, signals)
+        return self._update(q, qd, self._map.joint_torques(tau_motor), friction, signals, dt)
 
-    def _update(self, sample: "_Sample", dt: float) -> bool:
-        body, (q, qd, tau, friction, signals) = self._body, sample
-        at, speed = np.array(q), np.array(qd)
+    def _update(
+        self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: list[float], dt: float
+    ) -> bool:
+        """Take a sample of the joints: state and torque, (n,); friction, (n,), and signals of the shafts, if any."""
+        body, at, speed = self._body, np.array(q), np.array(qd)
         inertia = body.mass_matrix(at) + self._carried
         momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)] if friction else bias
@@ -364,13 +366,3 @@ class _Decay(NamedTuple):
         keep = [math.exp(-span / time) for time in times]
         keeps = np.repeat(np.array(keep)[:, None], size, axis=1)
         return cls(span, keep[0], keeps, 1.0 - keeps)
-
-
-class _Sample(NamedTuple):
-    """One sample on the joint side: state, torque, friction, each (n,); `signals` of the shafts if any."""
-
-    q: list[float]
-    qd: list[float]
-    tau: list[float]
-    friction: list[float]
-    signals: list[float]

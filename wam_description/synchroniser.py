@@ -110,6 +110,7 @@ class Synchroniser:
         self._outer, self._thinned = outer, thinned
         self._timing, self._trigger = timing, trigger
         self._period = timing.outer_period_ns if outer else timing.period_ns
+        self._nominal = seconds(self._period)
         waits = timing.mode == "lockstep"
         waited = {topic: spec for topic, spec in inputs.items() if waits and spec.streamed}
         self._longest_jump = max(LONGEST_JUMP, 3 * self._period)
@@ -121,7 +122,7 @@ class Synchroniser:
         for outer_rate, delay in dict.fromkeys(spec[:2] for spec in waited.values()):
             limits = {topic: spec.limit_ns for topic, spec in waited.items() if spec[:2] == (outer_rate, delay)}
             repeats = timing.outer_period_ns if outer_rate else 1
-            group = _Group(outer_rate, delay * timing.period_ns, repeats, tuple(limits))
+            group = _Group(delay * timing.period_ns, repeats, self._outer_phase, tuple(limits))
             self._groups.append(group)
             self._inlets.update({topic: self._waited(topic, group, limit) for topic, limit in limits.items()})
         self._inlets.update({topic: self._unwaited(topic, newest) for topic, newest in self._newest.items()})
@@ -138,13 +139,12 @@ class Synchroniser:
         ----------
         begin : first state of the session, ns; nothing can come in answer to one before it.
         """
-        self._begin = begin
         self._announced = None
         self._last = self._last_done = self._suspect = 0
         self._triggers.clear()
         self._lacks = None
         for group in self._groups:
-            group.clear()
+            group.restart(begin)
         for newest in self._newest.values():
             newest.clear()
 
@@ -294,21 +294,21 @@ class Synchroniser:
 
     def _has_missed(self, stamp: int) -> bool:
         """Whether an input of this step can no longer come, as a later one is there: the node began too late for it."""
-        return any((cause := self._cause(group, stamp)) and group.has_missed(cause) for group in self._groups)
+        return any(group.has_missed(stamp) for group in self._groups)
 
     def _step(self, stamp: int, value: Any, taken: dict[str, tuple[int, Any] | None]) -> Inputs:
         """The inputs of a step that is complete, with the time since the one before."""
         taken[self._trigger] = stamp, value
-        dt = stamp - self._last_done if self._last_done else self._period
-        self._last_done = stamp
-        return Inputs(stamp, seconds(dt), taken)
+        before, self._last_done = self._last_done, stamp
+        is_next = not before or stamp - before == self._period
+        return Inputs(stamp, self._nominal if is_next else seconds(stamp - before), taken)
 
     def missing(self, stamp: int) -> list[str]:
         """Topics whose message the step of this stamp still waits for."""
         return [
             topic
             for group in self._groups
-            if (cause := self._cause(group, stamp))
+            if (cause := group.cause(stamp))
             for topic in group.topics
             if topic not in group.kept.get(cause, ())
         ]
@@ -328,15 +328,6 @@ class Synchroniser:
             if newest.stamp
         }
 
-    def _cause(self, group: "_Group", stamp: int) -> int:
-        """Stamp of the inputs that belong to a step, 0 where none can have come yet."""
-        cause = stamp - group.delay_ns
-        if cause <= 0:
-            return 0
-        if group.outer:
-            cause -= (cause - self._outer_phase) % self._outer_period
-        return cause if cause >= self._begin else 0
-
     def _taken(self, stamp: int) -> dict[str, tuple[int, Any] | None] | None:
         """The inputs of a step, None where it still waits for one; older ones are forgotten.
 
@@ -347,13 +338,9 @@ class Synchroniser:
         for topic, newest in self._newest.items():
             taken[topic] = newest.taken(stamp)
         for group in self._groups:
-            if stamp >= group.until:
-                cause = self._cause(group, stamp)
-                if not cause:
-                    continue
-                if not group.find(cause):
-                    self._lacks = group, cause, min(self._cause(each, stamp) for each in self._groups)
-                    return None
+            if stamp >= group.until and not group.find(stamp):
+                self._lacks = group, group.cause(stamp), min(each.cause(stamp) for each in self._groups)
+                return None
             taken.update(group.found)
         return taken
 
@@ -407,9 +394,9 @@ class _Group:
 
     Parameters
     ----------
-    outer : whether they come once per outer period.
     delay_ns : time after which they are used, ns.
-    repeats_ns : time for which steps use the same ones, ns.
+    repeats_ns : time for which steps use the same ones, ns: an outer period, or none, as 1.
+    phase_ns : stamp of the first ones, where they repeat, ns.
     topics : of the inputs.
 
     Attributes
@@ -419,36 +406,47 @@ class _Group:
     until : stamp from which a step needs others, ns.
     """
 
-    __slots__ = ("_repeats_ns", "delay_ns", "found", "kept", "outer", "topics", "until")
+    __slots__ = ("_begin", "_delay_ns", "_phase_ns", "_repeats_ns", "found", "kept", "topics", "until")
 
-    def __init__(self, outer: bool, delay_ns: int, repeats_ns: int, topics: tuple[str, ...]) -> None:
-        self.outer, self.delay_ns, self._repeats_ns, self.topics = outer, delay_ns, repeats_ns, topics
+    def __init__(self, delay_ns: int, repeats_ns: int, phase_ns: int, topics: tuple[str, ...]) -> None:
+        self._delay_ns, self._repeats_ns, self._phase_ns, self.topics = delay_ns, repeats_ns, phase_ns, topics
         self.kept: dict[int, dict[str, tuple[int, Any]]] = {}
-        self.clear()
+        self.restart(0)
 
-    def clear(self) -> None:
-        """Forget all."""
+    def restart(self, begin: int) -> None:
+        """Forget all; nothing can come in answer to a state before this one, ns."""
         self.kept.clear()
-        self.until = 0
+        self._begin = max(begin, 1)
         self.found: dict[str, tuple[int, Any]] = {}
+        self.until = 0
+
+    def cause(self, stamp: int) -> int:
+        """Stamp of the inputs that belong to a step, 0 where none can have come yet."""
+        cause = stamp - self._delay_ns
+        cause -= (cause - self._phase_ns) % self._repeats_ns
+        return cause if cause >= self._begin else 0
 
     def has(self, cause: int) -> bool:
         """Whether all inputs of this stamp, ns, are there."""
         return len(self.kept.get(cause, ())) == len(self.topics)
 
-    def has_missed(self, cause: int) -> bool:
-        """Whether an input of this stamp, ns, is not there, and a later one of its topic is."""
-        if not self.kept or max(self.kept) <= cause:
+    def has_missed(self, stamp: int) -> bool:
+        """Whether an input of the step of this stamp, ns, is not there, and a later one of its topic is."""
+        cause = self.cause(stamp)
+        if not cause or not self.kept or max(self.kept) <= cause:
             return False
         here = self.kept.get(cause, {}).keys()
         return any(later > cause and not there.keys() <= here for later, there in self.kept.items())
 
-    def find(self, cause: int) -> bool:
-        """Take the inputs of this stamp, ns, if all are there, and forget those before; returns whether they are."""
-        if not self.has(cause):
+    def find(self, stamp: int) -> bool:
+        """Take the inputs of the step of this stamp, ns, and forget those before; False where one is not there yet."""
+        cause = self.cause(stamp)
+        if not cause:
+            return True
+        slot = self.kept.get(cause)
+        if slot is None or len(slot) < len(self.topics):
             return False
-        self.found, self.until = self.kept[cause], cause + self.delay_ns + self._repeats_ns
-        if len(self.kept) > 1:
-            for old in [stamp for stamp in self.kept if stamp < cause]:
-                del self.kept[old]
+        self.found, self.until = slot, cause + self._delay_ns + self._repeats_ns
+        while (oldest := next(iter(self.kept))) < cause:
+            del self.kept[oldest]
         return True

@@ -163,19 +163,17 @@ class Driver:
         self.currents = self.amplifier.step(self._command if enabled else self._zero, self._timing.period)
         torque = self.amplifier.torque(self.currents, self.plant.theta)
         self.plant.step(torque, self._timing.substeps)
-        if trouble := self.plant.trouble:
+        if trouble := self.plant.trouble():
             self.plant.recover()
             self._trip(
                 f"the simulation of the arm failed: {trouble}; the arm is where it was before; "
                 "press or command less, or lower timing.period"
             )
             enabled = False
-        self.plant.keep()
         self._tick += 1
         self._measure()
         if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
-            plant = self.plant
-            self.recent.append(DriverSample(self.stamp, plant.theta, plant.thetad, self._command, self.currents))
+            self.recent.append(DriverSample(self.stamp, *self._turned, self._command, self.currents))
         self._pull = list(map(max, self._pull, self.plant.cable_pull))
         if self.is_outer:
             if enabled:
@@ -303,7 +301,8 @@ class Driver:
     def _measure(self) -> None:
         plant, period = self.plant, self._timing.period
         torque = self.amplifier.nominal_torque(self.currents)
-        self.motor_state = self._sensors.motors(plant.theta, plant.thetad, torque, period)
+        self._turned = theta, thetad = plant.theta, plant.thetad
+        self.motor_state = self._sensors.motors(theta, thetad, torque, period)
         if self._arm.joint_sensors:
             self.joint_sensors = self._sensors.joints(plant.q, plant.qd, plant.strain_torque, period)
 

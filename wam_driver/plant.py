@@ -102,7 +102,7 @@ class Plant:
         self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
         self._rest()
-        self.keep()
+        self._kept = self._position.tolist(), self._plastic.tolist()
         if set(effects.pretension_share) != {1.0}:
             self.set_pretension(effects.pretension_share)
         require_fitting_step(self.model, arm, world, step)
@@ -143,22 +143,19 @@ class Plant:
         self.release()
         self._rest()
 
-    @property
     def trouble(self) -> str:
-        """Why the simulation of the arm cannot go on, '' if it can."""
+        """Why the arm's simulation cannot go on; '' if it can, and `recover` then comes back to the present angles."""
         if any(self._warnings.tolist()):
             names = [name for name, count in zip(WARNINGS, self._warnings.tolist(), strict=True) if count]
             return " and ".join(WARNINGS[name] for name in names)
-        if not math.isfinite(sum(self._every_velocity.tolist()) + sum(self._position.tolist())):
+        position: list[float] = self._position.tolist()
+        if not math.isfinite(sum(self._every_velocity.tolist()) + sum(position)):
             return WARNINGS["badqvel"]
+        self._kept = position, self._plastic.tolist()
         return ""
 
-    def keep(self) -> None:
-        """Remember the present angles for `recover`."""
-        self._kept = self._position.copy(), self._plastic.copy()
-
     def recover(self) -> None:
-        """Put the arm, braked and at rest, where it was when it was last remembered; end every push."""
+        """Put the arm, braked and at rest, where it was when there was no trouble; end every push."""
         self.release()
         time = self.data.time
         mujoco.mj_resetData(self.model, self.data)
@@ -201,7 +198,8 @@ class Plant:
         """Set the pretension of each circuit now (6.5), one part of the configured one for all, or one each, (n,)."""
         before = self._plastic.copy()
         self._friction.set_circuits(self._circuits.tighten(list(shares) if len(shares) > 1 else [*shares] * self._n))
-        self._kept[1][:] += self._plastic - before
+        position, plastic = self._kept
+        self._kept = position, (plastic + (self._plastic - before)).tolist()
         self._is_set = False
 
     def step(self, torque: list[float], count: int = 1) -> None:
