@@ -197,7 +197,7 @@ class MomentumObserver:
     ) -> bool:
         """Take a sample of the joints: state and torque, (n,); friction, (n,), and signals of the shafts, if any."""
         body, at, speed = self._body, np.array(q), np.array(qd)
-        inertia = body.mass_matrix(at) + self._carried
+        inertia = body.mass_matrix(at) if self._link_side else body.mass_matrix(at) + self._carried
         momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)] if friction else bias
         before, span, n = self._momentum, dt + self._gap, self._n

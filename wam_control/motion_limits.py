@@ -124,7 +124,7 @@ class MotionLimits:
         """Without the part that does work on the world, where its force is above the limit."""
         most = self._parameters.contact_force
         power = float(external.dot(velocity))
-        if power >= 0.0 or (force := least_force(self._body, q, external)) <= BEGIN * most:
+        if power >= 0.0 or (force := least_force(self._body, q, external, BEGIN * most)) <= BEGIN * most:
             return velocity, ""
         part = min((force - BEGIN * most) / max((1.0 - BEGIN) * most, 1e-9), 1.0)
         slowed: list[float] = (np.array(velocity) - part * power / float(external @ external) * external).tolist()
@@ -158,8 +158,14 @@ def _approach(distance: float, gain: float, margin: float) -> float:
     return gain * max(distance - margin, 0.0)
 
 
-def least_force(body: RigidBody, q: Sequence[float], external: Array) -> float:
-    """Smallest force at the tool that gives external torques of this size, N; a force nearer to the base is larger."""
-    jacobian = body.tool_jacobian(q)
+def least_force(body: RigidBody, q: Sequence[float], external: Array, above: float = 0.0) -> float:
+    """Smallest force at the tool that gives external torques of this size, N; a force nearer to the base is larger.
+
+    One that is certainly not `above` this, N, is returned as 0: the singular values, squared, of the Jacobian have
+    their mean below the largest.
+    """
+    jacobian, size = body.tool_jacobian(q), math.sqrt(float(external.dot(external)))
+    if size <= above * math.sqrt(float(np.vdot(jacobian, jacobian)) / 3.0):
+        return 0.0
     largest = math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1]))
-    return math.sqrt(float(external.dot(external))) / largest if largest > 0.0 else 0.0
+    return size / largest if largest > 0.0 else 0.0

@@ -1,5 +1,7 @@
 """Node `velocity_loop`: the inner loop, motor states in, motor currents out."""
 
+from operator import gt
+
 from wam_control.dither import Dither
 from wam_control.servo_guard import ServoGuard
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
@@ -52,16 +54,17 @@ class VelocityLoopNode:
 
     def _limited(self, velocity: list[float]) -> list[float]:
         """A commanded velocity within what the speed limits of the joints allow each motor, rad/s."""
-        for name, speed, most in zip(self._motors, velocity, self._fastest, strict=False):
-            if abs(speed) > most:
-                self.refusals["motor_velocity_command"] = (
-                    f"{name} is to turn at {speed:.4g} rad/s; allowed: up to {most:.4g} rad/s, "
-                    "from arm.joints.speed_limit; it turns no faster than that"
-                )
-                return [min(max(v, -m), m) for v, m in zip(velocity, self._fastest, strict=True)]
-        if self.refusals:
-            self.refusals.clear()
-        return velocity
+        if not any(map(gt, map(abs, velocity), self._fastest)):
+            if self.refusals:
+                self.refusals.clear()
+            return velocity
+        each = zip(self._motors, velocity, self._fastest, strict=True)
+        name, speed, most = next(one for one in each if abs(one[1]) > one[2])
+        self.refusals["motor_velocity_command"] = (
+            f"{name} is to turn at {speed:.4g} rad/s; allowed: up to {most:.4g} rad/s, "
+            "from arm.joints.speed_limit; it turns no faster than that"
+        )
+        return [min(max(v, -m), m) for v, m in zip(velocity, self._fastest, strict=True)]
 
     def _set_dither(self, own: VelocityLoopParameters) -> None:
         dither = Dither(self._shared.model_arm, self._shared.timing, own.dither)
