@@ -81,8 +81,7 @@ class Dither:
 
     def added(self, stamp: int, effort: Sequence[float]) -> Sequence[float]:
         """Feed-forward torques plus dither, (n,), N m."""
-        torque = self.torque(stamp)
-        return [a + b for a, b in zip(effort, torque, strict=True)] if torque else effort
+        return [a + b for a, b in zip(effort, self.torque(stamp), strict=True)] if self._torque else effort
 
     def cost(self, q: Sequence[float]) -> DitherCost:
         """Side effects of the dither in pose q, (n,), rad.

@@ -71,10 +71,12 @@ class DriverSample(NamedTuple):
 class Driver:
     """Steps the plant with the last valid command, as long as it is safe to do so.
 
-    Time is counted in periods from 1; `stamp` is the time of the present state in nanoseconds.
+    Time is counted in periods from 1.
 
     Attributes
     ----------
+    stamp : time of the present state, ns, strictly increasing.
+    is_outer : whether the joint side works on the present state.
     motor_state : angle, velocity and torque of each motor, as measured.
     joint_sensors : joint-side encoder and strain torque, if they are mounted.
     currents : actual currents, A, (n,).
@@ -108,7 +110,7 @@ class Driver:
         self._push_end = 0  # last tick of the present push
         self._disturbed: set[str] = set()  # covers that are pushed by messages
         self._pretension_share = parameters.effects.pretension_share
-        self._tick = 1
+        self._begin_period(1)
         self._release()
         self._measure()
 
@@ -120,15 +122,10 @@ class Driver:
         self._pull = self._zero  # N m, largest of each cable since its last check, so that no short peak is missed
         self.warnings = []
 
-    @property
-    def stamp(self) -> int:
-        """Time of the present state, ns, strictly increasing."""
-        return self._tick * self._timing.period_ns
-
-    @property
-    def is_outer(self) -> bool:
-        """True if the joint side works on the present state."""
-        return self._timing.is_outer(self.stamp)
+    def _begin_period(self, tick: int) -> None:
+        self._tick = tick
+        self.stamp = tick * self._timing.period_ns
+        self.is_outer = self._timing.is_outer(self.stamp)
 
     def command(self, stamp: int, currents: list[float]) -> None:
         """Take the currents, A (n,), that answer the state of time `stamp`, ns.
@@ -170,7 +167,7 @@ class Driver:
                 "press or command less, or lower timing.period"
             )
             enabled = False
-        self._tick += 1
+        self._begin_period(self._tick + 1)
         self._measure()
         if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
             self.recent.append(DriverSample(self.stamp, *self._turned, self._command, self.currents))

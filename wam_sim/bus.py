@@ -36,12 +36,7 @@ class Bus:
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
         """Call a function with stamp, ns, and value of each message of a topic."""
-
-        def inlet(stamp: int, value: Any) -> tuple[()]:
-            take(stamp, value)
-            return ()
-
-        self._routes[topic].takers.append((inlet, _nothing, {}))
+        self._routes[topic].takers.append((take, _nothing, {}))
 
     def connect(
         self, declaration: Declaration, feeds: Mapping[str, Sequence[Feed]], checks: Mapping[str, Check]
@@ -77,7 +72,7 @@ class Bus:
         if (write := route.write) is not None:
             write(route.log, stamp, value)
         for inlet, work, outlets in route.takers:
-            for inputs in inlet(stamp, value):
+            for inputs in inlet(stamp, value) or ():
                 for name, output in work(inputs).items():
                     self._deliver(outlets[name], inputs.stamp, output)
 
@@ -139,7 +134,7 @@ class _Route(NamedTuple):
 
 Work = Callable[[Any], Outputs]
 # where its inputs go, its step, the topics that it may publish
-_Taker = tuple[Callable[[int, Any], Sequence[Any]], Work, Mapping[str, _Route]]
+_Taker = tuple[Callable[[int, Any], Sequence[Any] | None], Work, Mapping[str, _Route]]
 
 
 class _Outlets(dict[str, _Route]):
