@@ -108,6 +108,11 @@ def _strings(names: tuple[str, ...]) -> bytes:
 
 
 @cache
+def _doubles(count: int) -> struct.Struct:
+    return struct.Struct(f"<{count}d")
+
+
+@cache
 def _joint_state_layout(size: int, counts: tuple[int, ...]) -> struct.Struct:
     layout, at = f"<4siI{size}s", 8 + size  # `at` counts from behind the encapsulation
     for count in counts:
@@ -141,7 +146,7 @@ def _read_joint_state(data: bytes, names: bytes, count: int, needed: list[bool],
             at += -(at - 4) % 8
             if found != count or len(data) < at + 8 * count:
                 return None
-            values = list(struct.unpack_from(f"<{count}d", data, at))
+            values = list(_doubles(count).unpack_from(data, at))
             at += 8 * count
             limit = _LARGEST[i]
             for value in values:
