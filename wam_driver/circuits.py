@@ -1,5 +1,6 @@
 """Cable circuits of the plant as MuJoCo simulates them: creep, slack, torque and tension."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -40,14 +41,14 @@ class CableCircuits:
         # with backlash the ends are those of the play
         self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
         self._damping = np.array([circuit.damping for circuit in arm.circuits])
-        losses = [step * circuit.loss_per_torque if effects.creep else 0.0 for circuit in arm.circuits]
-        # first slack end between the strands, creep of a step per speed and torque
-        self._creep = [(4 * i + 1, loss) for i, loss in enumerate(losses)]
+        self._losses = [step * circuit.loss_per_torque if effects.creep else 0.0 for circuit in arm.circuits]
         self._prepare()
 
     def _prepare(self) -> None:
-        # N m, torque beyond which a strand is slack
-        self._most = [2.0 * circuit.pretension * circuit.radius for circuit in self._circuits]
+        self._each = [
+            (4 * i + 1, loss, 2.0 * circuit.pretension * circuit.radius if self._friction_counts else math.inf)
+            for i, (loss, circuit) in enumerate(zip(self._losses, self._circuits, strict=True))
+        ]  # first slack end between the strands, creep of a step per speed and torque, torque that makes a strand slack
 
     def reset(self) -> None:
         """Return to power-up; the first step finds out whether a strand is slack."""
@@ -84,14 +85,17 @@ class CableCircuits:
         ----------
         direction : sign of the velocity of each rotor, 0 while it is stuck.
         """
-        ends, pulls = self._slack_ends, self._pull.tolist()
-        for (i, rate), way, speed, pull in zip(self._creep, direction, self._speed.tolist(), pulls):  # noqa: B905 - costs 1 % of a step
+        ends = self._slack_ends
+        self.is_slack = False
+        for (i, rate, most), way, speed, pull in zip(  # noqa: B905 - costs 1 % of a step
+            self._each, direction, self._speed.tolist(), self._pull.tolist()
+        ):
             if way:
                 crept = rate * abs(speed) * pull
                 ends[i] -= crept
                 ends[i + 1] -= crept
-        if self._friction_counts:
-            self.is_slack = any(abs(pull) > most for pull, most in zip(pulls, self._most, strict=True))
+            if abs(pull) > most:
+                self.is_slack = True
 
     @property
     def elastic_torque(self) -> list[float]:
