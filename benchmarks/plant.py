@@ -46,6 +46,7 @@ class Case:
         configuration = Configuration.load(packaged(name)).with_values({"arm.joints.start": q, **values})
         arm, step = configuration.shared.arm, configuration.shared.timing.substep
         parameters = configuration.node("driver", DriverParameters)
+        self._together = configuration.shared.timing.substeps
         self.plant = Plant(arm, parameters.world, parameters.effects, step)
         self.bare = mujoco.MjModel.from_xml_string(mjcf(arm, step, parameters.world, parameters.effects))
         self.data = mujoco.MjData(self.bare)
@@ -59,8 +60,8 @@ class Case:
         mujoco.mj_getState(self.plant.model, self.plant.data, self._state, STATE)
 
     def _steps(self, count: int) -> None:
-        for _ in range(count):
-            self.plant.step(self.torque)
+        for _ in range(count // self._together):  # as the driver does
+            self.plant.step(self.torque, self._together)
 
     def _bare_steps(self, count: int) -> None:
         for _ in range(count):
