@@ -119,7 +119,7 @@ class Driver:
         self._command = self._zero
         self._command_tick = self._tick
         self.currents = self._zero
-        self._pull = self._zero  # N m, largest of each cable since its last check, so that no short peak is missed
+        self._pulls: list[list[float]] = []  # N m, of each cable since the last check, so that no short peak is missed
         self.warnings = []
 
     def _begin_period(self, tick: int) -> None:
@@ -170,8 +170,9 @@ class Driver:
         self._begin_period(self._tick + 1)
         self._measure()
         if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
-            self.recent.append(DriverSample(self.stamp, *self._turned, self._command, self.currents))
-        self._pull = list(map(max, self._pull, self.plant.cable_pull))
+            theta, thetad = self._turned
+            self.recent.append(DriverSample(self.stamp, theta, thetad, self._command, self.currents))
+        self._pulls.append(self.plant.cable_pull)
         if self.is_outer:
             if enabled:
                 self._watch_limits()
@@ -180,8 +181,7 @@ class Driver:
 
     def _watch_limits(self) -> None:
         """Trip on the first quantity above its limit; warn of those near it."""
-        tensions = self.plant.tight_tensions(self._pull)
-        self._pull = self._zero
+        tensions = self._largest_tensions()
         watched = self._watch.watched(self.plant.theta, self.plant.thetad, self.currents, tensions)
         self.warnings = [limit.warning for limit in watched]
         self.warnings += [
@@ -195,11 +195,16 @@ class Driver:
 
     def _watch_braking(self) -> None:
         """Name the first cable that breaks under the brakes."""
-        tensions = self.plant.tight_tensions(self._pull)
-        self._pull = self._zero
+        tensions = self._largest_tensions()
         broken = next(filter(None, (limit.excess for limit in self._watch.tensions(tensions))), "")
         if broken:
             self.safety.damage(f"{broken} under the brakes; check the cable")
+
+    def _largest_tensions(self) -> list[float]:
+        """Tension of the tight strand of each cable, N, (n,), the largest since the last check."""
+        tensions = self.plant.tight_tensions(list(map(max, self._zero, *self._pulls)))
+        self._pulls.clear()
+        return tensions
 
     def _trip(self, reason: str) -> None:
         self.safety.trip(reason)
