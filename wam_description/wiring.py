@@ -234,14 +234,9 @@ def mask(arrays: str) -> Callable[[State], State] | None:
     position, velocity, effort = (name in arrays.replace("?", "").split() for name in State._fields)
     if position and velocity and effort:
         return None
-
-    def masked(value: State) -> State:
-        q, qd, torque = value
-        if (position or not q) and (velocity or not qd) and (effort or not torque):
-            return value
-        return State(q if position else [], qd if velocity else [], torque if effort else [])
-
-    return masked
+    return lambda value: State(
+        value.position if position else [], value.velocity if velocity else [], value.effort if effort else []
+    )
 
 
 def needed_arrays(inputs: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wam_description.defects import Check
-from wam_description.interface import Feed
+from wam_description.interface import Feed, is_packaged
 from wam_description.signals import Point, State, Table, Wrench
 from wam_description.synchroniser import Inlet, Inputs
 from wam_description.topics import EVERY_NODE, JOINT_STATE, POINT, TABLE, WRENCH, Topic
@@ -54,11 +54,10 @@ class Bus:
             outlets[name] = self._routes.setdefault(name, _Route(_Log(), []))
         for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
             outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(_Log(), []))
+        # a node of the stack reads what it declares, as the same bits over topics show: it needs no mask
+        inlet = _inlet if is_packaged(declaration) else _masked_inlet
         for topic, found in feeds.items():
-            reactions = [
-                (_masked(feed.synchroniser.inlet(topic), mask(feed.arrays)), _checked(feed.work, checks))
-                for feed in found
-            ]
+            reactions = [(inlet(feed, topic), _checked(feed.work, checks)) for feed in found]
             if len(reactions) > 1:
                 self._routes[topic].takers.append((_together(reactions), _outputs, outlets))
             else:
@@ -156,8 +155,13 @@ class _Done(NamedTuple):
     outputs: Outputs
 
 
-def _masked(inlet: Inlet, masked: Callable[[State], State] | None) -> Inlet:
-    """What takes of a JointState only what an input needs."""
+def _inlet(feed: Feed, topic: str) -> Inlet:
+    return feed.synchroniser.inlet(topic)
+
+
+def _masked_inlet(feed: Feed, topic: str) -> Inlet:
+    """What takes of a JointState only what an input declares."""
+    inlet, masked = _inlet(feed, topic), mask(feed.arrays)
     return inlet if masked is None else lambda stamp, value: inlet(stamp, masked(value))
 
 
