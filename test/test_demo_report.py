@@ -256,6 +256,7 @@ def test_a_lower_bound_of_the_force_is_drawn_as_one():
     assert np.isnan(np.delete(bound, np.arange(500, 700))).all()
 
 
+@pytest.mark.slow
 def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
     steps = [
         {"name": "enable", "seconds": 0.1, "request": "enable"},

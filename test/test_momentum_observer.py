@@ -97,6 +97,7 @@ def test_rotor_inertia_is_part_of_the_momentum() -> None:
     assert worst["without"] > 0.3
 
 
+@pytest.mark.slow
 def test_coulomb_friction_has_the_sign_of_each_motor() -> None:
     """Joints 2 and 3 move together so that motor 2 runs fast and motor 3 hardly changes its way."""
 
