@@ -61,7 +61,7 @@ def told(topic: Compared) -> str:
         share = 100.0 * topic.different / topic.compared
         line += f"{topic.different} differ ({share:.1f} %), at most by {topic.largest:.6g} {topic.unit}".rstrip()
     else:
-        line += "the same bit for bit"
+        line += "the same bit for bit" if topic.compared else "none on both sides"
     if topic.only_recorded or topic.only_replayed:
         line += f"; {topic.only_recorded} only recorded, {topic.only_replayed} only replayed"
     if topic.alone is not None:
