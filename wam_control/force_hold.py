@@ -280,7 +280,8 @@ class ForceHold:
                 f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
                 f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, "
                 "or the force is detected late or on the wrong link; the arm holds its position: command more force, "
-                f"another direction or position, or joint sensors{'' if point.is_pinned else ', or pin the position'}"
+                "another direction or position, or use joint sensors"
+                f"{'' if point.is_pinned else ', or pin the position'}"
             )
         return (
             f"the torques of {desired:.3g} N on another link than {point.cover} are {elsewhere:.2g} times the standard "

@@ -187,9 +187,7 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
         )
         return axis
     length = arm.covers.length_of(axis.cover)
-    require(
-        axis.place is not None or axis.is_sensed, f"{where}: no position is given; only that of a force is estimated"
-    )
+    require(axis.place is not None or axis.is_sensed, f"{where}: no position given; only that of a force is estimated")
     require(
         axis.place is None or 0.0 <= axis.place <= length,
         f"{where}: place is {axis.place} m; allowed: 0 to {length:g} m, on {axis.cover}",
