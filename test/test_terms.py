@@ -61,6 +61,8 @@ TERMS = {
 PATTERNS = {re.compile(rf"\b(?:{words})\b", re.IGNORECASE): instead for words, instead in TERMS.items()}
 ANY = re.compile(rf"\b(?:{'|'.join(f'(?:{words})' for words in TERMS)})\b", re.IGNORECASE)  # fast where all is well
 PAGES = ("*.md", "docs/*.md", "bags/*.md", "benchmarks/*.md")
+VALUES = ("config/**/*.yaml", "docs/*.yaml", "examples/*.yaml", "pyproject.toml")
+MODULES = ("wam_*/**/*.py", "launch/*.py", "examples/*.py", "benchmarks/*.py", "docs/*.py")
 NOT_OURS = {"CHANGELOG.md", "parameter_history.py"}  # they name the old terms
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`|\]\([^)]*\)", re.DOTALL | re.MULTILINE)
 
@@ -100,9 +102,9 @@ def complaints(root: Path) -> list[str]:
     for path in sorted(path for pattern in PAGES for path in root.glob(pattern)):
         if path.name not in NOT_OURS:
             found += found_in(texts_of_a_page(path.read_text(encoding="utf-8")), path.relative_to(root))
-    for path in sorted(root.glob("config/**/*.yaml")):
+    for path in sorted(path for pattern in VALUES for path in root.glob(pattern)):
         found += found_in(enumerate(path.read_text(encoding="utf-8").splitlines(), start=1), path.relative_to(root))
-    for path in sorted([*root.glob("wam_*/**/*.py"), *root.glob("launch/*.py"), *root.glob("examples/*.py")]):
+    for path in sorted(path for pattern in MODULES for path in root.glob(pattern)):
         if path.name in NOT_OURS:
             continue
         source = path.read_text(encoding="utf-8")
