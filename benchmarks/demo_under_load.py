@@ -82,7 +82,7 @@ def short_form(folder: Path) -> list[str]:
 
 
 def digest(bag: Path) -> str:
-    """Hash of all messages by topic, without what tells how fast time passed on the wall clock."""
+    """Hash of all messages by topic, without what depends on how fast time passed on the wall clock."""
     found = hashlib.sha256()
     for topic, series in sorted(raw(bag).items()):
         found.update(topic.encode())

@@ -489,9 +489,9 @@ def test_a_posture_beyond_the_joints_is_refused_by_name(angle: float) -> None:
 @pytest.mark.parametrize(
     ("command", "expected"),
     [
-        (ForceCommand("base", (0.0, 0.0, 5.0), (0.0, -1.5, 0.0)), "in frame 'base'; a torque pins the place"),
-        (ForceCommand("outer_link", (5.0, 0.0, 0.0), (0.0, -1.5, 0.0)), "a torque pins the place of a force across"),
-        (ForceCommand("outer_link", (0.0, 0.0, 5.0), (0.5, -1.5, 0.0)), r"is \(0, -x fz, x fy\), at the place x"),
+        (ForceCommand("base", (0.0, 0.0, 5.0), (0.0, -1.5, 0.0)), "in frame 'base'; a torque pins the position"),
+        (ForceCommand("outer_link", (5.0, 0.0, 0.0), (0.0, -1.5, 0.0)), "a torque pins the position of a force across"),
+        (ForceCommand("outer_link", (0.0, 0.0, 5.0), (0.5, -1.5, 0.0)), r"is \(0, -x fz, x fy\), at the position x"),
         (ForceCommand("outer_link", (0.0, 0.0, 5.0), (0.0, -2.5, 0.0)), "at 0.5 m of outer_link; allowed: 0 to 0.4064"),
         (ForceCommand("outer_link", (0.0, 0.0, 5.0), (0.0, 0.5, 0.0)), "at -0.1 m of outer_link; allowed: 0 to 0.4064"),
     ],

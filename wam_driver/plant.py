@@ -37,7 +37,7 @@ WARNINGS = {
     "badqvel": "a velocity is not finite or huge",
     "badqacc": "an acceleration is not finite or huge",
     "badctrl": "a torque is not finite",
-}  # what MuJoCo's warnings say of the arm
+}  # what MuJoCo's warnings mean for the arm
 RIGID = 1e3  # N m of a brake, far above any cable
 
 
@@ -154,11 +154,11 @@ class Plant:
         return ""
 
     def keep(self) -> None:
-        """Remember the present angles for `recover`."""
+        """Keep the present angles for `recover`."""
         self._kept = self._position.copy(), self._plastic.copy()
 
     def recover(self) -> None:
-        """Put the arm, braked and at rest, where it was when it was last remembered; end every push."""
+        """Put the arm, braked and at rest, where it was when `keep` was last called; end every push."""
         self.release()
         time = self.data.time
         mujoco.mj_resetData(self.model, self.data)
@@ -334,7 +334,7 @@ class Plant:
 
 
 def _unheard(_: str) -> None:
-    """In place of MuJoCo's own report of a warning, which writes a file; `Plant.trouble` tells of it."""
+    """In place of MuJoCo's own report of a warning, which writes a file; `Plant.trouble` reports it."""
 
 
 def _stretch(torque: float, circuit: Circuit, slack: bool, play: float) -> float:

@@ -124,7 +124,7 @@ def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
 
 
 def _verdict(sections: tuple[Section, ...]) -> Section:
-    """What every section says of importance, in a few sentences."""
+    """The most important findings of all sections, in a few sentences."""
     said = [sentence for section in sections for sentence in section.verdict]
     silent = "No force, contact, cycle or fault was recorded that could be evaluated."
     return Section("verdict", "Verdict", tuple(said) or (silent,), ())

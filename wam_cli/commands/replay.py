@@ -36,7 +36,7 @@ def reasons(done: Replay) -> list[str]:
     if gaps:
         lines.append(
             f"the bag lacks inputs of {done.node}: where one is missing nothing comes out, in lockstep perhaps for the "
-            "rest of it, and what comes out behind a gap remembers something else"
+            "rest of it, and after a gap the outputs follow from a different state"
         )
         lines += [
             f"    {gap.topic}: {gap.missing} missing between {gap.begin / 1e9:.3f} s and {gap.end / 1e9:.3f} s"
