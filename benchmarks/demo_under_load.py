@@ -7,6 +7,7 @@ import hashlib
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,11 +32,16 @@ SHORT = [
 
 
 class Run(NamedTuple):
-    """One demonstration: whether it passed and printed its result, its real-time factor, digest of its messages."""
+    """One demonstration: when it began, s since 1970, whether it passed and printed its result, its bag."""
 
+    begin: float
     passed: bool
-    factor: float
-    digest: str
+    bag: Path
+
+    @property
+    def factor(self) -> float:
+        """Real-time factor; 0 of one that failed."""
+        return summarize(read(self.bag)).loop.factor if self.passed else 0.0
 
 
 @contextmanager
@@ -51,7 +57,8 @@ def busy_loops(count: int) -> Iterator[None]:
 
 
 def demonstration(folder: Path, name: str, options: list[str]) -> Run:
-    """Run `wam demo` in a process of its own and read its bag."""
+    """Run `wam demo` in a process of its own."""
+    begin = time.time()
     done = subprocess.run(
         [sys.executable, "-P", "-m", "wam_cli.main", "demo", "--name", name, *options],
         cwd=folder,
@@ -62,13 +69,20 @@ def demonstration(folder: Path, name: str, options: list[str]) -> Run:
     )
     if done.returncode:
         print(done.stdout, done.stderr, sep="\n", file=sys.stderr)
-        return Run(False, 0.0, "")
-    bag = folder / "bags" / name
-    return Run("Result, worst case in brackets" in done.stdout, summarize(read(bag)).loop.factor, digest(bag))
+    passed = not done.returncode and "Result, worst case in brackets" in done.stdout
+    return Run(begin, passed, folder / "bags" / name)
+
+
+def short_form(folder: Path) -> list[str]:
+    """Options of a demonstration of some seconds."""
+    (folder / "short.yaml").write_text(yaml.safe_dump({"steps": SHORT}), encoding="utf-8")
+    section = {"ros__parameters": {"script": str(folder / "short.yaml")}}
+    (folder / "quick.yaml").write_text(yaml.safe_dump({"base": "wam", "/**/scenario": section}), encoding="utf-8")
+    return ["--config", "quick.yaml"]
 
 
 def digest(bag: Path) -> str:
-    """Hash of all messages by topic, without what tells how fast time passed on the wall clock."""
+    """Hash of all messages by topic, without what depends on how fast time passed on the wall clock."""
     found = hashlib.sha256()
     for topic, series in sorted(raw(bag).items()):
         found.update(topic.encode())
@@ -92,17 +106,13 @@ def main() -> None:
     given = arguments(__doc__, rounds=10, quick_rounds=1)
     rows, measured, digests, failed = [], dict[str, Any](), set[str](), 0
     with tempfile.TemporaryDirectory(prefix="wam_bench_") as name:
-        folder, options = Path(name), list[str]()
-        if given.quick:
-            (folder / "short.yaml").write_text(yaml.safe_dump({"steps": SHORT}), encoding="utf-8")
-            section = {"ros__parameters": {"script": str(folder / "short.yaml")}}
-            (folder / "quick.yaml").write_text(yaml.safe_dump({"base": "wam", "/**/scenario": section}))
-            options = ["--config", "quick.yaml"]
+        folder = Path(name)
+        options = short_form(folder) if given.quick else []
         for count in QUICK_LOOPS if given.quick else LOOPS:
             with busy_loops(count):
                 runs = [demonstration(folder, f"{count}_{i}", options) for i in range(given.rounds)]
             passed = sum(run.passed for run in runs)
-            equal = {run.digest for run in runs if run.passed}
+            equal = {digest(run.bag) for run in runs if run.passed}
             digests |= equal
             failed += given.rounds - passed
             factor = spread([run.factor for run in runs])

@@ -82,7 +82,7 @@ def _seconds(steps: Callable[[int], None], count: int) -> float:
 
 
 def every_effect(motors: int) -> dict[str, Any]:
-    """Everything that the plant can do at once, beside what is on anyway."""
+    """Everything that the plant can do at once, in addition to what is always on."""
     return {
         "driver:effects.tension_friction": (1e-5,) * motors,
         "driver:effects.added_coulomb_friction": (0.1,) * motors,

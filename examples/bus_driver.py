@@ -143,7 +143,7 @@ class BusDriver(TolerantNode):
         self._ports.publish_status(status._replace(session=self._session, since=self._since, stamp=self.stamp))
 
     def destroy_node(self) -> None:
-        """Brake, say so, and end when the others have the last messages."""
+        """Brake, report it, and end when the others have the last messages."""
         self._serve_enable(SetBool.Request(data=False), SetBool.Response())
         self._ports.wait_for_delivery()
         super().destroy_node()

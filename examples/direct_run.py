@@ -1,4 +1,4 @@
-"""Play the demonstration without ROS and say how well the force was held."""
+"""Play the demonstration without ROS and print how well the force was held."""
 
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged

@@ -39,7 +39,7 @@ ARGUMENTS = {  # name: default, description, allowed values
     "namespace": (NAMESPACE, "namespace of the arm; a second arm on this machine needs another one", None),
     "mode": (
         CONFIGURED,
-        "lockstep waits for every command, realtime runs on the steady clock, configured is what the file says",
+        "lockstep waits for every command, realtime runs on the steady clock, configured is what the file sets",
         [CONFIGURED, "realtime", "lockstep"],
     ),
     "processes": (
@@ -53,7 +53,7 @@ ARGUMENTS = {  # name: default, description, allowed values
         "record every topic into a bag in the directory that the configuration names (recorder: directory)",
         SWITCH,
     ),
-    "bag": ("", "path of a new bag into which every topic is recorded; empty: as record says", None),
+    "bag": ("", "path of a new bag into which every topic is recorded; empty: as record sets it", None),
     "log_level": ("info", "least severity of what the nodes print", ["debug", "info", "warn", "error", "fatal"]),
     "tf": (
         "auto",
@@ -129,7 +129,7 @@ def chosen(given: dict[str, str]) -> Configuration:
 
 
 def own_names(namespace: str, prefix: str) -> list[tuple[str, str]]:
-    """Names of a second arm: its clock, and its tree of frames where no prefix tells them from those of another arm."""
+    """Names of a second arm: its clock, and its tree of frames where no prefix distinguishes them."""
     if namespace == NAMESPACE:
         return []
     tree = [] if prefix else [("/tf", "tf"), ("/tf_static", "tf_static")]
@@ -137,7 +137,7 @@ def own_names(namespace: str, prefix: str) -> list[tuple[str, str]]:
 
 
 def transforms(configuration: Configuration, given: dict[str, str], namespace: str, ends: dict[str, Any]) -> list[Any]:
-    """The frames by the stack itself, by robot_state_publisher, or a line that says why there are none."""
+    """The frames by the stack itself, by robot_state_publisher, or a line that states why there are none."""
     if given["tf"] == "false":
         return []
     if importlib.util.find_spec("tf2_msgs") is not None:

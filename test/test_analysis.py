@@ -507,6 +507,7 @@ def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_foreign_bag_of_joint_states_is_told_as_far_as_it_goes(foreign: Path) -> None:
     found = analyse(foreign, lambda doing: None)
     said = text(found)

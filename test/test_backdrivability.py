@@ -40,6 +40,7 @@ def test_stretched_arm_has_a_direction_that_no_push_moves(arm: Arm) -> None:
     assert Backdriving(arm).at((0.0, -math.pi / 2.0, 0.0, math.pi / 2.0), 2.0).isotropy < 1e-6
 
 
+@pytest.mark.slow
 def test_with_two_kilograms_the_rotors_share_is_small_over_most_of_the_workspace_and_the_arm_is_not_isotropic() -> None:
     """7.2.2."""
     numbers = backdrivability()

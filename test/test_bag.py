@@ -437,6 +437,7 @@ def test_after_a_failed_write_the_file_is_still_whole(tmp_path: Path) -> None:
         assert sum(isinstance(record, Message) for record in StreamReader(stream, validate_crcs=True).records) == 2
 
 
+@pytest.mark.slow
 def test_bags_are_read_without_the_rest_of_the_project(tmp_path: Path) -> None:
     write_sample(tmp_path / "sample")
     shutil.copytree(Path(wam_bag.__file__).parent, tmp_path / "alone" / "wam_bag")

@@ -170,6 +170,7 @@ def test_a_part_of_a_bag_is_that_part_however_it_was_written(tmp_path: Path, way
         assert_columns(columns, expected[topic])
 
 
+@pytest.mark.slow
 def test_every_value_is_that_of_mcap_ros2(tmp_path: Path) -> None:
     kinds = [kind for kind in [*OURS, *FOREIGN] if kind != "std_msgs/msg/Empty"]
     path = write(tmp_path / "bag.mcap", random_samples(kinds, 25, seed=7))

@@ -215,6 +215,7 @@ def test_the_upper_arm_shows_its_moment_only_and_elbow_and_wrist_are_watched(arm
     assert "speed of the start of upper_arm" not in watched
 
 
+@pytest.mark.slow
 def test_the_force_loop_of_both_arms_is_within_the_guards_margin(arm: Arm, capsys: pytest.CaptureFixture[str]) -> None:
     name = arm.name.replace("_", "-")
     with pytest.raises(SystemExit) as accepted:
@@ -226,6 +227,7 @@ def test_the_force_loop_of_both_arms_is_within_the_guards_margin(arm: Arm, capsy
     assert refused.value.code == 1
 
 
+@pytest.mark.slow
 def test_contacts_of_the_benchmark_are_on_every_link() -> None:
     """Also with more than two: the first has its share, the others divide the rest."""
     configuration = CONFIGURATIONS["barrett_wam7"]

@@ -66,6 +66,11 @@ ROWS = {
         "bus, synchronisers, scheduling",
     ],
     "plant.py": ["arm free, moving", "arm free, pushed", "arm, every effect on", "in contact", "testbed, moving"],
+    "real_time.py": [
+        "periods kept, no other load [%]",
+        "periods kept, 4 busy loops [%]",
+        "wam demo to first motion [s]",
+    ],
     "recording.py": ["messages in the bag", "writing a message [us]"],
     "round_trip.py": ["one process, p50", "one process, p99", "two processes, p50", "two processes, p99"],
     "speed.py": [

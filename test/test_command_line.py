@@ -199,6 +199,7 @@ def completed(line: str, folder: Path) -> list[str]:
     return answer.read_text().split()
 
 
+@pytest.mark.slow
 def test_commands_options_and_requests_are_completed(tmp_path: Path) -> None:
     pytest.importorskip("argcomplete")
     assert completed("wam ana", tmp_path) == ["analyse"]
@@ -206,6 +207,7 @@ def test_commands_options_and_requests_are_completed(tmp_path: Path) -> None:
     assert {"reset", "resume", "reset_fault"} == set(completed("wam call re", tmp_path))
 
 
+@pytest.mark.slow
 def test_files_are_offered_where_a_file_is_asked_for_and_names_where_a_name_is(tmp_path: Path) -> None:
     pytest.importorskip("argcomplete")
     assert set(completed("wam demo --config barrett", tmp_path)) == {"barrett-wam4", "barrett-wam7"}

@@ -44,6 +44,7 @@ def test_shared_part_and_nodes_become_parameter_objects(file: Path) -> None:
     assert len(configuration.sha256) == 64
 
 
+@pytest.mark.slow
 def test_replaced_values_leave_the_original_alone(file: Path) -> None:
     original = Configuration.load(file)
     changed = original.with_values({"timing.mode": "realtime", "loop:gain": 3.0, "loop:names": ("c",)})
@@ -219,6 +220,7 @@ def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: 
         Configuration.load(path)
 
 
+@pytest.mark.slow
 def test_a_file_that_is_nested_without_end_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "deep.yaml").write_text("{" * 3_000)
     with pytest.raises(ParameterError, match=r"deep.yaml is not YAML: its brackets or blocks are nested hundreds of"):

@@ -363,6 +363,7 @@ def test_the_scores_have_a_picture(tmp_path: Path) -> None:
     assert (tmp_path / "page" / "benchmark.png").stat().st_size > 20_000
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_scores_in_one_process_and_in_two() -> None:
     drawn = scenarios(CONFIGURATION, 4, BenchmarkExtent(contacts=4, resting=0, free=0.0))
     with ThreadPoolExecutor(1) as one, processes(2) as two:

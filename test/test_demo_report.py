@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from wam_analysis import arm_picture
+from wam_analysis import arm_picture, demo_report
 from wam_analysis.demo_figure import draw_arm, draw_forces, save
-from wam_analysis.demo_report import report, text, verdict
+from wam_analysis.demo_report import report, text
 from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED, DemoSummary, summarize, summary_of
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
 from wam_analysis.recorded import RecordedArm, recorded_arm
@@ -107,6 +107,10 @@ class Recording:
 
     def summary(self) -> DemoSummary:
         return summarize(self.bag())
+
+
+def verdict(summary):
+    return " | ".join(demo_report.verdict(summary))
 
 
 def hypotheses(stamp: int) -> TableColumns:
@@ -256,6 +260,7 @@ def test_a_lower_bound_of_the_force_is_drawn_as_one():
     assert np.isnan(np.delete(bound, np.arange(500, 700))).all()
 
 
+@pytest.mark.slow
 def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
     steps = [
         {"name": "enable", "seconds": 0.1, "request": "enable"},

@@ -86,6 +86,7 @@ def test_every_block_says_whether_it_is_run(page: Path) -> None:
     assert unmarked(blocks_of(page)) == []
 
 
+@pytest.mark.slow
 def test_code_in_the_pages_is_as_the_project_writes_it() -> None:
     for block in [block for page in PAGES for block in blocks_of(page) if block.language == "python"]:
         file = block.mark.partition(": ")[2] if block.mark.startswith("file: ") else "docs/block.py"
@@ -318,6 +319,7 @@ def presses(printed: str) -> list[tuple[float, float]]:
     return [(float(commanded), float(measured)) for commanded, measured in lines]
 
 
+@pytest.mark.slow
 def test_a_block_that_does_not_end_is_ended_with_its_children_and_named(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "alive")
     reader = os.open(tmp_path / "alive", os.O_RDONLY | os.O_NONBLOCK)

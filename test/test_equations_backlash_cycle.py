@@ -49,6 +49,7 @@ def test_gain_of_a_play_is_its_first_harmonic(amplitude: float) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("critical", "damping"), [(0.4, 0.0), (0.7, 0.1)])
 def test_exact_cycle_is_that_of_small_steps_in_time(critical: float, damping: float) -> None:
     torque, frequency = stepped(loop(critical, damping), 60.0)
@@ -57,6 +58,7 @@ def test_exact_cycle_is_that_of_small_steps_in_time(critical: float, damping: fl
     assert found.frequency == pytest.approx(frequency, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_describing_function_is_the_nearer_the_less_of_a_cycle_is_within_the_play() -> None:
     errors = [predicted_cycle(loop(n)).frequency / exact_cycle(loop(n)).frequency - 1.0 for n in (0.2, 0.5, 0.8)]
     assert errors[0] > 0.2 > errors[1] > 0.03 > errors[2] > 0.0

@@ -47,6 +47,7 @@ def test_force_hunts_about_the_border_of_two_steps(desired: float) -> None:
     assert period == pytest.approx(2.0 * math.pi / math.sqrt((KTR + KC) / J), rel=0.1)
 
 
+@pytest.mark.slow
 def test_friction_makes_the_motor_cycle_with_a_period_that_stays() -> None:
     gain, desired, friction = 0.01, 4.3, 0.3
     force, motor = stepped(gain, desired, friction, 2000.0)

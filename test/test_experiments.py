@@ -618,6 +618,7 @@ def test_a_strand_that_stays_tight_under_a_low_pretension_is_not_what_is_predict
         assert found.agrees == agrees
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "left"), [(0, 1.0), (1, 1.0 / 1.46)])
 def test_friction_that_an_inner_loop_leaves_is_half_of_the_loop_of_force_over_command(
     number: int, left: float, tmp_path: Path

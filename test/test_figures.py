@@ -161,6 +161,7 @@ def test_command_draws_what_is_named_and_refuses_what_is_not(
     assert "no figure 5.4; choose from 1.1, 2.1.1, 2.1.2, 3.1" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_command_writes_the_map_as_a_table(tmp_path: Path) -> None:
     file = tmp_path / "map.csv"
     points = ["--gamma", "0.9", "2.0", "--gamma-points", "12", "--zeta", "0.25", "0.25", "--zeta-points", "1"]

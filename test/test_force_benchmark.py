@@ -68,6 +68,7 @@ def test_the_plant_of_a_task_touches_nothing_and_is_the_true_arm(number: int) ->
     assert factors == pytest.approx(task.conditions.mass)
 
 
+@pytest.mark.slow
 def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
     """Moved along the force by more than the gap the link touches, by less it does not."""
     body = RigidBody(WAM)

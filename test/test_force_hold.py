@@ -377,6 +377,7 @@ def test_what_is_touched_is_pressed_on_slowly() -> None:
         assert 0.5 * whole / rise < speeds[name] < 1.05 * whole / rise, name
 
 
+@pytest.mark.slow
 def test_a_free_arm_that_starts_and_a_filtered_force_do_not_let_it_overshoot() -> None:
     """The inertia of the first milliseconds reads as a touch, and the filter shows 0.6 of a force that rises."""
     q = bent(0.5)
@@ -452,6 +453,7 @@ def test_until_something_is_touched_the_speed_is_that_of_a_bounded_impact() -> N
     assert lever(POSE) @ ask(loop, World(400.0, force=2.0), down(5.0)).velocity > 0.0
 
 
+@pytest.mark.slow
 def test_no_joint_is_driven_into_its_end() -> None:
     for gain, is_safe in ((5.0, True), (0.0, False)):
         loop = force_loop(ARM, replace(OWN, limits=replace(OWN.limits, joint_gain=gain, joint_margin=0.05)))
@@ -487,9 +489,9 @@ def test_a_posture_beyond_the_joints_is_refused_by_name(angle: float) -> None:
 @pytest.mark.parametrize(
     ("command", "expected"),
     [
-        (ForceCommand("base", (0.0, 0.0, 5.0), (0.0, -1.5, 0.0)), "in frame 'base'; a torque pins the place"),
-        (ForceCommand("outer_link", (5.0, 0.0, 0.0), (0.0, -1.5, 0.0)), "a torque pins the place of a force across"),
-        (ForceCommand("outer_link", (0.0, 0.0, 5.0), (0.5, -1.5, 0.0)), r"is \(0, -x fz, x fy\), at the place x"),
+        (ForceCommand("base", (0.0, 0.0, 5.0), (0.0, -1.5, 0.0)), "in frame 'base'; a torque pins the position"),
+        (ForceCommand("outer_link", (5.0, 0.0, 0.0), (0.0, -1.5, 0.0)), "a torque pins the position of a force across"),
+        (ForceCommand("outer_link", (0.0, 0.0, 5.0), (0.5, -1.5, 0.0)), r"is \(0, -x fz, x fy\), at the position x"),
         (ForceCommand("outer_link", (0.0, 0.0, 5.0), (0.0, -2.5, 0.0)), "at 0.5 m of outer_link; allowed: 0 to 0.4064"),
         (ForceCommand("outer_link", (0.0, 0.0, 5.0), (0.0, 0.5, 0.0)), "at -0.1 m of outer_link; allowed: 0 to 0.4064"),
     ],

@@ -59,6 +59,11 @@ def test_each_joint_has_a_law_of_its_own() -> None:
     assert out.velocity == pytest.approx([1.0, 1.0, -3.0, 8.0], abs=1e-6)
 
 
+def test_proportional_action_of_each_axis_has_the_saturation_of_that_axis() -> None:
+    law = ForceLaw("torque", ("a", "b"), (0.0, 0.0), (0.1, 0.1), (5.0, 1.0), (0.0, 0.0))
+    assert law.velocities([3.0, 3.0], [0.0, 0.0], DT) == pytest.approx([0.3 / DT, 0.1 / DT])
+
+
 def test_proportional_action_moves_by_its_gain_times_the_change_of_force_and_not_of_the_set_point() -> None:
     own, gp = replace(OWN, force_gain=(0.0,), force_proportional_gain=(2e-4,)), 2e-4
     loop = force_loop(ARM, own)

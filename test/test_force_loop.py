@@ -114,6 +114,7 @@ def down(newtons: float) -> tuple[float, float, float]:
     return (0.0, 0.0, -newtons)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [200.0, 800.0])
 def test_force_comes_with_the_time_constant_of_equation_5_2(stiffness: float) -> None:
     loop, world, dt = force_loop(ARM, OWN), World(stiffness, force=1.0), 2e-4

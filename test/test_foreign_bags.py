@@ -350,6 +350,7 @@ def test_values_between_samples_do_not_overshoot_a_step() -> None:
     assert between.max() == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 2e-3, 5e-3])
 def test_a_joint_that_turns_back_does_not_stick_and_one_that_hunts_does(noise: float, tmp_path: Path) -> None:
     time = times(24.0)
@@ -463,6 +464,7 @@ def test_a_clock_that_is_set_makes_no_gap(jump: float, tmp_path: Path) -> None:
     assert "periods without a message" not in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "frequency"), [(10.0, 0.8), (100.0, 2.7)])
 def test_a_slow_recording_of_a_motion_back_and_forth_shows_no_rest(
     rate: float, frequency: float, tmp_path: Path
@@ -503,6 +505,7 @@ def test_a_command_in_another_frame_is_named(tmp_path: Path) -> None:
 # ways in
 
 
+@pytest.mark.slow
 def test_a_mapped_mcap_of_json_is_read(tmp_path: Path) -> None:
     time = times(12.0)
     position = 1e3 * (at_rest(time, ["x", "y"], 33) + np.column_stack([sine(time, 3.1, 0.02), np.zeros(len(time))]))
@@ -525,6 +528,7 @@ def small(tmp_path: Path) -> Path:
     return by_rosbags(tmp_path / "small", sent + wrenches("/ft/wrench", time, at_rest(time, ["x", "y", "z"], 36)))
 
 
+@pytest.mark.slow
 def test_a_topic_that_is_named_as_one_of_ours_makes_no_recording_of_ours(small: Path) -> None:
     analysis, numbers = found((small, TopicMap()))
     assert "not a recording of this stack" in " ".join(analysis.sections[1].sentences)
@@ -575,6 +579,7 @@ def test_without_rosbags_a_sentence_says_how_to_read_the_bag(tmp_path: Path, mon
         found((bag, TopicMap()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 @pytest.mark.parametrize("dry", [DRY, 0.0])
 @pytest.mark.parametrize("waves", [[(0.3, 2.0)], [(0.5, 0.31), (0.3, 0.53), (0.15, 1.07)]])
@@ -614,6 +619,7 @@ def recorded_late(effort: Any, how: str) -> Any:
     return late
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "drag", "said"), [("filter", 0.0, "is filtered"), ("late", 0.0, "behind the motion"), ("", 0.4, "drag")]
 )
@@ -643,6 +649,7 @@ def test_viscous_friction_of_one_frequency_is_said_to_be_that_of_a_delay_too(tmp
     assert f"1 ms of which changes it by {0.5 * w**2 * 1e-3:.2g}" in section(analysis, "friction")[1]
 
 
+@pytest.mark.slow
 def test_friction_of_a_slow_motion_by_hand_is_within_its_errors(tmp_path: Path) -> None:
     time = times(40.0)
     drawn, speed = chance(84), np.zeros(10000)
@@ -704,6 +711,7 @@ def test_a_slow_ring_down_is_no_limit_cycle_in_any_of_its_parts(tau: float, tmp_
     assert sentences == ("Nothing in this recording repeats five times.",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["triangle", "waves"])
 def test_a_cycle_beside_a_commanded_motion_of_any_shape_is_found(way: str, tmp_path: Path) -> None:
     time = times(30.0)
@@ -722,6 +730,7 @@ def test_a_cycle_beside_a_commanded_motion_of_any_shape_is_found(way: str, tmp_p
             assert cycle_of(analysis, 8.7).measured == pytest.approx(size, rel=CLOSE)
 
 
+@pytest.mark.slow
 def test_a_velocity_that_is_filtered_gives_way_to_the_rate_of_the_position(tmp_path: Path) -> None:
     """The effort seems to be early then; the viscous friction was up to 7 % low."""
     time = times(40.0)

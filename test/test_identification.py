@@ -126,6 +126,7 @@ def test_stated_errors_are_the_errors_from_both_sides() -> None:
     assert 0.5 < rms < 2.0, "neither too small nor too large"
 
 
+@pytest.mark.slow
 def test_white_residuals_would_state_far_too_small_errors() -> None:
     planted = Planted(25.0, 1, noise=0.002)
     found = planted.identify()
@@ -248,6 +249,7 @@ def test_a_wrong_model_is_refused_by_name(values: dict[str, Any], text: str) -> 
         CONFIGURATION.with_values(values).shared  # noqa: B018
 
 
+@pytest.mark.slow
 def test_too_little_motion_is_refused_and_a_slow_one_is_warned_about() -> None:
     short = Planted(6.0, 1)
     with pytest.raises(ValueError, match=r"over 6 s; identification needs 10 s or more"):
@@ -283,6 +285,7 @@ def test_a_wrong_bag_is_refused(bag: str, text: str) -> None:
         recorded_motion(recorded_run(read(folder, ["motor_states", "status"], may_lack=True)), WAM)
 
 
+@pytest.mark.slow
 def test_the_exciting_scenario_is_one_that_plays_and_keeps_its_limits(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

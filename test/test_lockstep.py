@@ -122,6 +122,7 @@ def test_lockstep_over_topics_equals_the_loop_without_ros(
     assert differences(run.rows, bag) == []
 
 
+@pytest.mark.slow
 def test_one_period_of_delay_changes_the_numbers(script: Path, tmp_path: Path) -> None:
     """The comparison above would notice an outer command that is used a period too late."""
     runs = [

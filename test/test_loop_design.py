@@ -93,6 +93,7 @@ def of_margin(part: float, node: FrictionNode = NODE, limit: float = np.inf) -> 
     return IntegralLoop(part * margin, error_limit=limit)
 
 
+@pytest.mark.slow
 def test_in_domain_ii_the_safe_error_creeps_to_its_end_in_a_direct_simulation_and_far_more_does_not() -> None:
     found = loop_design(NODE, of_margin(1.2), RATE, DELAY)
     assert found.verdict.domain is Domain.II
@@ -104,6 +105,7 @@ def test_in_domain_ii_the_safe_error_creeps_to_its_end_in_a_direct_simulation_an
     assert largest_late_motion(NODE, replace(safe.loop, error_limit=1e4), 100.0 * NODE.static_friction, 2.0) > 1.0
 
 
+@pytest.mark.slow
 def test_in_domain_iii_no_error_is_safe_and_a_direct_simulation_never_rests() -> None:
     found = loop_design(NODE, of_margin(20.0), RATE, DELAY)
     assert (found.verdict.domain, found.verdict.stable_error) == (Domain.III, 0.0)
@@ -112,6 +114,7 @@ def test_in_domain_iii_no_error_is_safe_and_a_direct_simulation_never_rests() ->
     assert largest_late_motion(NODE, loop, 5.0, 1.0) > 0.01
 
 
+@pytest.mark.slow
 def test_a_loop_that_is_sampled_fast_has_the_domain_of_the_continuous_one() -> None:
     node, loop = FrictionNode(0.1, 0.1, 1000.0, 1000.0, 1.0, 1.0), IntegralLoop(0.01)
     found = [loop_design(node, loop, rate).verdict for rate in (0.0, 1e3, 2e3, 1e7, 1e10)]
@@ -120,6 +123,7 @@ def test_a_loop_that_is_sampled_fast_has_the_domain_of_the_continuous_one() -> N
     assert [one.margin for one in found] == pytest.approx([2e-3] * 5, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_response_that_is_not_followed_to_its_end_is_undecided_and_its_loop_neither_safe_nor_called_unstable(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -170,6 +174,7 @@ def test_numbers_that_overflow_together_are_refused_by_the_one_that_is_farthest_
 PLANT = FrictionNode(0.1, 10.0, 2000.0, 1000.0, 0.5, 0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.85, 0.95, 0.995, 1.005, 1.5])
 def test_a_gain_close_to_the_margin_is_warned_of_and_the_one_that_is_advised_is_not(part: float) -> None:
     margin = loop_design(PLANT, IntegralLoop(1e-3), 500.0, 2e-3).verdict.margin
@@ -183,6 +188,7 @@ def test_a_gain_close_to_the_margin_is_warned_of_and_the_one_that_is_advised_is_
         assert "lower" not in loop_design(PLANT, IntegralLoop(advised), 500.0, 2e-3).text()
 
 
+@pytest.mark.slow
 def test_the_saturation_that_is_advised_is_safe() -> None:
     margin = loop_design(PLANT, IntegralLoop(1e-3), 500.0, 2e-3).verdict.margin
     text = loop_design(PLANT, IntegralLoop(1.3 * margin), 500.0, 2e-3).text()

@@ -104,6 +104,7 @@ def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.3, rel=0.3)
 
 
+@pytest.mark.slow
 def test_the_size_of_the_errors_is_followed_in_motion_but_not_in_contact_or_at_rest() -> None:
     for statistic in (1.5, 3.0):
         tracked = errors()

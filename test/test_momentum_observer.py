@@ -97,6 +97,7 @@ def test_rotor_inertia_is_part_of_the_momentum() -> None:
     assert worst["without"] > 0.3
 
 
+@pytest.mark.slow
 def test_coulomb_friction_has_the_sign_of_each_motor() -> None:
     """Joints 2 and 3 move together so that motor 2 runs fast and motor 3 hardly changes its way."""
 
@@ -231,6 +232,23 @@ def test_torques_are_averaged_over_each_period_so_that_slow_sampling_costs_littl
         assert every.observe(State(*plant.motors(motor)), slow * DT)
         residuals.append(np.abs(every.torques()[0]).max())
     assert max(residuals) < 0.06
+
+
+def test_the_torque_of_the_model_is_that_of_the_strain_gauges_of_a_free_arm_with_slow_sampling_too() -> None:
+    """Its size shows in the covariance; the gauges go through a low-pass filter of the test's own."""
+    own = dataclasses.replace(KNOWN, mass_uncertainty=1.0, joint_torque_sd=1e-9)
+    slow, observer = 5, MomentumObserver(ARM, own, use_joint_sensors=True)
+    plant = RigidArm(ARM, POSE, friction=0.0)
+    passed, differences = NONE, []
+    for k in range(120):
+        motor = np.linalg.solve(DRIVE, wave(k * slow * DT) + plant.gravity())
+        for _ in range(slow):
+            plant.step(motor, NONE)
+            passed = passed + (np.array(plant.sensors()[2]) - passed) * -math.expm1(-DT / own.time_constant)
+        assert observer.observe(State(*plant.sensors()), slow * DT)
+        sizes = np.sqrt(np.diag(observer.torques()[1]))
+        differences.append(np.abs(sizes - np.abs(passed)).max())
+    assert max(differences[40:]) < 0.1
 
 
 def test_a_shaft_that_has_just_stopped_is_held_as_it_was_slowed_down_and_that_fades() -> None:

@@ -121,6 +121,7 @@ def own_class(node: str) -> Any:
     return declared(node).parameter_class
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_every_section_of_every_configuration_builds_the_class_of_its_node(path: Path) -> None:
     configuration = Configuration.load(path)

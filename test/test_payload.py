@@ -56,6 +56,7 @@ def test_the_estimator_feels_nothing_of_it() -> None:
         assert (max(map(abs, observer.torques()[0])) > 0.5) is feels
 
 
+@pytest.mark.slow
 def test_one_newton_is_pressed_with_half_a_kilogram_at_the_tool() -> None:
     """Not declared, it makes an error of 4.6 N."""
     q = (0.0, -1.8, 0.0, 1.45)

@@ -96,6 +96,7 @@ def test_play_is_without_effect_while_a_force_above_the_friction_keeps_the_flank
     assert travel == pytest.approx(travel[0], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_velocity_feedback_ends_the_cycle_of_backlash_in_a_torque_loop() -> None:
     """2.2, "eliminated through proper compensation": damping that also acts within the play."""
     for damping, ends in ((1.2, True), (0.5, False)):

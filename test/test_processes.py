@@ -453,6 +453,7 @@ def test_a_battery_that_is_told_to_end_leaves_nothing_behind(tmp_path: Path) -> 
         wait(lambda: os.killpg(battery.pid, 0), "the end of the workers")
 
 
+@pytest.mark.slow
 def test_a_reader_who_has_had_enough_is_no_error() -> None:
     """As in `wam scorecard | head -1`."""
     read, write = os.pipe()

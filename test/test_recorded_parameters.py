@@ -89,6 +89,7 @@ def test_names_that_are_not_known_are_ignored_and_those_of_ros_are_nobodys() -> 
     assert complete("driver", {"driver": recorded}, (Young,)).unknown == ("colour",)
 
 
+@pytest.mark.slow
 def test_parameters_of_the_first_edition_are_those_of_today_by_their_present_names() -> None:
     former = of_first_edition()
     assert "departure.mass" in former["driver"]
@@ -153,6 +154,7 @@ def test_a_bag_without_a_node_is_refused_with_the_nodes_that_it_has() -> None:
         read({"gravity": NODES["gravity"]}).node("driver")
 
 
+@pytest.mark.slow
 def test_what_this_version_does_not_know_is_named_once() -> None:
     found = read({node: {**values, "arm.colour": "red"} for node, values in NODES.items()})
     assert found.notes == ("this version does not know the parameters arm.colour; they are ignored",)
@@ -166,6 +168,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

@@ -222,6 +222,11 @@ def test_a_missing_input_is_named(bag: Path, tmp_path: Path) -> None:
         replay(tmp_path / "part", "velocity_loop")
 
 
+def test_a_comparison_of_nothing_is_no_success() -> None:
+    with pytest.raises(BagError, match="velocity_loop publishes nothing from what is recorded"):
+        replay(Path(__file__).parents[1] / "bags/sample/active-pretension", "velocity_loop")
+
+
 def test_parameters_that_are_not_in_the_bag_are_asked_for(bag: Path, tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bare") as writer:
         for name, messages in raw(bag, ["joint_states", "gravity_effort"]).items():

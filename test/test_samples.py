@@ -122,6 +122,7 @@ def test_the_limit_cycle_of_the_sample_is_that_of_the_thesis() -> None:
     assert np.diff(rises) == pytest.approx(1.943, rel=0.04)
 
 
+@pytest.mark.slow
 def test_nodes_replayed_from_the_sample_say_the_same_but_for_the_last_digits_of_another_processor() -> None:
     for node in ("contact_estimator", "velocity_loop"):
         for topic in replay(BAGS / "sample" / "wam-touch", node).topics:

@@ -178,6 +178,7 @@ def test_a_bad_measure_and_another_arm_are_refused(arm: Measures) -> None:
         report(Configuration.load(packaged("testbed")))
 
 
+@pytest.mark.slow
 def test_the_command_prints_the_table(configuration: Configuration) -> None:
     command = [sys.executable, "-m", "wam_cli.main", "scorecard"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).resolve().parents[1])

@@ -91,6 +91,7 @@ def test_noise_of_an_angle_has_its_standard_deviation_and_no_offset_and_no_memor
     assert all(state.effort == [0.5] * 4 for state in states)
 
 
+@pytest.mark.slow
 def test_noise_of_the_strain_gauges_has_its_standard_deviation_and_leaves_the_angles_alone() -> None:
     deviation = (0.02, 0.0, 0.05, 0.01)
     read = sensors(strain_noise=deviation)

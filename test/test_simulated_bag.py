@@ -62,6 +62,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, done.stdout
 
 
+@pytest.mark.slow
 def test_the_demonstration_without_ros_says_so_and_reports(played: tuple[Path, str]) -> None:
     _, out = played
     assert out.count("ROS is not installed") == 1
@@ -70,6 +71,7 @@ def test_the_demonstration_without_ros_says_so_and_reports(played: tuple[Path, s
     assert out.index("Result") < out.index("Contacts")
 
 
+@pytest.mark.slow
 def test_its_bag_is_that_of_a_recorder(played: tuple[Path, str]) -> None:
     path = played[0] / "bags" / "touch"
     found = contents(path)
@@ -91,6 +93,7 @@ def test_its_bag_is_that_of_a_recorder(played: tuple[Path, str]) -> None:
     assert modes == ["braked", "enabled", "braked"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["--live"], ["--realtime"]])
 def test_what_needs_ros_is_refused_in_one_sentence(tmp_path: Path, words: list[str]) -> None:
     (tmp_path / "touch.yaml").write_text(TOUCH)

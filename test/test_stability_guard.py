@@ -171,6 +171,7 @@ def test_a_bad_set_stops_the_loop_at_its_start() -> None:
     assert Loop(replace(OWN, mode="open_loop", force_gain=(9.0,))).assessment is None
 
 
+@pytest.mark.slow
 def test_a_stiffer_surface_leaves_less_gain_and_a_lag_of_the_feedback_no_more() -> None:
     def scale(own: ForceLoopParameters) -> float:
         assessment = Loop(guarded(own, mode="warn")).assessment
@@ -187,6 +188,7 @@ def test_a_stiffer_surface_leaves_less_gain_and_a_lag_of_the_feedback_no_more() 
 STIFF = Servo(*(tuple(2.0 * gain for gain in gains) for gains in (SERVO.proportional_gain, SERVO.integral_gain)))
 
 
+@pytest.mark.slow
 def test_the_mean_over_a_cycle_of_the_dither_is_a_delay_that_leaves_less_gain() -> None:
     own = guarded(replace(OWN, feedback="contact_estimate"), contact_stiffness=1e5, mode="warn")
     own = guarded(own, posture=(-2.07, -0.11, -0.26, 1.58))
@@ -198,6 +200,7 @@ def test_the_mean_over_a_cycle_of_the_dither_is_a_delay_that_leaves_less_gain() 
     assert margins[1] < 0.6 * margins[0]
 
 
+@pytest.mark.slow
 def test_the_guard_follows_the_gains_of_the_velocity_loop() -> None:
     own = replace(OWN, force_gain=(0.09,))
     loop = Loop(own)
@@ -299,6 +302,7 @@ def follow(
 STIFF_POSE = (-0.5, -0.3, 0.3, 1.3)  # where the joint sensors see the foam through a lesser margin than at the box
 
 
+@pytest.mark.slow
 def test_gains_are_taken_down_where_the_pose_would_leave_the_domain_and_come_back() -> None:
     own = replace(OWN, force_gain=(0.09,))
     loop = Loop(own)
@@ -409,6 +413,7 @@ def test_a_position_is_certain_where_it_is_known_closely_enough() -> None:
     assert not position_is_certain(math.nan, 0.0, 0.03)
 
 
+@pytest.mark.slow
 def test_a_force_that_turns_is_judged_again_though_the_arm_is_at_rest() -> None:
     own = guarded(replace(OWN, force_gain=(0.09,)), mode="warn")
     along_y, along_z = (0.0, -6.0, 0.0), (0.0, 0.0, -6.0)

@@ -59,6 +59,7 @@ def test_a_recording_holds_the_objects_by_name() -> None:
     assert (can.x, can.y, can.z) == pytest.approx(traces["can"].position[200])
 
 
+@pytest.mark.slow
 def test_a_picture_of_a_task_is_drawn_from_its_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("wam_analysis.arm_picture.render", lambda *_, **__: None)  # as without OpenGL
     task = load("open-door")

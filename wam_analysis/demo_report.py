@@ -74,7 +74,7 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     lines = [line for lost in summary.lost for line in _wrapped(f"INCOMPLETE: {lost}")]
     lines += _wrapped(f"Demonstration of {summary.namespace or '/'}: {_played(summary)}")
     worst = "Result, worst case in brackets" + (", for what is left of the recording" if summary.lost else "")
-    lines += ["", worst, *(f"  {answer}" for answer in verdict(summary).split(" | "))]
+    lines += ["", worst, *(f"  {answer}" for answer in verdict(summary))]
     lines += ["", *_presses(summary.presses), "", *_touches(summary.touches, summary.period)]
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
@@ -82,9 +82,9 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     return "\n".join(lines)
 
 
-def verdict(summary: DemoSummary) -> str:
+def verdict(summary: DemoSummary) -> tuple[str, str, str]:
     """Whether force, link and position were right, each with its worst value."""
-    return " | ".join([_force_verdict(summary.presses), _link_verdict(summary), _position_verdict(summary)])
+    return _force_verdict(summary.presses), _link_verdict(summary), _position_verdict(summary)
 
 
 def _force_verdict(presses: Sequence[SteadyPress]) -> str:

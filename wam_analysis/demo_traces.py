@@ -59,7 +59,7 @@ class Traces(NamedTuple):
     ----------
     commanded, measured : force of the arm on the world.
     true, estimated : contact according to the simulator and to the estimator, force of the world on the arm.
-    push : disturbance that the scenario commanded, applied by the simulator.
+    push : disturbance that the scenario commanded, exerted by the simulator.
     """
 
     stamp: Times

@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 class RecordedArm(NamedTuple):
-    """The arm and its surroundings; `note` says where they come from if not from the bag."""
+    """The arm and its surroundings; `note` names where they come from if not from the bag."""
 
     arm: Arm
     obstacles: Obstacles

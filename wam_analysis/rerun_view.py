@@ -56,7 +56,7 @@ def viewer() -> str:
     Raises
     ------
     NoViewerError
-        if it is in neither; the message says what to do.
+        if it is in neither; the message states what to do.
     """
     own = Path(sys.executable).parent
     found = shutil.which(PROGRAM, path=str(own)) or shutil.which(PROGRAM)
@@ -74,7 +74,7 @@ def load_rerun() -> Any:
     Raises
     ------
     NoViewerError
-        if it is not installed; the message says how to install it.
+        if it is not installed; the message states how to install it.
     """
     try:
         import rerun

@@ -16,7 +16,7 @@ class RecordingError(OSError):
 
 
 class Damage(ValueError):
-    """Something in a file that is not as it must be; the message says what and where."""
+    """Something in a file that is not as it must be; the message names what and where."""
 
 
 class TooLargeError(Damage):

@@ -130,7 +130,7 @@ def decompress(index: ChunkIndex, record: bytes, into: Bytes, zstd: zstandard.Zs
     """
     where = f"the chunk at byte {index.chunk_start_offset}"
     if len(record) != index.chunk_length or HEAD.unpack_from(record) != (Opcode.CHUNK, len(record) - HEAD.size):
-        raise Damage(f"{where} is not where its index says")
+        raise Damage(f"{where} is not where its index has it")
     chunk: Chunk = parsed(Opcode.CHUNK, record[HEAD.size :])
     expected = index.message_start_time, index.message_end_time, index.uncompressed_size
     if (chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size) != expected:

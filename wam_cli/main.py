@@ -155,7 +155,7 @@ def _end(number: int, frame: object) -> None:
 
 
 def _unknown(word: str) -> str:
-    """What to say about a command that does not exist."""
+    """What to print about a command that does not exist."""
     near = difflib.get_close_matches(word, [*COMMANDS, *ALIASES], n=1)
     meant = f"; did you mean '{ALIASES.get(near[0], near[0])}'?" if near else ""
     return f"no command '{word}'" + (meant or f"; choose from {', '.join(COMMANDS)}")
@@ -195,7 +195,7 @@ def _check_request(parser: argparse.ArgumentParser, word: str) -> None:
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> int:
-    """Say which extra of the package has a module that is not installed; raise the error for a module of none."""
+    """Print which extra of the package has a module that is not installed; raise the error for a module of none."""
     module = (error.name or "").partition(".")[0]
     extra = next((extra for extra, modules in EXTRAS.items() if module in modules), None)
     if extra is None:
@@ -206,7 +206,7 @@ def _missing(command: str, error: ModuleNotFoundError) -> int:
 
 
 def _without_library(command: str, error: ImportError) -> str:
-    """Say which library of the system is missing, as in a container with little in it."""
+    """State which library of the system is missing, as in a container with little in it."""
     library, _, is_missing = str(error).partition(": cannot open shared object file")
     if not is_missing:
         raise error

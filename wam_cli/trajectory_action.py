@@ -62,7 +62,7 @@ class TrajectoryActionNode(Node):
         super().destroy_node()
 
     def watch(self) -> None:
-        """End a goal of an arm that says nothing more; to be called now and then."""
+        """End a goal of an arm that publishes nothing more; to be called now and then."""
         if self._goal and time.monotonic() - self._last > SILENCE:
             self._end(GoalEnd(GoalCode.PATH_TOLERANCE_VIOLATED, f"no joint_states for {SILENCE:g} s"))
 
@@ -163,7 +163,7 @@ class TrajectoryActionNode(Node):
             self._end(GoalEnd(GoalCode.PATH_TOLERANCE_VIOLATED, self._obstacle))
 
     def _end(self, end: GoalEnd) -> None:
-        """Stop streaming, so that the arm stops, and tell the client."""
+        """Stop streaming, so that the arm stops, and send the client the result."""
         following, self._goal = self._goal, None
         if following is not None:
             self.destroy_publisher(following.publisher)

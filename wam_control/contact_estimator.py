@@ -65,7 +65,7 @@ class ContactEstimate(NamedTuple):
     contacts : number of contacts: 2 where a second one is suspected, which one contact then only seems to explain.
     link : name of the cover in contact, '' without contact.
     place : contact position, m along the cover's x axis, NaN where it cannot be observed.
-    position_sd : m, NaN with the place.
+    position_sd : m, NaN where the position is.
     probability : that this link is in contact, NaN without contact.
     direction_sd : rad, of the angle of the force about the link, NaN without contact.
     force : (3,), N, of the world on the link, in the cover's frame; zeros without contact, the

@@ -78,7 +78,7 @@ class Hypothesis(NamedTuple):
     cover : name of the cover.
     probability : of this hypothesis among all, 0..1.
     place : contact position, m along the cover's x axis, NaN where it cannot be observed.
-    position_sd : m, NaN with the place.
+    position_sd : m, NaN where the position is.
     low, high : m, ends of the part of the cover that is in the 90 % set of positions on all covers; NaN
         where no part is.
     force : (3,), N, of the world on the link, in the cover's frame; where the position is NaN the

@@ -116,7 +116,7 @@ def pinned_position(command: ForceCommand | None) -> tuple[str, float] | None:
     """Cover and position, m, that a command pins: its torque is that of the force about the origin of the cover.
 
     A force (fx, fy, fz) at the position x has the torque (0, -x fz, x fy).  None for a command without a torque
-    or in the base frame, whose torque says nothing of a cover.
+    or in the base frame, whose torque determines no cover.
     """
     if command is None or command.frame == BASE or not any(command.torque):
         return None

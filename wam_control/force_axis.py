@@ -1,7 +1,7 @@
-"""One direction of force at one place of the arm: how it is sensed, how the arm moves along it, how well.
+"""One direction of force at one position on the arm: how it is sensed, how the arm moves along it, how well.
 
 Shared by the force loop and its guard.  Torques of the world on the joints are tau = -(l f + J' P t + l' f dx) + e:
-the force f along the direction u with its lever l = J'u, tangential forces t (P = I - u u'), an error dx of the place,
+the force f along the direction u with its lever l = J'u, tangential forces t (P = I - u u'), an error dx of position,
 whose lever changes by l' per metre, and an error e of the torques.  With e, t and dx as random numbers of
 known size, f is sensed by generalised least squares, without shrinkage (s.l = 1).
 """
@@ -116,7 +116,7 @@ class SensingParameters:
 
 
 class ForceAxis(NamedTuple):
-    """A direction of force at a place of the arm.
+    """A direction of force at a position on the arm.
 
     Attributes
     ----------
@@ -246,7 +246,7 @@ class ForceAxes:
         size = max(force, SMALLEST_FORCE)
         length = self._covers.length_of(cover)
         aside = self._push(q, cover, direction)
-        # the end of a link is round, and other forces at the same place press the surface as well
+        # the end of a link is round, and other forces at the same position press the surface as well
         is_side = position + 2.0 * position_sd < length - self._covers.radius_of(cover) and not others
         push = aside if is_side else direction
         friction = parameters.friction * size * _across(direction, push)
@@ -272,7 +272,7 @@ class ForceAxes:
             damped *= max(1.0, abs(mass) / parameters.apparent_mass_limit)
         anywhere = spread + max(length * length / 12.0, position_sd**2) * moved
         if position_sd and not is_side:
-            other = (aside - direction) @ jacobian * size  # the side or the end: the same torques do not tell
+            other = (aside - direction) @ jacobian * size  # the side or the end: the same torques do not show it
             anywhere += np.outer(other, other)
         sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ np.linalg.solve(anywhere, press))))
         yielding = float(lever @ self._compliance @ lever)

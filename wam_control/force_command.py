@@ -9,7 +9,7 @@ from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_description.arm import Covers, Joints
 from wam_description.signals import ZERO, ForceCommand
 
-ASIDE = 1e-3  # m, lever of the part of a torque that is not that of the force at a place of the cover
+ASIDE = 1e-3  # m, lever of the part of a torque that is not that of the force at a position on the cover
 NOTHING = 1e-6  # N; a smaller force is none: its direction is a rounding, and nothing can be divided by it
 NO_FORCE = ForceCommand("", (0.0, 0.0, 0.0))
 
@@ -116,14 +116,14 @@ class CommandAdmission:
         )
 
     def _unpinned(self, command: ForceCommand) -> str:
-        """Why the torque of a command is refused: it is not that of its force at a place of a cover; '' if it is."""
+        """Why the torque of a command is refused: not that of its force at a position on a cover; '' if it is."""
         if not any(command.torque):
             return ""
         covers, pinned = self._covers, pinned_position(command)
         last = "; the last good command remains in force"
         if pinned is None or command.frame not in covers.names:
             return (
-                f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque pins the place of a "
+                f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque pins the position of a "
                 f"force across a cover, in the frame of that cover ({', '.join(covers.names)}); send zero torque, "
                 f"or such a force{last}"
             )
@@ -133,7 +133,7 @@ class CommandAdmission:
         if math.dist(own, command.torque) > ASIDE * _size(command):
             return (
                 f"torque {command.torque} N m is commanded; that of the force {command.force} N about the origin of "
-                f"{cover} is (0, -x fz, x fy), at the place x: send zero torque, or such a one; joint torques are "
+                f"{cover} is (0, -x fz, x fy), at the position x: send zero torque, or such a one; joint torques are "
                 f"commanded on joint_torque_command{last}"
             )
         if not 0.0 <= place <= length:

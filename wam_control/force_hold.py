@@ -25,7 +25,7 @@ FED = 0.3  # s, in which the torque of the force is fed forward after the touch
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
-KEPT = 1.25  # settling times, up to which a force off the tolerance is remembered
+KEPT = 1.25  # settling times, up to which a force off the tolerance is counted
 SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
 FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
@@ -78,7 +78,7 @@ class ForceHold:
     ----------
     is_touching : whether the measured force shows that something is touched.
     share : of the speed along the force: less where the late force of the motors was seen to swing.
-    fed : share of the torque of the commanded force that is fed forward.
+    fed : fraction of the torque of the commanded force that is fed forward.
     """
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ class ForceHold:
         self._forget_swings()
 
     def _forget_swings(self) -> None:
-        """What the force was before something was touched says nothing of how it is held."""
+        """What the force was before something was touched shows nothing of how it is held."""
         self._swings = self._off = self._within = 0.0
         self._above = self._below = math.inf
         self._report = ""
@@ -129,7 +129,7 @@ class ForceHold:
         return fastest / axis.speed_fraction
 
     def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
-        """Share of the torque of the commanded force that is fed forward in this period.
+        """Fraction of the torque of the commanded force that is fed forward in this period.
 
         On a free arm it would be a throw.  From the motors it rises after the touch: the velocity loop would take
         seconds to wind up to it on a stiff surface.  Without dither it would only wind up the friction of the arm.
@@ -280,13 +280,14 @@ class ForceHold:
                 f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
                 f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, "
                 "or the force is detected late or on the wrong link; the arm holds its position: command more force, "
-                f"another direction or place, or use joint sensors{'' if point.is_pinned else ', or pin the place'}"
+                "another direction or position, or use joint sensors"
+                f"{'' if point.is_pinned else ', or pin the position'}"
             )
         return (
             f"the torques of {desired:.3g} N on another link than {point.cover} are {elsewhere:.2g} times the standard "
             f"deviation with which the motors show them; allowed: sensing.least_signal, {sensing.least_signal:g}, and "
             "above, or that link is pressed harder than commanded before it is detected; the arm holds its position: "
-            "pin the place, command more force, or use joint sensors"
+            "pin the position, command more force, or use joint sensors"
         )
 
     def _against(self, point: ForcePoint, is_strange: bool) -> float:
@@ -313,8 +314,8 @@ class ForceHold:
                 f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
                 f"of {point.cover}; allowed: {limit:.3g} N, and {RESUME:g} of it to begin (sensing.force_sd_limit, "
                 "force_sd_fraction); the arm holds its position: bend the arm, or command more force, another "
-                "direction or place"
-                f"{'' if point.is_pinned else ', or pin the place'}"
+                "direction or position"
+                f"{'' if point.is_pinned else ', or pin the position'}"
             )
         if weak:
             return ForceReaction.NOT_SENSED, weak
@@ -335,7 +336,7 @@ class ForceHold:
                 f"with {axis.speed_fraction:.2g} of the commanded speed (sensing.apparent_mass_limit) the force would "
                 f"settle with a time constant of {1.0 / pace:.2g} s, and at most 1/{SETTLED:g} of "
                 "limits.settling_time is allowed; the arm holds its position: bend the arm, or command another "
-                "direction or place"
+                "direction or position"
             )
         speed = self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < CREEP:
@@ -400,7 +401,7 @@ class ForceHold:
             return (
                 f"nothing is touched yet, {abs(self._missed):.2g} s after the command: the arm has moved "
                 f"{1e3 * self._travel:.2g} mm towards it; go nearer, declare a softer surface "
-                "(guard.contact_stiffness), or pin the place"
+                "(guard.contact_stiffness), or pin the position"
             )
         is_late = self._missed > 0.0 and not self._has_settled
         if abs(self._missed) > (lasting if is_late else LEFT * lasting):

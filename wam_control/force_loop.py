@@ -387,7 +387,7 @@ class ForceLoop:
         return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
 
     def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint) -> None:
-        """Remember where the arm presses, how far it has slid there, and where it was free."""
+        """Keep where the arm presses, how far it has slid there, and where it was free."""
         if self._hold.is_touching:
             self._pressed_at = list(q)
             self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))

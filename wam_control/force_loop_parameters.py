@@ -86,7 +86,7 @@ class ForceLoopParameters:
         live=True,
     )
     force_feedforward: float = parameter(
-        "share of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
+        "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
         "arm at the surface",
         low=0.0,
         high=1.0,
@@ -94,7 +94,7 @@ class ForceLoopParameters:
         before=1.0,
     )
     friction_feedforward: float = parameter(
-        "share of the dry friction of the model that is fed forward along the commanded motion while a force is "
+        "fraction of the dry friction of the model that is fed forward along the commanded motion while a force is "
         "controlled; with feedback contact_estimate none, as a dither does the same",
         low=0.0,
         high=1.0,

@@ -19,7 +19,7 @@ ABSURD = 1e12  # a number of the loop above it, or below its inverse but not 0, 
 
 
 class LoopDesign(NamedTuple):
-    """What chapter 5 says of a loop.
+    """What chapter 5 predicts for a loop.
 
     Attributes
     ----------

@@ -231,7 +231,7 @@ class LineMotion:
         return Moving(position.tolist(), (speed * slope).tolist())
 
     def _node(self, body: RigidBody, target: Array) -> Array:
-        """Joint angles for a place of the tool, nearest to those of the node before."""
+        """Joint angles for a position of the tool, nearest to those of the node before."""
         step = self._length / NODES
         q = self._angles[-1] + step * self._slopes[-1]
         for _ in range(10):

@@ -1,7 +1,7 @@
 """A second contact, by the change of the external torques against a steady first one.
 
 One contact has three unknowns, two have six, and an arm of four joints gives four equations: the torques of one moment
-do not tell two contacts from one.  Their change does: the errors of the model that are the same in both moments drop
+do not separate two contacts from one.  Their change does: errors of the model that are the same in both moments drop
 out.  What the first contact itself may change is no second one: it grows along its own torques, its friction follows
 its force, it slides a little, and its torques turn with the arm.
 """

@@ -43,7 +43,7 @@ class ServoGuardParameters:
         before=1.0,
     )
     extra_delay: int = parameter(
-        "inner periods by which a current may come late in realtime; the gains have to be stable then, too",
+        "inner periods by which a current may be delayed in realtime; the gains have to be stable then, too",
         low=0,
         high=10,
         before=0,
@@ -146,7 +146,7 @@ class ServoGuard:
                 )
             for scale, delay in sorted({(1.0, 0), (1.0 / fraction, 0), (1.0, late)}):
                 if not is_stable(self._period(mechanism, servo, scale * proportional, scale * integral, delay)):
-                    when = f"{delay} periods late" if delay else "on time"
+                    when = f"delayed by {delay} periods" if delay else "on time"
                     share = f", of which velocity_loop:guard.stability_fraction, {fraction:g}, is accepted"
                     return f"an oscillation grows with {mechanism.what}, currents {when}{share if scale > 1.0 else ''}"
         return ""

@@ -30,7 +30,7 @@ class TaskAxis(NamedTuple):
     ----------
     kind : what is commanded.
     joint : index of the joint; -1 for a point of a link.
-    cover, place : link and place along it, m, of the point; '' and 0 for a joint; None for the estimated place.
+    cover, place : link and position along it, m, of the point; '' and 0 for a joint; None for the estimated one.
     direction : unit vector in the frame of the task (3,); zeros for a joint.
     value : N, m/s or m; of a joint N m, rad/s or rad; None for the position where the axis is when it begins.
     rate : at which a commanded position moves, m/s or rad/s.
@@ -59,7 +59,7 @@ class TaskAxis(NamedTuple):
         if self.joint >= 0:
             return f"{kind} of joint {self.joint + 1}"
         x, y, z = self.direction
-        place = "the estimated place" if self.place is None else f"{self.place:.3g} m"
+        place = "the estimated position" if self.place is None else f"{self.place:.3g} m"
         return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place} of {self.cover}"
 
 
@@ -187,7 +187,7 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
         )
         return axis
     length = arm.covers.length_of(axis.cover)
-    require(axis.place is not None or axis.is_sensed, f"{where}: no place is given; only that of a force is estimated")
+    require(axis.place is not None or axis.is_sensed, f"{where}: no position given; only that of a force is estimated")
     require(
         axis.place is None or 0.0 <= axis.place <= length,
         f"{where}: place is {axis.place} m; allowed: 0 to {length:g} m, on {axis.cover}",

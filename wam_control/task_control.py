@@ -181,13 +181,13 @@ class TaskControl:
         return max(found, key=lambda one: (one[0].holds, one[0] is not ForceReaction.NONE))
 
     def _points(self, task: TaskCommand, contact: Contact) -> list[ForcePoint]:
-        """Where each axis acts; an estimated place is the last certain one, at first the middle of the link."""
+        """Where each axis acts; an estimated position is the last certain one, at first the middle of the link."""
         own = self._parameters
         known = [axis.cover for axis in task.axes if axis.is_sensed and axis.cover]
         conflict = ""
         if contact.cover and contact.cover not in known and contact.probability >= own.link_probability_limit:
             conflict = f"{contact.cover} is touched, and no force of the task acts on it"
-        is_single = contact.is_single or len(set(known)) > 1  # a task may press in two places
+        is_single = contact.is_single or len(set(known)) > 1  # a task may press at two positions
         limit = own.position_uncertainty_limit
         if (
             is_single

@@ -143,7 +143,7 @@ class TaskFrame:
                 return (
                     f"{state.axis.name}: the force is measured with a standard deviation of {state.force_sd:.3g} N; "
                     f"allowed: {most:g} N (sensing.force_sd_limit, force_sd_fraction); bend the arm, or command "
-                    "another direction or place"
+                    "another direction or position"
                 )
         return next((reason for state in states if (reason := self._too_stiff(state.axis))), "")
 

@@ -160,7 +160,7 @@ ARM_ASSUMED: tuple[Constant, ...] = (
         "none is printed; it puts the peak torque at 19 A, the size of a servo amplifier of the time",
         parameter="arm.motors.torque_constant"),
     _assumed("", "fraction of the friction at the motor", MOTOR_FRACTION, "1",
-        "7.2.2 says 'major'; 70 to 80 %"),
+        "7.2.2 states 'major'; 70 to 80 %"),
     _assumed("F_d/F_s", "dynamic over static friction", DYNAMIC, "1",
         "not printed; low-stiction cable drive"),
     _assumed("F_s", "static friction, motor", _MOTOR_STATIC, "in-lb", _MOTOR_FRICTION,

@@ -88,7 +88,7 @@ def wrench_defect(wrench: Wrench, frames: Sequence[str]) -> str:
 
 
 def point_defect(point: Point, frames: Sequence[str]) -> str:
-    """What is wrong with a position in one of the frames; NaN says that a coordinate is not known."""
+    """What is wrong with a position in one of the frames; NaN means that a coordinate is not known."""
     frame, position = point
     if frame not in frames:
         return f"frame_id is '{frame}'; allowed are {', '.join(frames)}"
@@ -102,7 +102,7 @@ def point_defect(point: Point, frames: Sequence[str]) -> str:
 
 
 def table_defect(table: Table, columns: Sequence[str], frames: Sequence[str]) -> str:
-    """What is wrong with rows of numbers under these columns; NaN says of some that a number is not known."""
+    """What is wrong with rows of numbers under these columns; NaN in some means that a number is not known."""
     if table.frame not in frames:
         return f"frame_id is '{table.frame}'; allowed are {', '.join(frames)}"
     if sizes := {len(row) for row in table.rows} - {len(columns)}:

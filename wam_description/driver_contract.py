@@ -63,7 +63,7 @@ REQUIREMENTS: Final = {
         "publish status transient local, depth 1; repeat it from a timer",
     ),
     "silence": Requirement(
-        "refuses enable while no commands come, and says why",
+        "refuses enable while no commands come, and states why",
         "answer enable with success false where the last command is older than the watchdog",
     ),
     "current": Requirement(
@@ -112,7 +112,7 @@ REQUIREMENTS: Final = {
         "count the publishers of the topic in every status period",
     ),
     "end": Requirement(
-        "ended by SIGTERM it brakes first and says so",
+        "ended by SIGTERM it brakes first and reports that",
         "disable and publish the status before the node is destroyed",
     ),
     "session": Requirement(

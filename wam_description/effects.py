@@ -74,7 +74,7 @@ class Effects:
         return self.pretension_share[motor if len(self.pretension_share) > 1 else 0]
 
     def require_pretension(self, arm: Arm) -> None:
-        """Refuse a pretension that leaves a cable no room for its load up to its breaking strength.
+        """Refuse a pretension that leaves a cable no margin for its load up to its breaking strength.
 
         The load at full torque is that for which the configured pretension was chosen, half of it on each strand.
 

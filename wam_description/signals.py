@@ -66,7 +66,7 @@ class ForceCommand(NamedTuple):
 
     frame: str
     force: Triple  # N
-    torque: Triple = ZERO  # N m; pins the place, refused where it does not
+    torque: Triple = ZERO  # N m; pins the position, refused where it does not
 
 
 class Contact(NamedTuple):

@@ -30,7 +30,7 @@ def diagnosed_name(namespace: str, node: str) -> str:
 def guidance(
     mode: str, before: str, absent: Sequence[str], faulty: Sequence[str], namespace: str, is_played: bool
 ) -> str:
-    """What the console says of the driver's state, and what to call next.
+    """What the console shows of the driver's state, and what to call next.
 
     Parameters
     ----------

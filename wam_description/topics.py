@@ -25,7 +25,7 @@ HYPOTHESIS_COLUMNS: Final = (
     LINK,  # index of the cover in arm.covers.names
     "probability",  # of this hypothesis among all
     "place",  # m along the cover, NaN where it cannot be observed
-    "position_sd",  # m, NaN with the place
+    "position_sd",  # m, NaN where the position is
     "low",  # m, ends of the part of the cover that is in the 90 % set, NaN where no part is
     "high",
     "force_x",  # N, of the world on the link, in the cover's frame
@@ -39,7 +39,7 @@ HYPOTHESIS_COLUMNS: Final = (
     "moment_y",
     "moment_z",
     "residual",  # chi^2 that the contact leaves unexplained
-    "reasons",  # why the place is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact_inference.REASONS`
+    "reasons",  # why the position is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact_inference.REASONS`
 )
 
 FORCE_AXIS_COLUMNS: Final = (
@@ -57,7 +57,7 @@ TASK_COLUMNS: Final = (
     "kind",  # number of `wam_control.task.AxisKind`: 1 force, 2 velocity, 3 position, 4 impedance
     "joint",  # index of the joint, -1 for a point of a link
     "link",  # index of the cover in arm.covers.names, -1 for a joint
-    "place",  # m along the cover; NaN of a force: the estimated place
+    "place",  # m along the cover; NaN of a force: the estimated position
     "x",  # direction of the axis in the frame of the table; its length does not count
     "y",
     "z",

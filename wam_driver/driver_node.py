@@ -94,7 +94,7 @@ class DriverNode(TolerantNode):
             self.time.start()
 
     def destroy_node(self) -> None:
-        """Put on the brakes and say so."""
+        """Put on the brakes and report it."""
         self.driver.disable()
         self._announce()
         self.get_logger().info(f"{self._timing.mode}: {self.time.summary}")
@@ -158,7 +158,7 @@ class DriverNode(TolerantNode):
             raise Refused(refusal)
 
     def _look_for_start(self) -> None:
-        """Say that the peers are connected; in lockstep begin."""
+        """Report that the peers are connected; in lockstep begin."""
         if self._ports.ready and not self._connected:
             self._connected = True
             self._announce()

@@ -11,7 +11,7 @@ from wam_driver.pacer import Pacer
 from wam_driver.session import Session
 
 WATCH: Final = 0.02  # s between two looks at the progress
-ROLL_CALL: Final = 0.4  # s before the time-out, in which the nodes say that they run
+ROLL_CALL: Final = 0.4  # s before the time-out, in which the nodes report that they run
 LONGEST_LOOK: Final = 0.1  # s; a process that was frozen did not wait for longer than that
 
 
@@ -22,7 +22,7 @@ def unpublished(found: Mapping[str, Sequence[str]]) -> str:
 
 
 class Lockstep:
-    """Advances the driver with the command that answers its present state, and says when none comes.
+    """Advances the driver with the command that answers its present state, and reports when none comes.
 
     Where no answer comes within `timing.timeout`, there is a fault that names the topic and the node: shortly before,
     the roll is called with a new session.  A node that does not report that it follows has stopped; of those that do,
@@ -40,7 +40,7 @@ class Lockstep:
     publish : called after each period, to publish the new state.
     announce : called to publish the session.
     fault : called with the reason, to stop the arm.
-    pacer : says when a period is due; also measures.
+    pacer : determines when a period is due; also measures.
     now : steady clock, s.
     """
 

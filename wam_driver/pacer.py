@@ -24,7 +24,7 @@ class Pace(NamedTuple):
 
 
 class Pacer:
-    """Says when a period is due, and measures how fast simulated time passes.
+    """Determines when a period is due, and measures how fast simulated time passes.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ WARNINGS = {
     "badqvel": "a velocity is not finite or huge",
     "badqacc": "an acceleration is not finite or huge",
     "badctrl": "a torque is not finite",
-}  # what MuJoCo's warnings say of the arm
+}  # what MuJoCo's warnings mean for the arm
 RIGID = 1e3  # N m of a brake, far above any cable
 
 
@@ -334,7 +334,7 @@ class Plant:
 
 
 def _unheard(_: str) -> None:
-    """In place of MuJoCo's own report of a warning, which writes a file; `Plant.trouble` tells of it."""
+    """In place of MuJoCo's own report of a warning, which writes a file; `Plant.trouble` reports it."""
 
 
 def _stretch(torque: float, circuit: Circuit, slack: bool, play: float) -> float:

@@ -39,7 +39,7 @@ class Realtime:
 
     def start(self) -> None:
         """Publish the first state."""
-        # half a period of slack, so that a timer that comes a little early or late misses nothing
+        # half a period of slack, so that a timer that comes a little early or late loses no period
         self._progress = self._now()
         self._begin = self._progress - 0.5 * self._timing.period
         self._send()
@@ -119,4 +119,4 @@ class Realtime:
     @property
     def summary(self) -> str:
         """How well the periods were kept, for people."""
-        return f"{self._missed} of {self._done} periods late"
+        return f"{self._missed} late periods of {self._done}"

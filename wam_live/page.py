@@ -75,7 +75,7 @@ def obstacle(port: int) -> str:
 
 @contextlib.contextmanager
 def needing_viser() -> Iterator[None]:
-    """Say what to install where an import of the page's own modules fails.
+    """State what to install where an import of the page's own modules fails.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def serve(port: int) -> Any:
     Raises
     ------
     NoPageError
-        if viser is not installed or the port is taken; the message says what to do.
+        if viser is not installed or the port is taken; the message states what to do.
     """
     if reason := obstacle(port):  # viser would silently take the next port
         raise NoPageError(reason)
@@ -119,10 +119,10 @@ def serve(port: int) -> Any:
 
 
 def name_page(server: Any, label: str, more: str = "") -> None:
-    """Give a page a label that tells it from others: at the top of its panel, with more in the title of its window."""
+    """Give a page a distinct label: at the top of its panel, with more in the title of its window."""
     title = label + more
     server.gui.set_panel_label(label)
-    # viser has no call for the title of the window; this picture cannot be loaded, and says so
+    # viser has no call for the title of the window; this picture cannot be loaded, which raises the event
     script = html.escape(f"document.title={json.dumps(title)}", quote=True)
     server.gui.add_html(f'<img src="data:," alt="" style="display:none" onerror="{script}">')
 

@@ -34,7 +34,7 @@ from wam_description.world import Obstacles
 from wam_live.snapshot import Snapshot, size
 
 LONGEST_ARROW = 0.6  # m
-ARROWS = {"true": (0.011, 0.02), "estimated": (0.006, 0.026)}  # m, radii of shaft and head: both are seen at one place
+ARROWS = {"true": (0.011, 0.02), "estimated": (0.006, 0.026)}  # m, radii of shaft and head: both are seen at one point
 VISERS_LONGEST = 0.9  # m, beyond which the head of viser's arrow does not grow
 DEEPER = 1.8  # exponent of a colour that the lights of the page would turn into a paler one
 STIFFNESS = 60.0  # N/m, of the rubber band between the pointer and the link

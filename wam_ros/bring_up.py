@@ -40,7 +40,7 @@ def start(
 
     Parameters
     ----------
-    configuration : values for all nodes; its `shared.nodes` says which ones are started.
+    configuration : values for all nodes; its `shared.nodes` names which ones are started.
     processes : ONE, GROUPED or EACH, of `wam_description.nodes`; ONE is this one.
     is_stopped : whether the start is to be broken off.
     namespace : namespace of the nodes.
@@ -86,7 +86,7 @@ class Processes:
 
     Parameters
     ----------
-    configuration : values for all nodes; its `shared.nodes` says which ones are started.
+    configuration : values for all nodes; its `shared.nodes` names which ones are started.
     namespace : namespace of the nodes.
     log_level : least severity of what they print.
     processes : GROUPED or EACH, of `wam_description.nodes`; a process of several nodes is named for all of them.
@@ -274,7 +274,7 @@ class Composition:
 
     Parameters
     ----------
-    configuration : values for all nodes; its `shared.nodes` says which ones are made.
+    configuration : values for all nodes; its `shared.nodes` names which ones are made.
     namespace : namespace of the nodes.
     domain_id : ROS domain, the one of the environment where None.
     is_stopped : no further node is made once it is true.

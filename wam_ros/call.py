@@ -39,7 +39,7 @@ class Reply(NamedTuple):
 
 
 class NoAnswerError(OSError):
-    """A node, service or topic that is not there; the text says what to do."""
+    """A node, service or topic that is not there; the text states what to do."""
 
 
 class CalledStack:

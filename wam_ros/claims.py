@@ -5,7 +5,7 @@ from collections import Counter
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not tell yet
+UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node the graph does not show yet
 PROOF = 5  # messages out of order after which two publishers of one node name both count as alive
 
 

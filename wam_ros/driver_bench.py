@@ -14,7 +14,7 @@ Restart = Callable[[], None]
 
 
 class Untested(Exception):
-    """A row cannot be tested; the text says why."""
+    """A row cannot be tested; the text states why."""
 
 
 class DriverBench:

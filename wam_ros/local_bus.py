@@ -3,7 +3,7 @@
 In lockstep most of the time of several nodes in one process went into sending bytes to the middleware and fetching
 them from it again, once for each listener.  Here a listener of a topic that only nodes of its own process publish is
 called with the bytes themselves.  They go to the middleware, too, for the recorder and everybody else.  The
-subscription of the middleware stays, but nothing fetches its messages: the graph shows it, and it tells of a second
+subscription of the middleware stays, but nothing fetches its messages: the graph shows it, and it reveals a second
 publisher.  It is the reference: it carries what a node of another process publishes, the status, which many publish,
 and everything in realtime.  benchmarks/speed.py shows the gain; the bits are the same.
 """

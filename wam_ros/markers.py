@@ -1,4 +1,4 @@
-"""The contact as RViz markers: an arrow for the force, a sphere for the place, a band where it is likely."""
+"""The contact as RViz markers: an arrow for the force, a sphere for the position, a band where it is likely."""
 
 from math import isnan
 

@@ -81,7 +81,7 @@ class Place:
         self._socket.listen()
 
     def close(self) -> None:
-        """Give the place free."""
+        """Release the place."""
         self._socket.close()
 
 
@@ -103,7 +103,7 @@ def require_name(node: Any, name: str) -> None:
     Raises
     ------
     ParameterError
-        which says what to do instead.
+        with what to do instead.
     """
     if node.get_name() != name:
         raise ParameterError(
@@ -164,7 +164,7 @@ def move_to_free_domain(namespace: str, environment: MutableMapping[str, str] = 
         return ""
     free = next((one for one in USUAL_DOMAINS if not is_inhabited(one)), None)
     if free is None:
-        return ""  # the nodes say that the place is taken
+        return ""  # the nodes report that the place is taken
     environment["ROS_DOMAIN_ID"] = str(free)
     return f"another arm runs in ROS domain {domain} (process {pid}), so this one runs in ROS_DOMAIN_ID={free}"
 

@@ -188,7 +188,7 @@ class AdaptedNode(TolerantNode):
                 self._asking = False
 
     def end(self) -> None:
-        """Say at once that this node ends, so that an enabled arm is braked before its commands cease."""
+        """Report at once that this node ends, so that an enabled arm is braked before its commands cease."""
         if self._is_enabled:
             self._ports.set_problem("end", f"{self.get_name()} has ended; start it again, then reset_fault")
 

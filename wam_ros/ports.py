@@ -62,7 +62,7 @@ class Ports:
     node : the ROS node.
     declaration : of the node.
     shared : the shared configuration.
-    interface : of the bring-up; says which peers to expect.
+    interface : of the bring-up; names which peers to expect.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Ports:
         self._send(STATUS, diagnostic_status(self._status, self.shared.arm.name))
 
     def set_problem(self, concerned: str, reason: str) -> None:
-        """Say in the status, with level ERROR, why the driver has to brake; '' where there is no reason any more."""
+        """State in the status, with level ERROR, why the driver has to brake; '' where there is no reason any more."""
         if self.problems.get(concerned, "") == reason:
             return
         self.problems[concerned] = reason
@@ -243,7 +243,7 @@ class Ports:
         self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
 
     def follow(self, session: int, awaited: Collection[str]) -> None:
-        """Say that this node follows another session of the driver, and which topics it lacks for its next step."""
+        """Report that this node follows another session of the driver, and which topics it lacks for its next step."""
         facts = {AWAITED: " ".join(awaited)} if self.session else {}  # at the start nobody asks
         self.session = session
         self.claims.restart()
@@ -277,7 +277,7 @@ class Ports:
             self._tell()
 
     def _tell(self) -> None:
-        """Say on the console what the driver's state is and what to call next, where that has changed."""
+        """Print on the console what the driver's state is and what to call next, where that has changed."""
         mode = self._status.mode
         faulty = tuple(sorted(node for node, fault in self.faults.items() if fault)) if mode == "braked" else ()
         state = (mode, bool(self._absent), faulty)

@@ -26,7 +26,7 @@ def ignore_signals() -> None:
 
 
 class Stop:
-    """Set by SIGINT and SIGTERM; the context stays alive, so that nodes can say goodbye."""
+    """Set by SIGINT and SIGTERM; the context stays alive, so that nodes can report that they end."""
 
     def __init__(self) -> None:
         self.is_set = False

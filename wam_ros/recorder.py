@@ -147,7 +147,7 @@ class Recorder:
             self._channels[name] = _Channel(topic, name, sender, diagnosed_name(namespace, "") if namespace else "")
 
     def announce(self, node: str, name: str, total: int) -> None:
-        """Take the number of messages that a node says it has published on a topic, by its full name."""
+        """Take the number of messages that a node reports as published on a topic, by its full name."""
         if channel := self._channels.get(name):
             channel.announce(node, total)
 

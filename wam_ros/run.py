@@ -169,7 +169,7 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
     nodes: dict[str, Node] = {}
 
     def end() -> None:
-        # where the driver puts the brakes on, no other node has to say that it ends
+        # where the driver puts the brakes on, no other node has to report that it ends
         for node in [nodes[FIRST]] if FIRST in nodes else nodes.values():
             if stop.is_set and hasattr(node, "end"):
                 node.end()

@@ -158,6 +158,11 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
         order = names.get(rows[topic].side, [])
         recorded = _rows(rows[topic], columns, order) if columns is not None else []
         compared.append(_compare(rows[topic], recorded, published.get(topic, []), order, _units(topic, columns)))
+    if not any(topic.compared or topic.only_recorded or topic.only_replayed for topic in compared):
+        raise BagError(
+            f"{path}: {declaration.name} publishes nothing from what is recorded, and no message of it is there: "
+            "nothing to compare; a bag of the stack's recorder with all topics can be replayed"
+        )
     mode = shared.timing.mode if run.mode == "unknown" else run.mode
     gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(bag.first_ns)

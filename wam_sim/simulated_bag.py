@@ -38,7 +38,7 @@ def record(
 ) -> str:
     """Play a scenario in this process and record it.
 
-    Not recorded are what only viewers use and what tells of the network: markers, diagnostics, the clock.
+    Not recorded are what only viewers use and what describes the network: markers, diagnostics, the clock.
 
     Parameters
     ----------

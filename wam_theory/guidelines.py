@@ -44,7 +44,7 @@ def half_cycles_to_deadband(deadband_share: ArrayLike, ratio: ArrayLike) -> Arra
 def kept_contact_ratio(gamma: ArrayLike, zeta: ArrayLike) -> Array:
     """Largest F_c before a step DOWN over F_des after it with contact kept, 1 + 1/Psi; infinite without overshoot.
 
-    Friction-dominated.  A step from F_0 to F_des overshoots to F_des - Psi (F_0 - F_des).  The thesis says that a
+    Friction-dominated.  A step from F_0 to F_des overshoots to F_des - Psi (F_0 - F_des).  The thesis states that a
     stable loop never loses contact (5.5.2): true for a step up from zero, which ends between (1 - Psi^2) F_des
     and (1 + Psi) F_des, and not for a step down beyond this ratio.
 

@@ -1,8 +1,8 @@
 """A sampled velocity servo on motors behind elastic cables, as one linear map from period to period.
 
 The motors see the torque tau = K_p e + K_i sum(e) T of a sampled velocity error e = -thetad, held for a period T and
-used some periods late.  Between samples the mechanism is carried in closed form.  An encoder gives no velocity but the
-difference of two angles over a period, which is half a period old.
+used with a delay of some periods.  Between samples the mechanism is carried in closed form.  An encoder gives no
+velocity but the difference of two angles over a period, which is half a period old.
 """
 
 import math

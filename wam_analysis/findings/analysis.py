@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from wam_analysis.demo_summary import driver_faults
 from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
 from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.finding import Section, shown, times
@@ -123,7 +124,7 @@ def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
 
 
 def _verdict(sections: tuple[Section, ...]) -> Section:
-    """What every section says of importance, in a few sentences."""
+    """The most important findings of all sections, in a few sentences."""
     said = [sentence for section in sections for sentence in section.verdict]
     silent = "No force, contact, cycle or fault was recorded that could be evaluated."
     return Section("verdict", "Verdict", tuple(said) or (silent,), ())
@@ -143,7 +144,7 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
         sentences.append(f"The arm was commanded to press {times(len(recording.holds))} ({forces}).")
     if touches:
         sentences.append(f"It touched something in {_count(len(touches), 'step')}.")
-    faults = [note for note in summary.notes if note.startswith("driver fault")]
+    faults = driver_faults(recording.run)
     sentences += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")

@@ -73,7 +73,7 @@ def motion_sections(recording: AnalysedRun) -> MotionFindings:
 
 
 def _drowned(signals: TransmissionSignals, arm: Arm) -> str:
-    """Why the motors' torque tells nothing about losses, '' if it does.
+    """Why the motors' torque shows nothing about losses, '' if it does.
 
     Motors modelled as velocity sources have a huge inertia: friction would be the difference of two huge torques.
     """

@@ -30,7 +30,7 @@ class Swinging(NamedTuple):
 
 
 def swinging(recording: AnalysedRun, hold: Hold) -> Swinging | None:
-    """The motor, or else the joint, whose swings tell most about a hold; None if none was recorded."""
+    """The motor, or else the joint, whose swings show most about a hold; None if none was recorded."""
     found = []
     for topic in ("motor_states", "joint_sensors", "joint_states"):
         columns = recording.run.joints(topic)

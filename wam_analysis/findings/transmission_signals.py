@@ -14,7 +14,7 @@ Numbers = NDArray[np.float64]
 CABLE = "cable torque of the simulator"
 STRAIN = "strain gauges"
 RELEASE = 200_000_000  # ns after the brakes were released
-SLOWEST = 0.006  # s; with a longer period, cable torques miss what a resonance does between samples
+SLOWEST = 0.006  # s; with a longer period, cable torques do not show what a resonance does between samples
 GRAVITY = "gravity alone, while nothing touches"
 SOURCES = {CABLE: "sim/joint_states", STRAIN: "joint_sensors", GRAVITY: "gravity_effort"}
 

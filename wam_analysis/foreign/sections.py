@@ -94,7 +94,7 @@ def _share_frame(one: Source, other: Source) -> bool:
 
 def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], given: TopicMap) -> Section:
     what = (
-        "Analysed as that of another robot, as the options say."
+        "Analysed as that of another robot, as the options request."
         if given.is_given
         else "This is not a recording of this stack."
     )

@@ -26,7 +26,7 @@ class TopicMap(NamedTuple):
     ----------
     topics : the only ones that are analysed; all if empty.
     joints : the only ones; where a message has no names, the names of its values.
-    commands : topics of commands, besides those whose name says so.
+    commands : topics of commands, besides those whose name shows it.
     fields : path in the message by quantity, such as 'effort': 'current'.
     units : factor and unit that is shown by quantity.
     """
@@ -43,7 +43,7 @@ class TopicMap(NamedTuple):
 
     @property
     def is_given(self) -> bool:
-        """Whether it says anything."""
+        """Whether anything is given."""
         return any(self)
 
 
@@ -63,7 +63,7 @@ def topic_map(
     Raises
     ------
     ValueError
-        which says what is allowed.
+        with what is allowed.
     """
     found: dict[str, str] = {}
     for option in fields:

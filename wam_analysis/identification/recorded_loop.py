@@ -29,7 +29,7 @@ class LoopNumber(NamedTuple):
 
 
 class RecordedLoop(NamedTuple):
-    """Numbers by the names of the options of `wam guard`; what the stack's own guard says of the loop, or ''."""
+    """Numbers by the names of the options of `wam guard`; what the stack's own guard reports of the loop, or ''."""
 
     numbers: dict[str, LoopNumber]
     guard: str
@@ -50,7 +50,7 @@ def recorded_loop(path: Path, given: TopicMap) -> RecordedLoop:
     Raises
     ------
     ValueError
-        if nothing can be identified, or there is a choice; the message says which.
+        if nothing can be identified, or there is a choice; the message names which.
     """
     analysis = analyse(path, lambda doing: None, given)
     if not analysis.recording.is_foreign:

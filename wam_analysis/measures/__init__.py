@@ -10,7 +10,7 @@ stability           whether a response settles, cycles or diverges
 stick_slip_phases   phases of rest and of motion
 friction            static, dynamic and viscous friction
 frequency           frequency response, coherence, bandwidth, poles
-efficiency          efficiency and backdrivability
+efficiency          efficiency in both directions
 ripple              torque ripple by the angle of a pulley
 loop_timing         periods, jitter and latency from stamps
 runs                intervals of a condition, noise, smoothing

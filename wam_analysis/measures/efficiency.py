@@ -1,12 +1,10 @@
-"""Efficiency and backdrivability of a transmission (3.2.4, 3.2.5)."""
+"""Efficiency of a transmission (3.2.4)."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from wam_analysis.measures.friction import identify_friction
 
 Numbers = NDArray[np.float64]
 
@@ -55,35 +53,3 @@ def efficiency(time: Numbers, motor_power: Numbers, joint_power: Numbers) -> Eff
         back_put=back_put,
         back_got=back_got,
     )
-
-
-class Backdrivability(NamedTuple):
-    """Resistance of the arm to external motion; NaN if it could not be measured.
-
-    Attributes
-    ----------
-    breakaway : force at which it begins to move, N.
-    friction : force of dry friction in motion, N.
-    damping : force per velocity, N s/m.
-    mass : force per acceleration, kg.
-    """
-
-    breakaway: float
-    friction: float
-    damping: float
-    mass: float
-
-
-def backdrivability(time: Numbers, velocity: Numbers, force: Numbers, rest: float, window: float) -> Backdrivability:
-    """Friction, damping and mass at a point that is moved from outside (3.2.5).
-
-    Parameters
-    ----------
-    time : (n,), s, at a constant rate.
-    velocity : (n,), of the point along the force, m/s.
-    force : (n,), on the point from outside, N.
-    rest : speed up to which the point is at rest, m/s.
-    window : of the average, s, as in `identify_friction`.
-    """
-    found = identify_friction(time, velocity, force, rest, window)
-    return Backdrivability(found.static, found.dynamic, found.viscous, found.inertia)

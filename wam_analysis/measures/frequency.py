@@ -1,4 +1,4 @@
-"""Frequency response of recorded signals, its coherence, bandwidth and poles."""
+"""Frequency response of recorded signals, its coherence and bandwidth."""
 
 from typing import NamedTuple
 
@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
-
-ROUNDS = 30  # of the iteration of the fit; it settles in a few
 
 
 class FrequencyResponse(NamedTuple):
@@ -98,54 +96,3 @@ def bandwidth(found: FrequencyResponse, believed: Mask) -> float:
     size = np.abs(found.response[rows])
     below = np.flatnonzero(size < size[0] / np.sqrt(2.0))
     return float(found.frequency[rows[below[0]]]) if len(below) else float("inf")
-
-
-def fit_poles(frequency: Numbers, response: Complex, weight: Numbers, zeros: int, poles: int) -> Complex:
-    """Poles of the rational function that fits a frequency response best.
-
-    The numerator has degree `zeros`, the denominator `poles`; the linear fit is repeated with the
-    last denominator as weight (Sanathanan and Koerner), which makes it one of the response itself.
-
-    Parameters
-    ----------
-    frequency : (k,), Hz.
-    response : (k,), complex.
-    weight : (k,), zero or more, for example coherence over (1 - coherence).
-    zeros, poles : degrees, zeros at most poles.
-
-    Returns
-    -------
-    (poles,), complex
-        rad/s, the slowest first.
-
-    Raises
-    ------
-    ValueError
-        if there are too few frequencies for the unknowns.
-    """
-    unknowns = zeros + 1 + poles
-    if not 0 <= zeros <= poles or poles < 1 or 2 * int(np.sum(weight > 0.0)) < unknowns:
-        raise ValueError(
-            f"{int(np.sum(weight > 0.0))} frequencies for {zeros} zeros and {poles} poles; "
-            "zeros must not be more than poles, and half as many frequencies as unknowns are needed"
-        )
-    scale = 2.0 * np.pi * float(np.median(frequency[weight > 0.0]))
-    s = 2j * np.pi * frequency / scale
-    powers = s[:, np.newaxis] ** np.arange(poles + 1)
-    last = np.ones(len(s), dtype=np.complex128)
-    denominator = np.ones(poles + 1)
-    for _ in range(ROUNDS):
-        row = np.sqrt(weight) / np.abs(last)
-        columns = row[:, np.newaxis] * np.hstack([powers[:, : zeros + 1], -response[:, np.newaxis] * powers[:, :poles]])
-        wanted = row * response * powers[:, poles]
-        a, b = np.vstack([columns.real, columns.imag]), np.concatenate([wanted.real, wanted.imag])
-        size = np.linalg.norm(a, axis=0)
-        solution = np.linalg.lstsq(a / size, b, rcond=None)[0] / size
-        denominator = np.append(solution[zeros + 1 :], 1.0)
-        now = powers @ denominator
-        if np.allclose(now, last, rtol=1e-10):
-            break
-        last = now
-    found = np.roots(denominator[::-1]).astype(np.complex128) * scale
-    order: Complex = found[np.argsort(np.abs(found), kind="stable")]
-    return order

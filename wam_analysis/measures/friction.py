@@ -18,7 +18,7 @@ PRECISE = 0.01  # of the torque: noise at a breakaway after the line
 SIGMAS = 3.0  # standard errors that are meant to hold the truth
 FREEDOM = 2.0  # least degrees of freedom: with fewer, an error could be anything
 NEGLECTED = 2e-3  # of a number: what the averaged law neglects, where a recording without noise leaves no error
-UNEVEN = 0.003  # of dry friction, by which it changes with load and place: over few speeds that looks like viscous
+UNEVEN = 0.003  # of dry friction, by which it changes with load and position: over few speeds that looks like viscous
 SINGULAR = 1e12  # condition of normal equations beyond which a column has no information
 JUMP = 6.0  # robust standard deviations of the residual beyond which a sample is left out (impacts, contacts)
 
@@ -184,7 +184,7 @@ def _robust(
 
 
 def _correlation_length(rest: Numbers) -> float:
-    """Samples in which a sequence says one new thing: the sum of its autocorrelation up to its first zero."""
+    """Samples in which a sequence has one independent value: the sum of its autocorrelation up to its first zero."""
     rest = rest - np.mean(rest)
     power = float(rest @ rest)
     if not power > 0.0:

@@ -44,7 +44,7 @@ def namespace(text: str) -> str:
 
 @contextmanager
 def of_installation(package: str) -> Iterator[None]:
-    """Imports of a package that only an installation of ROS has; says so where it is missing.
+    """Imports of a package that only an installation of ROS has; states this where it is missing.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def configuration_of(given: argparse.Namespace) -> Configuration:
 
 
 def take_time(parser: argparse.ArgumentParser) -> None:
-    """Give a command the options that say how time passes."""
+    """Give a command the options for how time passes."""
     parser.add_argument(
         "--processes",
         nargs="?",
@@ -109,7 +109,7 @@ def take_time(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--realtime",
         action="store_true",
-        help="do not wait for commands, as a real driver; a process for each node, or as --processes says; default: "
+        help="do not wait for commands, as a real driver; a process for each node, or as --processes sets; default: "
         "timing.mode, lockstep",
     )
     parser.add_argument(
@@ -122,7 +122,7 @@ def take_time(parser: argparse.ArgumentParser) -> None:
 
 
 def timed(configuration: Configuration, given: argparse.Namespace) -> Configuration:
-    """The configuration with what the options say about time.
+    """The configuration with what the options set for time.
 
     Raises
     ------
@@ -267,7 +267,7 @@ def writable_file(option: str, file: Path) -> None:
     Raises
     ------
     ValueError
-        which says why, and what to do.
+        with the reason, and what to do.
     """
     folder = file.parent
     if file.is_dir():
@@ -298,7 +298,7 @@ def writable_directory(option: str, directory: Path) -> None:
     Raises
     ------
     ValueError
-        which says why, and what to do.
+        with the reason, and what to do.
     """
     there = next(folder for folder in (directory, *directory.parents) if folder.exists() or folder == folder.parent)
     if not there.is_dir():

@@ -25,7 +25,7 @@ def run(given: argparse.Namespace) -> int:
 
 
 def described(found: Contents) -> list[str]:
-    """Lines about a bag: files, time, what the recorder says, topics."""
+    """Lines about a bag: files, time, what the recorder reports, topics."""
     seconds = (found.last - found.first) / 1e9
     count = sum(topic.messages for topic in found.topics.values())
     counts = {name: topic.messages for name, topic in found.topics.items()}

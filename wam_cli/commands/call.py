@@ -205,7 +205,7 @@ def _state(driver: NodeStatus) -> str:
 
 
 def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrench, float, Shared]:
-    """What is to be sent, the place, m, and the shared parameters among those of the driver."""
+    """What is to be sent, the contact position, m, and the shared parameters among those of the driver."""
     at_least("--seconds", given.seconds, 0.0)
     for what, value in (("the force", math.hypot(*given.force)), ("--seconds", given.seconds)):
         if not math.isfinite(value):

@@ -36,7 +36,7 @@ def reasons(done: Replay) -> list[str]:
     if gaps:
         lines.append(
             f"the bag lacks inputs of {done.node}: where one is missing nothing comes out, in lockstep perhaps for the "
-            "rest of it, and what comes out behind a gap remembers something else"
+            "rest of it, and after a gap the outputs follow from a different state"
         )
         lines += [
             f"    {gap.topic}: {gap.missing} missing between {gap.begin / 1e9:.3f} s and {gap.end / 1e9:.3f} s"
@@ -61,7 +61,7 @@ def told(topic: Compared) -> str:
         share = 100.0 * topic.different / topic.compared
         line += f"{topic.different} differ ({share:.1f} %), at most by {topic.largest:.6g} {topic.unit}".rstrip()
     else:
-        line += "the same bit for bit"
+        line += "the same bit for bit" if topic.compared else "none on both sides"
     if topic.only_recorded or topic.only_replayed:
         line += f"; {topic.only_recorded} only recorded, {topic.only_replayed} only replayed"
     if topic.alone is not None:

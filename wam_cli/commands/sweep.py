@@ -2,14 +2,12 @@
 
 import argparse
 import csv
-import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from wam_analysis.drawing import MEASURED, TRUE
 from wam_cli.commands import (
     BASE_CONFIGURATION,
     at_least,
@@ -22,15 +20,13 @@ from wam_cli.commands import (
 )
 from wam_control.scenario import load
 from wam_description.configuration import packaged
-from wam_experiments.figures.style import panels
+from wam_experiments.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_experiments.thesis import definition, sweeping
-from wam_experiments.thesis.sweeping import ExperimentOutcome
 from wam_sim.batch import results
 from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
 
 RANDOM_RUNS = 100
 SCENARIO = "demo_scenario"
-Sets = list[tuple[Any, ...]]
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,7 +86,7 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> lis
         found = sweep(runs, *batch)
     _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])
     if given.picture:
-        _draw(given.picture, axes, sets, found)
+        scenario_figure(given.picture, axes, sets, found)
     return [bool(result.failure) for result in found]
 
 
@@ -109,7 +105,7 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> l
         rows += [(*values, one.failure, *[""] * 5)] if one.failure else []
     _write(given.file, axes, ("failure", "quantity", "predicted", "measured", "unit", "agrees"), rows)
     if given.picture:
-        _draw_experiment(given.picture, axes, sets, found)
+        experiment_figure(given.picture, axes, sets, found)
     return [bool(one.failure) for one in found]
 
 
@@ -138,43 +134,3 @@ def _write(file: Path, axes: list[Axis], fields: Iterable[str], rows: Iterable[t
         writer = csv.writer(stream)
         writer.writerow([*(axis.name for axis in axes), *fields])
         writer.writerows(rows)
-
-
-def _column(sets: Sets, i: int) -> list[Any]:
-    return [row[i] if isinstance(row[i], (int, float)) else str(row[i]) for row in sets]
-
-
-def _draw(file: Path, axes: list[Axis], sets: Sets, found: list[SweepResult]) -> None:
-    """One panel for each parameter; runs that failed are crosses on the axis."""
-    with panels(file, 1, len(axes), 3.6 * len(axes), 3.0) as (_, shown):
-        for i, (axis, part) in enumerate(zip(axes, shown, strict=True)):
-            rows = list(zip(_column(sets, i), found, strict=True))
-            good = [(value, r.force_rms) for value, r in rows if not r.failure and math.isfinite(r.force_rms)]
-            bad = [(value, 0.0) for value, r in rows if r.failure]
-            for pairs, marker, colour, label in ((good, "o", TRUE, "held"), (bad, "x", MEASURED, "failed")):
-                if pairs:
-                    across, up = zip(*pairs, strict=True)
-                    part.scatter(across, up, s=14, label=label, marker=marker, color=colour)
-            part.set(xlabel=axis.name, ylabel="rms of the settled force error, N")
-            part.legend()
-
-
-def _draw_experiment(file: Path, axes: list[Axis], sets: Sets, found: list[ExperimentOutcome]) -> None:
-    """One row for each quantity that is a number, one column for each parameter."""
-    units = {c.quantity: c.unit for one in found for c in one.rows if not isinstance(c.measured, str)}
-    with panels(file, max(len(units), 1), len(axes), 3.6 * len(axes), 2.2 * max(len(units), 1)) as (_, shown):
-        for place, (quantity, unit) in enumerate(units.items()):
-            for i, axis in enumerate(axes):
-                part = shown[place * len(axes) + i]
-                for role, colour in (("predicted", TRUE), ("measured", MEASURED)):
-                    pairs = [
-                        (value, getattr(c, role))
-                        for value, one in zip(_column(sets, i), found, strict=True)
-                        for c in one.rows
-                        if c.quantity == quantity and not isinstance(getattr(c, role), str)
-                    ]
-                    if pairs:
-                        across, up = zip(*pairs, strict=True)
-                        part.scatter(across, up, s=14, label=role, color=colour)
-                part.set(title=quantity, xlabel=axis.name, ylabel=unit)
-                part.legend()

@@ -2,7 +2,7 @@
 
 No dynamics and no observer: drawn poses and contacts, their joint torques by the Jacobian, errors added, the position
 inferred with a covariance that is just that of the errors.  Friction of the contact is not observable: four torques
-cannot tell it from position and force.
+cannot distinguish it from position and force.
 """
 
 from typing import NamedTuple

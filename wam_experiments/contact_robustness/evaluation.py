@@ -220,8 +220,9 @@ twenty is outside its interval by chance: the worst of many rows is no measure o
 
 BOUNDS = """The inference alone, in poses and on contacts drawn as after an identification, with torques that have these
 errors and no others, and with just their covariance. The rows of the requirement lie between the last two: the last
-takes errors at rest, where stiction hides a force, as frequent as any. Friction of the contact is in all of them: four
-torques do not tell it from position and force. So is the inner link near the shoulder, where 10 N have no moment."""
+takes errors at rest, where stiction hides a force, as frequent as any. Friction of the contact is in all of them:
+four torques do not distinguish it from position and force. So is the inner link near the shoulder, where 10 N have no
+moment."""
 
 METHOD = """## Method
 

@@ -64,7 +64,7 @@ def false_changes(scores: Scores) -> Interval:
 
 
 def coverage(scores: Scores) -> Interval:
-    """Detected contacts in motion whose place the 90 % set holds."""
+    """Detected contacts in motion whose position is in the 90 % set."""
     return _share([one.in_set for one in outcomes(scores) if one.detected])
 
 

@@ -59,7 +59,7 @@ class Touch(NamedTuple):
     force : (3,), N, of the world on the cover, in its frame.
     arm : (3,), m, from the axis at `place` to the point of the force.
     twist : N m about the cover's x axis.
-    speed : m/s, of the place.
+    speed : m/s, of the position.
     begin, end : s.
     friction : coefficient; tangential over normal force.
     harder, within : factor by which the force grows, `HARDER_AFTER` the start, and s that this takes.
@@ -90,14 +90,14 @@ class Touch(NamedTuple):
         return self.place + self.speed * max(0.0, time - self.begin)
 
     def wrench(self, time: float, axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-        """Force, N, and moment about the origin of the cover, N m; `axis` is the tube's axis at the place, m."""
+        """Force, N, and moment about the origin of the cover, N m; `axis` is the tube's axis at the contact, m."""
         share = self.share(time)
         force = share * np.array(self.force)
         return force, np.cross(np.array(axis) + np.array(self.arm), force) + np.array([share * self.twist, 0.0, 0.0])
 
 
 def axis_of(arm: Arm, cover: str, place: float) -> tuple[float, float, float]:
-    """Point of the tube's axis at a place along the cover, m."""
+    """Point of the tube's axis at a position along the cover, m."""
     i = arm.covers.names.index(cover)
     start, end = (np.array(ends[3 * i : 3 * i + 3]) for ends in (arm.covers.start, arm.covers.end))
     x, y, z = (start + (place - start[0]) / (end[0] - start[0]) * (end - start)).tolist()

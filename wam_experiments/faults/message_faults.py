@@ -180,7 +180,7 @@ def garbage(data: bytes, chance: Random) -> bytes:
     if way == 1:
         return data[: chance.randrange(len(data))]
     if way == 2:
-        return b"\0\0\0\0" + data[4:]  # says big-endian, is little-endian
+        return b"\0\0\0\0" + data[4:]  # declared big-endian, is little-endian
     if way == 3:
         return data[:4] + chance.randbytes(len(data) - 4)
     out = bytearray(data)

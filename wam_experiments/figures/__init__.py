@@ -16,5 +16,6 @@ transmission_drawings     drawings of chapters 3, 4 and 6
 force_control_drawings    drawings of chapter 5
 panels                    a figure as data: panels of lines with points; draws figures 1.1, 2.1.1, 2.1.2, 4.5
 series                    a line with points, and their distance
+sweeps                    results of `wam sweep` over each parameter
 style                     colours and sizes
 """

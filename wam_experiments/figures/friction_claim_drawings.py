@@ -1,4 +1,4 @@
-"""Drawings of figures 5.4, 5.5.1 and 5.5.2, which the thesis tells in words."""
+"""Drawings of figures 5.4, 5.5.1 and 5.5.2, which the thesis describes in words."""
 
 from pathlib import Path
 

@@ -95,7 +95,7 @@ class OpenLoopArm:
     def bound(self, q: tuple[float, ...], force: Numbers) -> float:
         """Largest error at rest by statics, N: every friction, ripple and deadband at its worst.
 
-        n (J J^T)^-1 J maps torques that the joints miss to the force along n.
+        n (J J^T)^-1 J maps torques that the joints lack to the force along n.
         """
         jacobian = self._body.tool_jacobian(q)
         unit = force / np.linalg.norm(force)
@@ -104,7 +104,7 @@ class OpenLoopArm:
         torque = np.abs(self._to_motors @ jacobian.T @ force)
         at_motor = RIPPLE * torque + motors.static_friction + self._cogging
         at_motor += DEADBAND * np.array(motors.continuous_torque)
-        through = np.linalg.inv(self._to_motors) * at_motor  # columns: joint torques that each motor misses
+        through = np.linalg.inv(self._to_motors) * at_motor  # columns: joint torques that each motor lacks
         return float(np.abs(weights) @ joints.static_friction + np.abs(weights @ through).sum())
 
     def pushes(self) -> Pushes:

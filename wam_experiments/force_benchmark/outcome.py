@@ -36,7 +36,7 @@ class TaskTrace(NamedTuple):
     ----------
     forces : true force along the commanded direction, N, in each inner period from the command on.
     period : s.
-    travel : largest motion of the touched place along the force, m.
+    travel : largest motion of the touched point along the force, m.
     impact : largest force of the first touch by (3.1), N; 0 where nothing was touched.
     reason : why the loop or the driver does not do the task, at the end; '' if it does.
     is_stopped : whether the loop holds the arm instead, or the driver is in fault, at the end.

@@ -129,7 +129,7 @@ class TaskWatch:
         )
 
     def _along(self, q: list[float]) -> float:
-        """Position of the touched place along the force, m."""
+        """Position of the touched point along the force, m."""
         surface = self._task.surface
         point = (surface.place, *self._arm.covers.aside(surface.cover, surface.place))
         return float(self._direction @ self._body.point(q, surface.cover, point))

@@ -29,7 +29,7 @@ class ForceTaskRow(NamedTuple):
 
 
 def rod(base: Configuration, q: Sequence[float], place: float, force: float, friction: float = FRICTION) -> Task:
-    """A rod across the outer link at a place, m, pressed in the plane of the links."""
+    """A rod across the outer link at a position, m, pressed in the plane of the links."""
     return _task(base, q, place, force, 0.0, friction)
 
 

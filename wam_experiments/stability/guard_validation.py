@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.table import plain
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters
 from wam_control.friction_verdict import friction_verdict, linear_margin, stiction_cycle
 from wam_control.scenario import ScenarioStep
@@ -164,13 +165,14 @@ class ValidationTable(NamedTuple):
 
     def text(self) -> str:
         """The table as text."""
-        lines = ["domain     guard     rests  cycles  diverges"]
-        for domain in ("I", "II", "III"):
-            for accepted in (True, False):
-                row = [self.counts.get((domain, accepted, end), 0) for end in ENDS]
-                if any(row):
-                    verdict = "accepts" if accepted else "refuses"
-                    lines.append(f"{domain:<10} {verdict:<8} {row[0]:6d} {row[1]:7d} {row[2]:9d}")
+        kinds = [(domain, accepted) for domain in ("I", "II", "III") for accepted in (True, False)]
+        counts = [[self.counts.get((*kind, end), 0) for end in ENDS] for kind in kinds]
+        rows = [
+            [domain, "accepts" if accepted else "refuses", *map(str, row)]
+            for (domain, accepted), row in zip(kinds, counts, strict=True)
+            if any(row)
+        ]
+        lines = plain([["domain", "guard", *ENDS]], rows, left=(0, 1))
         total = sum(self.counts.values())
         lines.append(
             f"{total} sets: {self.accepted_and_diverged} accepted that diverge, "

@@ -12,7 +12,7 @@ from wam_experiments.thesis.rows import Comparison, Curve, Numbers, Panel, Resul
 NO_CLAIM = math.nan
 STEADY = 0.8  # s at the end of a step, taken as its steady state
 FORCE = 0.1  # of the commanded force
-SLIPPED = 0.15  # the same where friction along the link moves the estimated place
+SLIPPED = 0.15  # the same where friction along the link moves the estimated position
 STILL = 1e-3  # m, that a body moves at rest
 MOVING = 1e-3  # m/s above which a body slides
 MOVED = 0.05  # m, of a body that was swept along

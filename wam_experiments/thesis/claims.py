@@ -41,7 +41,7 @@ def load(file: Path) -> dict[str, tuple[Claim, ...]]:
     Raises
     ------
     ValueError
-        if a row has not five cells, or neither shows anything nor says why not.
+        if a row has not five cells, or neither shows anything nor states why not.
     """
     chapters: Mapping[str, list[list[object]]] = yaml.safe_load(file.read_text(encoding="utf-8"))
     return {title: tuple(_claim(row) for row in rows) for title, rows in chapters.items()}

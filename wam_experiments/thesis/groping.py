@@ -1,4 +1,4 @@
-"""The experiment `wam-grope`, groping a box (7.3): where it is by the contacts of the arm, against its true place."""
+"""The experiment `wam-grope`, groping a box (7.3): its position by the contacts of the arm, and the true one."""
 
 from collections.abc import Mapping
 
@@ -10,8 +10,8 @@ from wam_description.world import World
 from wam_experiments.thesis.recording import Recording, Step
 from wam_experiments.thesis.rows import Comparison, Curve, Numbers, Panel, Result
 
-KNOWN_AFTER = 0.05  # s after a contact was detected, when its place is known better
-HEIGHT, ACROSS, ALONG = 0.01, 0.02, 0.03  # m; the place along the link is what is known worst
+KNOWN_AFTER = 0.05  # s after a contact was detected, when its position is known better
+HEIGHT, ACROSS, ALONG = 0.01, 0.02, 0.03  # m; the position along the link is the least certain
 
 
 def groping(runs: Mapping[str, Recording]) -> Result:
@@ -24,7 +24,7 @@ def groping(runs: Mapping[str, Recording]) -> Result:
     steps = [step for step in run.steps if step.name.startswith("touch") and step.end <= until]
     points = {step.name.removeprefix("touch the "): touched(run, step) for step in steps}
     rows = [
-        Comparison(f"{side}, height", high[2], float(point[2]), "m", HEIGHT, "true place", True)
+        Comparison(f"{side}, height", high[2], float(point[2]), "m", HEIGHT, "true position", True)
         for side, point in points.items()
     ]
     for side, edge in (("left edge", high[1]), ("right edge", low[1])):

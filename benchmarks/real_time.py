@@ -1,0 +1,84 @@
+"""Periods that the driver keeps in realtime, without and with busy loops next to it, and the start of `wam demo`.
+
+The reference is the wall clock.  What the system grants the driver is in its `/diagnostics`, `priority`.
+"""
+
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from comparing import arguments, machine, mark, save, spread, table
+from demo_under_load import Run, busy_loops, demonstration, short_form
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
+
+from wam_analysis.demo_summary import summarize
+from wam_bag.bag import read
+from wam_bag.columns import JointColumns
+from wam_ros.run import Connection
+from wam_ros.wire import stamp_of
+
+MOVED = 1e-3  # rad, of a joint since the first message
+ROWS = {  # must, aim
+    "periods kept, no other load [%]": (99.0, 99.7),
+    "periods kept, 4 busy loops [%]": (98.0, 99.7),
+    "wam demo to first motion [s]": (2.0, 1.5),
+}
+
+
+def kept(run: Run) -> float:
+    """Periods in time of a demonstration in realtime, per cent; also of one that a late node has ended."""
+    loop = summarize(read(run.bag)).loop
+    return 100.0 * (1.0 - loop.missed / loop.periods)
+
+
+def first_motion(folder: Path, name: str, options: list[str]) -> float:
+    """Time from the start of `wam demo` until the arm's clock, seen from outside, is where a joint has moved, s."""
+    seen: list[tuple[float, int]] = []  # wall clock in s, the arm's time in ns
+    with ThreadPoolExecutor(1) as pool:
+        connection = Connection()
+        watch = Node("stopwatch", context=connection.context)
+        connection.add(watch)
+        watch.create_subscription(
+            Clock, "/clock", lambda data: seen.append((time.time(), stamp_of(data))), qos_profile_sensor_data, raw=True
+        )
+        playing = pool.submit(demonstration, folder, name, options)
+        while not playing.done():
+            connection.executor.spin_once(timeout_sec=0.05)
+        connection.close()
+    run = playing.result()
+    states = read(run.bag, topics=["/wam/joint_states"]).topics["/wam/joint_states"]
+    assert isinstance(states, JointColumns)
+    moved = np.abs(states.position - states.position[0]).max(axis=1) > MOVED
+    stamp = int(states.stamp_ns[int(np.argmax(moved))])
+    return next(at for at, shown in seen if shown >= stamp) - run.begin
+
+
+def main() -> None:
+    """Measure in turns, print the table."""
+    given = arguments(__doc__, rounds=5, quick_rounds=1)
+    found: dict[str, list[float]] = {row: [] for row in ROWS}
+    with tempfile.TemporaryDirectory(prefix="wam_bench_") as name:
+        folder = Path(name)
+        short = short_form(folder)
+        for i in range(given.rounds):
+            for row, loops in zip(ROWS, (0, 4), strict=False):
+                with busy_loops(loops):
+                    run = demonstration(folder, f"{loops}_{i}", [*(short if given.quick else []), "--realtime"])
+                found[row].append(kept(run))
+            found["wam demo to first motion [s]"].append(first_motion(folder, f"start_{i}", short))
+    rows, measured = [], dict[str, Any]()
+    for name, values in found.items():
+        measured[name] = spread(values)
+        rows.append([name, f"{spread(values):.2f}", mark(spread(values).median, *ROWS[name])])
+    print(machine())
+    print(table(["in real time", "(middle half)", "[must, aim]"], rows))
+    save("real_time", given, measured)
+
+
+if __name__ == "__main__":
+    main()
