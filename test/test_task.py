@@ -166,6 +166,28 @@ def test_a_free_arm_follows_a_stiff_hand_without_oscillating(stiffness: float) -
     assert np.all(np.diff(forces[60:]) < 0.02), "it yields more and more, and never comes back"
 
 
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_task_feeds_the_torque_of_its_forces_forward_as_the_force_loop_does(share: float) -> None:
+    """By the same parameter: on a free arm it is a throw, and the arm hits what it was to touch."""
+    world = Springs()
+    world.loop.tune(replace(OWN, force_feedforward=share, friction_feedforward=0.0))
+    joint = TaskAxis(AxisKind.FORCE, 2, value=0.5)
+    effort = world.step(base(force(10.0), joint)).effort
+    assert effort == pytest.approx(share * (10.0 * world.lever(DOWN) + [0.0, 0.0, 0.5, 0.0]), abs=1e-6)
+
+
+def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_touch() -> None:
+    world = Springs()
+    world.loop.tune(replace(OWN, feedback="contact_estimate"))
+    lever, still = world.lever(DOWN), State(POSE, REST, [1.0] * 4)
+    for touched, share in ((0.0, 0.0), (8.0, 1.0)):
+        contact = Contact(COVER, PLACE, (0.0, 0.0, touched), 0.001, 1.0, 0.1) if touched else NO_CONTACT
+        for _ in range(200):
+            external = (-touched * lever).tolist()
+            out = world.loop.step(still, None, contact, external, None, None, None, DT, base(force(10.0)))
+        assert out.effort == pytest.approx(share * 10.0 * lever, abs=1e-6)
+
+
 def test_a_line_is_held_while_the_link_slides_along_it() -> None:
     world = Springs(LEVEL)
     ends = [BODY.point(LEVEL, COVER, (s, 0.0, 0.0)) for s in (0.0, 0.4064)]

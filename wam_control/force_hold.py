@@ -129,14 +129,14 @@ class ForceHold:
         return fastest / axis.speed_fraction
 
     def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
-        """Share of the torque of the commanded force that is fed forward in this period.
+        """Share of the torque of the commanded force that is fed forward in this period: `force_feedforward` at least.
 
-        On a free arm it would be a throw.  From the motors it rises after the touch: the velocity loop would take
-        seconds to wind up to it on a stiff surface.  Without dither it would only wind up the friction of the arm.
+        From the motors it rises after the touch: the velocity loop would take seconds to wind up to it on a stiff
+        surface.  Without dither it would only wind up the friction of the arm.
         """
         is_fed = parameters.is_estimated and point.is_pinned and self.is_touching
         self.fed = min(self.fed + dt / FED, 1.0) if is_fed else 0.0
-        return self.fed
+        return max(parameters.force_feedforward, self.fed)
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
         """Whether the arm is to keep a force, N, that is nearly the commanded one.

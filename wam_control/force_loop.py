@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
+from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_command import CommandAdmission
 from wam_control.force_hold import ForceHold, ForceReaction
@@ -32,7 +33,6 @@ from wam_control.task_control import AxisRow, TaskControl
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
-from wam_description.transmission_map import TransmissionMap
 
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
@@ -43,8 +43,6 @@ SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a fo
 BACK = 3e-3  # m, way back from another link than commanded
 NEAR, MIDDLE = 0.25, 0.5  # of a link that is perhaps touched: where its force is taken to be
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
-COUNTERED = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters where the lever is short
-SLOW_MOTOR, SLOW_JOINT = 0.04, 0.002  # rad/s, below which less of the dry friction is fed forward
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
@@ -96,7 +94,7 @@ class ForceLoop:
         command_age: float = math.inf,
     ) -> None:
         self._arm, self._timing = arm, timing
-        self._body, self._map = RigidBody(arm), TransmissionMap.of(arm)
+        self._body = RigidBody(arm)
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
@@ -106,7 +104,7 @@ class ForceLoop:
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
-        self._countered = LowPass()
+        self._feed_forward = FeedForward(arm)
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
         self._is_free = False
@@ -277,7 +275,7 @@ class ForceLoop:
         self._hold.reset()
         self._position.touch_again()
         self._delay.reset()
-        self._countered.reset()
+        self._feed_forward.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
         self._axes = axes
         self._held_at = None
@@ -353,31 +351,8 @@ class ForceLoop:
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
-        return out._replace(velocity=velocity, effort=self._fed_forward(force_axis, point, desired, velocity, dt))
-
-    def _fed_forward(
-        self, axis: ForceAxis, point: ForcePoint, desired: float, velocity: list[float], dt: float
-    ) -> list[float]:
-        """Torque of the joints (n,), N m: of the force, from the motors, or of friction, with sensors."""
-        own = self.parameters
-        effort = axis.lever * (max(own.force_feedforward, self._hold.feed(point, own, dt)) * desired)
-        if own.friction_feedforward and not own.is_estimated:
-            friction, _ = self._countered.step(self._friction(velocity), COUNTERED, dt)
-            effort = effort + own.friction_feedforward * friction
-        result: list[float] = effort.tolist()
-        return result
-
-    def _friction(self, velocity: Sequence[float]) -> Array:
-        """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
-
-        Less than all of it moves nothing.  Where the force is off to the other side, the velocity loops need not wind
-        up through twice the friction, which takes them seconds.
-        """
-        motors, joints = self._arm.motors.dynamic_friction, self._arm.joints.dynamic_friction
-        turning = zip(motors, self._map.motor_velocities(velocity), strict=True)
-        turned = self._map.joint_torques([friction * math.tanh(speed / SLOW_MOTOR) for friction, speed in turning])
-        moved = zip(joints, velocity, turned, strict=True)
-        return np.array([torque + friction * math.tanh(speed / SLOW_JOINT) for friction, speed, torque in moved])
+        fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
+        return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
@@ -470,7 +445,8 @@ class ForceLoop:
         velocity = self._delay.step(velocity, self.parameters.delay_samples)
         point = self._position.step(contact, None, 0.0, self.parameters)
         factor = self._gain_factor(point, None, 0.0, dt)
-        return ForceOutput([factor * v for v in velocity], list(torque))
+        share = self.parameters.force_feedforward
+        return ForceOutput([factor * v for v in velocity], [share * value for value in torque])
 
     def _point(self, contact: Contact, command: ForceCommand, direction: Array) -> ForcePoint:
         """Point of action of the force; where the loop relies on the estimate, a rejected one counts as refused."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact_position import ForcePoint, position_is_certain
+from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes
 from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
@@ -66,6 +67,7 @@ class TaskControl:
     ) -> None:
         self._frame = TaskFrame(arm, body, axes, parameters.task, parameters.sensing)
         self._covers, self._parameters, self._supervision = arm.covers, parameters, supervision
+        self._feed_forward = FeedForward(arm)
         self.restart()
 
     def restart(self) -> None:
@@ -74,6 +76,7 @@ class TaskControl:
         self._anchors: dict[object, float] = {}
         self._holds: list[ForceHold] = []
         self._held_at: list[float] | None = None
+        self._feed_forward.reset()
         self._refusal = ""
         self._places: dict[str, tuple[float, float]] = {}  # m, of the last certain estimate, and its sd, by cover
 
@@ -119,15 +122,17 @@ class TaskControl:
         held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, rate)
         resolved = self._frame.resolve(states, speeds, held, q)
         velocity = _limited(resolved.velocity, own.joint_speed_limit)
-        effort = np.sum([_desired(state) * state.row for state in states], axis=0)
+        fed = np.sum([self._fed(*pair, dt) for pair in zip(states, self._holds, strict=True)], axis=0)
         if self._held_at is not None:
             velocity = posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
-            effort = np.zeros(len(q))
+            effort = [0.0] * len(q)
+        else:
+            effort = self._feed_forward.step(fed, velocity, own, dt)
         for state, hold in zip(states, self._holds, strict=True):
             hold.travel(float(state.row @ velocity) * dt)
         rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
         measured, error = _vectors(states, forces)
-        return TaskOutput(velocity, effort.tolist(), measured, error, rows, reaction, reason, has_changed or is_other)
+        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed or is_other)
 
     def _begin(self, task: TaskCommand) -> bool:
         """Take a task; whether it has other axes than the one before."""
@@ -231,11 +236,18 @@ class TaskControl:
         if state.axis.kind is not AxisKind.FORCE:
             return self._frame.velocity(state, force, anchor)
         laws = self._supervision.force_law, self._supervision.torque_law
-        speed = factor * force_speed(state, *laws, force, state.force(before), dt)
+        speed = factor * hold.share * force_speed(state, *laws, force, state.force(before), dt)
         if state.sensed and state.point and (desired := _desired(state)):
             speed = min(speed, hold.approach_speed(state.sensed, state.point, desired, self._parameters))
         fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
         return min(max(speed, -fastest), fastest)
+
+
+    def _fed(self, state: AxisState, hold: ForceHold, dt: float) -> Array:
+        """Torque of a commanded force that is fed forward (n,), N m."""
+        own = self._parameters
+        share = hold.feed(state.point, own, dt) if state.point else own.force_feedforward
+        return share * _desired(state) * state.row
 
 
 def _axes(task: TaskCommand) -> list[object]:
