@@ -166,6 +166,30 @@ def test_a_free_arm_follows_a_stiff_hand_without_oscillating(stiffness: float) -
     assert np.all(np.diff(forces[60:]) < 0.02), "it yields more and more, and never comes back"
 
 
+def test_the_stated_error_of_a_force_counts_the_friction_of_another_one_on_the_same_link() -> None:
+    """Each force with friction of 0.3 across it, in every direction: the other one is measured as wrong as stated."""
+    places, along, newtons = (0.33, 0.2), (np.array(DOWN), np.array(Y)), (12.0, 8.0)
+    task = base(*(force(f, tuple(n), x) for f, n, x in zip(newtons, along, places, strict=True)))
+    worst = np.zeros(2)
+    for pressed in (0, 1):
+        for angle in np.linspace(0.0, 2.0 * math.pi, 9):
+            world, torque = Springs(), np.zeros(4)
+            for i, (f, n, x) in enumerate(zip(newtons, along, places, strict=True)):
+                across = np.cross(n, X)
+                friction = 0.3 * f * (math.cos(angle) * np.array(X) + math.sin(angle) * across) if i == pressed else 0.0
+                point = [x, 0.0, 0.0] + ARM.covers.radius[1] * (BODY.cover_pose(POSE, COVER).rotation.T @ n)
+                torque += (f * n + friction) @ BODY.point_jacobian(POSE, COVER, tuple(point))
+            world.hand = -torque
+            rows = world.step(task).rows
+            errors = [abs(row[2] - f) for row, f in zip(rows, newtons, strict=True)]
+            worst = np.maximum(worst, [error / row[3] for error, row in zip(errors, rows, strict=True)])
+    assert np.all(worst < 2.0)
+    assert np.all(worst > 0.2), "nor is it stated as larger than it is"
+    assert world.loop.reaction is ForceReaction.NOT_SENSED, "and so it is not done"
+    same = base(force(12.0), force(8.0, Y))
+    assert Springs().step(same, 20).rows[0][3] < 0.1 * 12.0, "two axes at one place are one force"
+
+
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_a_task_feeds_the_torque_of_its_forces_forward_as_the_force_loop_does(share: float) -> None:
     """By the same parameter: on a free arm it is a throw, and the arm hits what it was to touch."""

@@ -184,6 +184,19 @@ class ForceAxes:
         result: Array = direction @ self._jacobian(q, cover, position, direction)[0]
         return result
 
+    def disturbance(
+        self, q: Sequence[float], cover: str, position: float, position_sd: float, direction: Array, force: float
+    ) -> list[Array]:
+        """Torques (n,), N m, of another force and of its friction, each as large as its standard deviation.
+
+        Arguments as those of `axis`.
+        """
+        size = max(force, SMALLEST_FORCE)
+        jacobian, point = self._jacobian(q, cover, position, direction)
+        slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
+        friction = self._parameters.friction * size * _across(direction, direction)
+        return [size * direction @ jacobian, *(friction @ jacobian), position_sd * size * direction @ slide]
+
     def slide(self, q: Sequence[float], cover: str, position: float, moved: Array) -> float:
         """Way of a point of a cover along the cover, m, by a motion of the joints (n,), rad."""
         point = (position, *self._covers.aside(cover, position))

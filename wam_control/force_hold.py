@@ -54,7 +54,7 @@ class ForceReaction(IntEnum):
     UNCERTAIN = 10  # goes on: the force is not known as well as it has to be reached
     CYCLE = 11  # goes on: the measured force is in a limit cycle
     SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
-    TOO_SLOW = 13  # holds: the surface is so stiff for the commanded force that the arm would hardly move towards it
+    TOO_SLOW = 13  # holds: towards the surface, or with it, the arm moves too slowly for the commanded force
     SECOND_CONTACT = 14  # holds: a second contact is nearly certain, whose torques are not those of the force
 
     @property
@@ -293,7 +293,7 @@ class ForceHold:
         """How fast it counts that another link is touched: `CONFLICT` is full after so many s at 1."""
         # at a pinned position the estimated link counts only where the torques are not those of the force
         if point.conflict and (is_strange or not point.is_pinned):
-            return 1.0
+            return max(parameters.force_feedforward, self.fed)
         return CONFLICT / DOUBTED if point.is_doubtful else -FADING
 
     def _held(
@@ -336,6 +336,14 @@ class ForceHold:
                 f"settle with a time constant of {1.0 / pace:.2g} s, and at most 1/{SETTLED:g} of "
                 "limits.settling_time is allowed; the arm holds its position: bend the arm, or command another "
                 "direction or place"
+            )
+        lag = parameters.limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
+        most = parameters.sensing.reported_fraction * desired
+        if lag > most:
+            return ForceReaction.TOO_SLOW, (
+                f"a surface that moves with {parameters.limits.surface_speed:g} m/s (limits.surface_speed) would keep "
+                f"the force {lag:.2g} N off; allowed: {most:.2g} N (sensing.reported_fraction); the arm holds its "
+                "position: command more force, a larger force_gain, or let the surface move more slowly"
             )
         speed = self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < CREEP:

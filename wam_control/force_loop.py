@@ -101,6 +101,7 @@ class ForceLoop:
         self._position = ContactPosition(arm.covers)
         self._contact_rejected = False
         self._held_at: list[float] | None = None
+        self._goes_back = False
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
@@ -330,8 +331,9 @@ class ForceLoop:
         if reaction.holds:
             self.refusals["force_command"] = reason
             self._hold.fed = 0.0
-            if self._held_at is None:
-                self._held_at = self._free_of(force_axis) if reaction is ForceReaction.OTHER_LINK else list(q)
+            goes_back = reaction is ForceReaction.OTHER_LINK
+            if self._held_at is None or goes_back != self._goes_back:
+                self._held_at, self._goes_back = self._free_of(force_axis) if goes_back else list(q), goes_back
                 self._transfer.restart()
             return out._replace(
                 velocity=[] if is_open else posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.contact_position import ForcePoint, position_is_certain
+from wam_control.contact_position import ForcePoint, position_is_certain, slid_position
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes
 from wam_control.force_hold import ForceHold, ForceReaction
@@ -66,6 +66,7 @@ class TaskControl:
         self, arm: Arm, body: RigidBody, axes: ForceAxes, parameters: ForceLoopParameters, supervision: Supervision
     ) -> None:
         self._frame = TaskFrame(arm, body, axes, parameters.task, parameters.sensing)
+        self._force_axes = axes
         self._covers, self._parameters, self._supervision = arm.covers, parameters, supervision
         self._feed_forward = FeedForward(arm)
         self.restart()
@@ -75,6 +76,8 @@ class TaskControl:
         self._task: TaskCommand | None = None
         self._anchors: dict[object, float] = {}
         self._holds: list[ForceHold] = []
+        self._slid: dict[tuple[str, float], float] = {}  # m, by cover and place, since something is touched there
+        self._q_before: list[float] = []
         self._held_at: list[float] | None = None
         self._feed_forward.reset()
         self._refusal = ""
@@ -103,6 +106,7 @@ class TaskControl:
         """
         own = self._parameters
         has_changed = self._begin(task)
+        self._slide(task, q)
         states = self._frame.states(task, q, self._points(task, contact))
         anchors = self._find_anchors(states)
         forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
@@ -144,7 +148,21 @@ class TaskControl:
             return False
         self._anchors = {key: self._anchors[key] for key in _axes(task) if key in self._anchors}
         self._holds = [ForceHold() for _ in task.axes]
+        self._slid = {}
         return True
+
+    def _slide(self, task: TaskCommand, q: Sequence[float]) -> None:
+        """Count how far the link has slid along what each force presses, which stays where it is."""
+        moved = np.array(q) - np.array(self._q_before or q)
+        self._q_before = list(q)
+        pressed = {
+            (axis.cover, axis.place)
+            for axis, hold in zip(task.axes, self._holds, strict=True)
+            if axis.kind is AxisKind.FORCE and axis.place is not None and hold.is_touching
+        }
+        self._slid = {
+            at: self._slid.get(at, 0.0) + self._force_axes.slide(q, *at, moved) for at in pressed
+        }
 
     def _find_anchors(self, states: Sequence[AxisState]) -> list[float]:
         """Commanded position of each axis; where none is, the position at which it has begun."""
@@ -204,7 +222,9 @@ class TaskControl:
         found = []
         for axis in task.axes:
             if axis.place is not None:
-                found.append(ForcePoint(axis.cover, axis.place, 0.0, True, True, True, False, "", conflict, is_single))
+                slid = self._slid.get((axis.cover, axis.place), 0.0)
+                place = slid_position(self._covers, axis.cover, axis.place, slid) if slid else axis.place
+                found.append(ForcePoint(axis.cover, place, 0.0, True, True, True, False, "", conflict, is_single))
                 continue
             length = self._covers.length_of(axis.cover)
             place, sd = self._places.get(axis.cover, (length / 2.0, length / math.sqrt(12.0)))

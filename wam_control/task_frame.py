@@ -98,26 +98,36 @@ class TaskFrame:
         directions = [rotation @ np.array(axis.direction) for axis in task.axes]
         # a force is positive along its direction, which is the normal of the surface
         directions = [-d if _pulls(axis) else d for axis, d in zip(task.axes, directions, strict=True)]
-        levers = [
-            self._axes.lever(q, axis.cover, point.position, u) if axis.is_sensed and axis.joint < 0 else None
+        torques = [
+            self._torques(q, axis, point, u) if axis.is_sensed and axis.joint < 0 else []
             for axis, u, point in zip(task.axes, directions, points, strict=True)
         ]
         found = []
-        for i, (axis, u, lever) in enumerate(zip(task.axes, directions, levers, strict=True)):
+        for i, (axis, u, own) in enumerate(zip(task.axes, directions, torques, strict=True)):
             if axis.joint >= 0:
                 found.append(AxisState(axis, np.eye(n)[axis.joint], u, q[axis.joint], None))
                 continue
             place, place_sd = points[i].position, points[i].position_sd
             axis_point = np.array([place, *self._arm.covers.aside(axis.cover, place)])
             coordinate = float(u @ self._body.point(q, axis.cover, axis_point))
-            if lever is None:
+            if not own:
                 row: Array = u @ self._body.point_jacobian(q, axis.cover, axis_point)
                 found.append(AxisState(axis, row, u, coordinate, None))
                 continue
-            others = [_size(task.axes[k]) * o for k, o in enumerate(levers) if k != i and o is not None]
+            others = []
+            for k, other in enumerate(torques):
+                # two axes at one place are parts of one force, whose friction is that of `sensed` already
+                is_same = (task.axes[k].cover, task.axes[k].place) == (axis.cover, axis.place)
+                others += [] if k == i else other[:1] if is_same else other
             sensed = self._axes.axis(q, axis.cover, place, place_sd, u, _size(axis), others)
             found.append(AxisState(axis, sensed.lever, u, coordinate, sensed, points[i]))
         return found
+
+    def _torques(self, q: Sequence[float], axis: TaskAxis, point: ForcePoint, direction: Array) -> list[Array]:
+        """Torques (n,), N m, by which a force along this axis disturbs the other ones; a hand has no friction."""
+        if axis.kind is AxisKind.IMPEDANCE:
+            return [HAND * self._axes.lever(q, axis.cover, point.position, direction)]
+        return self._axes.disturbance(q, axis.cover, point.position, point.position_sd, direction, _size(axis))
 
     def refusal(self, states: Sequence[AxisState]) -> str:
         """Why this task cannot be done in this pose, with the number; '' where it can."""

@@ -12,12 +12,15 @@ from wam_experiments.force_benchmark.outcome import OVERSHOOT, TOLERANCE, TaskEn
 from wam_experiments.force_benchmark.surfaces import GAP
 from wam_experiments.force_benchmark.tasks import (
     CABLES,
+    FARTHEST,
     FORCES,
+    FREQUENCIES,
     FRICTION,
     FRICTIONS,
     MASS,
     POSES,
     SECONDS,
+    SPEEDS,
     STIFFNESSES,
     TORQUE,
     Task,
@@ -27,6 +30,8 @@ SENSORS, MOTORS = "joint sensors", "motors with dither"
 REQUIRED = {SENSORS: 0.95, MOTORS: 0.9}  # share of accepted tasks within the tolerance
 STIFFNESS_ENDS = {"400 to 4000": 4e3, "4000 to 40 000": 4e4, "40 000 to 400 000": 4e5}  # N/m
 FORCE_ENDS = {"1 to 3": 3.0, "3 to 10": 10.0, "10 to 40": 40.0}  # N
+MOTIONS = ("at rest", "moves along the force", "moves across it")
+STEADY = 1e-6  # m/s along the force, of a surface that moves across it
 LISTED = 40  # failures of one kind
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 HEAD = ("", "tasks", "within 10 %", "refused", "given up", "ended", "silent", "above the limit", "cycles unreported")
@@ -50,6 +55,11 @@ def _contact(task: Task) -> str:
     return f"rod across the {task.surface.cover.replace('_', ' ')}"
 
 
+def _motion(task: Task) -> str:
+    surface = task.surface
+    return MOTIONS[0] if not surface.frequency else MOTIONS[1] if surface.speed > STEADY else MOTIONS[2]
+
+
 GROUPINGS = (
     TaskGrouping("feedback", (SENSORS, MOTORS), lambda task: MOTORS if task.conditions.is_dithered else SENSORS),
     TaskGrouping("stiffness [N/m]", tuple(STIFFNESS_ENDS), lambda task: _below(STIFFNESS_ENDS, task.surface.stiffness)),
@@ -60,6 +70,8 @@ GROUPINGS = (
         "contact position", ("pinned", "estimated"), lambda task: "pinned" if task.conditions.is_pinned else "estimated"
     ),
     TaskGrouping("tare", ("tared", "not tared"), lambda task: "tared" if task.conditions.is_tared else "not tared"),
+    TaskGrouping("surface", MOTIONS, _motion),
+    TaskGrouping("forces", ("one", "two at once"), lambda task: "two at once" if task.second else "one"),
     TaskGrouping("command", ("step", "ramp"), lambda task: "ramp" if task.conditions.ramp else "step"),
 )
 
@@ -245,7 +257,7 @@ PREFACE = f"""# Benchmark of force control
 Written by `{{command}}`; nothing here is written by hand.
 
 {{count}} tasks, each drawn from the seed and its number alone: pose, contact, force, friction of the surface,
-feedback, ramp, and a true arm that differs from the configured one, uniformly distributed: masses by up to
+feedback, ramp, motion of the surface, and a true arm that differs from the configured one, uniformly distributed: masses by up to
 {MASS:.0%}, friction by {FRICTION:.0%}, cable stiffness by {CABLES:.0%}, motor constants by {TORQUE:.0%}. Forces are
 {FORCES[0]:g} to {FORCES[1]:g} N, surfaces {STIFFNESSES[0]:.0f} to {STIFFNESSES[1]:.0f} N/m with friction
 {FRICTIONS[0]:g} to {FRICTIONS[1]:g}.
@@ -266,5 +278,6 @@ RULES = f"""## Method
   which all kinetic energy of links and rotors at the first touch goes into the surface.
 * A cycle is a motion of the force that repeats in the last 2 s, above 10 % of the commanded force peak to peak. It
   counts as reported if the loop gives a reason, or the guard predicts at least half of its size.
-* The surfaces do not move.
+* One surface of seven moves, as a sine after 1.5 s of the whole force, half of them along the force: with
+  {1e3 * SPEEDS[0]:g} to {1e3 * SPEEDS[1]:g} mm/s at most, at {FREQUENCIES[0]:g} to {FREQUENCIES[1]:g} Hz, by {1e3 * FARTHEST:g} mm at most. The user declares the speed along the force.
 """
