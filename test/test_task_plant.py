@@ -59,5 +59,5 @@ def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_
     slide = TaskAxis(AxisKind.VELOCITY, -1, OUTER, 0.2, triple(along), speed)
     played = Played(Task(LEVEL, surface, 5.0), [force(surface, 5.0), line[1], slide], 2.5)
     slid = BODY.point(played.q, OUTER, (0.0, 0.0, 0.0)) - BODY.point(LEVEL, OUTER, (0.0, 0.0, 0.0))
-    assert slid @ along == pytest.approx(2.5 * speed, rel=0.05), "m"
-    assert played.forces[1000:, 0] == pytest.approx(np.full(1500, 5.0), rel=0.05)
+    assert slid @ along == pytest.approx(2.5 * speed, rel=0.1), "m"
+    assert played.forces[1000:, 0] == pytest.approx(np.full(1500, 5.0), rel=0.04)

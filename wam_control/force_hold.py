@@ -293,7 +293,7 @@ class ForceHold:
         """How fast it counts that another link is touched: `CONFLICT` is full after so many s at 1."""
         # at a pinned position the estimated link counts only where the torques are not those of the force
         if point.conflict and (is_strange or not point.is_pinned):
-            return max(parameters.force_feedforward, self.fed)
+            return 1.0
         return CONFLICT / DOUBTED if point.is_doubtful else -FADING
 
     def _held(
