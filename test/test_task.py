@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,9 @@ import pytest
 
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.force_loop_parameters import force_law, sensing_of
+from wam_control.force_loop_parameters import task_of as task_of_parameters
+from wam_control.stability_guard import GuardedForces, GuardedTask, StabilityGuard
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, joint_axes, line_axes, table_of, task_of
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
@@ -210,6 +214,50 @@ def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_
             external = (-touched * lever).tolist()
             out = world.loop.step(still, None, contact, external, None, None, None, DT, base(force(10.0)))
         assert out.effort == pytest.approx(share * 10.0 * lever, abs=1e-6)
+
+
+def linear_loop(world: Springs, task: TaskCommand) -> tuple[StabilityGuard, GuardedTask, GuardedForces]:
+    """What the guard considers of a task."""
+    guard = StabilityGuard(ARM, SHARED.servo, SHARED.timing, GIVEN.guard, sensing_of(GIVEN))
+    seen: list[GuardedForces] = []
+
+    def factor(where: Callable[[], list[GuardedForces]], dt: float) -> tuple[float, bool]:
+        seen.extend(where())
+        return 1.0, False
+
+    world.loop._supervision.factor = factor  # type: ignore[assignment, method-assign]
+    world.step(task)
+    return guard, task_of_parameters(GIVEN, force_law(GIVEN)), seen[0]
+
+
+def test_the_guard_considers_one_force_of_a_task_as_a_force_alone() -> None:
+    guard, task, forces = linear_loop(Springs(), base(force(10.0)))
+    assert min(guard.scales(task, [forces])) == pytest.approx(min(guard.scales(task, forces.contacts)), rel=0.01)
+
+
+def test_the_guard_considers_the_forces_of_a_task_together() -> None:
+    """Its linear law is that of the task: joint velocities per torque of the world and per joint angle."""
+    stiff = TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, X, None, 0.0, 400.0, 100.0)
+    task = base(force(10.0), stiff, position(None, Y, 0.1))
+    _, _, forces = linear_loop(Springs(), task)
+    still = np.array(settled(task, np.zeros(4), np.zeros(4)))
+    for joint in np.eye(4):
+        torque, angle = 0.4 * joint, 0.005 * joint  # N m, rad
+        expected = forces.move @ (forces.gain * (forces.sense @ torque))
+        found = settled(task, torque, np.zeros(4)) - still
+        assert -found == pytest.approx(expected, abs=3e-3)
+        assert still - settled(task, np.zeros(4), angle) == pytest.approx(forces.hold @ angle, abs=3e-3)
+
+
+def settled(task: TaskCommand, torque: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Joint velocities (4,), rad/s, of an arm that is kept where it is, off the anchors of the task by an angle, rad."""
+    world = Springs()
+    world.loop.tune(replace(OWN, limits=replace(OWN.limits, impact=0.0), task=replace(OWN.task, deadband=0.0)))
+    world.step(task)
+    for _ in range(150):
+        world.q, world.hand = np.array(POSE) + angle, -(torque + 9.0 * world.lever(DOWN))
+        out = world.step(task)
+    return np.array(out.velocity)
 
 
 def test_a_line_is_held_while_the_link_slides_along_it() -> None:

@@ -14,7 +14,7 @@ from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
 from wam_control.hybrid_velocity import posture_velocity
-from wam_control.stability_guard import GuardedContact
+from wam_control.stability_guard import GuardedContact, GuardedForces
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_frame import HAND, AxisState, TaskFrame, force_speed
 from wam_description.arm import Arm
@@ -118,7 +118,7 @@ class TaskControl:
         )
         if reaction.holds != (self._held_at is not None):
             self._held_at, has_changed = (list(q) if reaction.holds else None), True
-        factor, is_other = self._supervision.factor(lambda: self._contacts(states, q), dt)
+        factor, is_other = self._supervision.factor(lambda: self._guarded(states, q), dt)
         speeds = [
             self._speed(state, force, anchor, torques[1], hold, factor, dt)
             for state, force, anchor, hold in zip(states, forces, anchors, self._holds, strict=True)
@@ -160,9 +160,7 @@ class TaskControl:
             for axis, hold in zip(task.axes, self._holds, strict=True)
             if axis.kind is AxisKind.FORCE and axis.place is not None and hold.is_touching
         }
-        self._slid = {
-            at: self._slid.get(at, 0.0) + self._force_axes.slide(q, *at, moved) for at in pressed
-        }
+        self._slid = {at: self._slid.get(at, 0.0) + self._force_axes.slide(q, *at, moved) for at in pressed}
 
     def _find_anchors(self, states: Sequence[AxisState]) -> list[float]:
         """Commanded position of each axis; where none is, the position at which it has begun."""
@@ -232,15 +230,18 @@ class TaskControl:
             found.append(ForcePoint(axis.cover, place, sd, is_known, False, is_known, False, "", conflict, is_single))
         return found
 
-    def _contacts(self, states: Sequence[AxisState], q: Sequence[float]) -> list[GuardedContact]:
+    def _guarded(self, states: Sequence[AxisState], q: Sequence[float]) -> list[GuardedForces]:
+        """All contacts of the task at once; none where nothing is sensed at a point, or not here."""
         contacts = []
         for state in states:
-            if state.point:
+            if state.point and state.force_sd < math.inf:
                 x, y, z = state.direction.tolist()
                 point, force = state.point, _desired(state) or HAND
                 where = (point.cover, point.position, point.position_sd)
                 contacts.append(GuardedContact(tuple(q), *where, (x, y, z), force))
-        return self._supervision.known(contacts)
+        laws = self._supervision.force_law, self._supervision.torque_law
+        loop = self._frame.linear(states, *laws, self._parameters.posture_gain, q) if contacts else None
+        return [GuardedForces(tuple(contacts), *loop)] if loop else []
 
     def _speed(
         self,
@@ -261,7 +262,6 @@ class TaskControl:
             speed = min(speed, hold.approach_speed(state.sensed, state.point, desired, self._parameters))
         fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
         return min(max(speed, -fastest), fastest)
-
 
     def _fed(self, state: AxisState, hold: ForceHold, dt: float) -> Array:
         """Torque of a commanded force that is fed forward (n,), N m."""

@@ -167,7 +167,7 @@ class TaskFrame:
             name, least = "least_joint_damping", own.least_joint_damping
         if axis.damping and axis.damping < least:
             return f"{axis.name}: damping is {axis.damping:g}; allowed: task.{name}, {least:g}, and above"
-        damping = axis.damping or least
+        damping = self._damping(axis)
         if axis.stiffness > own.largest_rate * damping:
             return (
                 f"{axis.name}: stiffness is {axis.stiffness:g} at a damping of {damping:g}; allowed: up to "
@@ -192,7 +192,7 @@ class TaskFrame:
         elif axis.kind is AxisKind.POSITION:
             speed = axis.rate + own.largest_rate * (anchor - state.coordinate)
         else:
-            damping = axis.damping or (own.least_joint_damping if is_joint else own.least_damping)
+            damping = self._damping(axis)
             drive = axis.stiffness * (anchor - state.coordinate) - force
             deadband = own.joint_deadband if is_joint else own.deadband
             speed = axis.rate + math.copysign(max(abs(drive) - deadband, 0.0), drive) / damping
@@ -220,6 +220,47 @@ class TaskFrame:
             left -= np.outer(a, a) / square
             fractions.append(square / damped)
         return Resolved(velocity + left @ np.array(posture), tuple(independence), tuple(fractions))
+
+    def linear(
+        self,
+        states: Sequence[AxisState],
+        frame_law: ForceLaw,
+        joint_law: ForceLaw,
+        posture_gain: float,
+        q: Sequence[float],
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """The law of the task for small motions, for the guard: fields of `wam_control.sampled_loop.Axes`.
+
+        Returns
+        -------
+        tuple
+            sense (p, n), move (n, p), gain and proportional gain (p,), hold (n, n).
+        """
+        n, count = len(q), len(states)
+        no_speed, no_posture = [0.0] * count, [0.0] * n
+        move = np.array([self.resolve(states, unit, no_posture, q).velocity for unit in np.eye(count).tolist()]).T
+        left = np.array([self.resolve(states, no_speed, unit, q).velocity for unit in np.eye(n).tolist()]).T
+        hold, sense, gain = posture_gain * left, np.zeros((count, n)), np.zeros((2, count))
+        for i, state in enumerate(states):
+            axis = state.axis
+            if axis.is_sensed:
+                sense[i] = state.sensed.sense if state.sensed else state.row
+            if axis.kind is AxisKind.FORCE:
+                law = joint_law if axis.joint >= 0 else frame_law.along(axis.direction)
+                k = max(axis.joint, 0)
+                gain[:, i] = law.gain[k], law.proportional_gain[k]
+            elif axis.kind is not AxisKind.VELOCITY:
+                rate = self._parameters.largest_rate
+                if axis.kind is AxisKind.IMPEDANCE:
+                    damping = self._damping(axis)
+                    rate, gain[0, i] = axis.stiffness / damping, 1.0 / damping
+                hold = hold + rate * np.outer(move[:, i], state.row)
+        return sense, move, gain[0], gain[1], hold
+
+    def _damping(self, axis: TaskAxis) -> float:
+        """Damping of an impedance, N s/m or N m s/rad."""
+        own = self._parameters
+        return axis.damping or (own.least_joint_damping if axis.joint >= 0 else own.least_damping)
 
 
 def rank_and_condition(rows: Sequence[Array], limit: float) -> tuple[int, float]:

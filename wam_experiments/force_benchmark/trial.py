@@ -51,7 +51,9 @@ def perform(
     except ValueError as error:
         return refused(task, str(error))
     traces = TaskWatch(configuration, task, run).traces()
-    return worst([evaluated(task._replace(force=force), trace) for (_, force), trace in zip(task.forces, traces, strict=True)])
+    return worst(
+        [evaluated(task._replace(force=force), trace) for (_, force), trace in zip(task.forces, traces, strict=True)]
+    )
 
 
 def with_accepted_gain(configuration: Configuration) -> Configuration:
