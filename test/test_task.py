@@ -250,7 +250,7 @@ def test_the_guard_considers_the_forces_of_a_task_together() -> None:
 
 
 def settled(task: TaskCommand, torque: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Joint velocities (4,), rad/s, of an arm that is kept where it is, off the anchors of the task by an angle, rad."""
+    """Joint velocities (4,), rad/s, of an arm that is kept at an angle, rad, from where the task began."""
     world = Springs()
     world.loop.tune(replace(OWN, limits=replace(OWN.limits, impact=0.0), task=replace(OWN.task, deadband=0.0)))
     world.step(task)

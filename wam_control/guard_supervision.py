@@ -7,7 +7,7 @@ from wam_control.contact_position import ForcePoint
 from wam_control.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of, torque_law
 from wam_control.guard_report import report
 from wam_control.guard_watch import Watch, possible_contacts
-from wam_control.stability_guard import Guarded, GuardAssessment, GuardedContact, StabilityGuard
+from wam_control.stability_guard import GuardAssessment, Guarded, GuardedContact, StabilityGuard
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
 

@@ -219,7 +219,7 @@ class StabilityGuard:
     def scales(
         self, task: GuardedTask, contacts: Sequence[Guarded], tried: Sequence[float] = SCALES
     ) -> Iterator[float]:
-        """Largest linearly stable scales of the gains, each for one contact or several at once, stiffness, delay and lag.
+        """Largest linearly stable scales of the gains, each for one contact or several, stiffness, delay and lag.
 
         One at a time, so that the work can be distributed over periods; the smallest counts.
 

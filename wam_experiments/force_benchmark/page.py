@@ -11,13 +11,16 @@ from wam_experiments.force_benchmark.evaluation import ForceTrial
 from wam_experiments.force_benchmark.outcome import OVERSHOOT, TOLERANCE, TaskEnd
 from wam_experiments.force_benchmark.surfaces import GAP
 from wam_experiments.force_benchmark.tasks import (
+    AT_REST,
     CABLES,
+    DOUBLED,
     FARTHEST,
     FORCES,
     FREQUENCIES,
     FRICTION,
     FRICTIONS,
     MASS,
+    MOVING,
     POSES,
     SECONDS,
     SPEEDS,
@@ -160,9 +163,10 @@ LINE_HEAD = (
 )  # fmt: skip
 
 
-def report(seed: int, trials: Sequence[ForceTrial]) -> str:
+def report(seed: int, code: str, trials: Sequence[ForceTrial]) -> str:
     """The output of the command: what is required, shares, and the failures with their commands."""
-    lines = [
+    lines = [f"code and configuration: {code}"]
+    lines += [
         f"{title}: {found}" + (f"; required {needed}" if needed else "") for title, needed, found, _ in required(trials)
     ]
     lines += ["", *plain([HEAD], [_counts("all", trials)])]
@@ -204,13 +208,14 @@ def details(seed: int, trial: ForceTrial) -> str:
     return "\n".join([*lines, f"  reason: {result.reason}"] if result.reason else lines)
 
 
-def page(trials: Sequence[ForceTrial], seed: int, repeat: str, picture: str) -> str:
+def page(trials: Sequence[ForceTrial], seed: int, code: str, repeat: str, picture: str) -> str:
     """The page of the documentation.
 
     Parameters
     ----------
     trials : of the benchmark.
     seed : of all of them.
+    code : hash of what they are a result of.
     repeat : command that writes this page.
     picture : the figure's path relative to the page.
     """
@@ -219,7 +224,7 @@ def page(trials: Sequence[ForceTrial], seed: int, repeat: str, picture: str) -> 
         for title, needed, found, is_met in required(trials)
     ]
     parts = [
-        PREFACE.format(command=repeat, count=len(trials)),
+        PREFACE.format(command=repeat, count=len(trials), code=code),
         f"![True against commanded force, outcomes by class, peaks]({picture})",
         "",
         markdown(("", "required", "found", ""), rows),
@@ -257,10 +262,16 @@ PREFACE = f"""# Benchmark of force control
 Written by `{{command}}`; nothing here is written by hand.
 
 {{count}} tasks, each drawn from the seed and its number alone: pose, contact, force, friction of the surface,
-feedback, ramp, motion of the surface, and a true arm that differs from the configured one, uniformly distributed: masses by up to
-{MASS:.0%}, friction by {FRICTION:.0%}, cable stiffness by {CABLES:.0%}, motor constants by {TORQUE:.0%}. Forces are
-{FORCES[0]:g} to {FORCES[1]:g} N, surfaces {STIFFNESSES[0]:.0f} to {STIFFNESSES[1]:.0f} N/m with friction
-{FRICTIONS[0]:g} to {FRICTIONS[1]:g}.
+feedback, ramp, motion of the surface, and a true arm that differs from the configured one, uniformly distributed:
+masses by up to {MASS:.0%}, friction by {FRICTION:.0%}, cable stiffness by {CABLES:.0%}, motor constants by
+{TORQUE:.0%}. Forces are {FORCES[0]:g} to {FORCES[1]:g} N, surfaces {STIFFNESSES[0]:.0f} to {STIFFNESSES[1]:.0f} N/m
+with friction {FRICTIONS[0]:g} to {FRICTIONS[1]:g}.
+
+A task is *accepted* where it is neither refused before the arm moves, nor given up before the true force was above the
+commanded one. An accepted task that ends with a wrong force counts against the shares below, whatever was reported.
+
+Code and configuration: `{{code}}`, a hash of the packages that control and simulate, of the tasks and how they are
+evaluated, and of the configuration. The command prints that of the code it runs.
 """
 RULES = f"""## Method
 
@@ -273,11 +284,14 @@ RULES = f"""## Method
 * Refused: the loop reports a reason and neither moves nor touches anything, or the stack does not start. Given up:
   the arm has moved or touched, then holds with a reason, and the true force was never above the commanded one, as
   where another link is touched than commanded. Ended: the force is not within 10 %, or the arm is held, and a reason
-  is reported. Silent: the force is wrong and nothing is reported. Accepted is what is neither refused nor given up.
+  is reported. Silent: the force is wrong and nothing is reported.
 * Above the limit: at some time the true force is above {OVERSHOOT:g} times the commanded plus the impact of (3.1), for
   which all kinetic energy of links and rotors at the first touch goes into the surface.
 * A cycle is a motion of the force that repeats in the last 2 s, above 10 % of the commanded force peak to peak. It
   counts as reported if the loop gives a reason, or the guard predicts at least half of its size.
-* One surface of seven moves, as a sine after 1.5 s of the whole force, half of them along the force: with
-  {1e3 * SPEEDS[0]:g} to {1e3 * SPEEDS[1]:g} mm/s at most, at {FREQUENCIES[0]:g} to {FREQUENCIES[1]:g} Hz, by {1e3 * FARTHEST:g} mm at most. The user declares the speed along the force.
+* {MOVING:.0%} of the surfaces move, as a sine after {AT_REST:g} s of the whole force, half of them along it: with
+  {1e3 * SPEEDS[0]:g} to {1e3 * SPEEDS[1]:g} mm/s, at {FREQUENCIES[0]:g} to {FREQUENCIES[1]:g} Hz, by
+  {1e3 * FARTHEST:g} mm at most. The user declares the speed along the force.
+* {DOUBLED:.0%} of the tasks have a second force elsewhere, commanded at the same time by a task frame of two axes at known
+  positions. Such a task has ended as the force with the greater failure.
 """
