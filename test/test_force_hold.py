@@ -251,7 +251,7 @@ def test_a_place_that_is_not_certain_makes_the_force_less_certain() -> None:
 
 def test_a_contact_on_another_link_is_not_controlled_through_the_jacobian_of_this_one() -> None:
     """A push on the inner link: its position cannot be observed, so it cannot be followed."""
-    touch = Contact("inner_link", math.nan, (0.0, 8.0, 0.0), math.nan, 0.99)
+    touch = other_link(8.0)
     loop = force_loop(ARM, QUIET)
     state = State(POSE, STILL, DRIVEN)
     pushed = BODY.gravity_torque(POSE) + 8.0 * lever(POSE, DOWNWARDS, "inner_link", 0.4)
@@ -303,6 +303,29 @@ def test_a_force_is_not_controlled_while_a_second_contact_is_suspected() -> None
             for _ in range(45):
                 loop.step(State(POSE, STILL, DRIVEN), sensed, contact, None, command, None, None, DT)
             assert loop.reaction is (ForceReaction.NONE if is_single else reaction)
+
+
+def test_a_force_held_for_a_second_contact_goes_back_where_another_link_is_touched() -> None:
+    """It stayed where it was, and pressed on."""
+    loop, command = force_loop(ARM, QUIET), ForceCommand("base", down(5.0))
+    vague = Contact("outer_link", 0.28, (0.0, 8.0, 0.0), 0.001, 0.99, is_single=False)
+    pushed = BODY.gravity_torque(POSE) + 8.0 * lever(POSE, DOWNWARDS, "inner_link", 0.4)
+    moved = State([angle + 0.01 for angle in POSE], STILL, DRIVEN)
+    loop.step(
+        State(POSE, STILL, DRIVEN), State(POSE, STILL, pushed.tolist()), NO_CONTACT, None, command, None, None, DT
+    )
+    for contact, reaction in ((vague, ForceReaction.SECOND_CONTACT), (other_link(8.0), ForceReaction.OTHER_LINK)):
+        for _ in range(60):
+            out = loop.step(
+                moved, State(moved.position, STILL, pushed.tolist()), contact, None, command, None, None, DT
+            )
+        assert loop.reaction is reaction
+        assert (max(map(abs, out.velocity)) > 0.05) is (reaction is ForceReaction.OTHER_LINK)
+
+
+def other_link(newtons: float) -> Contact:
+    """The inner link, touched somewhere."""
+    return Contact("inner_link", math.nan, (0.0, newtons, 0.0), math.nan, 0.99)
 
 
 def test_a_contact_of_which_the_link_stays_unknown_ends_the_command() -> None:
@@ -404,6 +427,17 @@ def test_a_surface_too_hard_for_the_force_is_refused_before_anything_moves() -> 
     loop = force_loop(ARM, slow)
     press(loop, POSE, np.array(DOWNWARDS), 10.0, 3)
     assert "time constant of 2." in loop.reason or "time constant of 3." in loop.reason
+
+
+@pytest.mark.parametrize(("speed", "reaction"), [(0.009, ForceReaction.NONE), (0.013, ForceReaction.TOO_SLOW)])
+def test_a_surface_that_moves_faster_than_the_force_follows_is_refused(speed: float, reaction: ForceReaction) -> None:
+    """An integral law is v/G_I behind: 0.013/0.0145 = 0.9 N, where 5 % of 15 N are allowed."""
+    loop = force_loop(ARM, replace(PINNED, force_gain=(0.0145,), limits=replace(PINNED.limits, surface_speed=speed)))
+    out = press(loop, POSE, np.array(DOWNWARDS), 15.0, 3)
+    assert loop.reaction is reaction
+    assert any(out.velocity) is not bool(reaction)
+    if reaction:
+        assert "would keep the force 0.9 N off; allowed: 0.75 N" in loop.reason
 
 
 def test_errors_of_estimated_torques_grow_with_the_force() -> None:
@@ -723,6 +757,13 @@ def test_an_approach_that_takes_long_is_called_so() -> None:
         world.move(ask(loop, world, down(1.5)).velocity)
     assert loop.reaction is ForceReaction.NOT_REACHED
     assert "nothing is touched yet, 2 s after the command: the arm has moved" in loop.reason
+    for _ in range(250):
+        world.move(ask(loop, world, down(1.5)).velocity)
+    assert loop.reaction is ForceReaction.NOTHING_TOUCHED, "an arm that creeps gives up"
+    assert "3 s after the command: the arm creeps, and has moved" in loop.reason
+    before = list(world.q)
+    world.move(ask(loop, world, down(1.5)).velocity)
+    assert world.q == pytest.approx(before, abs=1e-4)
 
 
 def test_where_the_arm_follows_slowly_it_is_commanded_faster_up_to_the_speed_of_a_bounded_impact() -> None:

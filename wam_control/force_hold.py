@@ -22,6 +22,7 @@ DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
 BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
 FED = 0.3  # s, in which the torque of the force is fed forward after the touch
+CREPT, LITTLE = 1.5, 9e-3  # settling times in which the arm has moved less, m, and touched nothing
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -323,6 +324,12 @@ class ForceHold:
                 f"the arm has moved {self._travel:.3g} m along the force and nothing is touched; allowed: "
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
+            )
+        if not self._has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
+            return ForceReaction.NOTHING_TOUCHED, (
+                f"nothing is touched {self._missed:.2g} s after the command: the arm creeps, and has moved "
+                f"{1e3 * self._travel:.2g} mm; it holds its position: go nearer, declare a softer surface "
+                "(guard.contact_stiffness), or pin the place; command no force, then again"
             )
         if shaken := self._shaken(axis, desired, parameters):
             return ForceReaction.SHAKEN, shaken

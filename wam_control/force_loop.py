@@ -41,7 +41,8 @@ TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
 SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
-NEAR, MIDDLE = 0.25, 0.5  # of a link that is perhaps touched: where its force is taken to be
+NEAR, MIDDLE = 0.15, 0.5  # of a link that is perhaps touched: where its force is taken to be
+FAINT = 0.25  # of a link that may be touched, where its force has to be detected
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
@@ -384,12 +385,12 @@ class ForceLoop:
         return [a - b for a, b in zip(self._free_at, away.tolist(), strict=True)]
 
     def _signal_elsewhere(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
-        """Torques of the commanded force, N, on another cover, `NEAR` its base, in sd of the estimated torques."""
+        """Torques of the commanded force, N, on another cover, `FAINT` its base, in sd of the estimated torques."""
         if not self._external_sd:
             return math.inf
         sd = np.array(self._external_sd)
         found = [
-            desired * float(np.linalg.norm(self._force_axes.lever(q, cover, NEAR * length, direction) / sd))
+            desired * float(np.linalg.norm(self._force_axes.lever(q, cover, FAINT * length, direction) / sd))
             for cover, length in self._other_covers(point)
         ]
         return min(found, default=math.inf)
