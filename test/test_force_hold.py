@@ -432,7 +432,8 @@ def test_a_surface_too_hard_for_the_force_is_refused_before_anything_moves() -> 
 @pytest.mark.parametrize(("speed", "reaction"), [(0.009, ForceReaction.NONE), (0.013, ForceReaction.TOO_SLOW)])
 def test_a_surface_that_moves_faster_than_the_force_follows_is_refused(speed: float, reaction: ForceReaction) -> None:
     """An integral law is v/G_I behind: 0.013/0.0145 = 0.9 N, where 5 % of 15 N are allowed."""
-    loop = force_loop(ARM, replace(PINNED, force_gain=(0.0145,), limits=replace(PINNED.limits, surface_speed=speed)))
+    limits, sensing = replace(PINNED.limits, surface_speed=speed), replace(PINNED.sensing, reported_fraction=0.05)
+    loop = force_loop(ARM, replace(PINNED, force_gain=(0.0145,), limits=limits, sensing=sensing))
     out = press(loop, POSE, np.array(DOWNWARDS), 15.0, 3)
     assert loop.reaction is reaction
     assert any(out.velocity) is not bool(reaction)

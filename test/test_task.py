@@ -189,7 +189,7 @@ def test_the_stated_error_of_a_force_counts_the_friction_of_another_one_on_the_s
             worst = np.maximum(worst, [error / row[3] for error, row in zip(errors, rows, strict=True)])
     assert np.all(worst < 2.0)
     assert np.all(worst > 0.2), "nor is it stated as larger than it is"
-    assert world.loop.reaction is ForceReaction.NOT_SENSED, "and so it is not done"
+    assert world.loop.reaction is ForceReaction.TASK_REFUSED, "and so it is not done"
     same = base(force(12.0), force(8.0, Y))
     assert Springs().step(same, 20).rows[0][3] < 0.1 * 12.0, "two axes at one place are one force"
 

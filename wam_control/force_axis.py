@@ -73,6 +73,13 @@ class SensingParameters:
         live=True,
         before=0.0,
     )
+    force_sd_fraction_unpinned: float = parameter(
+        "the same where the position is estimated, if it is larger: once touched, the position is known better",
+        low=0.0,
+        high=1.0,
+        live=True,
+        before=0.0,
+    )
     reported_fraction: float = parameter(
         "standard deviation of the measured force, per commanded force, above which it is reported",
         low=0.0,
@@ -110,9 +117,10 @@ class SensingParameters:
         """Those of torques that are estimated from the motors."""
         return replace(self, torque_sd=self.estimated_torque_sd, torque_fraction=self.estimated_torque_fraction)
 
-    def sd_limit(self, force: float) -> float:
-        """Largest standard deviation, N, with which a commanded force, N, is controlled."""
-        return max(self.force_sd_limit, self.force_sd_fraction * force)
+    def sd_limit(self, force: float, is_pinned: bool) -> float:
+        """Largest standard deviation, N, with which a force, N, at a pinned or an estimated position is controlled."""
+        unpinned = 0.0 if is_pinned else self.force_sd_fraction_unpinned
+        return max(self.force_sd_limit, max(self.force_sd_fraction, unpinned) * force)
 
 
 class ForceAxis(NamedTuple):

@@ -216,7 +216,7 @@ class ForceHold:
         signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
         elsewhere : the same if another link is touched.
         """
-        limit = parameters.sensing.sd_limit(desired)
+        limit = parameters.sensing.sd_limit(desired, point.is_pinned)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
         self.is_touching = measured >= TOUCH * desired
         if self.is_touching and not self._has_touched:

@@ -317,7 +317,7 @@ class ForceLoop:
             command.frame,
             force_axis,
             point,
-            own.sensing.sd_limit(desired),
+            own.sensing.sd_limit(desired, point.is_pinned),
         )
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
@@ -409,7 +409,7 @@ class ForceLoop:
         found = -math.inf
         for cover, length in self._other_covers(point):
             axis = self._force_axes.axis(q, cover, part * length, 0.0, direction, desired)
-            if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired):
+            if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired, is_pinned=False):
                 found = max(found, -float(axis.sense @ self._external[0]))
         return found
 

@@ -208,8 +208,9 @@ class StabilityGuard:
         return [contact] if float(lever @ lever) > REACH * REACH else []
 
     def sensed(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
-        """Those contacts whose force is known well enough to be controlled."""
-        return [contact for contact in contacts if self.axis(contact).force_sd <= self._sensing.sd_limit(contact.force)]
+        """Those contacts whose force is known well enough to be controlled, at a pinned position or an estimated one."""
+        most = [self._sensing.sd_limit(contact.force, is_pinned=False) for contact in contacts]
+        return [each for each, sd in zip(contacts, most, strict=True) if self.axis(each).force_sd <= sd]
 
     def axis(self, contact: GuardedContact) -> ForceAxis:
         """How the force loop senses the force of a contact, and moves along it."""

@@ -148,7 +148,7 @@ class TaskFrame:
                 "go to another posture"
             )
         for state in states:
-            most = self._sensing.sd_limit(_size(state.axis))
+            most = self._sensing.sd_limit(_size(state.axis), is_pinned=state.axis.place is not None)
             if state.sensed and state.force_sd > most:
                 return (
                     f"{state.axis.name}: the force is measured with a standard deviation of {state.force_sd:.3g} N; "

@@ -292,6 +292,6 @@ RULES = f"""## Method
 * {MOVING:.0%} of the surfaces move, as a sine after {AT_REST:g} s of the whole force, half of them along it: with
   {1e3 * SPEEDS[0]:g} to {1e3 * SPEEDS[1]:g} mm/s, at {FREQUENCIES[0]:g} to {FREQUENCIES[1]:g} Hz, by
   {1e3 * FARTHEST:g} mm at most. The user declares the speed along the force.
-* {DOUBLED:.0%} of the tasks have a second force elsewhere, commanded at the same time by a task frame of two axes at known
-  positions. Such a task has ended as the force with the greater failure.
+* {DOUBLED:.0%} of the tasks have a second force elsewhere, commanded at the same time by a task frame of two axes at
+  known positions. Such a task has ended as the force with the greater failure.
 """
