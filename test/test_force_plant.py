@@ -41,7 +41,10 @@ def free_arm(q: tuple[float, ...], step: ScenarioStep, **changes: Any) -> Simula
 @pytest.mark.parametrize(
     ("q", "newtons"),
     [
-        *(((0.0, -1.0, 0.0, math.pi / 2.0 - bend), newtons) for bend, newtons in ((0.15, 5.0), (0.2, 15.0), (0.4, 15.0))),
+        *(
+            ((0.0, -1.0, 0.0, math.pi / 2.0 - bend), newtons)
+            for bend, newtons in ((0.15, 5.0), (0.2, 15.0), (0.4, 15.0))
+        ),
         ((-2.2, -1.03, 1.34, 0.7), 15.0),
         ((-2.15, -0.26, -0.09, -0.66), 15.0),
     ],
@@ -76,7 +79,9 @@ def test_the_guard_counts_a_payload() -> None:
     scales = []
     for mass in (0.0, 0.5):
         loaded = replace(WAM, payload=mass)
-        guard = StabilityGuard(loaded, CONFIGURATION.shared.servo, CONFIGURATION.shared.timing, own.guard, sensing_of(own))
+        guard = StabilityGuard(
+            loaded, CONFIGURATION.shared.servo, CONFIGURATION.shared.timing, own.guard, sensing_of(own)
+        )
         contacts = guard.contacts(own.guard.posture, OUTER, 0.28, 0.0)
         scales.append(min(guard.scales(task_of(own, force_law(own)), contacts)))
     assert abs(scales[1] / scales[0] - 1.0) > 0.1
