@@ -208,7 +208,7 @@ class StabilityGuard:
         return [contact] if float(lever @ lever) > REACH * REACH else []
 
     def sensed(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
-        """Those contacts whose force is known well enough to be controlled, at a pinned position or an estimated one."""
+        """Those contacts whose force is known well enough to be controlled, pinned or not."""
         most = [self._sensing.sd_limit(contact.force, is_pinned=False) for contact in contacts]
         return [each for each, sd in zip(contacts, most, strict=True) if self.axis(each).force_sd <= sd]
 
