@@ -83,7 +83,8 @@ class ContactPosition:
             cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
             conflict = _conflict(contact, cover, parameters)
             position = slid_position(self._covers, cover, position, self._slid)
-            return ForcePoint(cover, position, 0.0, True, True, True, False, "", conflict, contact.is_single)
+            sd = parameters.contact_position_sd
+            return ForcePoint(cover, position, sd, True, True, True, False, "", conflict, contact.is_single)
         problem = _problem(contact, lean, parameters) if contact.cover else ""
         if not contact.cover:
             self._last = None

@@ -54,7 +54,8 @@ class Supervision:
         guard, parameters = self._guard, self._parameters
         is_joints, mode = parameters.mode == "joint_torque", parameters.guard.mode
         task = task_of(parameters, self.torque_law if is_joints else self.force_law)
-        position_sd = 0.0 if parameters.contact_source == "pinned" else parameters.position_uncertainty_limit
+        is_pinned = parameters.contact_source == "pinned"
+        position_sd = parameters.contact_position_sd if is_pinned else parameters.position_uncertainty_limit
         contacts = [
             contact
             for q in postures

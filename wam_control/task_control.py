@@ -222,7 +222,8 @@ class TaskControl:
             if axis.place is not None:
                 slid = self._slid.get((axis.cover, axis.place), 0.0)
                 place = slid_position(self._covers, axis.cover, axis.place, slid) if slid else axis.place
-                found.append(ForcePoint(axis.cover, place, 0.0, True, True, True, False, "", conflict, is_single))
+                sd = own.contact_position_sd
+                found.append(ForcePoint(axis.cover, place, sd, True, True, True, False, "", conflict, is_single))
                 continue
             length = self._covers.length_of(axis.cover)
             place, sd = self._places.get(axis.cover, (length / 2.0, length / math.sqrt(12.0)))

@@ -51,6 +51,10 @@ class Surface(NamedTuple):
         along = sum(a * b for a, b in zip(self.direction, self.motion, strict=True))
         return 2.0 * math.pi * self.frequency * abs(along)
 
+    def slide(self, link: Array) -> float:
+        """Standard deviation of the motion along a link, whose direction is given (3,), m."""
+        return abs(float(link @ np.array(self.motion))) / math.sqrt(2.0)
+
 
 def is_clear(body: RigidBody, q: Sequence[float], surface: Surface) -> bool:
     """Whether it touches nothing in the pose q, rad, and no other part of the arm is nearer than `CLEARANCE`."""

@@ -35,6 +35,7 @@ RAMP_STEP = 0.02  # s
 DITHER_CYCLE = 40  # inner periods: 25 Hz
 RELEASE = 0.5  # s, until the force is commanded
 SECONDS = 4.0  # s of the whole force
+FULL_FRICTION = 0.5  # sd of the friction of a surface that moves, which is there in full: rms of `FRICTIONS`
 AT_REST = 1.5  # s of the whole force, until a surface moves
 
 
@@ -218,7 +219,6 @@ def configured(base: Configuration, task: Task) -> Configuration:
     values: dict[str, Any] = {
         "arm.joints.start": list(task.q),
         "force_loop:guard.contact_stiffness": surface.stiffness,
-        "force_loop:limits.surface_speed": surface.speed,
         "force_loop:guard.posture": list(task.q),
         "force_loop:contact_source": "pinned" if conditions.is_pinned else "estimated",
         "contact_estimator:observer.mass_scale": [1.0] * n,
@@ -228,6 +228,13 @@ def configured(base: Configuration, task: Task) -> Configuration:
     }
     if conditions.is_pinned:
         values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": surface.place}
+    if surface.frequency:
+        along = RigidBody(base.shared.arm).cover_pose(task.q, surface.cover).rotation[:, 0]
+        values |= {
+            "force_loop:sensing.friction": FULL_FRICTION,
+            "force_loop:limits.surface_speed": surface.speed,
+            "force_loop:contact_position_sd": surface.slide(along),
+        }
     if conditions.is_dithered:
         values |= {
             "arm.joint_sensors": False,
