@@ -26,8 +26,6 @@ CREPT, LITTLE = 1.5, 9e-3  # settling times in which the arm has moved less, m, 
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
-KEPT = 1.25  # settling times, up to which a force off the tolerance is remembered
-SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
 FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
@@ -101,8 +99,7 @@ class ForceHold:
 
     def _forget_swings(self) -> None:
         """What the force was before something was touched says nothing of how it is held."""
-        self._swings = self._off = self._within = 0.0
-        self._above = self._below = math.inf
+        self._strayed = self._within = 0.0
         self._report = ""
         self._turns.reset()
 
@@ -406,11 +403,8 @@ class ForceHold:
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
-        self._above = 0.0 if is_off and error < 0.0 else self._above + dt
-        self._below = 0.0 if is_off and error > 0.0 else self._below + dt
-        self._swings = self._swings + dt if max(self._above, self._below) < SWING * lasting else 0.0
-        # within the tolerance for the lesser part of the time, or not yet for long
-        self._off = min(max(self._off + (dt if is_off else -dt), 0.0), KEPT * lasting)
+        has_rested = not self._has_settled or self._within >= LEFT * lasting
+        self._strayed = 0.0 if has_rested else self._strayed + dt * is_off
         if not self._has_touched and abs(self._missed) > lasting:
             return (
                 f"nothing is touched yet, {abs(self._missed):.2g} s after the command: the arm has moved "
@@ -424,16 +418,11 @@ class ForceHold:
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
                 "another direction, or bend the arm"
             )
-        if self._swings > lasting:
+        if self._strayed > LEFT * lasting:
             return (
-                f"the force swings about {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N to either "
-                f"side, for {self._swings:.2g} s: the surface moves, the position is not known, or it is a limit "
-                "cycle; pin the position, or lower force_gain"
-            )
-        if self._off > lasting:
-            return (
-                f"the force was off {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N for most of "
-                f"the last {2.0 * lasting:.2g} s: it comes slowly, the surface moves, or it is a slow limit cycle"
+                f"the force was reached, and leaves {desired:.3g} N again and again by more than "
+                f"{tolerance(desired, parameters):.2g} N: the surface moves, friction turns, the position is not known, or it is a limit cycle; "
+                "pin the position, or lower force_gain"
             )
         return ""
 
