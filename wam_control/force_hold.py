@@ -421,7 +421,7 @@ class ForceHold:
         if self._strayed > LEFT * lasting:
             return (
                 f"the force was reached, and leaves {desired:.3g} N again and again by more than "
-                f"{tolerance(desired, parameters):.2g} N: the surface moves, friction turns, the position is not known, "
+                f"{tolerance(desired, parameters):.2g} N: the surface moves, friction turns, the position is unknown, "
                 "or it is a limit cycle; pin the position, or lower force_gain"
             )
         return ""
