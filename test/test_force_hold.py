@@ -794,6 +794,21 @@ def test_a_force_that_the_motors_would_not_show_is_refused_before_the_arm_moves(
             assert f"allowed: sensing.{name}, and above" in loop.reason
 
 
+@pytest.mark.parametrize(("sd", "reaction"), [(0.1, ForceReaction.NONE), (1.2, ForceReaction.UNCERTAIN)])
+def test_what_the_estimator_states_of_its_torques_counts_in_what_is_reported(
+    sd: float, reaction: ForceReaction
+) -> None:
+    """5.8 N were true of 7, known to 0.25 N by the configured errors of the torques, to 0.8 N by the stated ones."""
+    limits = replace(QUIET.limits, settling_time=0.3)
+    own = replace(QUIET, feedback="contact_estimate", contact_source="pinned", contact_position=0.28, limits=limits)
+    loop = force_loop(ARM, replace(own, sensing=replace(FULL, friction=0.0)))
+    touch = Contact("outer_link", 0.28, (0.0, 20.0, 0.0), 0.001, 1.0)
+    external = (-20.0 * lever(POSE)).tolist()
+    for _ in range(100):
+        ask(loop, World(1e-9), down(20.0), external=external, external_sd=[sd] * 4, contact=touch)
+    assert loop.reaction is reaction
+
+
 def test_from_the_motors_a_link_that_would_be_pressed_too_hard_before_it_is_detected_is_a_reason_to_hold() -> None:
     """At an estimated position: another link, touched at a quarter of its length, has to be detected at that force."""
     elsewhere = 8.0 * lever(POSE, DOWNWARDS, "inner_link", 0.25 * ARM.covers.length[0])

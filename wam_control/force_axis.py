@@ -157,6 +157,10 @@ class ForceAxis(NamedTuple):
         """Size of the torques of a force, N, in standard deviations of the estimated torques (n,), N m."""
         return force * float(np.linalg.norm(self.press / np.array(torque_sd)))
 
+    def error(self, torque_sd: Sequence[float]) -> float:
+        """Standard deviation of the force, N, by those of the torques (n,), N m."""
+        return float(np.linalg.norm(self.sense * np.array(torque_sd)))
+
     def unexplained(self, torques: Array) -> float:
         """chi^2 of torques of the world on the joints (n,), N m, that no force along the direction explains."""
         weighted = self.precision @ torques

@@ -199,6 +199,7 @@ class ForceHold:
         dt: float,
         signal: float = math.inf,
         elsewhere: float = math.inf,
+        torque_error: float = 0.0,
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
@@ -212,6 +213,7 @@ class ForceHold:
         dt : outer period, s.
         signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
         elsewhere : the same if another link is touched.
+        torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
         """
         limit = parameters.sensing.sd_limit(desired, point.is_pinned)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
@@ -245,7 +247,8 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        is_uncertain = axis.force_sd > known
+        force_sd = math.hypot(axis.force_sd, torque_error)
+        is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
@@ -258,7 +261,7 @@ class ForceHold:
             return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
         if missed:
             return ForceReaction.NOT_REACHED, missed
-        return self._doubted(axis, point, desired, unexplained, parameters)
+        return self._doubted(axis, point, force_sd, desired, unexplained, parameters)
 
     def _too_weak(
         self, point: ForcePoint, desired: float, signal: float, elsewhere: float, parameters: ForceLoopParameters
@@ -363,6 +366,7 @@ class ForceHold:
         self,
         axis: ForceAxis,
         point: ForcePoint,
+        force_sd: float,
         desired: float,
         unexplained: float,
         parameters: ForceLoopParameters,
@@ -379,7 +383,7 @@ class ForceHold:
             return ForceReaction.PLACE_ASSUMED, _place_assumed(axis, point)
         if self._uncertain > lasting:
             return ForceReaction.UNCERTAIN, (
-                f"the force is known to +-{axis.force_sd:.2g} N, {axis.force_sd / desired:.0%} of the commanded "
+                f"the force is known to +-{force_sd:.2g} N, {force_sd / desired:.0%} of the commanded "
                 f"{desired:.3g} N; sensing.reported_fraction, {parameters.sensing.reported_fraction:.0%}, is to be "
                 "known, less where it is measured off: tare in free space, command more force, or another direction "
                 "or pose"

@@ -41,7 +41,7 @@ TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
 SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
-NEAR, MIDDLE = 0.15, 0.5  # of a link that is perhaps touched: where its force is taken to be
+NEAR, MIDDLE = 0.1, 0.5  # of a link that is perhaps touched: where its force is taken to be
 FAINT = 0.25  # of a link that may be touched, where its force has to be detected
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
@@ -323,9 +323,10 @@ class ForceLoop:
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
         signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
+        torque_error = force_axis.error(self._external_sd) if self._external_sd else 0.0
         elsewhere = math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired)
         reaction, reason = self._hold.step(
-            force_axis, point, self._external[0], measured, desired, own, dt, signal, elsewhere
+            force_axis, point, self._external[0], measured, desired, own, dt, signal, elsewhere, torque_error
         )
         self._react(reaction, reason)
         self._remember(q, moved, contact, point)
