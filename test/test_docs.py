@@ -60,6 +60,18 @@ def test_a_changed_block_is_noticed_and_a_changed_sentence_is_kept(generate: Any
 # names
 
 
+def test_the_tests_that_force_md_names_exist() -> None:
+    named = re.findall(r"`(test_\w+)\.(test_\w+)`", HANDBOOK["force.md"])
+    assert len({row.split("|")[1] for row in HANDBOOK["force.md"].splitlines() if re.match(r"\| F\d+ ", row)}) == 21
+    missing = [f"{file}.{name}" for file, name in named if f"def {name}(" not in source(file)]
+    assert missing == []
+
+
+def source(test: str) -> str:
+    path = ROOT / "test" / f"{test}.py"
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
+
+
 def test_topics_and_services_named_in_the_handbook_exist(domain_id: int) -> None:
     from wam_description.nodes import NODES
     from wam_ros.bring_up import Composition

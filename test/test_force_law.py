@@ -258,7 +258,7 @@ def test_a_force_too_small_to_have_a_direction_is_none(newtons: float) -> None:
 
 
 def test_a_torque_above_the_limit_is_refused_and_the_last_good_one_remains_in_force() -> None:
-    loop = force_loop(ARM, replace(OWN, mode="joint_torque", torque_limit=4.0))
+    loop = force_loop(ARM, replace(OWN, mode="joint_torque", torque_limit=4.0, force_feedforward=1.0))
     for torque in ([1.0, 2.0, 0.0, 0.0], [1.0, -4.5, 0.0, 0.0]):
         out = ask(loop, World(1e-9), None, torque=torque)
     assert out.effort == [1.0, 2.0, 0.0, 0.0]

@@ -152,7 +152,7 @@ def test_servo_gains_of_the_velocity_loop_reach_the_guard_while_both_run(ros: An
 
 def test_a_joint_torque_command_that_is_too_old_counts_as_none(ros: Any, tmp_path: Path) -> None:
     feeder = Feeder(ros, tmp_path)
-    assert feeder.set(mode="joint_torque").successful
+    assert feeder.set(mode="joint_torque", force_feedforward=1.0).successful
     heard = Listener(ros, "joint_effort_command").seen["joint_effort_command"]
     row = BY_NAME["joint_torque_command"]
     publisher = feeder.node.create_publisher(message_type(row), row.name, qos(row))

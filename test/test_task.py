@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,9 @@ import pytest
 
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.force_loop_parameters import force_law, sensing_of
+from wam_control.force_loop_parameters import task_of as task_of_parameters
+from wam_control.stability_guard import GuardedForces, GuardedTask, StabilityGuard
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, joint_axes, line_axes, table_of, task_of
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
@@ -164,6 +168,96 @@ def test_a_free_arm_follows_a_stiff_hand_without_oscillating(stiffness: float) -
         forces.append(float(np.linalg.norm(pull)))
     assert forces[-1] < 4.0
     assert np.all(np.diff(forces[60:]) < 0.02), "it yields more and more, and never comes back"
+
+
+def test_the_stated_error_of_a_force_counts_the_friction_of_another_one_on_the_same_link() -> None:
+    """Each force with friction of 0.3 across it, in every direction: the other one is measured as wrong as stated."""
+    places, along, newtons = (0.33, 0.2), (np.array(DOWN), np.array(Y)), (12.0, 8.0)
+    task = base(*(force(f, tuple(n), x) for f, n, x in zip(newtons, along, places, strict=True)))
+    worst = np.zeros(2)
+    for pressed in (0, 1):
+        for angle in np.linspace(0.0, 2.0 * math.pi, 9):
+            world, torque = Springs(), np.zeros(4)
+            for i, (f, n, x) in enumerate(zip(newtons, along, places, strict=True)):
+                across = np.cross(n, X)
+                friction = 0.3 * f * (math.cos(angle) * np.array(X) + math.sin(angle) * across) if i == pressed else 0.0
+                point = [x, 0.0, 0.0] + ARM.covers.radius[1] * (BODY.cover_pose(POSE, COVER).rotation.T @ n)
+                torque += (f * n + friction) @ BODY.point_jacobian(POSE, COVER, tuple(point))
+            world.hand = -torque
+            rows = world.step(task).rows
+            errors = [abs(row[2] - f) for row, f in zip(rows, newtons, strict=True)]
+            worst = np.maximum(worst, [error / row[3] for error, row in zip(errors, rows, strict=True)])
+    assert np.all(worst < 2.0)
+    assert np.all(worst > 0.2), "nor is it stated as larger than it is"
+    assert world.loop.reaction is ForceReaction.TASK_REFUSED, "and so it is not done"
+    same = base(force(12.0), force(8.0, Y))
+    assert Springs().step(same, 20).rows[0][3] < 0.1 * 12.0, "two axes at one place are one force"
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_task_feeds_the_torque_of_its_forces_forward_as_the_force_loop_does(share: float) -> None:
+    """By the same parameter: on a free arm it is a throw, and the arm hits what it was to touch."""
+    world = Springs()
+    world.loop.tune(replace(OWN, force_feedforward=share, friction_feedforward=0.0))
+    joint = TaskAxis(AxisKind.FORCE, 2, value=0.5)
+    effort = world.step(base(force(10.0), joint)).effort
+    assert effort == pytest.approx(share * (10.0 * world.lever(DOWN) + [0.0, 0.0, 0.5, 0.0]), abs=1e-6)
+
+
+def test_a_task_from_the_motors_feeds_the_torque_of_its_force_forward_after_the_touch() -> None:
+    world = Springs()
+    world.loop.tune(replace(OWN, feedback="contact_estimate"))
+    lever, still = world.lever(DOWN), State(POSE, REST, [1.0] * 4)
+    for touched, share in ((0.0, 0.0), (8.0, 1.0)):
+        contact = Contact(COVER, PLACE, (0.0, 0.0, touched), 0.001, 1.0, 0.1) if touched else NO_CONTACT
+        for _ in range(200):
+            external = (-touched * lever).tolist()
+            out = world.loop.step(still, None, contact, external, None, None, None, DT, base(force(10.0)))
+        assert out.effort == pytest.approx(share * 10.0 * lever, abs=1e-6)
+
+
+def linear_loop(world: Springs, task: TaskCommand) -> tuple[StabilityGuard, GuardedTask, GuardedForces]:
+    """What the guard considers of a task."""
+    guard = StabilityGuard(ARM, SHARED.servo, SHARED.timing, GIVEN.guard, sensing_of(GIVEN))
+    seen: list[GuardedForces] = []
+
+    def factor(where: Callable[[], list[GuardedForces]], dt: float) -> tuple[float, bool]:
+        seen.extend(where())
+        return 1.0, False
+
+    world.loop._supervision.factor = factor  # type: ignore[assignment, method-assign]
+    world.step(task)
+    return guard, task_of_parameters(GIVEN, force_law(GIVEN)), seen[0]
+
+
+def test_the_guard_considers_one_force_of_a_task_as_a_force_alone() -> None:
+    guard, task, forces = linear_loop(Springs(), base(force(10.0)))
+    assert min(guard.scales(task, [forces])) == pytest.approx(min(guard.scales(task, forces.contacts)), rel=0.01)
+
+
+def test_the_guard_considers_the_forces_of_a_task_together() -> None:
+    """Its linear law is that of the task: joint velocities per torque of the world and per joint angle."""
+    stiff = TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, X, None, 0.0, 400.0, 100.0)
+    task = base(force(10.0), stiff, position(None, Y, 0.1))
+    _, _, forces = linear_loop(Springs(), task)
+    still = np.array(settled(task, np.zeros(4), np.zeros(4)))
+    for joint in np.eye(4):
+        torque, angle = 0.4 * joint, 0.005 * joint  # N m, rad
+        expected = forces.move @ (forces.gain * (forces.sense @ torque))
+        found = settled(task, torque, np.zeros(4)) - still
+        assert -found == pytest.approx(expected, abs=3e-3)
+        assert still - settled(task, np.zeros(4), angle) == pytest.approx(forces.hold @ angle, abs=3e-3)
+
+
+def settled(task: TaskCommand, torque: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Joint velocities (4,), rad/s, of an arm that is kept at an angle, rad, from where the task began."""
+    world = Springs()
+    world.loop.tune(replace(OWN, limits=replace(OWN.limits, impact=0.0), task=replace(OWN.task, deadband=0.0)))
+    world.step(task)
+    for _ in range(150):
+        world.q, world.hand = np.array(POSE) + angle, -(torque + 9.0 * world.lever(DOWN))
+        out = world.step(task)
+    return np.array(out.velocity)
 
 
 def test_a_line_is_held_while_the_link_slides_along_it() -> None:

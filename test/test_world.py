@@ -13,6 +13,7 @@ from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.movable import Doors, FreeBodies, Motions, principal_inertia
 from wam_description.parameters import ParameterError, build_part
+from wam_description.rigid_body import RigidBody
 from wam_description.signals import ObjectState
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
@@ -218,3 +219,26 @@ def test_a_reset_puts_every_object_back() -> None:
     assert plant.objects()[1].angle > 0.1
     plant.reset()
     assert np.array(plant.objects()) == pytest.approx(np.array(start), nan_ok=True)
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 4000.0])
+def test_a_folded_elbow_is_stopped_by_the_links_that_touch(stiffness: float) -> None:
+    """One force between the two tubes; its torque about the elbow is what the joint measures."""
+    start, goal = (0.0, -1.0, 0.0, -1.2), (0.0, -1.0, 0.0, -1.45)
+    given = {"arm.joints.start": list(start), "force_loop:guard.posture": list(start)}
+    given |= {"driver:world.folding.stiffness": stiffness, "driver:world.obstacles.positions": [3.0, 3.0, 3.0]}
+    steps = [ScenarioStep("release", 0.3, request="enable"), ScenarioStep("fold", 1.7, posture=goal)]
+    run = Simulation(CONFIGURATION.with_values(given), steps)
+    while not run.step():
+        pass
+    plant, body = run.driver.plant, RigidBody(WAM)
+    loads = {load.cover: load for load in plant.loads()}
+    assert set(loads) == ({"inner_link", "outer_link"} if stiffness else set())
+    if stiffness:
+        on = {name: body.cover_pose(plant.q, name).rotation @ np.array(load.force) for name, load in loads.items()}
+        assert on["inner_link"] == pytest.approx(-on["outer_link"], abs=0.01)
+        size = float(np.linalg.norm(on["outer_link"]))
+        assert size > 20.0, "N"
+        torques = run.estimate.external_torques
+        assert abs(torques[3]) == pytest.approx(size * loads["outer_link"].place, rel=0.05)
+        assert np.abs(torques[:3]).max() < 0.3, "N m: nothing else holds the arm"

@@ -16,6 +16,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``force_measurement``             - the external torques, by the feedback that is chosen; low pass
 ``force_axis``                    - how a force along a direction is sensed, how the arm moves along it, how well
 ``force_hold``                    - when the arm holds its position instead, and why
+``feed_forward``                  - torques of the forces and dry friction, fed forward
 ``force_swing``                   - limit cycles of the measured force, and the shaking of the arm by a dither
 ``motion_limits``                 - limits of the velocities: ends of the joints, contact force
 ``force_law``                     - error to velocity of one axis: saturation, deadband, G_I, G_P; delay line

@@ -82,10 +82,9 @@ class ContactPosition:
             self._last = None
             cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
             conflict = _conflict(contact, cover, parameters)
-            length = self._covers.length_of(cover)
-            if position < length - self._covers.radius_of(cover):
-                position = min(max(position - self._slid, 0.0), length)
-            return ForcePoint(cover, position, 0.0, True, True, True, False, "", conflict, contact.is_single)
+            position = slid_position(self._covers, cover, position, self._slid)
+            sd = parameters.contact_position_sd
+            return ForcePoint(cover, position, sd, True, True, True, False, "", conflict, contact.is_single)
         problem = _problem(contact, lean, parameters) if contact.cover else ""
         if not contact.cover:
             self._last = None
@@ -104,6 +103,12 @@ class ContactPosition:
         return ForcePoint(
             cover, position, sd, is_certain, False, is_identified, is_doubtful, problem, conflict, contact.is_single
         )
+
+
+def slid_position(covers: Covers, cover: str, position: float, way: float) -> float:
+    """Where a cover is touched, m, that has slid along itself by a way, m, since it was touched at a position, m."""
+    length = covers.length_of(cover)
+    return min(max(position - way, 0.0), length) if position < length - covers.radius_of(cover) else position
 
 
 def anywhere_sd(covers: Covers, cover: str, position: float) -> float:

@@ -73,6 +73,13 @@ class SensingParameters:
         live=True,
         before=0.0,
     )
+    force_sd_fraction_unpinned: float = parameter(
+        "the same where the position is estimated, if it is larger: once touched, the position is known better",
+        low=0.0,
+        high=1.0,
+        live=True,
+        before=0.0,
+    )
     reported_fraction: float = parameter(
         "standard deviation of the measured force, per commanded force, above which it is reported",
         low=0.0,
@@ -110,9 +117,10 @@ class SensingParameters:
         """Those of torques that are estimated from the motors."""
         return replace(self, torque_sd=self.estimated_torque_sd, torque_fraction=self.estimated_torque_fraction)
 
-    def sd_limit(self, force: float) -> float:
-        """Largest standard deviation, N, with which a commanded force, N, is controlled."""
-        return max(self.force_sd_limit, self.force_sd_fraction * force)
+    def sd_limit(self, force: float, is_pinned: bool) -> float:
+        """Largest standard deviation, N, with which a force, N, at a pinned or an estimated position is controlled."""
+        unpinned = 0.0 if is_pinned else self.force_sd_fraction_unpinned
+        return max(self.force_sd_limit, max(self.force_sd_fraction, unpinned) * force)
 
 
 class ForceAxis(NamedTuple):
@@ -149,6 +157,10 @@ class ForceAxis(NamedTuple):
         """Size of the torques of a force, N, in standard deviations of the estimated torques (n,), N m."""
         return force * float(np.linalg.norm(self.press / np.array(torque_sd)))
 
+    def error(self, torque_sd: Sequence[float]) -> float:
+        """Standard deviation of the force, N, by those of the torques (n,), N m."""
+        return float(np.linalg.norm(self.sense * np.array(torque_sd)))
+
     def unexplained(self, torques: Array) -> float:
         """chi^2 of torques of the world on the joints (n,), N m, that no force along the direction explains."""
         weighted = self.precision @ torques
@@ -183,6 +195,19 @@ class ForceAxes:
         """Torque on each joint per force (n,), m; arguments as those of `axis`."""
         result: Array = direction @ self._jacobian(q, cover, position, direction)[0]
         return result
+
+    def disturbance(
+        self, q: Sequence[float], cover: str, position: float, position_sd: float, direction: Array, force: float
+    ) -> list[Array]:
+        """Torques (n,), N m, of another force and of its friction, each as large as its standard deviation.
+
+        Arguments as those of `axis`.
+        """
+        size = max(force, SMALLEST_FORCE)
+        jacobian, point = self._jacobian(q, cover, position, direction)
+        slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
+        friction = self._parameters.friction * size * _across(direction, direction)
+        return [size * direction @ jacobian, *(friction @ jacobian), position_sd * size * direction @ slide]
 
     def slide(self, q: Sequence[float], cover: str, position: float, moved: Array) -> float:
         """Way of a point of a cover along the cover, m, by a motion of the joints (n,), rad."""

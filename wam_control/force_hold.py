@@ -22,11 +22,10 @@ DETECTED = 0.04  # s, until a touch is detected there
 LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measured force and the arm's speed are late
 BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
 FED = 0.3  # s, in which the torque of the force is fed forward after the touch
+CREPT, LITTLE = 1.5, 9e-3  # settling times in which the arm has moved less, m, and touched nothing
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
-KEPT = 1.25  # settling times, up to which a force off the tolerance is counted
-SWING = 0.5  # of the settling time, within which a force that swings is off to both sides
 FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
@@ -54,7 +53,7 @@ class ForceReaction(IntEnum):
     UNCERTAIN = 10  # goes on: the force is not known as well as it has to be reached
     CYCLE = 11  # goes on: the measured force is in a limit cycle
     SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
-    TOO_SLOW = 13  # holds: the surface is so stiff for the commanded force that the arm would hardly move towards it
+    TOO_SLOW = 13  # holds: towards the surface, or with it, the arm moves too slowly for the commanded force
     SECOND_CONTACT = 14  # holds: a second contact is nearly certain, whose torques are not those of the force
 
     @property
@@ -100,8 +99,7 @@ class ForceHold:
 
     def _forget_swings(self) -> None:
         """What the force was before something was touched shows nothing of how it is held."""
-        self._swings = self._off = self._within = 0.0
-        self._above = self._below = math.inf
+        self._strayed = self._within = 0.0
         self._report = ""
         self._turns.reset()
 
@@ -129,14 +127,14 @@ class ForceHold:
         return fastest / axis.speed_fraction
 
     def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
-        """Fraction of the torque of the commanded force that is fed forward in this period.
+        """Fraction of the torque of the commanded force that is fed forward in this period: `force_feedforward` at least.
 
-        On a free arm it would be a throw.  From the motors it rises after the touch: the velocity loop would take
-        seconds to wind up to it on a stiff surface.  Without dither it would only wind up the friction of the arm.
+        From the motors it rises after the touch: the velocity loop would take seconds to wind up to it on a stiff
+        surface.  Without dither it would only wind up the friction of the arm.
         """
         is_fed = parameters.is_estimated and point.is_pinned and self.is_touching
         self.fed = min(self.fed + dt / FED, 1.0) if is_fed else 0.0
-        return self.fed
+        return max(parameters.force_feedforward, self.fed)
 
     def keeps(self, axis: ForceAxis, measured: float, desired: float, parameters: ForceLoopParameters) -> bool:
         """Whether the arm is to keep a force, N, that is nearly the commanded one.
@@ -201,6 +199,7 @@ class ForceHold:
         dt: float,
         signal: float = math.inf,
         elsewhere: float = math.inf,
+        torque_error: float = 0.0,
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
@@ -214,8 +213,9 @@ class ForceHold:
         dt : outer period, s.
         signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
         elsewhere : the same if another link is touched.
+        torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
         """
-        limit = parameters.sensing.sd_limit(desired)
+        limit = parameters.sensing.sd_limit(desired, point.is_pinned)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
         self.is_touching = measured >= TOUCH * desired
         if self.is_touching and not self._has_touched:
@@ -247,7 +247,8 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        is_uncertain = axis.force_sd > known
+        force_sd = math.hypot(axis.force_sd, torque_error)
+        is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
@@ -260,7 +261,7 @@ class ForceHold:
             return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
         if missed:
             return ForceReaction.NOT_REACHED, missed
-        return self._doubted(axis, point, desired, unexplained, parameters)
+        return self._doubted(axis, point, force_sd, desired, unexplained, parameters)
 
     def _too_weak(
         self, point: ForcePoint, desired: float, signal: float, elsewhere: float, parameters: ForceLoopParameters
@@ -325,6 +326,12 @@ class ForceHold:
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
+        if not self._has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
+            return ForceReaction.NOTHING_TOUCHED, (
+                f"nothing is touched {self._missed:.2g} s after the command: the arm creeps, and has moved "
+                f"{1e3 * self._travel:.2g} mm; it holds its position: go nearer, declare a softer surface "
+                "(guard.contact_stiffness), or pin the position; command no force, then again"
+            )
         if shaken := self._shaken(axis, desired, parameters):
             return ForceReaction.SHAKEN, shaken
         if self.is_touching:
@@ -337,6 +344,14 @@ class ForceHold:
                 f"settle with a time constant of {1.0 / pace:.2g} s, and at most 1/{SETTLED:g} of "
                 "limits.settling_time is allowed; the arm holds its position: bend the arm, or command another "
                 "direction or position"
+            )
+        lag = parameters.limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
+        most = parameters.sensing.reported_fraction * desired
+        if lag > most:
+            return ForceReaction.TOO_SLOW, (
+                f"a surface that moves with {parameters.limits.surface_speed:g} m/s (limits.surface_speed) would keep "
+                f"the force {lag:.2g} N off; allowed: {most:.2g} N (sensing.reported_fraction); the arm holds its "
+                "position: command more force, a larger force_gain, or let the surface move more slowly"
             )
         speed = self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < CREEP:
@@ -352,6 +367,7 @@ class ForceHold:
         self,
         axis: ForceAxis,
         point: ForcePoint,
+        force_sd: float,
         desired: float,
         unexplained: float,
         parameters: ForceLoopParameters,
@@ -368,7 +384,7 @@ class ForceHold:
             return ForceReaction.PLACE_ASSUMED, _place_assumed(axis, point)
         if self._uncertain > lasting:
             return ForceReaction.UNCERTAIN, (
-                f"the force is known to +-{axis.force_sd:.2g} N, {axis.force_sd / desired:.0%} of the commanded "
+                f"the force is known to +-{force_sd:.2g} N, {force_sd / desired:.0%} of the commanded "
                 f"{desired:.3g} N; sensing.reported_fraction, {parameters.sensing.reported_fraction:.0%}, is to be "
                 "known, less where it is measured off: tare in free space, command more force, or another direction "
                 "or pose"
@@ -392,11 +408,8 @@ class ForceHold:
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
-        self._above = 0.0 if is_off and error < 0.0 else self._above + dt
-        self._below = 0.0 if is_off and error > 0.0 else self._below + dt
-        self._swings = self._swings + dt if max(self._above, self._below) < SWING * lasting else 0.0
-        # within the tolerance for the lesser part of the time, or not yet for long
-        self._off = min(max(self._off + (dt if is_off else -dt), 0.0), KEPT * lasting)
+        has_rested = not self._has_settled or self._within >= LEFT * lasting
+        self._strayed = 0.0 if has_rested else self._strayed + dt * is_off
         if not self._has_touched and abs(self._missed) > lasting:
             return (
                 f"nothing is touched yet, {abs(self._missed):.2g} s after the command: the arm has moved "
@@ -410,16 +423,11 @@ class ForceHold:
                 f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
                 "another direction, or bend the arm"
             )
-        if self._swings > lasting:
+        if self._strayed > LEFT * lasting:
             return (
-                f"the force swings about {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N to either "
-                f"side, for {self._swings:.2g} s: the surface moves, the position is not known, or it is a limit "
-                "cycle; pin the position, or lower force_gain"
-            )
-        if self._off > lasting:
-            return (
-                f"the force was off {desired:.3g} N by more than {tolerance(desired, parameters):.2g} N for most of "
-                f"the last {2.0 * lasting:.2g} s: it comes slowly, the surface moves, or it is a slow limit cycle"
+                f"the force was reached, and leaves {desired:.3g} N again and again by more than "
+                f"{tolerance(desired, parameters):.2g} N: the surface moves, friction turns, the position is unknown, "
+                "or it is a limit cycle; pin the position, or lower force_gain"
             )
         return ""
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
+from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_command import CommandAdmission
 from wam_control.force_hold import ForceHold, ForceReaction
@@ -32,7 +33,6 @@ from wam_control.task_control import AxisRow, TaskControl
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
-from wam_description.transmission_map import TransmissionMap
 
 __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 
@@ -41,10 +41,9 @@ TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
 SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
-NEAR, MIDDLE = 0.25, 0.5  # of a link that is perhaps touched: where its force is taken to be
+NEAR, MIDDLE = 0.1, 0.5  # of a link that is perhaps touched: where its force is taken to be
+FAINT = 0.25  # of a link that may be touched, where its force has to be detected
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
-COUNTERED = 0.04  # s, time constant of the friction that is fed forward: at once, it chatters where the lever is short
-SLOW_MOTOR, SLOW_JOINT = 0.04, 0.002  # rad/s, below which less of the dry friction is fed forward
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
@@ -96,17 +95,18 @@ class ForceLoop:
         command_age: float = math.inf,
     ) -> None:
         self._arm, self._timing = arm, timing
-        self._body, self._map = RigidBody(arm), TransmissionMap.of(arm)
+        self._body = RigidBody(arm)
         self._n = len(arm.joints.names)
         self._joints: tuple[float, ...] = ()
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._position = ContactPosition(arm.covers)
         self._contact_rejected = False
         self._held_at: list[float] | None = None
+        self._goes_back = False
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
-        self._countered = LowPass()
+        self._feed_forward = FeedForward(arm)
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
         self._is_free = False
@@ -277,7 +277,7 @@ class ForceLoop:
         self._hold.reset()
         self._position.touch_again()
         self._delay.reset()
-        self._countered.reset()
+        self._feed_forward.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
         self._axes = axes
         self._held_at = None
@@ -317,23 +317,25 @@ class ForceLoop:
             command.frame,
             force_axis,
             point,
-            own.sensing.sd_limit(desired),
+            own.sensing.sd_limit(desired, point.is_pinned),
         )
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
         signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
+        torque_error = force_axis.error(self._external_sd) if self._external_sd else 0.0
         elsewhere = math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired)
         reaction, reason = self._hold.step(
-            force_axis, point, self._external[0], measured, desired, own, dt, signal, elsewhere
+            force_axis, point, self._external[0], measured, desired, own, dt, signal, elsewhere, torque_error
         )
         self._react(reaction, reason)
         self._remember(q, moved, contact, point)
         if reaction.holds:
             self.refusals["force_command"] = reason
             self._hold.fed = 0.0
-            if self._held_at is None:
-                self._held_at = self._free_of(force_axis) if reaction is ForceReaction.OTHER_LINK else list(q)
+            goes_back = reaction is ForceReaction.OTHER_LINK
+            if self._held_at is None or goes_back != self._goes_back:
+                self._held_at, self._goes_back = self._free_of(force_axis) if goes_back else list(q), goes_back
                 self._transfer.restart()
             return out._replace(
                 velocity=[] if is_open else posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
@@ -353,31 +355,8 @@ class ForceLoop:
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
-        return out._replace(velocity=velocity, effort=self._fed_forward(force_axis, point, desired, velocity, dt))
-
-    def _fed_forward(
-        self, axis: ForceAxis, point: ForcePoint, desired: float, velocity: list[float], dt: float
-    ) -> list[float]:
-        """Torque of the joints (n,), N m: of the force, from the motors, or of friction, with sensors."""
-        own = self.parameters
-        effort = axis.lever * (max(own.force_feedforward, self._hold.feed(point, own, dt)) * desired)
-        if own.friction_feedforward and not own.is_estimated:
-            friction, _ = self._countered.step(self._friction(velocity), COUNTERED, dt)
-            effort = effort + own.friction_feedforward * friction
-        result: list[float] = effort.tolist()
-        return result
-
-    def _friction(self, velocity: Sequence[float]) -> Array:
-        """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
-
-        Less than all of it moves nothing.  Where the force is off to the other side, the velocity loops need not wind
-        up through twice the friction, which takes them seconds.
-        """
-        motors, joints = self._arm.motors.dynamic_friction, self._arm.joints.dynamic_friction
-        turning = zip(motors, self._map.motor_velocities(velocity), strict=True)
-        turned = self._map.joint_torques([friction * math.tanh(speed / SLOW_MOTOR) for friction, speed in turning])
-        moved = zip(joints, velocity, turned, strict=True)
-        return np.array([torque + friction * math.tanh(speed / SLOW_JOINT) for friction, speed, torque in moved])
+        fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
+        return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
@@ -407,12 +386,12 @@ class ForceLoop:
         return [a - b for a, b in zip(self._free_at, away.tolist(), strict=True)]
 
     def _signal_elsewhere(self, q: Sequence[float], point: ForcePoint, direction: Array, desired: float) -> float:
-        """Torques of the commanded force, N, on another cover, `NEAR` its base, in sd of the estimated torques."""
+        """Torques of the commanded force, N, on another cover, `FAINT` its base, in sd of the estimated torques."""
         if not self._external_sd:
             return math.inf
         sd = np.array(self._external_sd)
         found = [
-            desired * float(np.linalg.norm(self._force_axes.lever(q, cover, NEAR * length, direction) / sd))
+            desired * float(np.linalg.norm(self._force_axes.lever(q, cover, FAINT * length, direction) / sd))
             for cover, length in self._other_covers(point)
         ]
         return min(found, default=math.inf)
@@ -431,7 +410,7 @@ class ForceLoop:
         found = -math.inf
         for cover, length in self._other_covers(point):
             axis = self._force_axes.axis(q, cover, part * length, 0.0, direction, desired)
-            if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired):
+            if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired, is_pinned=False):
                 found = max(found, -float(axis.sense @ self._external[0]))
         return found
 
@@ -470,7 +449,8 @@ class ForceLoop:
         velocity = self._delay.step(velocity, self.parameters.delay_samples)
         point = self._position.step(contact, None, 0.0, self.parameters)
         factor = self._gain_factor(point, None, 0.0, dt)
-        return ForceOutput([factor * v for v in velocity], list(torque))
+        share = self.parameters.force_feedforward
+        return ForceOutput([factor * v for v in velocity], [share * value for value in torque])
 
     def _point(self, contact: Contact, command: ForceCommand, direction: Array) -> ForcePoint:
         """Point of action of the force; where the loop relies on the estimate, a rejected one counts as refused."""

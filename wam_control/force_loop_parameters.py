@@ -127,6 +127,14 @@ class ForceLoopParameters:
     )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
     contact_position: float = parameter("contact position assumed along it", "m", low=0.0, high=3.0, live=True)
+    contact_position_sd: float = parameter(
+        "standard deviation of a pinned contact position, as of a surface that moves along the link",
+        "m",
+        low=0.0,
+        high=1.0,
+        live=True,
+        before=0.0,
+    )
     schedule: str = parameter(
         "off: the gains stay; position: the gains follow the estimated contact position so that the stability margin "
         "stays the one at contact_position; where the estimate is not certain, the worst position of the cover counts",

@@ -7,7 +7,7 @@ from wam_control.contact_position import ForcePoint
 from wam_control.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of, torque_law
 from wam_control.guard_report import report
 from wam_control.guard_watch import Watch, possible_contacts
-from wam_control.stability_guard import GuardAssessment, GuardedContact, StabilityGuard
+from wam_control.stability_guard import GuardAssessment, Guarded, GuardedContact, StabilityGuard
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.parameters import require
 
@@ -54,7 +54,8 @@ class Supervision:
         guard, parameters = self._guard, self._parameters
         is_joints, mode = parameters.mode == "joint_torque", parameters.guard.mode
         task = task_of(parameters, self.torque_law if is_joints else self.force_law)
-        position_sd = 0.0 if parameters.contact_source == "pinned" else parameters.position_uncertainty_limit
+        is_pinned = parameters.contact_source == "pinned"
+        position_sd = parameters.contact_position_sd if is_pinned else parameters.position_uncertainty_limit
         contacts = [
             contact
             for q in postures
@@ -91,12 +92,12 @@ class Supervision:
         """
         return self.factor(lambda: self._contacts(q, point, direction, force), dt)
 
-    def factor(self, where: Callable[[], list[GuardedContact]], dt: float) -> tuple[float, bool]:
+    def factor(self, where: Callable[[], Sequence[Guarded]], dt: float) -> tuple[float, bool]:
         """Factor of the gains in this period, and whether it has changed.
 
         Parameters
         ----------
-        where : gives the contacts that are controlled now, each of which the guard considers alone.
+        where : gives the contacts that are controlled now.
         dt : outer period, s.
         """
         watch = self.watch
@@ -107,10 +108,6 @@ class Supervision:
         if watch.assessed is not before:
             self._report()
         return 1.0 if self._parameters.guard.mode == "warn" else watch.factor, has_changed
-
-    def known(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
-        """Those contacts whose force has a lever, and is known well enough to be controlled."""
-        return self._guard.sensed([found for contact in contacts for found in self._guard.with_lever(contact)])
 
     def _contacts(
         self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float

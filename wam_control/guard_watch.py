@@ -9,7 +9,14 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from wam_control.stability_guard import LARGEST, GuardAssessment, GuardedContact, GuardedTask, StabilityGuard
+from wam_control.stability_guard import (
+    LARGEST,
+    GuardAssessment,
+    Guarded,
+    GuardedContact,
+    GuardedTask,
+    StabilityGuard,
+)
 
 TURN = 0.1  # rad, of a joint or of the force direction, after which the loop is assessed again
 SHIFT = 0.02  # m, of the contact position or its uncertainty, after which it is assessed again
@@ -52,7 +59,7 @@ class Watch:
         self._since = math.inf
         self.factor, self.scale = 1.0, found.scale
 
-    def step(self, where: Callable[[], list[GuardedContact]], dt: float) -> bool:
+    def step(self, where: Callable[[], Sequence[Guarded]], dt: float) -> bool:
         """Continue the present assessment, or begin one if it is due; True if the factor has changed.
 
         Parameters
@@ -63,10 +70,11 @@ class Watch:
         self._since += dt
         if self._work is None and self._since >= self._guard.parameters.interval:
             self._since = 0.0
-            contacts = where()
+            guarded = where()
+            contacts = [contact for each in guarded for contact in each.contacts]
             if contacts and self._is_new(contacts):
                 self._pending, self._least = contacts, math.inf
-                self._work = self._guard.scales(self._task, contacts, self._tried())
+                self._work = self._guard.scales(self._task, guarded, self._tried())
         if self._work is None:
             return False
         try:

@@ -82,6 +82,15 @@ class LimitParameters:
         live=True,
         before=1e9,
     )
+    surface_speed: float = parameter(
+        "largest speed along the force of the surface that will be touched: a force that is off by more than "
+        "sensing.reported_fraction while it follows is refused",
+        "m/s",
+        low=0.0,
+        high=10.0,
+        live=True,
+        before=0.0,
+    )
 
 
 class Limited(NamedTuple):

@@ -110,6 +110,36 @@ class GuardedContact(NamedTuple):
     direction: tuple[float, float, float]
     force: float
 
+    @property
+    def contacts(self) -> tuple["GuardedContact", ...]:
+        """Itself alone."""
+        return (self,)
+
+
+class GuardedForces(NamedTuple):
+    """Forces at several contacts at once, which the guard considers together: two that are stable alone may not be.
+
+    Attributes
+    ----------
+    contacts : all of them, in one posture.
+    sense, move, gain, proportional_gain, hold : as in `wam_control.sampled_loop.Axes`, of all axes of the task.
+    """
+
+    contacts: tuple[GuardedContact, ...]
+    sense: Array
+    move: Array
+    gain: Array
+    proportional_gain: Array
+    hold: Array
+
+    @property
+    def q(self) -> tuple[float, ...]:
+        """Joint angles (n,), rad."""
+        return self.contacts[0].q
+
+
+Guarded = GuardedContact | GuardedForces
+
 
 class GuardAssessment(NamedTuple):
     """What the guard finds at some contacts.
@@ -178,8 +208,9 @@ class StabilityGuard:
         return [contact] if float(lever @ lever) > REACH * REACH else []
 
     def sensed(self, contacts: Sequence[GuardedContact]) -> list[GuardedContact]:
-        """Those contacts whose force is known well enough to be controlled."""
-        return [contact for contact in contacts if self.axis(contact).force_sd <= self._sensing.sd_limit(contact.force)]
+        """Those contacts whose force is known well enough to be controlled, pinned or not."""
+        most = [self._sensing.sd_limit(contact.force, is_pinned=False) for contact in contacts]
+        return [each for each, sd in zip(contacts, most, strict=True) if self.axis(each).force_sd <= sd]
 
     def axis(self, contact: GuardedContact) -> ForceAxis:
         """How the force loop senses the force of a contact, and moves along it."""
@@ -187,9 +218,9 @@ class StabilityGuard:
         return self._force_axes.axis(q, cover, position, position_sd, np.array(direction), force)
 
     def scales(
-        self, task: GuardedTask, contacts: Sequence[GuardedContact], tried: Sequence[float] = SCALES
+        self, task: GuardedTask, contacts: Sequence[Guarded], tried: Sequence[float] = SCALES
     ) -> Iterator[float]:
-        """Largest linearly stable scales of the gains, each for one contact, stiffness, delay and lag.
+        """Largest linearly stable scales of the gains, each for one contact or several, stiffness, delay and lag.
 
         One at a time, so that the work can be distributed over periods; the smallest counts.
 
@@ -199,12 +230,13 @@ class StabilityGuard:
         contacts : contacts to consider.
         tried : scales to try, in rising order; the last one is returned where all are stable.
         """
-        for contact in contacts:
-            stiffness = self._stiffness(contact)
+        for each in contacts:
+            alone = [self._stiffness(contact) for contact in each.contacts]
+            together = [np.sum(alone, axis=0), *alone] if len(alone) > 1 else alone
             for late, feedback in product(self._delays(task), _lags(task.feedback)):
-                axes = self._axes(task, contact, late)
-                for part in self._parts(task):
-                    yield self._loop.margin(contact.q, axes, part * stiffness, feedback, tried)
+                axes = self._axes(task, each, late)
+                for part, stiffness in product(self._parts(task), together):
+                    yield self._loop.margin(each.q, axes, part * stiffness, feedback, tried)
 
     def assess(self, task: GuardedTask, contacts: Sequence[GuardedContact]) -> GuardAssessment:
         """Assess a task at its worst contact.
@@ -322,10 +354,12 @@ class StabilityGuard:
         """Fractions of the stiffness to consider; a known spring has its own alone."""
         return SOFTER[:1] if task.feedback.kind == "joint_position" else SOFTER
 
-    def _axes(self, task: GuardedTask, contact: GuardedContact, late: int) -> Axes:
+    def _axes(self, task: GuardedTask, contact: Guarded, late: int) -> Axes:
         timing = self._timing
         n = len(self._arm.joints.names)
         delay = task.delay_samples * timing.outer_divisor + timing.outer_delay + late
+        if isinstance(contact, GuardedForces):
+            return Axes(*contact[1:], task.filter_time, delay)
         law = task.law
         if task.is_joints:
             gains = np.array(law.gain), np.array(law.proportional_gain)

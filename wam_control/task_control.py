@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.contact_position import ForcePoint, position_is_certain
+from wam_control.contact_position import ForcePoint, position_is_certain, slid_position
+from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes
 from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
 from wam_control.hybrid_velocity import posture_velocity
-from wam_control.stability_guard import GuardedContact
+from wam_control.stability_guard import GuardedContact, GuardedForces
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_frame import HAND, AxisState, TaskFrame, force_speed
 from wam_description.arm import Arm
@@ -65,7 +66,9 @@ class TaskControl:
         self, arm: Arm, body: RigidBody, axes: ForceAxes, parameters: ForceLoopParameters, supervision: Supervision
     ) -> None:
         self._frame = TaskFrame(arm, body, axes, parameters.task, parameters.sensing)
+        self._force_axes = axes
         self._covers, self._parameters, self._supervision = arm.covers, parameters, supervision
+        self._feed_forward = FeedForward(arm)
         self.restart()
 
     def restart(self) -> None:
@@ -73,7 +76,10 @@ class TaskControl:
         self._task: TaskCommand | None = None
         self._anchors: dict[object, float] = {}
         self._holds: list[ForceHold] = []
+        self._slid: dict[tuple[str, float], float] = {}  # m, by cover and place, since something is touched there
+        self._q_before: list[float] = []
         self._held_at: list[float] | None = None
+        self._feed_forward.reset()
         self._refusal = ""
         self._places: dict[str, tuple[float, float]] = {}  # m, of the last certain estimate, and its sd, by cover
 
@@ -100,6 +106,7 @@ class TaskControl:
         """
         own = self._parameters
         has_changed = self._begin(task)
+        self._slide(task, q)
         states = self._frame.states(task, q, self._points(task, contact))
         anchors = self._find_anchors(states)
         forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
@@ -111,7 +118,7 @@ class TaskControl:
         )
         if reaction.holds != (self._held_at is not None):
             self._held_at, has_changed = (list(q) if reaction.holds else None), True
-        factor, is_other = self._supervision.factor(lambda: self._contacts(states, q), dt)
+        factor, is_other = self._supervision.factor(lambda: self._guarded(states, q), dt)
         speeds = [
             self._speed(state, force, anchor, torques[1], hold, factor, dt)
             for state, force, anchor, hold in zip(states, forces, anchors, self._holds, strict=True)
@@ -119,15 +126,17 @@ class TaskControl:
         held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, rate)
         resolved = self._frame.resolve(states, speeds, held, q)
         velocity = _limited(resolved.velocity, own.joint_speed_limit)
-        effort = np.sum([_desired(state) * state.row for state in states], axis=0)
+        fed = np.sum([self._fed(*pair, dt) for pair in zip(states, self._holds, strict=True)], axis=0)
         if self._held_at is not None:
             velocity = posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
-            effort = np.zeros(len(q))
+            effort = [0.0] * len(q)
+        else:
+            effort = self._feed_forward.step(fed, velocity, own, dt)
         for state, hold in zip(states, self._holds, strict=True):
             hold.travel(float(state.row @ velocity) * dt)
         rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
         measured, error = _vectors(states, forces)
-        return TaskOutput(velocity, effort.tolist(), measured, error, rows, reaction, reason, has_changed or is_other)
+        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed or is_other)
 
     def _begin(self, task: TaskCommand) -> bool:
         """Take a task; whether it has other axes than the one before."""
@@ -139,7 +148,19 @@ class TaskControl:
             return False
         self._anchors = {key: self._anchors[key] for key in _axes(task) if key in self._anchors}
         self._holds = [ForceHold() for _ in task.axes]
+        self._slid = {}
         return True
+
+    def _slide(self, task: TaskCommand, q: Sequence[float]) -> None:
+        """Count how far the link has slid along what each force presses, which stays where it is."""
+        moved = np.array(q) - np.array(self._q_before or q)
+        self._q_before = list(q)
+        pressed = {
+            (axis.cover, axis.place)
+            for axis, hold in zip(task.axes, self._holds, strict=True)
+            if axis.kind is AxisKind.FORCE and axis.place is not None and hold.is_touching
+        }
+        self._slid = {at: self._slid.get(at, 0.0) + self._force_axes.slide(q, *at, moved) for at in pressed}
 
     def _find_anchors(self, states: Sequence[AxisState]) -> list[float]:
         """Commanded position of each axis; where none is, the position at which it has begun."""
@@ -199,7 +220,10 @@ class TaskControl:
         found = []
         for axis in task.axes:
             if axis.place is not None:
-                found.append(ForcePoint(axis.cover, axis.place, 0.0, True, True, True, False, "", conflict, is_single))
+                slid = self._slid.get((axis.cover, axis.place), 0.0)
+                place = slid_position(self._covers, axis.cover, axis.place, slid) if slid else axis.place
+                sd = own.contact_position_sd
+                found.append(ForcePoint(axis.cover, place, sd, True, True, True, False, "", conflict, is_single))
                 continue
             length = self._covers.length_of(axis.cover)
             place, sd = self._places.get(axis.cover, (length / 2.0, length / math.sqrt(12.0)))
@@ -207,15 +231,18 @@ class TaskControl:
             found.append(ForcePoint(axis.cover, place, sd, is_known, False, is_known, False, "", conflict, is_single))
         return found
 
-    def _contacts(self, states: Sequence[AxisState], q: Sequence[float]) -> list[GuardedContact]:
+    def _guarded(self, states: Sequence[AxisState], q: Sequence[float]) -> list[GuardedForces]:
+        """All contacts of the task at once; none where nothing is sensed at a point, or not here."""
         contacts = []
         for state in states:
-            if state.point:
+            if state.point and state.force_sd < math.inf:
                 x, y, z = state.direction.tolist()
                 point, force = state.point, _desired(state) or HAND
                 where = (point.cover, point.position, point.position_sd)
                 contacts.append(GuardedContact(tuple(q), *where, (x, y, z), force))
-        return self._supervision.known(contacts)
+        laws = self._supervision.force_law, self._supervision.torque_law
+        loop = self._frame.linear(states, *laws, self._parameters.posture_gain, q) if contacts else None
+        return [GuardedForces(tuple(contacts), *loop)] if loop else []
 
     def _speed(
         self,
@@ -231,11 +258,17 @@ class TaskControl:
         if state.axis.kind is not AxisKind.FORCE:
             return self._frame.velocity(state, force, anchor)
         laws = self._supervision.force_law, self._supervision.torque_law
-        speed = factor * force_speed(state, *laws, force, state.force(before), dt)
+        speed = factor * hold.share * force_speed(state, *laws, force, state.force(before), dt)
         if state.sensed and state.point and (desired := _desired(state)):
             speed = min(speed, hold.approach_speed(state.sensed, state.point, desired, self._parameters))
         fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
         return min(max(speed, -fastest), fastest)
+
+    def _fed(self, state: AxisState, hold: ForceHold, dt: float) -> Array:
+        """Torque of a commanded force that is fed forward (n,), N m."""
+        own = self._parameters
+        share = hold.feed(state.point, own, dt) if state.point else own.force_feedforward
+        return share * _desired(state) * state.row
 
 
 def _axes(task: TaskCommand) -> list[object]:

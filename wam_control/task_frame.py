@@ -98,26 +98,36 @@ class TaskFrame:
         directions = [rotation @ np.array(axis.direction) for axis in task.axes]
         # a force is positive along its direction, which is the normal of the surface
         directions = [-d if _pulls(axis) else d for axis, d in zip(task.axes, directions, strict=True)]
-        levers = [
-            self._axes.lever(q, axis.cover, point.position, u) if axis.is_sensed and axis.joint < 0 else None
+        torques = [
+            self._torques(q, axis, point, u) if axis.is_sensed and axis.joint < 0 else []
             for axis, u, point in zip(task.axes, directions, points, strict=True)
         ]
         found = []
-        for i, (axis, u, lever) in enumerate(zip(task.axes, directions, levers, strict=True)):
+        for i, (axis, u, own) in enumerate(zip(task.axes, directions, torques, strict=True)):
             if axis.joint >= 0:
                 found.append(AxisState(axis, np.eye(n)[axis.joint], u, q[axis.joint], None))
                 continue
             place, place_sd = points[i].position, points[i].position_sd
             axis_point = np.array([place, *self._arm.covers.aside(axis.cover, place)])
             coordinate = float(u @ self._body.point(q, axis.cover, axis_point))
-            if lever is None:
+            if not own:
                 row: Array = u @ self._body.point_jacobian(q, axis.cover, axis_point)
                 found.append(AxisState(axis, row, u, coordinate, None))
                 continue
-            others = [_size(task.axes[k]) * o for k, o in enumerate(levers) if k != i and o is not None]
+            others = []
+            for k, other in enumerate(torques):
+                # two axes at one place are parts of one force, whose friction is that of `sensed` already
+                is_same = (task.axes[k].cover, task.axes[k].place) == (axis.cover, axis.place)
+                others += [] if k == i else other[:1] if is_same else other
             sensed = self._axes.axis(q, axis.cover, place, place_sd, u, _size(axis), others)
             found.append(AxisState(axis, sensed.lever, u, coordinate, sensed, points[i]))
         return found
+
+    def _torques(self, q: Sequence[float], axis: TaskAxis, point: ForcePoint, direction: Array) -> list[Array]:
+        """Torques (n,), N m, by which a force along this axis disturbs the other ones; a hand has no friction."""
+        if axis.kind is AxisKind.IMPEDANCE:
+            return [HAND * self._axes.lever(q, axis.cover, point.position, direction)]
+        return self._axes.disturbance(q, axis.cover, point.position, point.position_sd, direction, _size(axis))
 
     def refusal(self, states: Sequence[AxisState]) -> str:
         """Why this task cannot be done in this pose, with the number; '' where it can."""
@@ -138,7 +148,7 @@ class TaskFrame:
                 "go to another posture"
             )
         for state in states:
-            most = self._sensing.sd_limit(_size(state.axis))
+            most = self._sensing.sd_limit(_size(state.axis), is_pinned=state.axis.place is not None)
             if state.sensed and state.force_sd > most:
                 return (
                     f"{state.axis.name}: the force is measured with a standard deviation of {state.force_sd:.3g} N; "
@@ -157,7 +167,7 @@ class TaskFrame:
             name, least = "least_joint_damping", own.least_joint_damping
         if axis.damping and axis.damping < least:
             return f"{axis.name}: damping is {axis.damping:g}; allowed: task.{name}, {least:g}, and above"
-        damping = axis.damping or least
+        damping = self._damping(axis)
         if axis.stiffness > own.largest_rate * damping:
             return (
                 f"{axis.name}: stiffness is {axis.stiffness:g} at a damping of {damping:g}; allowed: up to "
@@ -182,7 +192,7 @@ class TaskFrame:
         elif axis.kind is AxisKind.POSITION:
             speed = axis.rate + own.largest_rate * (anchor - state.coordinate)
         else:
-            damping = axis.damping or (own.least_joint_damping if is_joint else own.least_damping)
+            damping = self._damping(axis)
             drive = axis.stiffness * (anchor - state.coordinate) - force
             deadband = own.joint_deadband if is_joint else own.deadband
             speed = axis.rate + math.copysign(max(abs(drive) - deadband, 0.0), drive) / damping
@@ -210,6 +220,47 @@ class TaskFrame:
             left -= np.outer(a, a) / square
             fractions.append(square / damped)
         return Resolved(velocity + left @ np.array(posture), tuple(independence), tuple(fractions))
+
+    def linear(
+        self,
+        states: Sequence[AxisState],
+        frame_law: ForceLaw,
+        joint_law: ForceLaw,
+        posture_gain: float,
+        q: Sequence[float],
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """The law of the task for small motions, for the guard: fields of `wam_control.sampled_loop.Axes`.
+
+        Returns
+        -------
+        tuple
+            sense (p, n), move (n, p), gain and proportional gain (p,), hold (n, n).
+        """
+        n, count = len(q), len(states)
+        no_speed, no_posture = [0.0] * count, [0.0] * n
+        move = np.array([self.resolve(states, unit, no_posture, q).velocity for unit in np.eye(count).tolist()]).T
+        left = np.array([self.resolve(states, no_speed, unit, q).velocity for unit in np.eye(n).tolist()]).T
+        hold, sense, gain = posture_gain * left, np.zeros((count, n)), np.zeros((2, count))
+        for i, state in enumerate(states):
+            axis = state.axis
+            if axis.is_sensed:
+                sense[i] = state.sensed.sense if state.sensed else state.row
+            if axis.kind is AxisKind.FORCE:
+                law = joint_law if axis.joint >= 0 else frame_law.along(axis.direction)
+                k = max(axis.joint, 0)
+                gain[:, i] = law.gain[k], law.proportional_gain[k]
+            elif axis.kind is not AxisKind.VELOCITY:
+                rate = self._parameters.largest_rate
+                if axis.kind is AxisKind.IMPEDANCE:
+                    damping = self._damping(axis)
+                    rate, gain[0, i] = axis.stiffness / damping, 1.0 / damping
+                hold = hold + rate * np.outer(move[:, i], state.row)
+        return sense, move, gain[0], gain[1], hold
+
+    def _damping(self, axis: TaskAxis) -> float:
+        """Damping of an impedance, N s/m or N m s/rad."""
+        own = self._parameters
+        return axis.damping or (own.least_joint_damping if axis.joint >= 0 else own.least_damping)
 
 
 def rank_and_condition(rows: Sequence[Array], limit: float) -> tuple[int, float]:

@@ -1,7 +1,7 @@
 """What may touch what, and the law of each contact force."""
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 from wam_description.arm import Arm
@@ -36,7 +36,10 @@ class ContactPair(NamedTuple):
 
 
 def contact_pairs(arm: Arm, world: World) -> Iterator[ContactPair]:
-    """Every pair of geoms that may touch: covers with everything, free bodies with everything but pushers."""
+    """Every pair of geoms that may touch: covers with everything, free bodies with everything but pushers.
+
+    Covers that follow each other touch where `World.folding` has a stiffness.
+    """
     obstacles, pushers = world.obstacles, world.pushers
     for cover in arm.covers.names:
         for i, name in enumerate(obstacles.names):
@@ -50,6 +53,16 @@ def contact_pairs(arm: Arm, world: World) -> Iterator[ContactPair]:
         yield from _on_cover(cover, "body", world.bodies)
         yield from _on_cover(cover, "door", world.doors)
     yield from _of_bodies(world)
+    folding = world.folding
+    for one, other in pairwise(arm.covers.names):
+        if folding.stiffness:
+            law = folding.stiffness, folding.damping, 0.0, folding.friction
+            yield ContactPair(one, folded(other), f"the folded {other}", *law)
+
+
+def folded(cover: str) -> str:
+    """Name of the geom of a cover that touches the cover before it: its tube away from the joint between them."""
+    return f"{cover}_folded"
 
 
 def _on_cover(cover: str, what: str, group: FreeBodies | Doors) -> Iterator[ContactPair]:

@@ -12,11 +12,11 @@ from xml.etree import ElementTree
 import numpy as np
 
 from wam_description.arm import Arm, Links, Motors
-from wam_description.contact_pairs import ContactPair, contact_pairs
+from wam_description.contact_pairs import ContactPair, contact_pairs, folded
 from wam_description.effects import Effects, Ripples
 from wam_description.mjcf_objects import add_bodies, add_doors, require_names
 from wam_description.parameters import lengths, require
-from wam_description.world import SHAPES, Obstacles, Pushers, Springs, World
+from wam_description.world import SHAPES, Folding, Obstacles, Pushers, Springs, World
 
 NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, if slack is switched off
 FAR = 1e6  # rad or m, beyond the range of every tendon
@@ -53,7 +53,7 @@ def mjcf(arm: Arm, step: float, world: World, effects: Effects) -> str:
     _add_solver(root, arm, step)
     bodies = _add(root, "worldbody")
     _add_rotors(bodies, effects.dry(arm))
-    _add_links(bodies, arm)
+    _add_links(bodies, arm, world.folding)
     for i, name in enumerate(world.obstacles.names):
         _add_obstacle(bodies, world.obstacles, i, name, name in world.moving)
     _add_pushers(bodies, world.pushers)
@@ -149,7 +149,7 @@ def _add_rotors(world: ElementTree.Element, motors: Motors) -> None:
         )
 
 
-def _add_links(world: ElementTree.Element, arm: Arm) -> None:
+def _add_links(world: ElementTree.Element, arm: Arm, folding: Folding) -> None:
     joints, links, covers = arm.joints, arm.carried, arm.covers
     parent = world
     for i, name in enumerate(links.names):
@@ -174,7 +174,7 @@ def _add_links(world: ElementTree.Element, arm: Arm) -> None:
         )
         for j, cover in enumerate(covers.names):
             if covers.links[j] == name:
-                _add_cover(parent, arm, j, cover)
+                _add_cover(parent, arm, j, cover, folding.clearance if folding.stiffness and j else None)
     _add(parent, "site", name="tool", pos=_numbers(arm.tool))
 
 
@@ -185,7 +185,7 @@ def _inertia(links: Links, i: int) -> dict[str, str]:
     return {"diaginertia": moments}
 
 
-def _add_cover(body: ElementTree.Element, arm: Arm, i: int, name: str) -> None:
+def _add_cover(body: ElementTree.Element, arm: Arm, i: int, name: str, clearance: float | None) -> None:
     covers = arm.covers
     site = {"pos": _triple(covers.origin, i), "euler": _triple(covers.rotation, i)}
     _add(body, "site", name=f"{name}_frame", **site)
@@ -194,15 +194,19 @@ def _add_cover(body: ElementTree.Element, arm: Arm, i: int, name: str) -> None:
         rotation @ np.array(end[3 * i : 3 * i + 3]) + np.array(covers.origin[3 * i : 3 * i + 3])
         for end in (covers.start, covers.end)
     ]
-    _add(
-        body,
-        "geom",
-        name=name,
-        type="capsule",
-        fromto=_numbers([*ends[0], *ends[1]]),
-        size=repr(covers.radius[i]),
-        rgba="0.25 0.25 0.28 1" if i % 2 == 0 else "0.35 0.35 0.4 1",
-    )
+    geoms = {name: ends[0]}
+    if clearance is not None:
+        geoms[folded(name)] = ends[0] + clearance * (ends[1] - ends[0]) / float(np.linalg.norm(ends[1] - ends[0]))
+    for geom, start in geoms.items():
+        _add(
+            body,
+            "geom",
+            name=geom,
+            type="capsule",
+            fromto=_numbers([*start, *ends[1]]),
+            size=repr(covers.radius[i]),
+            rgba="0.25 0.25 0.28 1" if i % 2 == 0 else "0.35 0.35 0.4 1",
+        )
 
 
 def rotation_xyz(roll: float, pitch: float, yaw: float) -> np.ndarray:

@@ -129,6 +129,23 @@ class Pushers:
             )
 
 
+@dataclass(frozen=True)
+class Folding:
+    """Contact between the tubes of links that follow each other, as of a folded elbow."""
+
+    stiffness: float = parameter("stiffness; 0: the tubes never touch", "N/m", low=0.0, high=1e9, before=0.0)
+    damping: float = parameter("damping", "N s/m", low=0.0, high=1e6, before=0.0)
+    friction: float = parameter("friction coefficient", low=0.0, high=10.0, before=0.0)
+    clearance: float = parameter(
+        "length of the outer tube from the joint on that touches nothing: near it the tubes overlap",
+        "m",
+        low=0.0,
+        high=10.0,
+        before=0.0,
+    )
+
+
+NO_FOLDING = Folding(0.0, 0.0, 0.0, 0.0)
 NO_PUSHERS = Pushers((), (), (), (), (), (), (), (), (), (), (), (), (), (), (), ())
 
 
@@ -142,6 +159,7 @@ class World:
     bodies: FreeBodies = NO_BODIES
     doors: Doors = NO_DOORS
     motions: Motions = NO_MOTIONS
+    folding: Folding = NO_FOLDING
 
     def __post_init__(self) -> None:
         known = self.obstacles.names

@@ -9,6 +9,7 @@ import numpy as np
 from mujoco import mj_applyFT
 
 from wam_description.arm import Arm
+from wam_description.contact_pairs import folded
 from wam_description.signals import Load
 from wam_description.world import Springs
 
@@ -54,7 +55,9 @@ class CoverLoads:
         self._rotation = {name: data.site_xmat[site].reshape(3, 3) for name, site in sites.items()}
         self._origin = {name: data.site_xpos[site] for name, site in sites.items()}
         self._applied = data.qfrc_applied
-        self._cover_of_geom = {model.geom(name).id: name for name in covers.names}
+        present = {model.geom(i).name for i in range(model.ngeom)}
+        geoms = {geom: name for name in covers.names for geom in (name, folded(name)) if geom in present}
+        self._cover_of_geom = {model.geom(geom).id: name for geom, name in geoms.items()}
         self._body = {name: model.body(link).id for name, link in zip(covers.names, covers.links, strict=True)}
         self._springs = list(_springs_on_covers(model, arm, springs))
         self.pushes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
@@ -94,16 +97,14 @@ class CoverLoads:
         data = self._data
         for i in range(data.ncon):
             first, second = data.contact.geom[i].tolist()
-            cover, sign = self._cover_of_geom.get(second), 1.0
-            if cover is None:
-                cover, sign = self._cover_of_geom.get(first), -1.0
-            if cover is None:  # between objects
-                continue
-            mujoco.mj_contactForce(self._model, data, i, self._wrench)
-            rotation = self._rotation[cover]
-            force = rotation.T @ (sign * (data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3]))
-            at = rotation.T @ (data.contact.pos[i] - self._origin[cover])
-            yield cover, PartialLoad(force, np.cross(at, force), float(at[0]))
+            for geom, sign in ((second, 1.0), (first, -1.0)):  # none between objects, both between links
+                if geom in self._cover_of_geom:
+                    cover = self._cover_of_geom[geom]
+                    mujoco.mj_contactForce(self._model, data, i, self._wrench)
+                    rotation = self._rotation[cover]
+                    force = rotation.T @ (sign * (data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3]))
+                    at = rotation.T @ (data.contact.pos[i] - self._origin[cover])
+                    yield cover, PartialLoad(force, np.cross(at, force), float(at[0]))
 
     def _pushed(self) -> Iterator[tuple[str, PartialLoad]]:
         for cover, (force, torque) in self.pushes.items():

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
-from wam_description.contact_pairs import contact_pairs
+from wam_description.contact_pairs import contact_pairs, folded
 from wam_description.mjcf_objects import hinge_name
 from wam_description.parameters import ParameterError
 from wam_description.world import World
@@ -117,7 +117,7 @@ def _contacts(model: Any, data: Any, arm: Arm, world: World) -> Iterator[tuple[A
         for end in (arm.covers.start[3 * i : 3 * i + 3], arm.covers.end[3 * i : 3 * i + 3]):
             mujoco.mj_jac(model, data, jacobian, None, origin + rotation @ np.array(end), model.body(link).id)
             for axis, one in ((a, s) for a in range(3) for s in touched):
-                if one.first == cover:
+                if cover == one.first or folded(cover) == one.second:
                     k = one.stiffness * math.sqrt(1.0 + 4.0 * one.hardening * HARDENED_AT / one.stiffness)
                     reach = rotation[:, axis] @ jacobian
                     if one.second in loosest:

@@ -15,6 +15,7 @@ from wam_cli.commands import (
 from wam_experiments.force_benchmark.evaluation import ForceTrial, evaluate
 from wam_experiments.force_benchmark.figure import figure
 from wam_experiments.force_benchmark.page import details, page, report, required
+from wam_experiments.force_benchmark.results_file import key
 from wam_experiments.force_benchmark.tasks import SECONDS
 from wam_sim.batch import executor
 from wam_sim.pieces import default_folder
@@ -61,7 +62,7 @@ def run(given: argparse.Namespace) -> int:
     if given.only:
         print("\n".join(details(given.seed, trial) for trial in trials))
     else:
-        print(report(given.seed, trials))
+        print(report(given.seed, _code(given), trials))
     if given.write:
         _write(given, trials)
     return 0 if all(met for _, _, _, met in required(trials)) else 1
@@ -81,6 +82,10 @@ def _trials(given: argparse.Namespace) -> list[ForceTrial]:
         )
 
 
+def _code(given: argparse.Namespace) -> str:
+    return key(configuration_of(given), given.seed, given.seconds).code
+
+
 def _write(given: argparse.Namespace, trials: list[ForceTrial]) -> None:
     """Write the page, and its figure into a folder of the page's name."""
     file = Path(given.write)
@@ -88,4 +93,5 @@ def _write(given: argparse.Namespace, trials: list[ForceTrial]) -> None:
     figure(trials, picture)
     seconds = f" --seconds {given.seconds:g}" * (given.seconds != SECONDS)
     repeat = f"wam evaluate force --seed {given.seed} --tasks {given.tasks}{seconds} --write {file}"
-    file.write_text(page(trials, given.seed, repeat, f"{picture.parent.name}/{picture.name}"), encoding="utf-8")
+    shown = f"{picture.parent.name}/{picture.name}"
+    file.write_text(page(trials, given.seed, _code(given), repeat, shown), encoding="utf-8")

@@ -1,6 +1,7 @@
 """How a task has ended: from its true force, not from what the loop measures."""
 
 import math
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -113,6 +114,12 @@ def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
         gain=trace.gain,
         reason=trace.reason,
     )
+
+
+def worst(results: Sequence[TaskResult]) -> TaskResult:
+    """The result of a task of several forces: that of the force that counts as the greatest failure."""
+    order = list(TaskEnd)
+    return max(results, key=lambda one: (one.is_over + one.cycles_silently, order.index(one.outcome)))
 
 
 def _outcome(task: Task, trace: TaskTrace, mean: float, peak: float) -> TaskEnd:

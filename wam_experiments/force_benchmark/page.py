@@ -11,13 +11,20 @@ from wam_experiments.force_benchmark.evaluation import ForceTrial
 from wam_experiments.force_benchmark.outcome import OVERSHOOT, TOLERANCE, TaskEnd
 from wam_experiments.force_benchmark.surfaces import GAP
 from wam_experiments.force_benchmark.tasks import (
+    AT_REST,
     CABLES,
+    DOUBLED,
+    FARTHEST,
     FORCES,
+    FREQUENCIES,
     FRICTION,
     FRICTIONS,
+    FULL_FRICTION,
     MASS,
+    MOVING,
     POSES,
     SECONDS,
+    SPEEDS,
     STIFFNESSES,
     TORQUE,
     Task,
@@ -27,6 +34,8 @@ SENSORS, MOTORS = "joint sensors", "motors with dither"
 REQUIRED = {SENSORS: 0.95, MOTORS: 0.9}  # share of accepted tasks within the tolerance
 STIFFNESS_ENDS = {"400 to 4000": 4e3, "4000 to 40 000": 4e4, "40 000 to 400 000": 4e5}  # N/m
 FORCE_ENDS = {"1 to 3": 3.0, "3 to 10": 10.0, "10 to 40": 40.0}  # N
+MOTIONS = ("at rest", "moves along the force", "moves across it")
+STEADY = 1e-6  # m/s along the force, of a surface that moves across it
 LISTED = 40  # failures of one kind
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 HEAD = ("", "tasks", "within 10 %", "refused", "given up", "ended", "silent", "above the limit", "cycles unreported")
@@ -50,6 +59,11 @@ def _contact(task: Task) -> str:
     return f"rod across the {task.surface.cover.replace('_', ' ')}"
 
 
+def _motion(task: Task) -> str:
+    surface = task.surface
+    return MOTIONS[0] if not surface.frequency else MOTIONS[1] if surface.speed > STEADY else MOTIONS[2]
+
+
 GROUPINGS = (
     TaskGrouping("feedback", (SENSORS, MOTORS), lambda task: MOTORS if task.conditions.is_dithered else SENSORS),
     TaskGrouping("stiffness [N/m]", tuple(STIFFNESS_ENDS), lambda task: _below(STIFFNESS_ENDS, task.surface.stiffness)),
@@ -60,6 +74,8 @@ GROUPINGS = (
         "contact position", ("pinned", "estimated"), lambda task: "pinned" if task.conditions.is_pinned else "estimated"
     ),
     TaskGrouping("tare", ("tared", "not tared"), lambda task: "tared" if task.conditions.is_tared else "not tared"),
+    TaskGrouping("surface", MOTIONS, _motion),
+    TaskGrouping("forces", ("one", "two at once"), lambda task: "two at once" if task.second else "one"),
     TaskGrouping("command", ("step", "ramp"), lambda task: "ramp" if task.conditions.ramp else "step"),
 )
 
@@ -148,9 +164,10 @@ LINE_HEAD = (
 )  # fmt: skip
 
 
-def report(seed: int, trials: Sequence[ForceTrial]) -> str:
+def report(seed: int, code: str, trials: Sequence[ForceTrial]) -> str:
     """The output of the command: what is required, shares, and the failures with their commands."""
-    lines = [
+    lines = [f"code and configuration: {code}"]
+    lines += [
         f"{title}: {found}" + (f"; required {needed}" if needed else "") for title, needed, found, _ in required(trials)
     ]
     lines += ["", *plain([HEAD], [_counts("all", trials)])]
@@ -192,13 +209,14 @@ def details(seed: int, trial: ForceTrial) -> str:
     return "\n".join([*lines, f"  reason: {result.reason}"] if result.reason else lines)
 
 
-def page(trials: Sequence[ForceTrial], seed: int, repeat: str, picture: str) -> str:
+def page(trials: Sequence[ForceTrial], seed: int, code: str, repeat: str, picture: str) -> str:
     """The page of the documentation.
 
     Parameters
     ----------
     trials : of the benchmark.
     seed : of all of them.
+    code : hash of what they are a result of.
     repeat : command that writes this page.
     picture : the figure's path relative to the page.
     """
@@ -207,7 +225,7 @@ def page(trials: Sequence[ForceTrial], seed: int, repeat: str, picture: str) -> 
         for title, needed, found, is_met in required(trials)
     ]
     parts = [
-        PREFACE.format(command=repeat, count=len(trials)),
+        PREFACE.format(command=repeat, count=len(trials), code=code),
         f"![True against commanded force, outcomes by class, peaks]({picture})",
         "",
         markdown(("", "required", "found", ""), rows),
@@ -245,10 +263,16 @@ PREFACE = f"""# Benchmark of force control
 Written by `{{command}}`; nothing here is written by hand.
 
 {{count}} tasks, each drawn from the seed and its number alone: pose, contact, force, friction of the surface,
-feedback, ramp, and a true arm that differs from the configured one, uniformly distributed: masses by up to
-{MASS:.0%}, friction by {FRICTION:.0%}, cable stiffness by {CABLES:.0%}, motor constants by {TORQUE:.0%}. Forces are
-{FORCES[0]:g} to {FORCES[1]:g} N, surfaces {STIFFNESSES[0]:.0f} to {STIFFNESSES[1]:.0f} N/m with friction
-{FRICTIONS[0]:g} to {FRICTIONS[1]:g}.
+feedback, ramp, motion of the surface, and a true arm that differs from the configured one, uniformly distributed:
+masses by up to {MASS:.0%}, friction by {FRICTION:.0%}, cable stiffness by {CABLES:.0%}, motor constants by
+{TORQUE:.0%}. Forces are {FORCES[0]:g} to {FORCES[1]:g} N, surfaces {STIFFNESSES[0]:.0f} to {STIFFNESSES[1]:.0f} N/m
+with friction {FRICTIONS[0]:g} to {FRICTIONS[1]:g}.
+
+A task is *accepted* where it is neither refused before the arm moves, nor given up before the true force was above the
+commanded one. An accepted task that ends with a wrong force counts against the shares below, whatever was reported.
+
+Code and configuration: `{{code}}`, a hash of the packages that control and simulate, of the tasks and how they are
+evaluated, and of the configuration. The command prints that of the code it runs.
 """
 RULES = f"""## Method
 
@@ -261,10 +285,16 @@ RULES = f"""## Method
 * Refused: the loop reports a reason and neither moves nor touches anything, or the stack does not start. Given up:
   the arm has moved or touched, then holds with a reason, and the true force was never above the commanded one, as
   where another link is touched than commanded. Ended: the force is not within 10 %, or the arm is held, and a reason
-  is reported. Silent: the force is wrong and nothing is reported. Accepted is what is neither refused nor given up.
+  is reported. Silent: the force is wrong and nothing is reported.
 * Above the limit: at some time the true force is above {OVERSHOOT:g} times the commanded plus the impact of (3.1), for
   which all kinetic energy of links and rotors at the first touch goes into the surface.
 * A cycle is a motion of the force that repeats in the last 2 s, above 10 % of the commanded force peak to peak. It
   counts as reported if the loop gives a reason, or the guard predicts at least half of its size.
-* The surfaces do not move.
+* {MOVING:.0%} of the surfaces move, as a sine after {AT_REST:g} s of the whole force, half of them along it: with
+  {1e3 * SPEEDS[0]:g} to {1e3 * SPEEDS[1]:g} mm/s, at {FREQUENCIES[0]:g} to {FREQUENCIES[1]:g} Hz, by
+  {1e3 * FARTHEST:g} mm at most. The user declares the speed along the force (`limits.surface_speed`), a friction of
+  {FULL_FRICTION:g}, which is there in full (`sensing.friction`), and how far a pinned position moves along the link
+  (`contact_position_sd`).
+* {DOUBLED:.0%} of the tasks have a second force elsewhere, commanded at the same time by a task frame of two axes at
+  known positions. Such a task has ended as the force with the greater failure.
 """

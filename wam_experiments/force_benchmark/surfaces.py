@@ -16,6 +16,7 @@ GAP = 0.002  # m, between link and surface at the start
 CLEARANCE = 0.03  # m, between the surface and the rest of the arm
 ROD = (0.02, 0.08)  # m, radius and half length of a rod that the link touches at one position
 PLANE = 0.5  # m, half length
+NAMES = ("surface", "second_surface")
 POINTS = 20  # along each cover, at which the distance is checked
 
 
@@ -29,6 +30,9 @@ class Surface(NamedTuple):
     stiffness : N/m.
     friction : coefficient.
     is_plane : whether it is a plane, else a rod across the link.
+    motion : amplitude of its motion, a sine (3,), base frame, m.
+    frequency : of the motion, Hz; 0 for a surface at rest.
+    begin : of the motion, since power-up, s.
     """
 
     cover: str
@@ -37,6 +41,19 @@ class Surface(NamedTuple):
     stiffness: float
     friction: float
     is_plane: bool
+    motion: Triple = (0.0, 0.0, 0.0)
+    frequency: float = 0.0
+    begin: float = 0.0
+
+    @property
+    def speed(self) -> float:
+        """Largest speed along the force, m/s."""
+        along = sum(a * b for a, b in zip(self.direction, self.motion, strict=True))
+        return 2.0 * math.pi * self.frequency * abs(along)
+
+    def slide(self, link: Array) -> float:
+        """Standard deviation of the motion along a link, whose direction is given (3,), m."""
+        return abs(float(link @ np.array(self.motion))) / math.sqrt(2.0)
 
 
 def is_clear(body: RigidBody, q: Sequence[float], surface: Surface) -> bool:
@@ -74,21 +91,29 @@ def rotation(body: RigidBody, q: Sequence[float], surface: Surface) -> Array:
     return np.column_stack([-direction, np.cross(across, -direction), across])
 
 
-def obstacle(body: RigidBody, q: Sequence[float], surface: Surface) -> dict[str, Any]:
-    """Values of a configuration whose world is this surface alone."""
-    soft = surface.stiffness < 4000.0
-    values = {
-        "names": ["surface"],
-        "shapes": ["plane" if surface.is_plane else "cylinder"],
-        "positions": position(body, q, surface).tolist(),
-        "rotations": _angles(rotation(body, q, surface)),
-        "sizes": [PLANE, PLANE, 0.0] if surface.is_plane else [*ROD, 0.0],
-        "stiffness": [surface.stiffness],
-        "damping": [0.005 * surface.stiffness if soft else 20.0],
-        "hardening": [0.0],
-        "friction": [surface.friction],
-    }
-    return {f"driver:world.obstacles.{name}": value for name, value in values.items()}
+def obstacles(body: RigidBody, q: Sequence[float], surfaces: Sequence[Surface]) -> dict[str, Any]:
+    """Values of a configuration whose world are these surfaces alone, by the names `NAMES`."""
+    found: dict[str, list[Any]] = {}
+    for name, surface in zip(NAMES, surfaces, strict=False):
+        soft = surface.stiffness < 4000.0
+        values = {
+            "obstacles.names": [name],
+            "obstacles.shapes": ["plane" if surface.is_plane else "cylinder"],
+            "obstacles.positions": position(body, q, surface).tolist(),
+            "obstacles.rotations": _angles(rotation(body, q, surface)),
+            "obstacles.sizes": [PLANE, PLANE, 0.0] if surface.is_plane else [*ROD, 0.0],
+            "obstacles.stiffness": [surface.stiffness],
+            "obstacles.damping": [0.005 * surface.stiffness if soft else 20.0],
+            "obstacles.hardening": [0.0],
+            "obstacles.friction": [surface.friction],
+            "motions.obstacles": [name],
+            "motions.amplitude": list(surface.motion),
+            "motions.frequency": [surface.frequency],
+            "motions.begin": [surface.begin],
+        }
+        for key, value in values.items():
+            found[f"driver:world.{key}"] = [*found.get(f"driver:world.{key}", []), *value]
+    return found
 
 
 def _angles(turned: Array) -> list[float]:

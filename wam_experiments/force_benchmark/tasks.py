@@ -11,14 +11,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_control.scenario import ScenarioStep
+from wam_control.task import AxisKind, TaskAxis, TaskCommand
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
-from wam_experiments.force_benchmark.surfaces import Surface, Triple, is_clear, obstacle
+from wam_experiments.force_benchmark.surfaces import Surface, Triple, is_clear, obstacles
 
 # model mismatch, uniform in +- this
 MASS, FRICTION, CABLES, TORQUE = 0.03, 0.2, 0.1, 0.03
+DOUBLED, APART, TRIES = 0.1, 0.1, 100  # share of tasks with a second force; m between them on a link; draws of it
 FORCES, STIFFNESSES = (1.0, 40.0), (400.0, 4e5)  # N and N/m, uniform in the logarithm
 FRICTIONS, STEEPEST = (0.0, 0.8), math.radians(75.0)  # of the surface; lean of a plane from the side of the link
 MARGIN = 0.1  # rad, of a start from the ends of the joints
@@ -26,11 +28,15 @@ NEAR = 0.3  # rad, of a singular pose
 RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
 POSES = {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}  # shares
 ON_OUTER, AT_A_PLANE, DITHERED, PINNED, TARED, RAMPED = 0.85, 0.3, 0.4, 0.5, 0.5, 0.5  # shares
+MOVING, ALONG = 0.15, 0.5  # share of surfaces that move, and of these along the force, else across it
+SPEEDS, FREQUENCIES, FARTHEST = (0.002, 0.05), (0.1, 1.0), 0.02  # m/s and Hz, uniform in the logarithm; m
 LONGEST_RAMP, FIRST = 1.0, 0.2  # s, and the fraction of the force that it starts with
 RAMP_STEP = 0.02  # s
 DITHER_CYCLE = 40  # inner periods: 25 Hz
 RELEASE = 0.5  # s, until the force is commanded
 SECONDS = 4.0  # s of the whole force
+FULL_FRICTION = 0.5  # sd of the friction of a surface that moves, which is there in full: rms of `FRICTIONS`
+AT_REST = 1.5  # s of the whole force, until a surface moves
 
 
 class TaskConditions(NamedTuple):
@@ -60,13 +66,28 @@ NOMINAL = TaskConditions(is_dithered=False, is_pinned=True, is_tared=False, ramp
 
 
 class Task(NamedTuple):
-    """One force on one surface: joint angles at the start (n,), rad; surface; force, N; conditions; class of pose."""
+    """A force on a surface, and perhaps another one at the same time.
+
+    Attributes
+    ----------
+    q : joint angles at the start (n,), rad.
+    surface, force : what is pressed, and with how many N.
+    conditions : see there.
+    pose : its class.
+    second : another surface and its force, N.
+    """
 
     q: tuple[float, ...]
     surface: Surface
     force: float
     conditions: TaskConditions = NOMINAL
     pose: str = "any"
+    second: tuple[Surface, float] | None = None
+
+    @property
+    def forces(self) -> list[tuple[Surface, float]]:
+        """Each surface with its force, N."""
+        return [(self.surface, self.force), *([self.second] if self.second else [])]
 
 
 class ElbowJoint(NamedTuple):
@@ -110,7 +131,8 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     while not is_clear(body, q, surface):
         q = _pose(arm, elbow, random)
         surface = _surface(body, q, random)
-    return Task(q, surface, force, conditions, elbow.pose(q))
+    task = Task(q, _moving(surface, conditions, random), force, conditions, elbow.pose(q))
+    return _doubled(body, task, random) if random.random() < DOUBLED else task
 
 
 def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
@@ -162,6 +184,30 @@ def _surface(body: RigidBody, q: Sequence[float], random: np.random.Generator) -
     return Surface(cover, place, direction, stiffness, float(random.uniform(*FRICTIONS)), is_plane)
 
 
+def _moving(surface: Surface, conditions: TaskConditions, random: np.random.Generator) -> Surface:
+    """The surface at rest, or with a motion along the force or across it."""
+    if random.random() >= MOVING:
+        return surface
+    along, about = np.array(surface.direction), random.normal(size=3)
+    if random.random() >= ALONG:
+        along = np.cross(along, about) / np.linalg.norm(np.cross(along, about))
+    speed, frequency = _log_uniform(random, *SPEEDS), _log_uniform(random, *FREQUENCIES)
+    amplitude = min(speed / (2.0 * math.pi * frequency), FARTHEST)
+    begin = RELEASE + conditions.ramp + AT_REST
+    return surface._replace(motion=triple(amplitude * along), frequency=frequency, begin=begin)
+
+
+def _doubled(body: RigidBody, task: Task, random: np.random.Generator) -> Task:
+    """The task with a second force elsewhere on a surface of its own, both at known positions, where it fits."""
+    conditions = task.conditions._replace(is_pinned=True)
+    for _ in range(TRIES):
+        found = _surface(body, task.q, random)._replace(stiffness=task.surface.stiffness)
+        is_apart = found.cover != task.surface.cover or abs(found.place - task.surface.place) > APART
+        if is_apart and is_clear(body, task.q, found):
+            return task._replace(second=(found, _log_uniform(random, *FORCES)), conditions=conditions)
+    return task
+
+
 def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
     return math.exp(random.uniform(math.log(low), math.log(high)))
 
@@ -177,11 +223,18 @@ def configured(base: Configuration, task: Task) -> Configuration:
         "force_loop:contact_source": "pinned" if conditions.is_pinned else "estimated",
         "contact_estimator:observer.mass_scale": [1.0] * n,
         "contact_estimator:observer.friction_scale": 1.0,
-        **obstacle(RigidBody(base.shared.arm), task.q, surface),
+        **obstacles(RigidBody(base.shared.arm), task.q, [surface for surface, _ in task.forces]),
         **{f"driver:mismatch.{name}": list(factors) for name, factors in _mismatch(conditions).items() if factors},
     }
     if conditions.is_pinned:
         values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": surface.place}
+    if surface.frequency:
+        along = RigidBody(base.shared.arm).cover_pose(task.q, surface.cover).rotation[:, 0]
+        values |= {
+            "force_loop:sensing.friction": FULL_FRICTION,
+            "force_loop:limits.surface_speed": surface.speed,
+            "force_loop:contact_position_sd": surface.slide(along),
+        }
     if conditions.is_dithered:
         values |= {
             "arm.joint_sensors": False,
@@ -206,16 +259,23 @@ def steps(task: Task, seconds: float) -> list[ScenarioStep]:
     """Release, ramp in small steps, and `seconds` of the whole force."""
     count = round(task.conditions.ramp / RAMP_STEP)
     rising = [FIRST + (1.0 - FIRST) * i / count for i in range(count)]
-    ramp = [ScenarioStep("ramp", RAMP_STEP, force=_command(task, fraction)) for fraction in rising]
+    ramp = [ScenarioStep("ramp", RAMP_STEP, **_command(task, fraction)) for fraction in rising]
     return [
         ScenarioStep("release", RELEASE, request="enable"),
         *ramp,
-        ScenarioStep("press", seconds, force=_command(task, 1.0)),
+        ScenarioStep("press", seconds, **_command(task, 1.0)),
     ]
 
 
-def _command(task: Task, fraction: float) -> ForceCommand:
-    return ForceCommand("base", triple(fraction * task.force * np.array(task.surface.direction)))
+def _command(task: Task, fraction: float) -> dict[str, Any]:
+    """What a step of the scenario commands: one force, or a task of two."""
+    if not task.second:
+        return {"force": ForceCommand("base", triple(fraction * task.force * np.array(task.surface.direction)))}
+    axes = [
+        TaskAxis(AxisKind.FORCE, -1, surface.cover, surface.place, surface.direction, fraction * force)
+        for surface, force in task.forces
+    ]
+    return {"task": TaskCommand("base", tuple(axes))}
 
 
 def triple(values: Any) -> Triple:

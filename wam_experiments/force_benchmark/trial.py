@@ -15,7 +15,8 @@ from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
 from wam_driver.driver import DriverParameters
-from wam_experiments.force_benchmark.outcome import TaskResult, TaskTrace, evaluated, refused
+from wam_experiments.force_benchmark.outcome import TaskResult, TaskTrace, evaluated, refused, worst
+from wam_experiments.force_benchmark.surfaces import NAMES
 from wam_experiments.force_benchmark.tasks import RELEASE, SECONDS, Task, configured, steps
 from wam_sim.simulation import Simulation
 
@@ -49,7 +50,10 @@ def perform(
         run = Simulation(configuration, steps(task, seconds))
     except ValueError as error:
         return refused(task, str(error))
-    return evaluated(task, TaskWatch(configuration, task, run).trace())
+    traces = TaskWatch(configuration, task, run).traces()
+    return worst(
+        [evaluated(task._replace(force=force), trace) for (_, force), trace in zip(task.forces, traces, strict=True)]
+    )
 
 
 def with_accepted_gain(configuration: Configuration) -> Configuration:
@@ -80,68 +84,75 @@ class TaskWatch:
         driver = configuration.node("driver", DriverParameters)
         self._arm = true_arm(configuration.shared.arm, driver.mismatch)
         self._body = RigidBody(self._arm)
-        self._direction = np.array(task.surface.direction)
+        self._directions = [np.array(surface.direction) for surface, _ in task.forces]
+        self._surfaces = {run.driver.plant.model.geom(name).id: i for i, name in enumerate(NAMES[: len(task.forces)])}
         self._node = run.nodes["force_loop"]
-        self._covers = {run.driver.plant.model.geom(name).id for name in self._arm.covers.names}
         self._wrench = np.zeros(6)
         self._gain = configuration.node("force_loop", ForceLoopParameters).force_gain[0]
 
-    def trace(self) -> TaskTrace:
-        """Play the task to its end, or until it has been stopped for `STOPPED`."""
+    def traces(self) -> list[TaskTrace]:
+        """Play the task to its end, or until it has been stopped for `STOPPED`; what was seen of each force."""
         run, plant, period = self._run, self._run.driver.plant, self._timing.period
         for _ in range(round(RELEASE / period)):
             run.step()
         if self._task.conditions.is_tared:
             self._node.tare()
-        start = self._along(plant.q)
-        forces, travel, impact, stopped, velocity = [], 0.0, 0.0, 0.0, plant.qd
+        start, travel = self._along(plant.q), np.zeros(len(self._directions))
+        forces, impact, stopped, velocity = [], 0.0, 0.0, plant.qd
         standing = self._standing  # with the scenario the command ends, and what was reported of it
         while stopped < STOPPED and not run.step():
             force = self._force()
-            if force and not impact:
+            if any(force) and not impact:
                 impact = self._impact(plant.q, velocity)
             velocity = plant.qd
             if run.driver.is_outer:
-                travel = max(travel, abs(self._along(plant.q) - start))
+                travel = np.maximum(travel, np.abs(self._along(plant.q) - start))
             forces.append(force)
             standing = self._standing
             stopped = stopped + period if standing.is_stopped else 0.0
-        return TaskTrace(
-            forces=np.array(forces),
-            period=period,
-            travel=travel,
-            impact=impact,
-            reason=standing.reason,
-            is_stopped=standing.is_stopped,
-            is_fault=standing.is_fault,
-            predicted_cycle=standing.predicted_cycle,
-            gain=self._gain,
-        )
+        return [
+            TaskTrace(
+                forces=np.array(column),
+                period=period,
+                travel=float(way),
+                impact=impact,
+                reason=standing.reason,
+                is_stopped=standing.is_stopped,
+                is_fault=standing.is_fault,
+                predicted_cycle=standing.predicted_cycle,
+                gain=self._gain,
+            )
+            for column, way in zip(zip(*forces, strict=True), travel, strict=True)
+        ]
 
     @property
     def _standing(self) -> _Standing:
         fault, node = self._run.driver.safety.fault, self._node
         return _Standing(
-            fault or node.refusals.get("force_command", "") or node.reason,
+            fault or node.refusals.get("force_command", "") or node.refusals.get("task_command", "") or node.reason,
             bool(fault) or node.force_reaction.holds,
             bool(fault),
             float(node.guard_report.facts.get("limit cycle [N]", 0.0)),
         )
 
-    def _along(self, q: list[float]) -> float:
-        """Position of the touched point along the force, m."""
-        surface = self._task.surface
-        point = (surface.place, *self._arm.covers.aside(surface.cover, surface.place))
-        return float(self._direction @ self._body.point(q, surface.cover, point))
+    def _along(self, q: list[float]) -> Array:
+        """Position of each touched point along its force, m."""
+        found = []
+        for (surface, _), direction in zip(self._task.forces, self._directions, strict=True):
+            point = (surface.place, *self._arm.covers.aside(surface.cover, surface.place))
+            found.append(float(direction @ self._body.point(q, surface.cover, point)))
+        return np.array(found)
 
-    def _force(self) -> float:
-        """Force of the arm on the world along the commanded direction, N, over all covers."""
+    def _force(self) -> list[float]:
+        """Force of the arm on each surface along the commanded direction, N, over all covers."""
         model, data = self._run.driver.plant.model, self._run.driver.plant.data
-        total = 0.0
+        total = [0.0] * len(self._directions)
         for i in range(data.ncon):
             mujoco.mj_contactForce(model, data, i, self._wrench)
-            on_second = float(self._direction @ data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3])
-            total += on_second if data.contact.geom[i, 0] in self._covers else -on_second
+            first, second = data.contact.geom[i].tolist()
+            k = self._surfaces[first if first in self._surfaces else second]
+            on_second = float(self._directions[k] @ data.contact.frame[i].reshape(3, 3).T @ self._wrench[:3])
+            total[k] += -on_second if first in self._surfaces else on_second
         return total
 
     def _impact(self, q: list[float], qd: list[float]) -> float:

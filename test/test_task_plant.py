@@ -1,0 +1,79 @@
+"""Tasks of several axes on the simulated arm: the true force from the simulator."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from arms import CONFIGURATION, WAM
+
+from wam_control.scenario import ScenarioStep
+from wam_control.task import AxisKind, TaskAxis, TaskCommand, line_axes, unit
+from wam_description.rigid_body import RigidBody
+from wam_experiments.force_benchmark.surfaces import Surface
+from wam_experiments.force_benchmark.tasks import RELEASE, Task, configured, triple
+from wam_experiments.force_benchmark.trial import TaskWatch, with_accepted_gain
+from wam_sim.simulation import Simulation
+
+BODY = RigidBody(WAM)
+LEVEL = (-0.031, -1.083, -1.826, -0.482)  # the outer link is level
+OUTER = "outer_link"
+
+
+def force(surface: Surface, newtons: float) -> TaskAxis:
+    return TaskAxis(AxisKind.FORCE, -1, surface.cover, surface.place, surface.direction, newtons)
+
+
+class Played:
+    """A task that was played: true forces (T, p), N, along those of its surfaces, and the node at the end."""
+
+    def __init__(self, task: Task, axes: Sequence[TaskAxis], seconds: float, **changes: Any) -> None:
+        configuration = with_accepted_gain(configured(CONFIGURATION, task).with_values(changes))
+        steps = [
+            ScenarioStep("release", RELEASE, request="enable"),
+            ScenarioStep("press", seconds, task=TaskCommand("base", tuple(axes))),
+        ]
+        run = Simulation(configuration, steps)
+        traces = TaskWatch(configuration, task, run).traces()
+        self.forces = np.array([trace.forces for trace in traces]).T
+        self.reason, self.q = traces[0].reason, run.driver.plant.q
+
+
+def test_a_force_of_a_task_on_a_stiff_surface_does_not_jump_at_the_touch() -> None:
+    """Its torque fed forward to the free arm threw it at the surface: 27 N of 16 at 40 000 N/m."""
+    q = (0.3, -1.2, 0.2, 1.0)
+    x, y, z = (-BODY.cover_pose(q, OUTER).rotation[:, 1]).tolist()
+    surface = Surface(OUTER, 0.3, (x, y, z), 4e4, 0.0, is_plane=False)
+    played = Played(Task(q, surface, 16.0), [force(surface, 16.0)], 2.0)
+    assert played.forces.max() < 1.1 * 16.0
+    assert played.forces[-200:].mean() == pytest.approx(16.0, rel=0.05)
+
+
+@pytest.mark.parametrize("speed", [0.03, -0.03])
+def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_it(speed: float) -> None:
+    """What is touched stays where it is, so that it is touched elsewhere on the link: a friction of 0.3 is not all."""
+    along = BODY.cover_pose(LEVEL, OUTER).rotation[:, 0]
+    down = np.array([0.0, 0.0, -1.0]) + along[2] * along
+    surface = Surface(OUTER, 0.25, triple(down / np.linalg.norm(down)), 4000.0, 0.3, is_plane=False)
+    line = line_axes(WAM, OUTER, triple(BODY.point(LEVEL, OUTER, (0.0, 0.0, 0.0))), triple(along))
+    slide = TaskAxis(AxisKind.VELOCITY, -1, OUTER, 0.2, triple(along), speed)
+    played = Played(Task(LEVEL, surface, 5.0), [force(surface, 5.0), line[1], slide], 2.5)
+    slid = BODY.point(played.q, OUTER, (0.0, 0.0, 0.0)) - BODY.point(LEVEL, OUTER, (0.0, 0.0, 0.0))
+    assert slid @ along == pytest.approx(2.5 * speed, rel=0.1), "m"
+    assert played.forces[1000:, 0] == pytest.approx(np.full(1500, 5.0), rel=0.05)
+
+
+@pytest.mark.parametrize("mode", ["warn", "refuse"])
+def test_two_forces_that_are_stable_alone_do_not_swing_together(mode: str) -> None:
+    """Each alone has a margin of 7 and more at this gain; the two of them have one of 0.6."""
+    q = (-0.012, -0.881, 0.49, 0.786)
+    outer = Surface(OUTER, 0.317, unit((-0.298, 0.905, 0.303)), 4e4, 0.0, is_plane=False)
+    inner = Surface("inner_link", 0.388, unit((0.263, 0.915, -0.305)), 4e4, 0.0, is_plane=False)
+    given = {"force_loop:guard.mode": mode, "force_loop:sensing.force_sd_fraction": 0.16}
+    played = Played(Task(q, outer, 8.65, second=(inner, 16.8)), [force(outer, 8.65), force(inner, 16.8)], 3.0, **given)
+    swing = np.ptp(played.forces[-1000:], axis=0)
+    if mode == "warn":
+        assert swing.max() > 2.0, "N, where the guard only warns"
+    else:
+        assert swing.max() < 0.5, "N"
+        assert played.forces[-500:].mean(axis=0) == pytest.approx((8.65, 16.8), rel=0.03)
