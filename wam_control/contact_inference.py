@@ -208,18 +208,13 @@ class ContactInference:
         found = [self._hypothesis(q, cover, fit, ambiguity) for cover, fit in zip(self._covers, fits, strict=True)]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
 
-    def torques(self, hypotheses: Sequence[Hypothesis]) -> Array:
-        """Joint torques of hypotheses, (hypotheses, n), N m, in the pose of the last inference."""
-        wrenches = np.array([[(*h.force, *h.moment)] for h in hypotheses])
-        return (wrenches @ self._jacobians[[self._index[h.cover] for h in hypotheses]])[:, 0]
-
-    def slide(self, hypothesis: Hypothesis) -> Array:
-        """Joint torques, (n,), N m per m, of the force of a hypothesis moving along its link, in that pose."""
-        jacobian, (_, y, z) = self._jacobians[self._index[hypothesis.cover]], hypothesis.force
+    def slide(self, hypothesis: Hypothesis, force: Array) -> Array:
+        """Joint torques, (n,), N m per m, of a force, (3,), N, that moves along the link of a hypothesis."""
+        jacobian, (_, y, z) = self._jacobians[self._index[hypothesis.cover]], force
         return y * jacobian[5] - z * jacobian[4]
 
     def sides(self, hypothesis: Hypothesis) -> Array:
-        """Joint torques of a force where a hypothesis has it or at the far end, (3, n), N m per N."""
+        """Joint torques, (3, n), N m per N, of a force where a hypothesis has it or at the far end, in that pose."""
         i = self._index[hypothesis.cover]
         place = self._covers[i].end[0] if math.isnan(hypothesis.place) else hypothesis.place
         sides = self._jacobians[i][:3].copy()

@@ -27,6 +27,7 @@ NOISE_TIME = 1.0  # s, in which the noise of the motors is followed
 TRUST_TIME = 5.0  # s of motion, in which the size of the errors is followed
 MARGIN = 2.0  # of that size: errors in contact are larger, and some come rarely
 LARGEST = 4.0  # of that size
+ALIKE = 0.5  # of the variance of the rest that changes within a tenth of a second: half of it stays
 LEAST = 1e-30  # variance: avoids a division by zero for errors that are none
 SURE = 2.0  # sd of an error that it must have beyond what is tolerable
 
@@ -106,7 +107,7 @@ class ModelErrors:
         """
         effects = now.effects - then.effects
         noise = (self._through * (self.noise * now.moving)).dot(self._through.T)
-        covariance = effects.dot(self.covariance).dot(effects.T) + now.rest + then.rest + noise
+        covariance = effects.dot(self.covariance).dot(effects.T) + ALIKE * (now.rest + then.rest) + noise
         return now.residual - then.residual - effects.dot(self.errors), covariance
 
     def follow(self, seen: Observation, statistic: float, in_contact: bool, span: float) -> None:
