@@ -213,13 +213,16 @@ class ContactInference:
         jacobian, (_, y, z) = self._jacobians[self._index[hypothesis.cover]], force
         return y * jacobian[5] - z * jacobian[4]
 
-    def sides(self, hypothesis: Hypothesis) -> Array:
-        """Joint torques, (3, n), N m per N, of a force where a hypothesis has it or at the far end, in that pose."""
-        i = self._index[hypothesis.cover]
-        place = self._covers[i].end[0] if math.isnan(hypothesis.place) else hypothesis.place
-        sides = self._jacobians[i][:3].copy()
-        sides[1] += place * self._jacobians[i][5]
-        sides[2] -= place * self._jacobians[i][4]
+    def sides(self, hypotheses: Sequence[Hypothesis]) -> Array:
+        """Joint torques, (hypotheses, 3, n), m, of a force where each has it or at the far end, in that pose."""
+        index = [self._index[h.cover] for h in hypotheses]
+        places = [
+            self._covers[i].end[0] if math.isnan(h.place) else h.place for i, h in zip(index, hypotheses, strict=True)
+        ]
+        place, jacobians = np.array(places)[:, None], self._jacobians[index]
+        sides = jacobians[:, :3]
+        sides[:, 1] += place * jacobians[:, 5]
+        sides[:, 2] -= place * jacobians[:, 4]
         return sides
 
     def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str) -> Hypothesis:

@@ -33,15 +33,19 @@ GROWTH = 3.0  # sd of the change of the first contact's force, per force
 FRICTION = 0.1  # sd of its other components, per change
 SLIDE = 0.02  # m, sd of its displacement
 TURN = 0.5  # sd of the torques that change because the arm turns, per such change: the force may stay in the world
+LEAST_PROBABILITY = 0.1  # of a hypothesis
 UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a lever is as likely as errors of 0.14 N m
 
 
 class _Moment(NamedTuple):
-    """The first contact at one moment, `time` in s: its best explanation, and torques of a force there, (3, n), m."""
+    """The first contact at one moment, `time` in s.
+
+    `hypotheses` : its explanations, the best first; `sides` : torques of a force there, (hypotheses, 3, n), m.
+    """
 
     time: float
     seen: Observation
-    best: Hypothesis
+    hypotheses: tuple[Hypothesis, ...]
     sides: Array
 
 
@@ -101,13 +105,13 @@ class SecondContact:
         if not self._sums:
             self._sums = [np.zeros_like(part) for part in seen]
         if not self.is_suspected:
-            self._remember(_Moment(time, seen, hypotheses[0], inference.sides(hypotheses[0])))
+            self._remember(_Moment(time, seen, hypotheses, inference.sides(hypotheses)))
         if len(self._steady) < LEAST:
             return
         change = self._change(observer, inference)
-        statistic = self._statistic(change, 0.0)
+        statistic = self._statistic(change, 0.0) if change else 0.0
         if self.is_suspected:
-            if statistic < RELEASED * self._threshold:
+            if not change or statistic < RELEASED * self._threshold:
                 self.reset()
                 self._begin = time - SETTLING
             elif time - self._since < OLDEST and not self.is_certain:
@@ -131,32 +135,37 @@ class SecondContact:
         while steady and moment.time - steady[0].time > OLDEST:
             self._sums = [total - part for total, part in zip(self._sums, steady.popleft().seen, strict=True)]
 
-    def _change(self, observer: MomentumObserver, inference: ContactInference) -> _Change:
+    def _change(self, observer: MomentumObserver, inference: ContactInference) -> _Change | None:
         """The change of the torques since the steady moments, without the friction of the first contact.
 
-        Friction may give the first contact a force along the link, which its explanation does not have: its force is
-        that of all three components, where it is thought to be, that fits the steady torques.
+        None for one that errors explain.  Friction may give the first contact a force along the link, which its
+        explanations do not have: its force is that of all three components, at the place of each, that fits the
+        steady torques.
         """
         count = len(self._steady)
         then = Observation(*(total / count for total in self._sums))
         change, covariance = observer.change(then)
+        if change.dot(np.linalg.solve(covariance, change)) < RELEASED * self._threshold:
+            return None
         first = self._steady[count // 2]
-        then_sides, sides = first.sides, inference.sides(first.best)
-        torques = observer.corrected(then)
-        force = np.linalg.solve(then_sides.dot(then_sides.T) + UNMEASURED, then_sides.dot(torques))
-        turned, own = sides - then_sides, force.dot(sides)
-        turn = force.dot(turned)
+        best, then_sides, sides = first.hypotheses[0], first.sides, inference.sides(first.hypotheses)
+        levers = then_sides @ then_sides.transpose(0, 2, 1) + UNMEASURED
+        forces = np.linalg.solve(levers, (then_sides @ observer.corrected(then))[:, :, None]).transpose(0, 2, 1)
+        turned, force = sides - then_sides, forces[0, 0]
+        turns = (forces @ turned)[:, 0]
+        weight = np.array([max(h.probability, LEAST_PROBABILITY) for h in first.hypotheses])
+        weight /= weight.sum()
+        turn = weight.dot(turns)
         change -= turn
-        changes = np.array(  # of one sd each
-            (
-                TURN * turn,
-                turn - np.array(first.best.force).dot(turned),
-                SLIDE * inference.slide(first.best, force),
-                GROWTH * own,
-            )
-        )
+        others, own = len(turns), force.dot(sides[0])
+        changes = np.empty((others + 4, len(change)))  # of one sd each
+        changes[:others] = (turns - turn) * np.sqrt(weight)[:, None]
+        changes[others] = turns[0] - np.array(best.force).dot(turned[0])
+        changes[others + 1] = TURN * turn
+        changes[others + 2] = SLIDE * inference.slide(best, force)
+        changes[others + 3] = GROWTH * own
         covariance += changes.T.dot(changes)
-        return _Change(change, covariance, math.sqrt(force.dot(force)), own, sides)
+        return _Change(change, covariance, math.sqrt(force.dot(force)), own, sides[0])
 
     def _statistic(self, change: _Change, turned: float) -> float:
         """chi^2 of a change that the first contact does not explain; `turned` of its force may change across it."""
