@@ -38,15 +38,12 @@ UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a l
 
 
 class _Moment(NamedTuple):
-    """The first contact at one moment, `time` in s.
-
-    `hypotheses` : its explanations, the best first; `sides` : torques of a force there, (hypotheses, 3, n), m.
-    """
+    """The first contact at one moment, `time` in s: its explanations, the best first, and the covers' Jacobians."""
 
     time: float
     seen: Observation
     hypotheses: tuple[Hypothesis, ...]
-    sides: Array
+    jacobians: Array
 
 
 class _Change(NamedTuple):
@@ -105,7 +102,7 @@ class SecondContact:
         if not self._sums:
             self._sums = [np.zeros_like(part) for part in seen]
         if not self.is_suspected:
-            self._remember(_Moment(time, seen, hypotheses, inference.sides(hypotheses)))
+            self._remember(_Moment(time, seen, hypotheses, inference.jacobians))
         if len(self._steady) < LEAST:
             return
         change = self._change(observer, inference)
@@ -148,7 +145,8 @@ class SecondContact:
         if change.dot(np.linalg.solve(covariance, change)) < RELEASED * self._threshold:
             return None
         first = self._steady[count // 2]
-        best, then_sides, sides = first.hypotheses[0], first.sides, inference.sides(first.hypotheses)
+        best = first.hypotheses[0]
+        then_sides, sides = (inference.sides(first.hypotheses, pose) for pose in (first.jacobians, inference.jacobians))
         levers = then_sides @ then_sides.transpose(0, 2, 1) + UNMEASURED
         forces = np.linalg.solve(levers, (then_sides @ observer.corrected(then))[:, :, None]).transpose(0, 2, 1)
         turned, force = sides - then_sides, forces[0, 0]
