@@ -144,7 +144,7 @@ AMBIGUOUS = [
     ((0.3, -1.0, 0.2, math.pi / 2), "outer_link", (0.28, 0, 0), (0, 0, 3), contact_inference.STRAIGHT_LINK),
     (POSE, "outer_link", (0.0, 0, 0), (0, 0, 6), contact_inference.ELBOW),
     (POSE_BENT, "inner_link", (0.5, 0, 0.5 * 0.04064 / L3), (0, 0, 6), contact_inference.ELBOW),
-    (POSE, "inner_link", (0.3, 0, 0), (0, 0, 6), contact_inference.MOMENT_ONLY),
+    (POSE, "inner_link", (0.3, 0, 0), (0, 6, 0), contact_inference.MOMENT_ONLY),
 ]
 
 
@@ -224,7 +224,7 @@ def test_odds_of_the_links_are_those_of_brute_force(cover: str, x: float, force:
     inner, outer = (
         evidence(POSE, tau, name) + math.log(w) for name, w in zip(ARM.covers.names, PARAMETERS.weights, strict=True)
     )
-    assert odds == pytest.approx(inner - outer, abs=0.6)
+    assert odds == pytest.approx(inner - outer, abs=1.2)  # friction has one size on the whole link
 
 
 @pytest.mark.parametrize("size", [1.0, 10.0, 100.0])

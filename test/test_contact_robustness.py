@@ -14,8 +14,8 @@ from wam_experiments.contact_benchmark.statistics import share
 from wam_experiments.contact_robustness.degradations import NAMES, drawn
 from wam_experiments.contact_robustness.evaluation import RobustnessResult, drives, evaluate, page, report_text
 from wam_experiments.contact_robustness.recording import Drive, record
-from wam_experiments.contact_robustness.replay import SignalFaults
-from wam_experiments.contact_robustness.requirements import COVERAGE, USUAL, contacts_needed
+from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults
+from wam_experiments.contact_robustness.requirements import COVERAGE, USUAL, contacts_needed, required_rows
 from wam_experiments.contact_robustness.touches import axis_of
 
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
@@ -45,6 +45,16 @@ def test_with_the_contacts_that_the_page_names_a_share_in_the_middle_is_shown_to
 
 
 @pytest.mark.slow
+def test_the_worst_degradation_is_the_one_with_the_most_false_alarms_even_if_they_are_allowed() -> None:
+    def score(name: str, alarms: int) -> ReplayScore:
+        return ReplayScore(name, [], 100.0, alarms, 0.0, 0.0, [], 0.0, 0, [], [], "")
+
+    wide = {name: [score(name, alarms)] for name, alarms in ((COARSE, 0), (LOADED, 1))}
+    row = required_rows(wide, {}, [], [], 0.0)[0]
+    assert row.of == f"the worst: {LOADED}"
+    assert row.found.value == 0.01
+
+
 def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
     """By the joint torques that the estimator finds in motion: they are those of the drawn force, within 4 %."""
     drive = Drive(CONFIGURATION.with_values(base_values(CONFIGURATION, False)), STATED, 905, 14.0, "level")

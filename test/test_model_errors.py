@@ -123,11 +123,16 @@ def test_the_size_of_the_errors_is_followed_in_motion_but_not_in_contact_or_at_r
 
 
 def test_only_an_error_that_is_certainly_large_is_named() -> None:
+    variance = np.full(3, SD**2)
+    for certainty, named in ((1.0, []), (1e-4, ["b", "a"])):
+        prior = ModelPrior(
+            ("a", "b", "c"), np.array([0.3, -0.4, 0.1]), certainty * np.diag(variance), variance, np.full(3, 0.2)
+        )
+        assert ModelErrors(prior, 0.0, np.eye(2), np.zeros(2)).beyond == named
     tracked = errors()
-    tracked.errors[:] = 0.3, -0.4, 0.1
     assert tracked.beyond == []
-    tracked.covariance *= 1e-4
-    assert tracked.beyond == ["b", "a"]
+    follow(tracked, 400)
+    assert tracked.beyond == ["a"]
 
 
 def test_errors_of_parameters_without_uncertainty_stay_zero() -> None:

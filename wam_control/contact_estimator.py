@@ -95,6 +95,7 @@ class ContactEstimate(NamedTuple):
 
 NOTHING = (0.0, 0.0, 0.0)
 SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
+SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
 ALONE = 1.3  # times the threshold: detected in one period; below that in two, because noise exceeds it now and then
 TOO_EARLY = "too few samples yet"
 
@@ -135,6 +136,7 @@ class ContactEstimator:
         self._inference = ContactInference(arm, body, parameters.inference)
         self._second = SecondContact(parameters.second)
         self._in_contact = self._is_above = self._is_blind = False
+        self._ended = -math.inf  # by the age of the observer, s
         self.refused = 0
 
     def brake(self, on: bool) -> None:
@@ -150,6 +152,7 @@ class ContactEstimator:
         self._observer.reset()
         self._second.reset()
         self._in_contact = self._is_above = False
+        self._ended = -math.inf
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
         """Take the signals of one inner period.
@@ -183,15 +186,19 @@ class ContactEstimator:
         sd = tuple(math.sqrt(variance) for variance in covariance.diagonal().tolist())
         if not observer.is_ready:
             self._in_contact = self._is_above = False
+            self._ended = -math.inf
             self._second.reset()
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
         precision = np.asarray(np.linalg.inv(covariance), np.float64)
         statistic = detection_statistic(torques, precision)
-        fast = observer.fast_torques() if statistic <= parameters.detect else None
+        is_calm = self._in_contact or observer.age - self._ended > SHAKING
+        fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
         if fast is not None:
             quick = detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64))
             statistic = max(statistic, quick / SUDDEN)
-        self._in_contact = self._is_detected(statistic)
+        was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic)
+        if was_in_contact and not self._in_contact:
+            self._ended = observer.age
         observer.follow(statistic, self._in_contact)
         if not self._in_contact:
             self._second.reset()

@@ -25,7 +25,6 @@ LEAST_FORCE = 1e-6  # N, avoids a division by zero where there is no force
 REACH = 8.0  # of the log of probability; positions further below the maximum are neglected
 FEW = 6  # positions in a peak; with fewer, it is refined
 PARTS = 12  # pieces of a refined peak, two thirds of a standard deviation each
-ROUNDING = 1e-12  # of a determinant; below it is rounding error
 WEAK_PRIOR = 1e-9  # of the force prior: avoids a division by zero in directions that no joint measures
 END = 0.01  # m, length of the end of a link
 LEANS = (0.05, 0.5)  # force across the tube per force along it, on its end
@@ -65,6 +64,7 @@ class Fit(NamedTuple):
 
 
 Terms = tuple[Triple, Triple, Triple, Triple, Triple]
+Quartic = tuple[float, float, float, float, float]  # coefficients of 1, x, .., x^4
 Triangle = tuple[float, ...]  # 15: the rows of the upper triangle of a matrix 5 by 5, one after the other
 # a piece of a link: log of the probability density of a contact, per metre; position and width, m; link; whether it is
 # that of a force along the tube
@@ -108,11 +108,12 @@ class ContactFit:
         self._log_length = [math.log((b - a) / weight) for (a, b), weight in zip(self._ends, weights, strict=True)]
         self._precision, self._friction = force_scale**-2, friction
         self._end_weight, self._along_weight = end_weight, along_weight
+        self._thirds = [[a + (b - a) * part for part in (1 / 6, 1 / 2, 5 / 6)] for a, b in self._ends]
         self._widths = [(b - a) / positions for a, b in self._ends]
         steps = (np.arange(positions) + 0.5) / positions  # the middle of each
         row = np.array([a + (b - a) * steps for a, b in self._ends])
         self._row = row.tolist()
-        self._powers = np.stack((np.ones_like(row), row, row * row), axis=1)
+        self._powers = np.stack([row**k for k in range(5)], axis=1)
 
     def __call__(self, gram: Array) -> list[Fit]:
         """Fit a contact to each link.
@@ -123,8 +124,8 @@ class ContactFit:
         """
         full = gram.tolist()
         links = [
-            _Link(*_with_tangential_force(one, self._precision, 0.5 * (start + end), offset, self._friction, radius))
-            for one, (start, end), offset, radius in zip(full, self._ends, self._offset, self._radius, strict=True)
+            _Link(*_with_tangential_force(one, self._precision, places, offset, self._friction, radius))
+            for one, places, offset, radius in zip(full, self._thirds, self._offset, self._radius, strict=True)
         ]
         log_density = self._log_density(links)
         top = max(map(max, log_density))
@@ -141,14 +142,12 @@ class ContactFit:
         -1/2 (r^T (S + s^2 G G^T)^-1 r + log abs(1 + s^2 G^T W G)), G = A + x B, s the scale of the force;
         all positions on a link are equally likely a priori.
         """
-        n11, n12, n22, c1, c2 = (np.array([link.terms for link in links]) @ self._powers).transpose(1, 0, 2)
-        across = n12 / n11
-        rest, left = n22 - across * n12, c2 - across * c1
-        log_density = c1 * c1 / n11 + left * left / rest - np.log(n11 * rest)
+        explained, determinant = (np.array([link.ratio for link in links]) @ self._powers).transpose(1, 0, 2)
         constant = [
             [2.0 * (link.constant + log_length)] for link, log_length in zip(links, self._log_length, strict=True)
         ]
-        result: list[list[float]] = (0.5 * (log_density - constant)).tolist()
+        log_density = 0.5 * (explained / determinant - np.log(determinant) - constant)
+        result: list[list[float]] = log_density.tolist()
         return result
 
     def _cells(self, i: int, link: "_Link", values: list[float], top: float) -> list[Cell]:
@@ -315,6 +314,7 @@ class _Link:
         self.precision = precision
         self.constant = 0.5 * (self.rr + log_widening)  # subtracted from the log of the probability at every position
         self.terms = _terms(triangle, precision)
+        self.ratio = _explained(self.terms)
 
     def force(self, x: float) -> tuple[Pair, float, Triple]:
         """See `_force`."""
@@ -322,12 +322,9 @@ class _Link:
 
     def log_density(self, x: float) -> float:
         """Log of the probability of the torques for a contact at x, up to a constant of the link; see `ContactFit`."""
-        (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = self.terms
-        n11, n12, n22 = p0 + x * (p1 + x * p2), q0 + x * (q1 + x * q2), s0 + x * (s1 + x * s2)
-        torque1, torque2 = c0 + x * c1, e0 + x * e1
-        determinant = max(n11 * n22 - n12 * n12, ROUNDING * n11 * n22)
-        explained = (torque1 * (n22 * torque1 - 2.0 * n12 * torque2) + n11 * torque2 * torque2) / determinant
-        return 0.5 * (explained - math.log(determinant))
+        (m0, m1, m2, m3, m4), (d0, d1, d2, d3, d4) = self.ratio
+        determinant = d0 + x * (d1 + x * (d2 + x * (d3 + x * d4)))
+        return 0.5 * ((m0 + x * (m1 + x * (m2 + x * (m3 + x * m4)))) / determinant - math.log(determinant))
 
     def torque_position_sd(self, x: float, force: Pair) -> float:
         """Standard deviation of the position, m, by the torques alone, the force unknown: a Schur complement.
@@ -377,6 +374,30 @@ def _terms(triangle: Triangle, precision: float) -> Terms:
     )
 
 
+def _explained(terms: Terms) -> tuple[Quartic, Quartic]:
+    """What a force at x explains of r^T W r, as a ratio of two polynomials of x; the second is the determinant."""
+    (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = terms
+    f0, f1, f2 = c0 * c0, 2.0 * c0 * c1, c1 * c1
+    g0, g1, g2 = 2.0 * c0 * e0, 2.0 * (c0 * e1 + c1 * e0), 2.0 * c1 * e1
+    h0, h1, h2 = e0 * e0, 2.0 * e0 * e1, e1 * e1
+    return (
+        (
+            f0 * s0 - g0 * q0 + h0 * p0,
+            f0 * s1 + f1 * s0 - g0 * q1 - g1 * q0 + h0 * p1 + h1 * p0,
+            f0 * s2 + f1 * s1 + f2 * s0 - g0 * q2 - g1 * q1 - g2 * q0 + h0 * p2 + h1 * p1 + h2 * p0,
+            f1 * s2 + f2 * s1 - g1 * q2 - g2 * q1 + h1 * p2 + h2 * p1,
+            f2 * s2 - g2 * q2 + h2 * p2,
+        ),
+        (
+            p0 * s0 - q0 * q0,
+            p0 * s1 + p1 * s0 - 2.0 * q0 * q1,
+            p0 * s2 + p1 * s1 + p2 * s0 - 2.0 * q0 * q2 - q1 * q1,
+            p1 * s2 + p2 * s1 - 2.0 * q1 * q2,
+            p2 * s2 - q2 * q2,
+        ),
+    )
+
+
 def _force(terms: Terms, x: float) -> tuple[Pair, float, Triple]:
     """Most likely force at position x, the part of r^T W r that it explains, and its covariance 11, 12, 22."""
     (p0, p1, p2), (q0, q1, q2), (s0, s1, s2), (c0, c1, _), (e0, e1, _) = terms
@@ -388,9 +409,9 @@ def _force(terms: Terms, x: float) -> tuple[Pair, float, Triple]:
 
 
 def _with_tangential_force(
-    gram: list[list[float]], precision: float, middle: float, offset: float, friction: float, radius: float
+    gram: list[list[float]], precision: float, places: Sequence[float], offset: float, friction: float, radius: float
 ) -> tuple[Triangle, float, float]:
-    """Arguments of `_Link` with the tangential force, of the size at the middle of the link, in the covariance.
+    """Arguments of `_Link` with the tangential force in the covariance, of the size at the likeliest of some places.
 
     Twist: the line of the force has a moment arm about the axis.  Axial: a friction force along the
     surface, one radius off the axis.  With z these two as torques of one standard deviation,
@@ -399,7 +420,12 @@ def _with_tangential_force(
     """
     (r, g1, g2, g3, g4, t, a) = gram
     triangle = (*r[:5], *g1[1:5], *g2[2:5], *g3[3:5], g4[4])
-    (f1, f2), _, _ = _force(_terms(triangle, precision), middle)
+    terms = _terms(triangle, precision)
+    likely = [
+        (explained + math.log(s11 * s22 - s12 * s12), *force)
+        for force, explained, (s11, s12, s22) in [_force(terms, x) for x in places]
+    ]
+    _, f1, f2 = max(likely)
     size = math.hypot(f1, f2) + LEAST_FORCE
     sd, arm, turn = friction * size, offset * size, friction * radius
     b1, b2 = turn * f1, turn * f2

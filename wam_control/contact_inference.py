@@ -155,6 +155,10 @@ class ContactInference:
 
     Any joints, links and covers will do.  Where joints meet in a shoulder, with a cover from there to the next joint,
     the elbow, and a cover from that on, reasons name poses of these two.
+
+    Attributes
+    ----------
+    jacobians : (covers, 6, n), of the covers in the last pose.
     """
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: InferenceParameters) -> None:
@@ -176,7 +180,8 @@ class ContactInference:
         )
         self._elbow = _elbow(covers)
         self._index = {cover.name: i for i, cover in enumerate(covers)}
-        self._jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
+        self._wrenches = np.array([cover.wrenches for cover in covers])
+        self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
 
     def infer(self, q: Sequence[float], torques: Sequence[float], precision: Array) -> tuple[Hypothesis, ...]:
         """Explain external torques by one contact.
@@ -192,13 +197,11 @@ class ContactInference:
         tuple of Hypothesis
             one per cover, the most probable first; probabilities add up to 1.
         """
+        at = np.array(q)
+        self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
         rows = np.empty((len(self._covers), 7, len(torques)))
         rows[:, 0] = torques
-        at = np.array(q)
-        for i, cover in enumerate(self._covers):
-            jacobian = self._body.cover_jacobian(at, cover.name)
-            self._jacobians[i] = jacobian
-            np.matmul(cover.wrenches, jacobian, out=rows[i, 1:])
+        np.matmul(self._wrenches, self.jacobians, out=rows[:, 1:])
         fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1))
         ambiguity = (
             self._ambiguity(q, fits)
@@ -208,23 +211,20 @@ class ContactInference:
         found = [self._hypothesis(q, cover, fit, ambiguity) for cover, fit in zip(self._covers, fits, strict=True)]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
 
-    def torques(self, hypotheses: Sequence[Hypothesis]) -> Array:
-        """Joint torques of hypotheses, (hypotheses, n), N m, in the pose of the last inference."""
-        wrenches = np.array([[(*h.force, *h.moment)] for h in hypotheses])
-        return (wrenches @ self._jacobians[[self._index[h.cover] for h in hypotheses]])[:, 0]
-
-    def slide(self, hypothesis: Hypothesis) -> Array:
-        """Joint torques, (n,), N m per m, of the force of a hypothesis moving along its link, in that pose."""
-        jacobian, (_, y, z) = self._jacobians[self._index[hypothesis.cover]], hypothesis.force
+    def slide(self, hypothesis: Hypothesis, force: Array) -> Array:
+        """Joint torques, (n,), N m per m, of a force, (3,), N, that moves along the link of a hypothesis."""
+        jacobian, (_, y, z) = self.jacobians[self._index[hypothesis.cover]], force
         return y * jacobian[5] - z * jacobian[4]
 
-    def sides(self, hypothesis: Hypothesis) -> Array:
-        """Joint torques of a force where a hypothesis has it or at the far end, (3, n), N m per N."""
-        i = self._index[hypothesis.cover]
-        place = self._covers[i].end[0] if math.isnan(hypothesis.place) else hypothesis.place
-        sides = self._jacobians[i][:3].copy()
-        sides[1] += place * self._jacobians[i][5]
-        sides[2] -= place * self._jacobians[i][4]
+    def sides(self, hypotheses: Sequence[Hypothesis], jacobians: Array) -> Array:
+        """Joint torques, (hypotheses, 3, n), m, of a force where each has it or at the far end, in a pose."""
+        index = [self._index[h.cover] for h in hypotheses]
+        ends = [self._covers[i].end[0] for i in index]
+        places = [end if math.isnan(h.place) else h.place for end, h in zip(ends, hypotheses, strict=True)]
+        place, chosen = np.array(places)[:, None], jacobians[index]
+        sides = chosen[:, :3]
+        sides[:, 1] += place * chosen[:, 5]
+        sides[:, 2] -= place * chosen[:, 4]
         return sides
 
     def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str) -> Hypothesis:
@@ -276,7 +276,7 @@ class ContactInference:
             return BENT
         if in_plane < math.sqrt(1.0 - NEAR**2) and straight > NEAR:
             return STRAIGHT
-        axes = self._jacobians[self._elbow.inner][3:, : self._covers[self._elbow.inner].joints]
+        axes = self.jacobians[self._elbow.inner][3:, : self._covers[self._elbow.inner].joints]
         if np.linalg.eigvalsh(axes @ axes.T)[0] < 1.0 - NEAR:  # of three axes 1 - cos of the angle of two, as theta2
             return SHOULDER
         return WEAK

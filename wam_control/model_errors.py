@@ -27,6 +27,7 @@ NOISE_TIME = 1.0  # s, in which the noise of the motors is followed
 TRUST_TIME = 5.0  # s of motion, in which the size of the errors is followed
 MARGIN = 2.0  # of that size: errors in contact are larger, and some come rarely
 LARGEST = 4.0  # of that size
+ALIKE = 0.5  # of the variance of the rest that changes within a tenth of a second: half of it stays
 LEAST = 1e-30  # variance: avoids a division by zero for errors that are none
 SURE = 2.0  # sd of an error that it must have beyond what is tolerable
 
@@ -62,6 +63,7 @@ class ModelErrors:
     ----------
     size : squared errors of the torques in free motion, with a margin, over the variances that are stated for them;
         at least 1.
+    beyond : names of the errors that are certainly larger than tolerable, the largest first.
     """
 
     def __init__(self, prior: ModelPrior, drift: float, through: Array, noise: Array) -> None:
@@ -70,6 +72,7 @@ class ModelErrors:
         self._through, self._to_motors = through, np.linalg.inv(through)
         self.errors, self.covariance = prior.errors.copy(), prior.covariance.copy()
         self.noise, self.size = noise.copy(), 1.0
+        self.beyond = self._beyond()
         self._waiting: deque[tuple[Observation, float]] = deque()
         self._since = self._contact = self._hold = 0.0
 
@@ -77,14 +80,6 @@ class ModelErrors:
     def by_name(self) -> dict[str, float]:
         """The errors by name."""
         return dict(zip(self._prior.names, self.errors.tolist(), strict=True))
-
-    @property
-    def beyond(self) -> list[str]:
-        """Names of the errors that are certainly larger than tolerable, the largest first."""
-        excess = np.abs(self.errors) - SURE * np.sqrt(self.covariance.diagonal())
-        ratio = excess / self._prior.tolerable
-        found = np.flatnonzero(ratio > 1.0)
-        return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []
 
     def reset(self) -> None:
         """Forget the samples that wait, not the errors."""
@@ -106,7 +101,7 @@ class ModelErrors:
         """
         effects = now.effects - then.effects
         noise = (self._through * (self.noise * now.moving)).dot(self._through.T)
-        covariance = effects.dot(self.covariance).dot(effects.T) + now.rest + then.rest + noise
+        covariance = effects.dot(self.covariance).dot(effects.T) + ALIKE * (now.rest + then.rest) + noise
         return now.residual - then.residual - effects.dot(self.errors), covariance
 
     def follow(self, seen: Observation, statistic: float, in_contact: bool, span: float) -> None:
@@ -153,3 +148,10 @@ class ModelErrors:
         self.errors += gain @ innovation
         self.covariance -= gain @ gain_torques.T
         self.covariance = 0.5 * (self.covariance + self.covariance.T)
+        self.beyond = self._beyond()
+
+    def _beyond(self) -> list[str]:
+        excess = np.abs(self.errors) - SURE * np.sqrt(self.covariance.diagonal())
+        ratio = excess / self._prior.tolerable
+        found = np.flatnonzero(ratio > 1.0)
+        return [self._prior.names[i] for i in found[np.argsort(-ratio[found])]] if len(found) else []

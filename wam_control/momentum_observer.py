@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.model_errors import ModelErrors, Observation
+from wam_control.model_errors import ALIKE, ModelErrors, Observation
 from wam_control.model_prior import model_prior
 from wam_control.observer_parameters import ObserverParameters
 from wam_control.shaft_friction import ShaftFriction
@@ -272,7 +272,11 @@ class MomentumObserver:
         if not self._link_side:
             return self._errors.change(self.seen, then)
         effects = self.seen.effects - then.effects
-        return self.seen.residual - then.residual, effects.dot(effects.T) + self.seen.rest + then.rest
+        return self.seen.residual - then.residual, effects.dot(effects.T) + ALIKE * (self.seen.rest + then.rest)
+
+    def corrected(self, then: Observation) -> Array:
+        """External torques, (n,), N m, of a mean of what was `seen`, with the present errors of the model."""
+        return then.residual if self._link_side else then.residual - then.effects.dot(self._errors.errors)
 
     def fast_torques(self) -> tuple[list[float], Array] | None:
         """The same with `detection_time`, for a faster detection; None where there is none."""

@@ -178,7 +178,8 @@ def _worst(
 
     def excess(which: str) -> float:
         value = of(groups[which]).value
-        return -math.inf if math.isnan(value) else max(must[0] - value, value - must[1])
+        below = must[0] - value if must[0] else -math.inf  # none of what should be none is not the worst
+        return -math.inf if math.isnan(value) else max(below, value - must[1])
 
     worst = max(groups, key=excess, default="")
     found = of(groups[worst]) if worst else NONE
