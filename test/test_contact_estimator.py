@@ -195,7 +195,7 @@ def test_a_force_along_the_link_is_no_second_contact_when_the_arm_turns(
         q = np.array(TILTED) + ways * (1.0 - math.cos(rate * tick * DT))
         qd = ways * rate * math.sin(rate * tick * DT)
         momentum = body.mass_matrix(q) @ qd
-        bias = body.coriolis_transpose_times_velocity(q, qd) - body.gravity_torque(q)
+        bias = body.momentum_bias(q, qd)
         torque = (momentum - before) / DT - bias - (wrench @ body.cover_jacobian(q, "outer_link")) * (tick >= 100)
         before = momentum
         state = State(q.tolist(), qd.tolist(), torque.tolist())
