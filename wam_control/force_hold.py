@@ -119,7 +119,8 @@ class ForceHold:
         is_known = point.is_pinned or point.is_certain
         slowest = CREEP / parameters.limits.settling_time
         if self.is_touching:
-            is_slow = not is_known and self._identified < DOUBTED
+            is_stiff = desired * yielding < COARSE
+            is_slow = not is_known and not (is_stiff and self._identified >= DOUBTED)
             rise = IDENTIFIED if is_slow else BY_MOTORS if parameters.is_estimated else LATE
             return max(desired * yielding / axis.speed_fraction / rise, slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
