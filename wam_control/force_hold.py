@@ -94,7 +94,7 @@ class ForceHold:
         ) = False
         self._other = ""
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
-        self._uncertain = self._missed = 0.0
+        self._uncertain = self._missed = self._identified = 0.0
         self._forget_swings()
 
     def _forget_swings(self) -> None:
@@ -119,7 +119,9 @@ class ForceHold:
         is_known = point.is_pinned or point.is_certain
         slowest = CREEP / parameters.limits.settling_time
         if self.is_touching:
-            rise = IDENTIFIED if not is_known else BY_MOTORS if parameters.is_estimated else LATE
+            is_stiff = desired * yielding < COARSE
+            is_slow = not is_known and not (is_stiff and self._identified >= DOUBTED)
+            rise = IDENTIFIED if is_slow else BY_MOTORS if parameters.is_estimated else LATE
             return max(desired * yielding / axis.speed_fraction / rise, slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
         if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
@@ -215,6 +217,7 @@ class ForceHold:
         elsewhere : the same if another link is touched.
         torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
         """
+        self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
         limit = parameters.sensing.sd_limit(desired, point.is_pinned)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
         self.is_touching = measured >= TOUCH * desired
