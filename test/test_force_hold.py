@@ -787,13 +787,30 @@ def test_a_force_that_the_motors_would_not_show_is_refused_before_the_arm_moves(
 ) -> None:
     own = replace(QUIET, feedback="contact_estimate", contact_source=source, sensing=FULL)
     for share, is_refused in ((0.9, True), (4.0, False)):
-        loop, sd = force_loop(ARM, own), 2.0 * float(np.linalg.norm(lever(POSE))) / (share * least)
-        out = ask(loop, World(1e-9), down(2.0), external=[0.0] * 4, external_sd=[sd] * 4)
+        loop, sd = force_loop(ARM, own), 6.0 * float(np.linalg.norm(lever(POSE))) / (share * least)
+        out = ask(loop, World(1e-9), down(6.0), external=[0.0] * 4, external_sd=[sd] * 4)
         assert (loop.reaction is ForceReaction.NOT_SENSED) is is_refused
         assert any(abs(v) > 1e-9 for v in out.velocity) is not is_refused
         if is_refused:
             assert f"are {share * least:.2g} times the standard deviation" in loop.reason
             assert f"allowed: sensing.{name}, and above" in loop.reason
+
+
+@pytest.mark.parametrize(
+    ("source", "stiffness", "is_refused"),
+    [("estimated", 2.2e4, True), ("estimated", 1.8e4, False), ("pinned", 2.2e4, False)],
+)
+def test_from_the_motors_a_force_that_is_less_than_a_millimetre_needs_a_pinned_position(
+    source: str, stiffness: float, is_refused: bool
+) -> None:
+    """Friction takes so short a way in jerks, and without a pinned position no torque is fed forward."""
+    guard = replace(QUIET.guard, contact_stiffness=stiffness)
+    own = replace(QUIET, feedback="contact_estimate", contact_source=source, sensing=FULL, guard=guard)
+    loop = force_loop(ARM, own)
+    out = ask(loop, World(1e-9), down(20.0), external=[0.0] * 4, external_sd=[1e-3] * 4)
+    assert (loop.reaction is ForceReaction.TOO_SLOW) is is_refused
+    assert ("the whole force is 0.91 mm" in loop.reason) is is_refused
+    assert any(abs(v) > 1e-9 for v in out.velocity) is not is_refused
 
 
 @pytest.mark.parametrize(("sd", "reaction"), [(0.1, ForceReaction.NONE), (1.2, ForceReaction.UNCERTAIN)])

@@ -358,14 +358,14 @@ def test_an_uncertain_contact_position_is_replaced_by_the_configured_one(
     loop = force_loop(ARM, replace(OWN, feedback=feedback))
     contact = Contact("inner_link", 0.4, (0.0, 0.0, 1.0), position_sd, probability)
     for _ in range(2):
-        out = ask(loop, World(400.0), down(2.0), contact=contact)
+        out = ask(loop, World(400.0), down(6.0), contact=contact)
     there = lever(POSE, DOWN, "inner_link", 0.4) if is_used else lever(POSE)
     assert out.axis.lever == pytest.approx(there, abs=1e-6)
     assert ("contact_cover and contact_position are used" in loop.fallback) is not is_used
     is_refused = not is_used and feedback == "contact_estimate"
     assert ("contact/hypotheses" in loop.refusals) is is_refused
     assert loop.refused == is_refused
-    ask(loop, World(400.0), down(2.0))
+    ask(loop, World(400.0), down(6.0))
     assert (loop.fallback, loop.refusals) == ("", {})
 
 

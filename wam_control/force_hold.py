@@ -129,7 +129,7 @@ class ForceHold:
         return fastest / axis.speed_fraction
 
     def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
-        """Fraction of the torque of the commanded force that is fed forward in this period: `force_feedforward` at least.
+        """Fraction of the torque of the force that is fed forward in this period: `force_feedforward` at least.
 
         From the motors it rises after the touch: the velocity loop would take seconds to wind up to it on a stiff
         surface.  Without dither it would only wind up the friction of the arm.
@@ -347,6 +347,14 @@ class ForceHold:
                 f"settle with a time constant of {1.0 / pace:.2g} s, and at most 1/{SETTLED:g} of "
                 "limits.settling_time is allowed; the arm holds its position: bend the arm, or command another "
                 "direction or position"
+            )
+        way = desired / parameters.guard.contact_stiffness
+        if parameters.is_estimated and not point.is_pinned and way < COARSE:
+            return ForceReaction.TOO_SLOW, (
+                f"the whole force is {1e3 * way:.2g} mm on a surface of {parameters.guard.contact_stiffness:g} N/m "
+                f"(guard.contact_stiffness); from the motors at an estimated position {1e3 * COARSE:g} mm is the "
+                "least, as the velocity loops wind up through friction for longer than limits.settling_time; the arm holds "
+                "its position: pin the position, command more force, or use joint sensors"
             )
         lag = parameters.limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
         most = parameters.sensing.reported_fraction * desired
