@@ -353,8 +353,8 @@ class ForceHold:
             return ForceReaction.TOO_SLOW, (
                 f"the whole force is {1e3 * way:.2g} mm on a surface of {parameters.guard.contact_stiffness:g} N/m "
                 f"(guard.contact_stiffness); from the motors at an estimated position {1e3 * COARSE:g} mm is the "
-                "least, as the velocity loops wind up through friction for longer than limits.settling_time; the arm holds "
-                "its position: pin the position, command more force, or use joint sensors"
+                "least, as the velocity loops wind up through friction for longer than limits.settling_time; the arm "
+                "holds its position: pin the position, command more force, or use joint sensors"
             )
         lag = parameters.limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
         most = parameters.sensing.reported_fraction * desired
