@@ -117,7 +117,7 @@ def test_an_arm_that_would_swing_on_the_surface_in_resonance_with_the_dither_hol
         stiff = replace(own, guard=replace(own.guard, contact_stiffness=part * alike))
         loop, world, axis = ForceLoop(ARM, CONFIGURATION.shared.servo, stiff, timing), World(1e-9), lever(POSE)
         for k in range(60):
-            world.q = (POSE + 3e-5 * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
+            world.q = (POSE + 1.5e-5 * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
             ask(loop, world, down(2.5), external=STILL)
         assert loop.reaction is reaction
 
