@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
 
-from wam_control.force_hold import ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of
 from wam_control.scenario import Push, ScenarioStep
 from wam_control.stability_guard import StabilityGuard
@@ -63,22 +62,6 @@ def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...
     assert np.abs(pressed).max() < 1.2, "rad/s"
     signs = np.sign(np.where(np.abs(pressed) < 0.3, 0.0, pressed)).T
     assert max(np.count_nonzero(np.diff(sign[sign != 0.0])) for sign in signs) <= 2, "turns at more than 0.3 rad/s"
-
-
-@pytest.mark.parametrize("angle", [1.1, 1.2, 1.3])
-def test_where_the_apparent_mass_turns_with_the_pose_the_arm_comes_to_rest_with_a_reason(angle: float) -> None:
-    """A force ahead of the nearly straight arm in free space: -83 to 104 N were measured, and it shook for seconds."""
-    command = ForceCommand("base", (10.0, 0.0, 0.0))
-    given = {"force_loop:contact_source": "pinned", "force_loop:contact_position": 0.4064}
-    run = free_arm(
-        (0.0, -1.5, 0.0, angle), ScenarioStep("press", 4.0, force=command), **given, **{"force_loop:guard.mode": "warn"}
-    )
-    speeds = []
-    while not run.step():
-        speeds.append(np.abs(run.driver.plant.qd).max())
-    reactions = [row.values[0] for row in run.rows["force_axis"] if row.values]
-    assert reactions[-1] == ForceReaction.SHAKEN
-    assert max(speeds[-1000:]) < 0.02, "rad/s, for the last second"
 
 
 def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:

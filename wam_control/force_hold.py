@@ -94,7 +94,7 @@ class ForceHold:
         ) = False
         self._other = ""
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
-        self._uncertain = self._missed = self._identified = self._pulled = 0.0
+        self._uncertain = self._missed = self._identified = 0.0
         self._forget_swings()
 
     def _forget_swings(self) -> None:
@@ -174,12 +174,6 @@ class ForceHold:
         the arm swings on the surface in resonance, 1/F = |1/F_stopped - 1/F_followed|, and friction limits it.  Above
         twice the commanded force the contact is lost and hit again in every cycle of the dither.
         """
-        if self._pulled > CONFLICT:
-            return (
-                f"the measured force swings beyond -{desired:.3g} N, and what is pressed cannot pull: in this pose the "
-                f"arm's own inertia appears in it ({axis.apparent_mass:.2g} kg); the arm holds its position until the "
-                "command ends: bend the arm, or command another direction or position"
-            )
         yielding = 1.0 / parameters.guard.contact_stiffness + axis.compliance
         least = min(self._shaking / yielding, self._blocked)
         if self.is_touching or least <= 0.0:
@@ -226,8 +220,6 @@ class ForceHold:
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
         limit = parameters.sensing.sd_limit(desired, point.is_pinned)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
-        if self._pulled <= CONFLICT:  # else until the command ends
-            self._pulled = max(self._pulled + (dt if measured < -desired else -FADING * dt), 0.0)
         self.is_touching = measured >= TOUCH * desired
         if self.is_touching and not self._has_touched:
             self._has_touched = True
