@@ -4,23 +4,18 @@ The reference is the wall clock.  What the system grants the driver is in its `/
 """
 
 import tempfile
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from comparing import arguments, machine, mark, save, spread, table
+from comparing.clock import watched_clock
 from demo_under_load import Run, busy_loops, demonstration, short_form
-from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
-from rosgraph_msgs.msg import Clock
 
 from wam_analysis.demo_summary import summarize
 from wam_bag.bag import read
 from wam_bag.columns import JointColumns
-from wam_ros.run import Connection
-from wam_ros.wire import stamp_of
 
 MOVED = 1e-3  # rad, of a joint since the first message
 ROWS = {  # must, aim
@@ -38,18 +33,10 @@ def kept(run: Run) -> float:
 
 def first_motion(folder: Path, name: str, options: list[str]) -> float:
     """Time from the start of `wam demo` until the arm's clock, seen from outside, is where a joint has moved, s."""
-    seen: list[tuple[float, int]] = []  # wall clock in s, the arm's time in ns
-    with ThreadPoolExecutor(1) as pool:
-        connection = Connection()
-        watch = Node("stopwatch", context=connection.context)
-        connection.add(watch)
-        watch.create_subscription(
-            Clock, "/clock", lambda data: seen.append((time.time(), stamp_of(data))), qos_profile_sensor_data, raw=True
-        )
+    with ThreadPoolExecutor(1) as pool, watched_clock() as (executor, seen):
         playing = pool.submit(demonstration, folder, name, options)
         while not playing.done():
-            connection.executor.spin_once(timeout_sec=0.05)
-        connection.close()
+            executor.spin_once(timeout_sec=0.05)
     run = playing.result()
     states = read(run.bag, topics=["/wam/joint_states"]).topics["/wam/joint_states"]
     assert isinstance(states, JointColumns)

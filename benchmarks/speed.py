@@ -10,17 +10,14 @@ from typing import Any
 
 import yaml
 from comparing import arguments, machine, mark, ratios, save, spread, table
+from comparing.clock import Readings, watched_clock
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
-from rosgraph_msgs.msg import Clock as ClockMessage
 
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import EACH, GROUPED
 from wam_ros.bring_up import Composition, Processes
-from wam_ros.run import Connection
-from wam_ros.wire import stamp_of
 from wam_sim.simulation import Simulation
 
 STEADY = ClockType.STEADY_TIME
@@ -32,7 +29,6 @@ ROWS = {  # must, aim
     "grouped, recorded": (1.8, 3.0),
     "one process per node, recorded": (1.2, 1.6),
 }
-Readings = list[tuple[float, int]]  # wall clock in s, the arm's time in ns
 
 
 def scenario(seconds: float) -> dict[str, Any]:
@@ -80,21 +76,14 @@ def lockstep(configuration: Configuration, *recorder: str) -> float:
 def processes(configuration: Configuration, how: str) -> float:
     """The same in processes, with the recorder, seen from outside."""
     nodes = {"nodes": [*configuration.shared.nodes, "scenario", "recorder"]}
-    seen: Readings = []
-    connection = Connection()
-    watch = Node("stopwatch", context=connection.context, namespace="wam")
-    connection.add(watch)
-
-    def take(data: bytes) -> None:
-        seen.append((time.perf_counter(), stamp_of(data)))
-
-    watch.create_subscription(ClockMessage, "/clock", take, qos_profile_sensor_data, raw=True)
-    with Processes(configuration.with_values(nodes), log_level="warn", processes=how) as stack:
+    with (
+        watched_clock() as (executor, seen),
+        Processes(configuration.with_values(nodes), log_level="warn", processes=how) as stack,
+    ):
         while not stack.ended():
-            connection.executor.spin_once(timeout_sec=0.1)
+            executor.spin_once(timeout_sec=0.1)
         if stack.failures:
             raise SystemExit(stack.failures[0])
-    connection.close()
     if stack.bag_failure:
         raise SystemExit(stack.bag_failure)
     return _speed(seen)
