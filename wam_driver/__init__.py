@@ -10,9 +10,11 @@
 - limit_watch: speeds, travel, currents and tensions against their limits
 - amplifier: clipping, I2t, deadband, ripple and noise of the motor currents
 - sensors: resolution and noise of encoders and strain gauges
+- imperfections: parameters of amplifiers and sensors
 - plant: the arm in MuJoCo, stepped with motor torques
 - step_size: which step fits the plant's stiffest mode
-- friction: laws of dry friction at motors and joints
+- friction: laws of dry friction and their parameters
+- dry_friction: dry friction of all motors and joints, by these laws
 - circuits: creep, slack, torque and tension of the cable circuits
 - surfaces: contact forces of all that a cover can touch
 - objects: moving obstacles; true pose, motion and contact forces of bodies and doors

@@ -1,27 +1,14 @@
 """Motor amplifier: from the commanded to the actual current and the torque of the motor."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import sin
 from operator import mul
 
 import numpy as np
 
 from wam_description.arm import Motors
-from wam_description.parameters import lengths, parameter
-
-
-@dataclass(frozen=True)
-class AmplifierParameters:
-    """Imperfections of the amplifiers and the thermal time constant of the motors."""
-
-    thermal_time: float = parameter("thermal time constant of the motors' windings", "s", low=0.1, high=1e6)
-    deadband: tuple[float, ...] = parameter("commanded current below which no current flows", "A", low=0.0, high=100.0)
-    torque_ripple: tuple[float, ...] = parameter("torque ripple as a fraction of the torque (2.1.1)", low=0.0, high=1.0)
-    ripple_cycles: tuple[int, ...] = parameter("cycles of the torque ripple per turn of the motor", low=1, high=1e4)
-    current_noise: tuple[float, ...] = parameter(
-        "standard deviation of the actual current, while it is not zero", "A", low=0.0, high=100.0
-    )
+from wam_description.parameters import lengths
+from wam_driver.imperfections import AmplifierParameters
 
 
 class Amplifier:

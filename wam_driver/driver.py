@@ -14,12 +14,13 @@ from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import lengths, parameter
 from wam_description.signals import BASE, NO_LOAD, Answer, Load, State, Table, Wrench
 from wam_description.world import World
-from wam_driver.amplifier import Amplifier, AmplifierParameters
+from wam_driver.amplifier import Amplifier
 from wam_driver.friction import FrictionParameters
+from wam_driver.imperfections import AmplifierParameters, SensorParameters
 from wam_driver.limit_watch import WARNING, LimitWatch
 from wam_driver.plant import Plant
 from wam_driver.safety import Mode, Safety
-from wam_driver.sensors import SensorParameters, Sensors
+from wam_driver.sensors import Sensors
 
 
 @dataclass(frozen=True)

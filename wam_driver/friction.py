@@ -1,4 +1,4 @@
-"""Dry friction of every rotor and joint: the torque up to which it resists, before each step of the plant.
+"""Laws of dry friction of a rotor or joint, and their parameters.
 
 A law is a class with the methods of `FrictionLaw`.  To add one, write it here, name it in `LAWS` and give its
 parameters, if it has any, fields in `FrictionParameters` and values in ``config/``.
@@ -13,14 +13,7 @@ from dataclasses import dataclass
 from itertools import repeat
 from typing import Protocol
 
-from wam_description.arm import Arm
-from wam_description.cables import Circuit
-from wam_description.effects import Effects
-from wam_description.parameters import parameter, require
-
-STUCK_ROTOR = 1e-5  # rad/s; below it a rotor counts as stuck: far under one step of any real motion
-STUCK_JOINT = 1e-6  # rad/s; 1e-3 would make the limit cycle of (5.8) vanish
-LARGEST_PHASE = 1.0  # step times frequency of a presliding spring; explicit integration is unstable above 2
+from wam_description.parameters import parameter
 
 
 class FrictionLaw(Protocol):
@@ -124,7 +117,7 @@ class Presliding:
         return self.torque
 
 
-def _each(motors: tuple[float, ...], joints: tuple[float, ...], size: int) -> list[float]:
+def each_shaft(motors: tuple[float, ...], joints: tuple[float, ...], size: int) -> list[float]:
     """Values of all motors, then of all joints, from lists that hold one value or one each."""
     half = size // 2
     return [*(motors if len(motors) == half else motors * half), *(joints if len(joints) == half else joints * half)]
@@ -136,7 +129,7 @@ LAWS: dict[str, Callable[[Sequence[float], Sequence[float], "FrictionParameters"
         Stribeck,
         static,
         dynamic,
-        _each(given.motor_stribeck_velocity, given.joint_stribeck_velocity, len(static)),
+        each_shaft(given.motor_stribeck_velocity, given.joint_stribeck_velocity, len(static)),
         repeat(given.stribeck_exponent),
     ),
 }
@@ -187,167 +180,3 @@ class FrictionParameters:
 COULOMB_STICTION = FrictionParameters(
     "coulomb_stiction", (1.0,), (1.0,), 2.0, (0.0,), (0.0,), (0.0,), (0.0,), (0.0,), (0.0,)
 )
-
-
-class DryFriction:
-    """Level of dry friction of every shaft, rotors first, then joints: its law, plus what `Effects` adds.
-
-    A shaft is stuck from the moment its velocity changes its sign until it is faster than a threshold.
-
-    Parameters
-    ----------
-    arm : F_s and F_d of motors and joints.
-    effects : friction by the pretension of the cables, added Coulomb friction.
-    parameters : the law.
-    step : of the plant, s.
-    compliance : inverse inertia of each shaft, 1/(kg m^2): it limits the presliding stiffness that a step can follow.
-
-    Attributes
-    ----------
-    direction : sign of the velocity of each shaft, 0 while it is stuck.
-    levels : torque up to which each shaft sticks rigidly, N m; 0 if it has elastic displacement.
-    elastic : torque of friction on each shaft with elastic displacement, N m; empty if no shaft has any.
-    is_steady : True if `follow` needs neither loads nor held torques.
-
-    Raises
-    ------
-    ParameterError
-        if a list has neither one value nor one each, or a presliding stiffness is too large for the step.
-    """
-
-    def __init__(
-        self, arm: Arm, effects: Effects, parameters: FrictionParameters, step: float, compliance: Sequence[float]
-    ) -> None:
-        motors, joints = effects.dry(arm), arm.joints
-        size = 2 * len(motors.names)
-        _refuse_wrong_lengths(parameters, size // 2)
-        static = [*motors.static_friction, *joints.static_friction]
-        dynamic = [*motors.dynamic_friction, *joints.dynamic_friction]
-        asymmetry = _each(parameters.motor_asymmetry, parameters.joint_asymmetry, size)
-        factors = _each(parameters.motor_load_factor, parameters.joint_load_factor, size)
-        stiffness = _each(parameters.motor_presliding_stiffness, parameters.joint_presliding_stiffness, size)
-        _refuse_too_stiff([*motors.names, *joints.names], stiffness, step, compliance)
-        self._laws = [
-            _composed(law, factor, lean)
-            for law, factor, lean in zip(
-                LAWS[parameters.law](static, dynamic, parameters), factors, asymmetry, strict=True
-            )
-        ]
-        self._presliding = {i: Presliding(sigma) for i, sigma in enumerate(stiffness) if sigma > 0.0}
-        self._varying = [i for i, law in enumerate(self._laws) if not law.is_steady or i in self._presliding]
-        self.is_steady = not self._varying
-        self._circuits = list(zip(effects.tension_friction, arm.circuits, strict=True))
-        self._added = effects.added_coulomb_friction
-        self._step = step
-        self._shafts = range(size)
-        # velocities between which a shaft remains as it is: stuck, in positive or in negative motion
-        slowest = [math.nextafter(v, math.inf) for v in [STUCK_ROTOR] * (size // 2) + [STUCK_JOINT] * (size // 2)]
-        self._bounds = [((-v, v), (0.0, math.inf), (-math.inf, 0.0)) for v in slowest]
-        self.direction = [0] * size
-        self.set_circuits(arm.circuits)
-        self.reset()
-
-    def reset(self) -> None:
-        """Return to power-up: every shaft is stuck, none is displaced."""
-        self.direction = [0] * len(self._shafts)
-        self._low, self._high = ([bounds[0][end] for bounds in self._bounds] for end in (0, 1))
-        self.levels = self._static.copy()
-        for presliding in self._presliding.values():
-            presliding.torque = 0.0
-        self.elastic = [0.0] * len(self._shafts) if self._presliding else []
-
-    def set_circuits(self, circuits: Sequence[Circuit]) -> None:
-        """Take the pretension of each circuit, (n,), for the friction by tension (6.5)."""
-        self._circuits = [
-            (per_tension, circuit) for (per_tension, _), circuit in zip(self._circuits, circuits, strict=True)
-        ]
-        self._from_tension = [2.0 * circuit.pretension * per_tension for per_tension, circuit in self._circuits]
-        self.set_added(self._added)
-
-    def set_added(self, friction: Sequence[float]) -> None:
-        """Set the added Coulomb friction of each joint, (n,), N m, static and dynamic alike."""
-        self._added = tuple(friction)
-        self._extra = [*self._from_tension, *friction]
-        self._static = [law.level(0.0, 0, 0.0) + extra for law, extra in zip(self._laws, self._extra, strict=True)]
-        self._dynamic = [law.level(1.0, 1, 0.0) + extra for law, extra in zip(self._laws, self._extra, strict=True)]
-        by_shaft = zip(self.direction, self._static, self._dynamic, strict=True)
-        self.levels = [moving if way else stuck for way, stuck, moving in by_shaft]
-
-    def follow(self, velocity: Sequence[float], load: Sequence[float] = (), held: Sequence[float] = ()) -> bool:
-        """Bring `levels` and `elastic` up to date for the next step.
-
-        Parameters
-        ----------
-        velocity : of each shaft, rad/s.
-        load : torque that the cables transmit to each shaft, N m.
-        held : torque of friction on each shaft in the last step, N m.
-
-        Returns
-        -------
-        bool
-            True if a level has changed.
-        """
-        changed = False
-        for i, speed, low, high in zip(self._shafts, velocity, self._low, self._high):  # noqa: B905 - costs 1 % of a step
-            if low < speed < high:
-                continue
-            way = 0 if self.direction[i] else 1 if speed > 0.0 else -1
-            self.direction[i] = way
-            self._low[i], self._high[i] = self._bounds[i][way]
-            self.levels[i] = self._dynamic[i] if way else self._static[i]
-            changed = True
-        if self._varying:
-            self._evaluate(velocity, load, held)
-            changed = True
-        return changed
-
-    def levels_with_slack(self, transmitted: Sequence[float]) -> list[float]:
-        """Levels while a strand is slack, when the sum of both tensions is more than 2 T_0.
-
-        Parameters
-        ----------
-        transmitted : torque that the cables transmit to each rotor, N m.
-        """
-        levels = self.levels.copy()
-        for i, ((per_tension, circuit), torque) in enumerate(zip(self._circuits, transmitted, strict=False)):
-            excess = abs(torque) / circuit.radius - 2.0 * circuit.pretension
-            levels[i] += per_tension * max(excess, 0.0)
-        return levels
-
-    def _evaluate(self, velocity: Sequence[float], load: Sequence[float], held: Sequence[float]) -> None:
-        """Levels of the shafts whose law depends on more than whether they move; elastic torques."""
-        for i in self._varying:
-            if self.direction[i]:
-                level = self._laws[i].level(velocity[i], self.direction[i], load[i])
-            else:  # friction holds the torque that is opposite to its own
-                level = self._laws[i].level(0.0, (held[i] < 0.0) - (held[i] > 0.0), load[i])
-            level += self._extra[i]
-            if i in self._presliding:
-                # the plant's integrator moves a shaft by step times its new velocity
-                self.elastic[i] = -self._presliding[i].advance(velocity[i] * self._step, level)
-                level = 0.0
-            self.levels[i] = level
-
-
-def _composed(law: FrictionLaw, load_factor: float, asymmetry: float) -> FrictionLaw:
-    loaded = LoadDependent(law, load_factor) if load_factor else law
-    return Asymmetric(loaded, asymmetry) if asymmetry else loaded
-
-
-def _refuse_wrong_lengths(parameters: FrictionParameters, n: int) -> None:
-    for name, value in vars(parameters).items():
-        if isinstance(value, tuple):
-            count = len(value)
-            require(count in (1, n), f"parameter 'friction.{name}' has {count} values; {n} names need 1 or {n}")
-
-
-def _refuse_too_stiff(
-    names: Sequence[str], stiffness: Sequence[float], step: float, compliance: Sequence[float]
-) -> None:
-    for name, sigma, inverse_inertia in zip(names, stiffness, compliance, strict=True):
-        largest = (LARGEST_PHASE / step) ** 2 / inverse_inertia
-        require(
-            sigma <= largest,
-            f"{name}: its presliding stiffness in 'friction' is {sigma:g} N m/rad; a step of {step:g} s allows up to "
-            f"{largest:.3g}, raise timing.substeps for more",
-        )

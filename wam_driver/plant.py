@@ -22,7 +22,8 @@ from wam_description.mjcf import mjcf
 from wam_description.signals import Load, ObjectState
 from wam_description.world import World
 from wam_driver.circuits import CableCircuits
-from wam_driver.friction import COULOMB_STICTION, DryFriction, FrictionParameters
+from wam_driver.dry_friction import DryFriction
+from wam_driver.friction import COULOMB_STICTION, FrictionParameters
 from wam_driver.loads import CoverLoads
 from wam_driver.objects import TrueObjects, moving_obstacles
 from wam_driver.pusher import pushers

@@ -1,37 +1,13 @@
 """Sensors: the plant's true state with resolution and seeded noise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import lengths
 from wam_description.signals import State
-
-
-@dataclass(frozen=True)
-class SensorParameters:
-    """Imperfections of the sensors; with all zero they read true values."""
-
-    encoder_resolution: tuple[float, ...] = parameter(
-        "resolution of the motor angle; if it is not zero, the velocity is the difference over one period",
-        "rad",
-        low=0.0,
-        high=1.0,
-    )
-    encoder_noise: tuple[float, ...] = parameter("standard deviation of the motor angle", "rad", low=0.0, high=1.0)
-    joint_encoder_resolution: tuple[float, ...] = parameter(
-        "resolution of the joint angle, one for all or one each; the velocity as with encoder_resolution",
-        "rad",
-        low=0.0,
-        high=1.0,
-        before=(0.0,),
-    )
-    joint_encoder_noise: tuple[float, ...] = parameter(
-        "standard deviation of the joint angle", "rad", low=0.0, high=1.0
-    )
-    strain_noise: tuple[float, ...] = parameter("standard deviation of the strain torque", "N m", low=0.0, high=100.0)
+from wam_driver.imperfections import SensorParameters
 
 
 class Encoders:
