@@ -21,7 +21,6 @@ COMPILED = (
     "wam_control/contact_fit.py",
     "wam_control/force_axis.py",
     "wam_control/force_command.py",
-    "wam_control/force_law.py",
     "wam_control/force_loop.py",
     "wam_control/force_measurement.py",
     "wam_control/hybrid_velocity.py",
