@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -259,19 +260,24 @@ def test_statistic_respects_the_covariance() -> None:
     assert detection_statistic([1.0, -1.0], precision) == pytest.approx(2 / 0.2)
 
 
+def with_joints(arm: Arm, kept: slice, **others: Any) -> Arm:
+    """The arm with some of its joints, and what belongs to them; `others` are fields that have to fit these."""
+
+    def part(values: Any) -> Any:
+        each = len(values) // 4
+        return tuple(np.reshape(values, (4, each))[kept].ravel().tolist()) if each else values
+
+    parts = {name: getattr(arm, name) for name in ("motors", "cables", "joints", "links")}
+    matrix = np.reshape(arm.joint_from_motor, (4, 4))[kept, kept]
+    groups = {name: type(group)(**{k: part(v) for k, v in vars(group).items()}) for name, group in parts.items()}
+    return dataclasses.replace(arm, **others, **groups, joint_from_motor=tuple(matrix.ravel().tolist()))
+
+
 def one_joint(arm: Arm) -> Arm:
     """A testbed: the first motor and joint, lying down, with the outer cover on its link."""
-    first = lambda group: type(group)(**{k: v[: max(1, len(v) // 4)] for k, v in vars(group).items()})  # noqa: E731
     covers = {k: v[len(v) // 2 :] for k, v in vars(arm.covers).items()}
-    return dataclasses.replace(
-        arm,
-        motors=first(arm.motors),
-        cables=first(arm.cables),
-        joints=first(arm.joints),
-        links=first(arm.links),
-        covers=type(arm.covers)(**{**covers, "links": ("link1",)}),
-        joint_from_motor=arm.joint_from_motor[:1],
-    )
+    outer = type(arm.covers)(**{**covers, "links": ("link1",)})
+    return with_joints(arm, slice(1), covers=outer)
 
 
 def test_a_single_joint_reports_what_it_measures() -> None:
@@ -286,27 +292,13 @@ def test_a_single_joint_reports_what_it_measures() -> None:
     assert found.force == pytest.approx((0.0, 1.2 / L4, 0.0), rel=0.01)
 
 
-def without_the_first_joint(arm: Arm) -> Arm:
-    """A shoulder of two axes instead of three, and its elbow."""
-    others = lambda group: type(group)(**{k: v[len(v) // 4 :] for k, v in vars(group).items()})  # noqa: E731
-    joint_from_motor = np.reshape(arm.joint_from_motor, (4, 4))[1:, 1:]
-    return dataclasses.replace(
-        arm,
-        motors=others(arm.motors),
-        cables=others(arm.cables),
-        joints=others(arm.joints),
-        links=others(arm.links),
-        joint_from_motor=tuple(joint_from_motor.ravel().tolist()),
-    )
-
-
 @pytest.mark.parametrize(
     ("q", "cover", "point", "force", "reason"), [case for case in AMBIGUOUS if case[4] != contact_inference.SHOULDER]
 )
 def test_reasons_follow_from_the_arms_structure_and_not_from_a_number_of_joints(
     q: tuple[float, ...], cover: str, point: tuple[float, ...], force: tuple[float, ...], reason: str
 ) -> None:
-    arm = without_the_first_joint(ARM)
+    arm = with_joints(ARM, slice(1, None))
     inference = ContactInference(arm, RigidBody(arm), PARAMETERS)
     found = inference.infer(q[1:], torques(q, cover, point, force)[1:].tolist(), W[1:, 1:])
     assert reason in of(found, cover).reason
@@ -315,7 +307,7 @@ def test_reasons_follow_from_the_arms_structure_and_not_from_a_number_of_joints(
 
 @pytest.mark.parametrize("theta3", [0.0, 1.2])
 def test_a_shoulder_of_two_axes_leaves_a_moment_unmeasured_in_every_pose(theta3: float) -> None:
-    arm = without_the_first_joint(ARM)
+    arm = with_joints(ARM, slice(1, None))
     q, tau = (-1.0, theta3, 0.5), torques((0.0, -1.0, theta3, 0.5), "outer_link", (0.2, 0, 0), (0, 0.6, 0))[1:]
     inference = ContactInference(arm, RigidBody(arm), PARAMETERS)
     found = of(inference.infer(q, tau.tolist(), np.eye(3) / 0.3**2), "outer_link")

@@ -315,6 +315,16 @@ def running(domain_id: int, factor: float = 0.0, **values: Any) -> Iterator[tupl
             shown.close()
 
 
+@contextmanager
+def ready(domain_id: int, factor: float = 0.0, **values: Any) -> Iterator[tuple[Any, Shown, Any, Any]]:
+    """The same with the panel of the page, once it shows the braked arm, and what spins the stack meanwhile."""
+    with running(domain_id, factor, **values) as (composition, shown):
+        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
+        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
+        assert shown.page.panel is not None
+        yield composition, shown, shown.page.panel, spin
+
+
 def mode_of(shown: Shown) -> str:
     """State of the driver as the page shows it."""
     panel = shown.page.panel
@@ -374,11 +384,7 @@ def test_a_scenario_is_played_into_a_running_stack_and_a_wrong_one_is_refused(
         {"name": "move", "seconds": 1.0, "posture": [0.1, -0.7, 0.0, 0.6]},
     ]
     script.write_text(json.dumps({"steps": steps}))
-    with running(domain_id, 0.3) as (composition, shown):
-        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
-        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
-        panel = shown.page.panel
-        assert panel is not None
+    with ready(domain_id, 0.3) as (_, shown, panel, spin):
         panel.requests.put(Play("nosuch"))
         shown.wait(lambda: "refused" in panel._said.content and "nosuch" in panel._said.content, spin)
         start = panel.snapshot.q
@@ -495,11 +501,8 @@ def test_copies_for_the_page_are_few_and_newest_first(ros: RosWorld) -> None:
 
 
 def test_the_page_takes_copies_and_not_every_message(domain_id: int) -> None:
-    with running(domain_id) as (composition, shown):
-        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
-        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
-        panel, node = shown.page.panel, composition.nodes["driver"]
-        assert panel is not None
+    with ready(domain_id) as (composition, shown, panel, spin):
+        node = composition.nodes["driver"]
 
         def whole() -> set[str]:
             listeners = {name: node.get_subscriptions_info_by_topic(f"/wam/{name}") for name in COPIED}
@@ -515,11 +518,7 @@ def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypat
 
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
     far = {"force_loop:limits.free_travel": 0.3}  # m; it is 0.15 m to the box
-    with running(domain_id, 1.0, **far) as (composition, shown):
-        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
-        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
-        panel = shown.page.panel
-        assert panel is not None
+    with ready(domain_id, 1.0, **far) as (_, shown, panel, spin):
         panel.requests.put(Bend())
         shown.wait(lambda: "enable the arm first" in panel._said.content, spin)
         panel.requests.put(Call("driver", "enable", True))
@@ -539,11 +538,8 @@ def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypat
 def test_an_arm_goes_on_where_the_page_presses_and_lets_go(domain_id: int) -> None:
     from wam_description.wiring import Call
 
-    with running(domain_id) as (composition, shown):
-        spin = lambda: composition.executor.spin_once(timeout_sec=0.01)  # noqa: E731
-        shown.wait(lambda: mode_of(shown) == "braked" and shown.page.panel.snapshot.q, spin)
-        panel, node = shown.page.panel, composition.nodes["driver"]
-        assert panel is not None
+    with ready(domain_id) as (composition, shown, panel, spin):
+        node = composition.nodes["driver"]
         press = Press("outer_link", (0.0, -2.0, 0.0))
         panel.requests.put(press)
         shown.wait(lambda: "enable the arm first" in panel._said.content, spin)

@@ -51,6 +51,16 @@ class Naive:
         return [min(max(torque, -PEAK), PEAK) / CONSTANT]
 
 
+def blocked(law: VelocityLoop | Naive, command: float) -> Rotor:
+    """A rotor that was blocked under a command until the law gave its peak torque."""
+    rotor = Rotor(law=law)
+    rotor.blocked = True
+    for _ in range(500):
+        rotor.step([command])
+    assert rotor.torque == PEAK
+    return rotor
+
+
 def closed_form(time: float, command: float, surplus: float) -> float:
     """Speed error of J e'' + K_p e' + K_i e = 0 with e(0) = command and J e'(0) = -(K_p command + surplus)."""
     root = cmath.sqrt(KP * KP - 4.0 * INERTIA * KI)
@@ -85,11 +95,7 @@ def test_feedforward_that_equals_the_load_keeps_the_rotor_at_rest() -> None:
 def test_a_blocked_motor_does_not_wind_up_and_recovers_at_once() -> None:
     speeds = []
     for law in (VelocityLoop(ONE, SERVO, OWN), Naive()):
-        rotor = Rotor(law=law)
-        rotor.blocked = True
-        for _ in range(500):
-            rotor.step([400.0])
-        assert rotor.torque == PEAK
+        rotor = blocked(law, 400.0)
         rotor.blocked = False
         fastest = 0.0
         for _ in range(200):
@@ -104,11 +110,7 @@ def test_a_blocked_motor_does_not_wind_up_and_recovers_at_once() -> None:
 def test_a_motor_that_creeps_into_its_limit_leaves_it_when_the_error_turns() -> None:
     torques = []
     for law in (VelocityLoop(ONE, SERVO, OWN), Naive()):
-        rotor = Rotor(law=law)
-        rotor.blocked = True
-        for _ in range(500):
-            rotor.step([100.0])  # 1.5 N m from K_p, the rest up to 4 N m from the integral
-        assert rotor.torque == PEAK
+        rotor = blocked(law, 100.0)  # 1.5 N m from K_p, the rest up to 4 N m from the integral
         torques.append([rotor.step([-1.0]) for _ in range(20)])
     with_it, without = torques
     assert with_it[0] < PEAK - KP * 100.0 + 0.1

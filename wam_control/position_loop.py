@@ -30,19 +30,12 @@ class PositionLoop:
         self._commanded = [0.0] * len(motors.names)
 
     def step(self, motors: State, command: Sequence[float], feedforward: Sequence[float], dt: float) -> list[float]:
-        """Currents for one measurement.
+        """Currents for one measurement, (n,), A.
 
         Parameters
         ----------
-        motors : angles, rad, velocities, rad/s, and torques in the last period, N m, of the motors (n,) each.
-        command : commanded motor velocities (n,), rad/s; empty for torque only.
-        feedforward : torques (n,), N m.
-        dt : time since the last measurement, s.
-
-        Returns
-        -------
-        list of float
-            currents (n,), A.
+        motors : measured state of the motors; the torques are those of the last period.
+        command, feedforward, dt : as in `VelocityLoop.step`.
         """
         theta, currents = motors.position, []
         reference = self._reference = list(self._reference if command and self._reference else theta)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from wam_control.force_axis import REACH, ForceAxes, ForceAxis, SensingParameters
 from wam_control.force_law import ForceLaw
-from wam_control.friction_trial import stable_error
+from wam_control.friction_trial import FrictionTrial
 from wam_control.friction_verdict import SOFTER, Domain, PredictedCycle, stiction_cycle
 from wam_control.sampled_loop import Axes, Feedback, SampledLoop
 from wam_description.arm import Arm, Servo, Timing
@@ -336,12 +336,8 @@ class StabilityGuard:
                 softer = replace(node, contact_stiffness=part * node.contact_stiffness)
                 cycle = stiction_cycle(softer, max(law.gain)).peak_to_peak
                 stiffness = part * self._stiffness(contact)
-                least = min(
-                    least,
-                    stable_error(
-                        self._loop, contact.q, axes, stiffness, task.feedback, softer, max(law.deadband), cycle
-                    ),
-                )
+                trial = FrictionTrial(self._loop, contact.q, axes, stiffness, task.feedback, softer, max(law.deadband))
+                least = min(least, trial.stable_error(cycle))
         return least
 
     def _delays(self, task: GuardedTask) -> list[int]:

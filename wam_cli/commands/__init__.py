@@ -224,16 +224,24 @@ def topic_map_of(given: argparse.Namespace) -> TopicMap:
     return topic_map(given.only_topic, given.only_joint, given.only_command, given.only_map, given.only_unit)
 
 
-def take_seeds(parser: argparse.ArgumentParser, seeds: Sequence[int], of: str) -> None:
-    """Let a command take several seeds of what is drawn; `require_seeds` checks them."""
+def take_evaluation(parser: argparse.ArgumentParser, seeds: Sequence[int], of: str, page: str) -> None:
+    """Let a command take several seeds of what is drawn, a page, a configuration and a batch.
+
+    `require_evaluation` checks the first two.
+    """
     words = f"seeds of {of}, default {' '.join(str(seed) for seed in seeds)}"  # `map` is a command here
     parser.add_argument("--seed", type=int, nargs="+", default=list(seeds), help=words)
+    parser.add_argument("--write", type=Path, help=f"page to write, for example {page}")
+    take_configuration(parser)
+    take_batch(parser)
 
 
-def require_seeds(given: argparse.Namespace) -> None:
-    """Refuse a seed that is negative; errors as those of `at_least`."""
+def require_evaluation(given: argparse.Namespace) -> None:
+    """Refuse a seed that is negative, as `at_least` does, and a page that could not be written."""
     for seed in given.seed:
         at_least("--seed", seed, 0)
+    if given.write:
+        writable_file("--write", given.write)
 
 
 def at_least(option: str, value: float, low: float) -> None:

@@ -14,11 +14,8 @@ from wam_cli.commands import (
     at_least,
     batch_of,
     configuration_of,
-    require_seeds,
-    take_batch,
-    take_configuration,
-    take_seeds,
-    writable_file,
+    require_evaluation,
+    take_evaluation,
 )
 from wam_cli.commands import evaluate_faults as faults
 from wam_cli.commands import evaluate_force as force
@@ -89,7 +86,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _contact_arguments(parser: argparse.ArgumentParser) -> None:
-    take_seeds(parser, SEEDS, "the scenarios")
+    take_evaluation(parser, SEEDS, "the scenarios", "docs/contact.md")
     parser.add_argument("--contacts", type=int, default=200, help="contacts in motion per seed, default 200")
     parser.add_argument("--resting", type=int, default=30, help="contacts at rest per seed, default 30")
     parser.add_argument("--free", type=float, default=200.0, help="seconds of motion without contact per seed")
@@ -100,9 +97,6 @@ def _contact_arguments(parser: argparse.ArgumentParser) -> None:
         default="direct",
         help="direct: without ROS; lockstep: over topics, one scenario at a time",
     )
-    parser.add_argument("--write", type=Path, help="page to write, for example docs/contact.md")
-    take_configuration(parser)
-    take_batch(parser)
 
 
 def _write(
@@ -139,9 +133,7 @@ def _run_contact(given: argparse.Namespace) -> int:
     at_least("--contacts", given.contacts, 1)
     at_least("--resting", given.resting, 0)
     at_least("--free", given.free, 0.0)
-    require_seeds(given)
-    if given.write:
-        writable_file("--write", given.write)
+    require_evaluation(given)
     configuration = configuration_of(given)
     arm = configuration.shared.arm
     extent = BenchmarkExtent(given.contacts, given.resting, given.free)

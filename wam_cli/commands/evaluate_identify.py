@@ -2,18 +2,8 @@
 
 import argparse
 import sys
-from pathlib import Path
 
-from wam_cli.commands import (
-    at_least,
-    batch_of,
-    configuration_of,
-    require_seeds,
-    take_batch,
-    take_configuration,
-    take_seeds,
-    writable_file,
-)
+from wam_cli.commands import at_least, batch_of, configuration_of, require_evaluation, take_evaluation
 from wam_experiments.faults.page import with_section
 from wam_experiments.identification.evaluation import missed, run_trial, table, trials
 from wam_sim.batch import results
@@ -25,19 +15,15 @@ SECTION = "identification"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    take_seeds(parser, SEEDS, "plants and motions")
+    take_evaluation(parser, SEEDS, "plants and motions", "docs/identify.md")
     parser.add_argument("--seconds", type=float, default=60.0, help="length of each motion, default 60")
-    parser.add_argument("--write", type=Path, help="page to update, for example docs/identify.md")
-    take_configuration(parser)
-    take_batch(parser)
 
 
 def run(given: argparse.Namespace) -> int:
     """Play, identify, compare; 1 if a required value is missed."""
     at_least("--seconds", given.seconds, SHORTEST)
-    require_seeds(given)
+    require_evaluation(given)
     if given.write:
-        writable_file("--write", given.write)
         with_section(given.write, SECTION, "")  # refuses a page without the section, before the work
     with batch_of(given) as batch:
         found = results(run_trial, trials(configuration_of(given), given.seed, given.seconds), *batch)

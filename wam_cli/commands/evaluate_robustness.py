@@ -3,16 +3,7 @@
 import argparse
 from pathlib import Path
 
-from wam_cli.commands import (
-    at_least,
-    batch_of,
-    configuration_of,
-    require_seeds,
-    take_batch,
-    take_configuration,
-    take_seeds,
-    writable_file,
-)
+from wam_cli.commands import at_least, batch_of, configuration_of, require_evaluation, take_evaluation
 from wam_experiments.contact_robustness import degradations
 from wam_experiments.contact_robustness.evaluation import (
     SHORTEST,
@@ -33,7 +24,7 @@ SEEDS = (1, 2, 3)
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    take_seeds(parser, SEEDS, "arms and contacts")
+    take_evaluation(parser, SEEDS, "arms and contacts", "docs/contact-robustness.md")
     parser.add_argument("--seconds", type=float, default=110.0, help="length of a recording, default 110")
     parser.add_argument(
         "--only", nargs="+", default=list(degradations.NAMES), metavar="DEGRADATION", help="default: all"
@@ -41,18 +32,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--recordings", type=Path, metavar="DIRECTORY", help="keep the recordings here, and use those that are here"
     )
-    parser.add_argument("--write", type=Path, help="page to write, for example docs/contact-robustness.md")
     parser.add_argument("--before", type=Path, help="page of another version on the same seeds, to put below")
-    take_configuration(parser)
-    take_batch(parser)
 
 
 def run(given: argparse.Namespace) -> int:
     """Evaluate and print the tables."""
     at_least("--seconds", given.seconds, SHORTEST)
-    require_seeds(given)
-    if given.write:
-        writable_file("--write", given.write)
+    require_evaluation(given)
     before = given.before.read_text(encoding="utf-8") if given.before else ""
     configuration = configuration_of(given)
     chosen = drives(configuration, given.seed, given.only, given.seconds)
