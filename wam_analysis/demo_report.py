@@ -64,6 +64,11 @@ def report(bag: Path, picture: Path | None = None) -> str:
     return "\n".join([text(summary, notes), "", *files])
 
 
+def reaction_report(bag: Path) -> str:
+    """What was not simply obeyed in a recording, by step; '' if nothing."""
+    return "\n".join(_reactions(summary_of(recorded_run(read(bag, TOPICS_READ, may_lack=True)))))
+
+
 def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     """The report without the names of files.
 
