@@ -126,7 +126,8 @@ def _report_of_task(task: Experiment, bag: Path) -> str:
 
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
-    return f"{text(task, result)}\n{reaction_report(bag)}\n\nbag      {bag}\npicture  {bag / 'task.png'}"
+    told = "\n".join(filter(None, (text(task, result), reaction_report(bag))))
+    return f"{told}\n\nbag      {bag}\npicture  {bag / 'task.png'}"
 
 
 def _cause(bag: Path) -> str:

@@ -247,8 +247,8 @@ def page(trials: Sequence[ForceTrial], seed: int, code: str, repeat: str, pictur
     ]
     for grouping in GROUPINGS:
         head = (grouping.title, *HEAD[1:])
-        counted = [_counts(name, of_class(trials, grouping, name)) for name in grouping.classes]
-        parts += [markdown(head, [*counted, _counts("all", trials)])]
+        tally = [_counts(name, of_class(trials, grouping, name)) for name in grouping.classes]
+        parts += [markdown(head, [*tally, _counts("all", trials)])]
     parts += [
         "## Reasons",
         "",
