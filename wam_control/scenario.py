@@ -349,7 +349,9 @@ def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
     if "place" not in body:
         return ForceCommand(frame, (x, y, z))
     place = number(where, "place", body["place"])
-    require(frame != BASE and any((y, z)), f"{where}: place is given; it needs the frame of a link and a force across it")
+    require(
+        frame != BASE and any((y, z)), f"{where}: place is given; it needs the frame of a link and a force across it"
+    )
     length = arm.covers.length_of(frame)
     require(0.0 < place <= length, f"{where}: place is {place:g} m; allowed: above 0, up to {length:g} m of {frame}")
     return ForceCommand(frame, (x, y, z), torque_of_position((x, y, z), place))
