@@ -175,7 +175,7 @@ def _approach(distance: float, gain: float, margin: float) -> float:
 def least_force(
     body: RigidBody, q: Sequence[float], external: Array, above: float = 0.0, place: tuple[str, float] | None = None
 ) -> float:
-    """Smallest force that gives external torques of this size, N: at a place of a cover, m, or at the tool.
+    """Smallest force, N, that gives external torques of this size: at a position along a cover, m, or at the tool.
 
     A force nearer to the base than the tool is larger.  One that is certainly not `above` this, N, is returned as 0:
     the singular values, squared, of the Jacobian have their mean below the largest.
