@@ -19,7 +19,6 @@ from wam_experiments.contact_benchmark.figure import figure
 from wam_experiments.contact_benchmark.free_motion import ContactFreeTime, contact_free_time, torque_errors
 from wam_experiments.contact_benchmark.over_topics import script
 from wam_experiments.contact_benchmark.page import (
-    FEW,
     MARGINAL,
     MET,
     MISSED,
@@ -37,7 +36,8 @@ from wam_experiments.contact_benchmark.scenarios import (
 )
 from wam_experiments.contact_benchmark.score import ANY, ScenarioScore, further_metrics, required_metrics, score
 from wam_experiments.contact_benchmark.simulation import EstimatedHypothesis, LoadTorques, Played, Record, play
-from wam_experiments.contact_benchmark.statistics import Interval, events, quantile, rms, share
+from wam_experiments.contact_benchmark.statistics import FEW, Interval, counted, events, quantile, rms, share
+from wam_experiments.contact_robustness.requirements import RequiredRow, required_table
 from wam_sim.batch import processes
 
 CONFIGURATION = Configuration.load(packaged("wam"))
@@ -233,6 +233,16 @@ def test_marks_tell_a_good_number_from_a_marginal_one() -> None:
     assert mark(*none, Interval(0.0, 0.0, 3.7, 600)) == TARGET_MET
     assert mark(*none, Interval(1.0, 0.0, 5.0, 600)) == MISSED
     assert mark(ANY, ANY, Interval(9.0, 8.0, 10.0, 5)) == ""
+
+
+def test_a_verdict_on_few_observations_says_so() -> None:
+    assert counted(MET, 20) == MET
+    assert counted(MET, 2) == "met (n=2: too few)"
+    assert counted("", 2) == ""
+    assert "met (n=2: too few)" in required_table([RequiredRow("x", "", 1.0, "", (0.0, 1.0), ANY, share(2, 2), "")])
+    assert "too few" not in required_table(
+        [RequiredRow("x", "", 1.0, "", (0.0, 9.0), ANY, Interval(1.0, 1.0, 1.0, 1), "")]
+    )
 
 
 def synthetic(error: float, latency: float, right: float, group: str = "moving") -> list[ScenarioScore]:

@@ -10,6 +10,7 @@ import pytest
 from contact_truth import motor_from_joint
 
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact_estimator_node import ContactEstimatorNode
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
@@ -17,6 +18,7 @@ from wam_description.effects import no_effects
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
+from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
@@ -164,6 +166,30 @@ def test_a_second_contact_is_noticed_by_the_change_of_the_torques(
     assert len({hypothesis.reasons >> REASONS.index(SECOND) for hypothesis in noticed[-1].hypotheses} & {1, 2}) == 1
     assert SECOND in noticed[-1].reason or CERTAIN_SECOND in noticed[-1].reason
     assert not any(estimate.contacts > 1 for estimate in after_steady_contact(cover, x, force, 0.0))
+
+
+def test_a_second_contact_is_reported_once_in_a_contact_if_it_lasts() -> None:
+    arm, node = plant(TILTED), ContactEstimatorNode(CONFIGURATION.shared, SENSORS)
+    reported = []
+    for tick in range(2200):
+        if tick in (50, 450):
+            push(arm, *FIRST)
+        if tick in (350, 900):
+            push(arm, "outer_link", 0.1, (0.0, 6.0, 0.0))
+        if tick == 2000:
+            push(arm, *FIRST[:2], (0.0, 0.0, 0.0))
+        for _ in range(SUBSTEPS):
+            arm.step(ZERO)
+        state = {
+            "motor_states": (tick, State(arm.theta, arm.thetad, ZERO)),
+            "joint_sensors": (tick, State(arm.q, arm.qd, arm.strain_torque)),
+        }
+        out = node.step(Inputs((tick + 1) * 1_000_000, DT, state))
+        reported += [(tick, out["status"].message)] if "status" in out else []
+    ((begin, warning), (end, nothing)) = reported
+    assert (warning, nothing) == (SECOND, "")
+    assert 1200 < begin < 1450
+    assert end > 2000
 
 
 def test_a_second_contact_is_certain_where_friction_of_the_first_could_not_be_it() -> None:

@@ -307,7 +307,7 @@ def trials() -> list[ForceTrial]:
 
 def test_the_page_counts_what_went_in_and_lists_each_failure() -> None:
     found = trials()
-    rows = {name: (value, met) for name, _, value, met in required(found)}
+    rows = {name: (value, met) for name, _, value, met, _ in required(found)}
     assert rows["wrong force without a reason"] == ("1", False)
     assert rows["tasks refused with a reason"][0] == "0.5% of 200"
     text = page(found, 7, "0123abcd", "wam evaluate force --seed 7", "picture.png")
@@ -329,7 +329,7 @@ def test_required_shares_are_of_the_accepted_tasks() -> None:
     ends = [t.result.outcome for t in found if not t.task.conditions.is_dithered]
     refusals, withdrawals = ends.count(TaskEnd.REFUSED), ends.count(TaskEnd.GIVEN_UP)
     assert withdrawals == 1
-    strict, wide = [value for name, _, value, _ in required(found) if "joint sensors" in name]
+    strict, wide = [value for name, _, value, *_ in required(found) if "joint sensors" in name]
     assert f" of {len(ends) - refusals - withdrawals} (" in strict
     assert f" of {len(ends) - refusals} (" in wide
 

@@ -30,7 +30,7 @@ from wam_control.contact_position import pinned_position, torque_of_position
 from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceCommand, ForceLoop
-from wam_control.motion_limits import least_force
+from wam_control.motion_limits import MotionLimits, least_force
 from wam_control.stability_guard import GuardedContact, StabilityGuard
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
@@ -569,6 +569,19 @@ def test_above_the_largest_contact_force_the_arm_moves_only_away_from_it() -> No
     assert set(signs[2:]) == {-1.0, 1.0}, "without the limit one of them presses on"
 
 
+@pytest.mark.parametrize("place", [0.2, 0.4])
+def test_a_force_whose_place_is_known_is_limited_there_and_not_as_one_at_the_tool(place: float) -> None:
+    """100 N at half of the lever of the tool is to it as 50 N."""
+    limits = MotionLimits(ARM, BODY, replace(OWN.limits, contact_force=90.0))
+    external = BODY.point_jacobian(POSE, "outer_link", (place, 0.0, 0.0)).T @ np.array([0.0, 0.0, 100.0])
+    into = (-external / np.abs(external).max()).tolist()
+    assert float(external @ limits.step(into, POSE, external, ("outer_link", place)).velocity) == pytest.approx(0.0)
+    if place < 0.3:
+        assert limits.step(into, POSE, external).velocity == pytest.approx(into)
+    for force in (1.0, 70.0):
+        assert limits.step(into, POSE, external * force / 100.0, ("outer_link", place)).velocity == pytest.approx(into)
+
+
 def test_the_least_force_is_a_lower_bound() -> None:
     random = np.random.default_rng(3)
     for _ in range(200):
@@ -576,6 +589,8 @@ def test_the_least_force_is_a_lower_bound() -> None:
         place = random.uniform(0.0, TIP)
         torques = BODY.point_jacobian(q, "outer_link", (place, 0.0, 0.0)).T @ force
         assert least_force(BODY, q, torques) <= np.linalg.norm(force) * 1.2
+        there = least_force(BODY, q, torques, place=("outer_link", place))
+        assert there <= np.linalg.norm(force) * (1.0 + 1e-9)
 
 
 def test_a_force_that_is_not_reached_is_reported() -> None:

@@ -188,6 +188,7 @@ def test_another_parameter_makes_a_difference_that_is_named(bag: Path, node: str
     nodes = [*configuration.shared.nodes, "scenario"]
     done = replay(bag, node, configuration.with_values({"nodes": nodes}))
     found = {result.topic: result for result in done.topics}[topic]
+    assert replay(bag, node, values=value).topics == done.topics, "as with a configuration that has it"
     assert not done.is_same
     assert found.different > 0
     assert found.first is not None
@@ -263,6 +264,15 @@ def test_of_a_realtime_recording_the_share_that_differs_is_told() -> None:
     assert reasons(done._replace(mode="lockstep")) == []
 
 
+def test_a_parameter_to_set_that_is_not_in_the_bag_is_refused_by_name(bag: Path) -> None:
+    for name, said in (
+        ("force_loop:gain", "node 'force_loop' has no parameter 'gain'"),
+        ("nonsense", "no node has parameter"),
+    ):
+        with pytest.raises(ParameterError, match=said):
+            replay(bag, "force_loop", values={name: 1.0})
+
+
 def test_the_driver_cannot_be_replayed(bag: Path) -> None:
     with pytest.raises(ParameterError, match="node 'driver' cannot be replayed; nodes: transform, velocity_loop"):
         replay(bag, "driver")
@@ -276,3 +286,8 @@ def test_the_command_prints_each_topic_and_says_by_its_code(bag: Path, capsys: p
     with pytest.raises(SystemExit) as ended:
         cli.main(["replay", str(bag), "gravity", "--config", "wam"])
     assert ended.value.code == 0
+    for config in ([], ["--config", "wam"]):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(["replay", str(bag), "gravity", "--set", "arm.gravity=[0.0, 0.0, -9.7]", *config])
+        assert ended.value.code == 1
+        assert "differ (" in capsys.readouterr().out

@@ -1,6 +1,7 @@
 """Scenarios: paths without jerks, pushes, waiting for a contact, and files that are refused with a reason."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +9,28 @@ import numpy as np
 import pytest
 import yaml
 
+from wam_control.contact_position import pinned_position
 from wam_control.force_loop import ForceCommand
-from wam_control.scenario import NO_FORCE, Chirp, Push, Scenario, ScenarioOutput, ScenarioStep, Setting, load
+from wam_control.scenario import (
+    NO_FORCE,
+    Chirp,
+    Push,
+    Scenario,
+    ScenarioOutput,
+    ScenarioParameters,
+    ScenarioStep,
+    Setting,
+    load,
+)
+from wam_control.scenario_node import ScenarioNode
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import NO_CONTACT, Contact
+from wam_description.signals import NO_CONTACT, Contact, State
+from wam_description.synchroniser import Inputs
 
-ARM = Configuration.load(packaged("wam")).shared.arm
+SHARED = Configuration.load(packaged("wam")).shared
+ARM = SHARED.arm
 DT = 0.005
 START, GOAL = [0.0, -0.6, 0.0, 0.5], [0.2, -1.0, 0.1, 0.7]
 PRESS = ForceCommand("base", (0.0, 0.0, -5.0))
@@ -210,6 +225,10 @@ def write(directory: Path, tree: Any) -> Path:
     return path
 
 
+def placed(place: float, frame: str = "outer_link", newtons: Sequence[float] = (0, -3, 1)) -> dict[str, Any]:
+    return {**WHOLE, "force": {"frame": frame, "newtons": list(newtons), "place": place}}
+
+
 def without(body: dict[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in body.items() if name != key}
 
@@ -240,6 +259,10 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
         ({**WHOLE, "force": {"frame": "hand", "newtons": [0, 0, 1]}}, "frame is 'hand'; allowed: base, inner_link"),
         ({**WHOLE, "force": {"frame": "base", "newtons": [0, 1]}}, r"newtons is \[0, 1\]; it must be a list of 3"),
         ({**WHOLE, "force": {"frame": "base", "newtons": [0, 0, math.nan]}}, "newtons is nan; it must be a finite"),
+        (placed(0.28, "base"), "place is given; it needs the frame of a link and a force across it"),
+        (placed(0.28, newtons=[1, 0, 0]), "place is given; it needs the frame of a link and a force across it"),
+        (placed(0.0), "place is 0 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
+        (placed(0.9), "place is 0.9 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
         ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, place"),
         ({**WHOLE, "push": without(WHOLE["push"], "end")}, "push: 'end' is missing"),
         ({**WHOLE, "push": {**WHOLE["push"], "cover": "base"}}, "cover is 'base'; allowed: inner_link, outer_link"),
@@ -283,6 +306,19 @@ def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) ->
 
 
 # chirps and settings
+
+
+def test_a_force_with_a_place_is_commanded_with_the_torque_that_pins_it(tmp_path: Path) -> None:
+    step = {**without(placed(0.28), "push"), "chirp": {"newtons": 1.0, "from": 1.0, "to": 2.0}}
+    script = load(write(tmp_path, {"steps": [step]}), ARM)
+    node = ScenarioNode(SHARED, ScenarioParameters(""), Scenario(script))
+    sizes = []
+    for tick in range(100):
+        joints = {"joint_states": (tick, State(list(START), [], []))}
+        command = node.step(Inputs(tick + 1, 0.005, joints))["force_command"]
+        assert pinned_position(ForceCommand(*command)) == ("outer_link", pytest.approx(0.28))
+        sizes.append(math.hypot(*command.force))
+    assert max(sizes) > min(sizes) + 0.5
 
 
 def test_a_chirp_swings_the_force_along_itself_from_the_first_frequency_to_the_last() -> None:

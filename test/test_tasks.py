@@ -42,6 +42,17 @@ def test_every_task_has_a_world_that_can_be_simulated_and_steps_that_can_be_play
     assert sum(step.seconds for step in steps) == pytest.approx(run.seconds)
 
 
+def test_tasks_move_along_lines_of_the_tip_and_joint_trajectories(tmp_path: Path) -> None:
+    motions = {}
+    for name in tasks():
+        (run,) = load(name).runs
+        arm = with_run(Configuration.load(packaged("wam")), run, tmp_path).shared.arm
+        steps = scenario.load(tmp_path / f"{run.name}.yaml", arm)
+        motions[name] = sum(bool(step.trajectory) for step in steps), sum(bool(step.tip) for step in steps)
+    assert sum(any(counts) for counts in motions.values()) >= 2, motions
+    assert all(map(sum, zip(*motions.values(), strict=True))), motions
+
+
 @pytest.mark.parametrize("name", tasks())
 def test_every_number_of_a_task_with_a_bound_is_within_it(name: str) -> None:
     result = evaluate(load(name), SAMPLES / name)

@@ -17,6 +17,7 @@ from wam_analysis.demo_summary import (
     summary_of,
 )
 from wam_analysis.demo_traces import TOPICS_READ
+from wam_analysis.reactions import sentences, within
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import plain
 from wam_bag.bag import BagError, read
@@ -63,6 +64,11 @@ def report(bag: Path, picture: Path | None = None) -> str:
     return "\n".join([text(summary, notes), "", *files])
 
 
+def reaction_report(bag: Path) -> str:
+    """What was not simply obeyed in a recording, by step; '' if nothing."""
+    return "\n".join(_reactions(summary_of(recorded_run(read(bag, TOPICS_READ, may_lack=True)))))
+
+
 def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     """The report without the names of files.
 
@@ -75,7 +81,7 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     lines += _wrapped(f"Demonstration of {summary.namespace or '/'}: {_played(summary)}")
     worst = "Result, worst case in brackets" + (", for what is left of the recording" if summary.lost else "")
     lines += ["", worst, *(f"  {answer}" for answer in verdict(summary))]
-    lines += ["", *_presses(summary.presses), "", *_touches(summary.touches, summary.period)]
+    lines += ["", *_presses(summary.presses), *_reactions(summary), "", *_touches(summary.touches, summary.period)]
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
     lines += [line for note in (*summary.notes, *notes) for line in _wrapped(f"Note     {note}")]
@@ -90,7 +96,10 @@ def verdict(summary: DemoSummary) -> tuple[str, str, str]:
 def _force_verdict(presses: Sequence[SteadyPress]) -> str:
     question = f"force within {FORCE_TOLERANCE:g} %"
     # not the mean alone: a force that swings or is lost is not the commanded one
-    errors = [abs(press.error(press.true)) + 100.0 * press.ripple / abs(press.commanded) for press in presses]
+    done = [press for press in presses if not press.is_refused]
+    errors = [abs(press.error(press.true)) + 100.0 * press.ripple / abs(press.commanded) for press in done]
+    if len(done) < len(presses):
+        return f"{question}: NO ({len(presses) - len(done)} of {len(presses)} refused or held)"
     return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, lambda worst: f"{worst:.1f} %")
 
 
@@ -158,7 +167,19 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
         *_table(rows, head),
         "  true: of all that acts on the link (simulator), the part along the commanded force; +-: half of",
         "    its range; measured: force loop; estimated: contact estimator",
+        *["  held: the force was refused or the arm held its position, see below"][
+            : any(p.is_refused for p in presses)
+        ],
     ]
+
+
+def _reactions(summary: DemoSummary) -> list[str]:
+    """Commands that were not simply obeyed, by step."""
+    told = [
+        line for step in summary.steps for line in sentences(step.name, within(summary.reactions, step.begin, step.end))
+    ]
+    lines = ["Commands that were refused, held or doubted"] if told else []
+    return ["", *lines, *(line for one in told for line in _wrapped(f"  {one}", "    "))] if told else []
 
 
 def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
@@ -223,6 +244,8 @@ def _number(value: float, digits: int) -> str:
 
 def _per_cent(press: SteadyPress, force: float) -> str:
     error = press.error(force)
+    if press.is_refused:
+        return "held"
     return "-" if math.isnan(error) else f"{error:+.1f} %"
 
 

@@ -1,12 +1,15 @@
 """The demonstration in numbers, from its bag alone: presses, contacts, loop timing and losses."""
 
 from collections import Counter
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from wam_analysis.demo_traces import NAN, RECORDED, Mask, Names, Numbers, Traces, traces_of
 from wam_analysis.measures.runs import runs
+from wam_analysis.reactions import RecordedReaction, reactions_of, within
+from wam_analysis.task_forces import TaskForce, measured_force, task_forces
 from wam_bag.bag import Bag, TableColumns
 from wam_bag.losses import RECORDING, losses
 from wam_control.contact_table import reasons_of
@@ -24,7 +27,10 @@ BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact
 class SteadyPress(NamedTuple):
     """A pressing step in its steady state: means along the commanded force, N; NaN if unknown.
 
-    `ripple` is half of the range of the true force.
+    Attributes
+    ----------
+    ripple : half of the range of the true force.
+    reactions : what the force loop did meanwhile instead of what was commanded, in the whole step.
     """
 
     step: str
@@ -35,6 +41,12 @@ class SteadyPress(NamedTuple):
     ripple: float
     measured: float
     estimated: float
+    reactions: tuple[RecordedReaction, ...] = ()
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the force was not controlled in the steady state."""
+        return any(one.holds and one.end > self.begin for one in self.reactions)
 
     def error(self, force: float) -> float:
         """Deviation from the commanded force, in per cent of it."""
@@ -103,6 +115,8 @@ class DemoSummary(NamedTuple):
     ----------
     namespace : of the arm, '/wam'.
     period : time between two instants of the traces, s.
+    tasks : forces that tasks command.
+    reactions : of the force loop to what was commanded, and faults of the driver.
     outcome : 'done', why the scenario failed, or that the recording ended before.
     false_contact, longest_false_contact : time of false detections and the longest of them, s.
     free : time without contact, s.
@@ -117,8 +131,10 @@ class DemoSummary(NamedTuple):
     outcome: str
     steps: tuple[RecordedStep, ...]
     traces: Traces
+    tasks: tuple[TaskForce, ...]
     presses: tuple[SteadyPress, ...]
     touches: tuple[StepContact, ...]
+    reactions: tuple[RecordedReaction, ...]
     false_contact: float
     longest_false_contact: float
     free: float
@@ -140,7 +156,8 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     """Everything that the report needs, from a run."""
     bag = run.bag
     steps = run.steps if run.unfinished is None else (*run.steps, run.unfinished)
-    traces = traces_of(run)
+    tasks = task_forces(run)
+    traces = traces_of(run, tasks)
     notes = []
     if len(run.arms) > 1:
         notes.append(f"arms in this bag: {', '.join(run.arms)}; this is {run.namespace}")
@@ -149,7 +166,8 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     missing = [name for name in RECORDED if not _length(run, name)]
     if missing:
         notes.append(f"not recorded: {', '.join(missing)}")
-    presses = tuple(press for step in steps if (press := _press(traces, step)))
+    reactions = reactions_of(run, _end(traces, steps))
+    presses = tuple(press for step in steps for press in _presses(run, traces, tasks, step, reactions))
     known = traces.true.is_known & traces.estimated.is_known
     false = known & ~traces.true.acts & traces.estimated.acts
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
@@ -161,8 +179,10 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         outcome=run.outcome or UNFINISHED,
         steps=steps,
         traces=traces,
+        tasks=tuple(tasks),
         presses=presses,
-        touches=_touches(run, traces, steps),
+        touches=_touches(run, traces, steps, {press.step for press in presses if press.is_refused}),
+        reactions=reactions,
         false_contact=int(np.sum(false)) * period,
         longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * period,
         free=int(np.sum(known & ~traces.true.acts)) * period,
@@ -181,11 +201,34 @@ def _length(run: RecordedRun, topic: str) -> int:
     return 0 if columns is None else len(columns.log_time_ns)
 
 
-def _press(traces: Traces, step: RecordedStep) -> SteadyPress | None:
+def _end(traces: Traces, steps: Sequence[RecordedStep]) -> int:
+    """When the recording ends, ns."""
+    return max([int(stamp) for stamp in traces.stamp[-1:]] + [step.end for step in steps[-1:]], default=0)
+
+
+def _presses(
+    run: RecordedRun,
+    traces: Traces,
+    tasks: Sequence[TaskForce],
+    step: RecordedStep,
+    reactions: Sequence[RecordedReaction],
+) -> list[SteadyPress]:
+    """The forces of a step: the commanded one, or each one of a task that commands several."""
+    during = within(reactions, step.begin, step.end)
+    begin = max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
+    presses = [_press(traces, step, begin)]
+    for task in tasks:
+        if not task.is_only and task.begin < step.end and task.end > begin:
+            name, size = f"{step.name}, axis {task.number + 1}", float(np.linalg.norm(task.force))
+            _, measured = measured_force(run, task.number, max(begin, task.begin), min(step.end, task.end))
+            presses.append(SteadyPress(name, begin, step.end, size, NAN, NAN, _mean(measured), NAN))
+    return [press._replace(reactions=during) for press in presses if press]
+
+
+def _press(traces: Traces, step: RecordedStep, begin: int) -> SteadyPress | None:
     whole = traces.during(step.begin, step.end) & traces.commanded.acts
     if not np.any(whole):
         return None
-    begin = max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
     steady = traces.during(begin, step.end) & traces.commanded.acts
     if not np.any(steady):
         steady = whole
@@ -224,11 +267,15 @@ def _contacts(traces: Traces) -> list[tuple[int, int]]:
     return contacts
 
 
-def _touches(run: RecordedRun, traces: Traces, steps: tuple[RecordedStep, ...]) -> tuple[StepContact, ...]:
+def _touches(
+    run: RecordedRun, traces: Traces, steps: tuple[RecordedStep, ...], refused: Collection[str]
+) -> tuple[StepContact, ...]:
     touches = []
     seen: set[int] = set()
     for step in steps:
         rows = traces.during(step.begin, step.end)
+        if step.name in refused and not np.any(rows & (traces.true.acts | traces.estimated.acts)):
+            continue  # nothing was to be touched
         if np.any(rows & (traces.push.acts | traces.commanded.acts)):
             touches.append(_touch(traces, step, rows, seen, _reasons(run, step)))
     return tuple(touches)

@@ -1,10 +1,15 @@
 """Forces and contacts of a recorded run on one time base."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.task_forces import TaskForce, arm_of
+from wam_bag.bag import TableColumns
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import BASE
 from wam_sim.recording import RecordedRun
 
 Numbers = NDArray[np.float64]
@@ -19,7 +24,10 @@ RECORDED = (
     "force_command", "force_measured", "contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point",
     "sim/disturbance", "sim/joint_states",
 )  # fmt: skip
-TOPICS_READ = (*RECORDED, "joint_states", "contact/hypotheses", "status", "/diagnostics")
+TOPICS_READ = (
+    *RECORDED, "joint_states", "contact/hypotheses", "force_axis", "task_command", "task_axes", "status",
+    "/diagnostics",
+)  # fmt: skip
 
 
 class ForceSignal(NamedTuple):
@@ -57,7 +65,8 @@ class Traces(NamedTuple):
 
     Attributes
     ----------
-    commanded, measured : force of the arm on the world.
+    commanded, measured : force of the arm on the world; of a task only where it has one force.  One in the base frame
+        is given in that of the link on which it acts, once that is touched.
     true, estimated : contact according to the simulator and to the estimator, force of the world on the arm.
     push : disturbance that the scenario commanded, exerted by the simulator.
     """
@@ -88,8 +97,14 @@ class Traces(NamedTuple):
         return (self.stamp >= begin) & (self.stamp < end)
 
 
-def traces_of(run: RecordedRun) -> Traces:
-    """All signals at the stamps of the simulator's contact force, or of the next best topic that was recorded."""
+def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
+    """All signals at the stamps of the simulator's contact force, or of the next best topic that was recorded.
+
+    Parameters
+    ----------
+    run : the run.
+    tasks : forces that tasks command in it.
+    """
 
     def signal(wrench: str, point: str = "") -> ForceSignal:
         forces, points = run.wrench(wrench), run.points(point)
@@ -109,14 +124,50 @@ def traces_of(run: RecordedRun) -> Traces:
         if (columns := run.wrench(name)) is not None:
             base = columns.stamp_ns
             break
-    return Traces(
-        stamp=base,
-        commanded=signal("force_command"),
-        measured=signal("force_measured"),
-        true=signal("sim/contact/wrench", "sim/contact/point"),
-        estimated=signal("contact/wrench", "contact/point"),
-        push=signal("sim/disturbance"),
-    )
+    commanded, measured = signal("force_command"), signal("force_measured")
+    true = signal("sim/contact/wrench", "sim/contact/point")
+    estimated = signal("contact/wrench", "contact/point")
+    covers = _controlled(run, base, np.where(estimated.acts & ~true.acts, estimated.frame, true.frame))
+    for task in tasks:
+        rows = (base >= task.begin) & (base < task.end) & task.is_only
+        frames, forces = commanded.frame.astype(object), commanded.force.copy()
+        frames[rows], forces[rows], covers[rows] = task.frame, task.force, task.cover
+        commanded = commanded._replace(frame=frames.astype(np.str_), force=forces)
+    commanded, measured = _on_links(run, base, (commanded, measured), covers)
+    return Traces(base, commanded, measured, true, estimated, signal("sim/disturbance"))
+
+
+def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:
+    """The cover on which the force loop controls the force at each instant, (k,); where unknown, what is touched."""
+    columns = run.bag.topics.get(f"{run.namespace}/force_axis")
+    if not isinstance(columns, TableColumns) or not len(columns.stamp_ns):
+        return np.asarray(touched.astype(object))
+    row, known = _held(columns.stamp_ns, base)
+    frames = np.array(columns.frames, object)[row]
+    return np.asarray(np.where(known & (frames != BASE), frames, touched), object)
+
+
+def _on_links(
+    run: RecordedRun, base: Times, signals: tuple[ForceSignal, ForceSignal], covers: Names
+) -> tuple[ForceSignal, ForceSignal]:
+    """Signals whose forces in the base frame are given in those of some covers, (k,), if the first signal acts."""
+    rows = np.flatnonzero((signals[0].frame == BASE) & signals[0].acts)
+    arm, joints = arm_of(run), run.joints("sim/joint_states") or run.joints("joint_states")
+    if not len(rows) or arm is None or joints is None or any(name not in joints.names for name in arm.joints.names):
+        return signals
+    rows = rows[np.isin(covers[rows], arm.covers.names)]
+    order = [joints.names.index(name) for name in arm.joints.names]
+    q = np.stack([np.interp(base[rows], joints.stamp_ns, joints.position[:, i]) for i in order], axis=1)
+    body = RigidBody(arm)
+    rotations = [body.cover_pose(one, cover).rotation.T for one, cover in zip(q, covers[rows].tolist(), strict=True)]
+    found: list[ForceSignal] = []
+    for signal in signals:
+        frame, force = signal.frame.astype(object), signal.force.copy()
+        of_base = signal.frame[rows] == BASE
+        turned = np.einsum("kij,kj->ki", np.reshape(rotations, (-1, 3, 3)), signal.force[rows])
+        frame[rows[of_base]], force[rows[of_base]] = covers[rows[of_base]], turned[of_base]
+        found.append(signal._replace(frame=frame.astype(np.str_), force=force))
+    return found[0], found[1]
 
 
 def _held(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:

@@ -22,6 +22,7 @@ from wam_description.signals import (
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
 
+DOUBTED = 0.5  # s, in one contact, from which a suspected second one is reported; a release looks like one for 0.4 s
 ENABLED = "enabled"  # mode of the driver in which no brake holds
 
 
@@ -37,6 +38,7 @@ class ContactEstimatorNode:
         self._samples: list[tuple[State, State | None, float]] = []
         self._in_contact: bool | None = None
         self._warned = ""
+        self._doubted = 0.0
         self.unused = frozenset() if own.use_joint_sensors else frozenset({"joint_sensors"})
         self.estimate = self._estimator.estimate()
 
@@ -73,7 +75,9 @@ class ContactEstimatorNode:
         if estimate.in_contact is not self._in_contact:
             self._in_contact = estimate.in_contact
             outputs["contact/in_contact"] = estimate.in_contact
-        warning = SECOND if estimate.contacts > 1 else estimate.warning
+        self._doubted += (estimate.contacts > 1) * self._timing.outer_period_ns / 1e9
+        self._doubted *= estimate.in_contact
+        warning = SECOND if self._doubted > DOUBTED else estimate.warning
         if warning != self._warned:
             self._warned = warning
             outputs["status"] = NodeStatus(Level.WARN if warning else Level.OK, warning, stamp=inputs.stamp)

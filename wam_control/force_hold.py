@@ -34,6 +34,7 @@ SLOWED = 0.5  # of the speed along the force, from then on
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
+NOT_SLOWED = 0.95  # of the speed along the force
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
 
@@ -343,9 +344,8 @@ class ForceHold:
         pace = max(parameters.force_gain) * axis.speed_fraction * stiffness
         if pace * parameters.limits.settling_time < SETTLED:
             return ForceReaction.TOO_SLOW, (
-                f"with {axis.speed_fraction:.2g} of the commanded speed (sensing.apparent_mass_limit) the force would "
-                f"settle with a time constant of {1.0 / pace:.2g} s, and at most 1/{SETTLED:g} of "
-                "limits.settling_time is allowed; the arm holds its position: bend the arm, or command another "
+                f"the force would settle with a time constant of {1.0 / pace:.2g} s{_slowed(axis)}; allowed: "
+                f"1/{SETTLED:g} of limits.settling_time; the arm holds its position: bend the arm, or command another "
                 "direction or position"
             )
         way = desired / parameters.guard.contact_stiffness
@@ -430,9 +430,8 @@ class ForceHold:
         is_late = self._missed > 0.0 and not self._has_settled
         if abs(self._missed) > (lasting if is_late else LEFT * lasting):
             return (
-                f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s; the arm "
-                f"moves with {axis.speed_fraction:.2g} of the commanded speed here: command what can be reached, "
-                "another direction, or bend the arm"
+                f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s"
+                f"{_slowed(axis)}: command what can be reached, another direction, or bend the arm"
             )
         if self._strayed > LEFT * lasting:
             return (
@@ -446,6 +445,16 @@ class ForceHold:
 def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
     """Error, N, up to which a force counts as reached."""
     return max(TOLERANCE * desired, parameters.limits.least_tolerance)
+
+
+def _slowed(axis: ForceAxis) -> str:
+    """Why the arm is slow along the force, '' where it is not."""
+    if axis.speed_fraction > NOT_SLOWED:
+        return ""
+    return (
+        f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
+        "apparent mass is large in this pose (sensing.apparent_mass_limit)"
+    )
 
 
 def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) -> str:

@@ -28,7 +28,7 @@ from wam_control.guard_watch import Watch
 from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits
 from wam_control.stability_guard import GuardAssessment
-from wam_control.task import TaskCommand
+from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_control import AxisRow, TaskControl
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.rigid_body import RigidBody
@@ -252,7 +252,7 @@ class ForceLoop:
         else:
             out = self._force(joints.position, contact, commands.force, commands.posture, dt)
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        limited = self._limits.step(velocity, joints.position, self._external[0])
+        limited = self._limits.step(velocity, joints.position, self._external[0], _known_place(out.point, task))
         if not self.reaction.holds and limited.contact_force:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
         elif not self.reaction.holds and limited.joint_end:
@@ -472,6 +472,15 @@ class ForceLoop:
         if has_changed:
             self._transfer.restart()
         return factor
+
+
+def _known_place(point: ForcePoint | None, task: TaskCommand | None) -> tuple[str, float] | None:
+    """Cover and position, m, where the one commanded force acts; None where that is not known."""
+    if point is not None:
+        return (point.cover, point.position) if point.is_pinned or point.is_certain else None
+    forces = [axis for axis in task.axes if axis.kind is AxisKind.FORCE] if task is not None else []
+    places = [(axis.cover, axis.place) for axis in forces if axis.cover and axis.place is not None]
+    return places[0] if len(forces) == len(places) == 1 else None
 
 
 def _triple(values: Sequence[float]) -> Triple:

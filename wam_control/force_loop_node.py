@@ -11,6 +11,7 @@ from wam_control.trajectory_player import TrajectoryPlayer
 from wam_description.arm import Shared
 from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Table, Wrench
+from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Followed, Input, Outputs, reaction
 
@@ -34,7 +35,7 @@ class ForceLoopNode:
         self._refusal = ""
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
-        self._reported: tuple[Report, ForceReaction, str] | None = None
+        self._reported: tuple[Report, ForceReaction, tuple[str, ...], str] | None = None
         self._reaction = ForceReaction.NONE
 
     @reaction(
@@ -134,13 +135,15 @@ class ForceLoopNode:
     def _status(self) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
         report, reaction = self._loop.report, self._loop.reaction
-        refusal = self._refusal or self._player.refusal
-        if (report, reaction, refusal) == self._reported:
+        refused = {topic: why for topic, why in self.refusals.items() if topic != "contact/hypotheses"}
+        present = report, reaction, tuple(refused), self._refusal or self._player.refusal
+        if present == self._reported:
             return {}
-        self._reported = report, reaction, refusal
-        problem = self._loop.reason or refusal
+        self._reported = present
+        problem = self._loop.reason or next(iter(refused.values()), "")
         level = Level.WARN if report.is_warning or problem else Level.OK
         facts = {**report.facts, "reaction": reaction.name.lower()}
+        facts |= {REFUSED: ", ".join(refused)} if refused else {}
         return {"status": NodeStatus(level, problem or report.message, facts=facts)}
 
     @property

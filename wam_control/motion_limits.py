@@ -114,7 +114,9 @@ class MotionLimits:
     def __init__(self, arm: Arm, body: RigidBody, parameters: LimitParameters) -> None:
         self._joints, self._body, self._parameters = arm.joints, body, parameters
 
-    def step(self, velocity: Sequence[float], q: Sequence[float], external: Array) -> Limited:
+    def step(
+        self, velocity: Sequence[float], q: Sequence[float], external: Array, place: tuple[str, float] | None = None
+    ) -> Limited:
         """Limit commanded velocities.
 
         Parameters
@@ -122,18 +124,21 @@ class MotionLimits:
         velocity : commanded (n,), rad/s; empty for torque only, which is not limited.
         q : joint angles (n,), rad.
         external : torques of the world on the joints (n,), N m.
+        place : cover and position, m, where the commanded force acts; None if that is not known.
         """
         if not velocity:
             return Limited([], "", "")
-        slowed, force = self._against_the_world(list(velocity), q, external)
+        slowed, force = self._against_the_world(list(velocity), q, external, place)
         stopped, end = self._before_the_ends(slowed, q)
         return Limited(stopped, end, force)
 
-    def _against_the_world(self, velocity: list[float], q: Sequence[float], external: Array) -> tuple[list[float], str]:
+    def _against_the_world(
+        self, velocity: list[float], q: Sequence[float], external: Array, place: tuple[str, float] | None
+    ) -> tuple[list[float], str]:
         """Without the part that does work on the world, where its force is above the limit."""
         most = self._parameters.contact_force
         power = float(external.dot(velocity))
-        if power >= 0.0 or (force := least_force(self._body, q, external, BEGIN * most)) <= BEGIN * most:
+        if power >= 0.0 or (force := least_force(self._body, q, external, BEGIN * most, place)) <= BEGIN * most:
             return velocity, ""
         part = min((force - BEGIN * most) / max((1.0 - BEGIN) * most, 1e-9), 1.0)
         slowed: list[float] = (np.array(velocity) - part * power / float(external @ external) * external).tolist()
@@ -167,13 +172,16 @@ def _approach(distance: float, gain: float, margin: float) -> float:
     return gain * max(distance - margin, 0.0)
 
 
-def least_force(body: RigidBody, q: Sequence[float], external: Array, above: float = 0.0) -> float:
-    """Smallest force at the tool that gives external torques of this size, N; a force nearer to the base is larger.
+def least_force(
+    body: RigidBody, q: Sequence[float], external: Array, above: float = 0.0, place: tuple[str, float] | None = None
+) -> float:
+    """Smallest force, N, that gives external torques of this size: at a position along a cover, m, or at the tool.
 
-    One that is certainly not `above` this, N, is returned as 0: the singular values, squared, of the Jacobian have
-    their mean below the largest.
+    A force nearer to the base than the tool is larger.  One that is certainly not `above` this, N, is returned as 0:
+    the singular values, squared, of the Jacobian have their mean below the largest.
     """
-    jacobian, size = body.tool_jacobian(q), math.sqrt(float(external.dot(external)))
+    jacobian = body.tool_jacobian(q) if place is None else body.point_jacobian(q, place[0], (place[1], 0.0, 0.0))
+    size = math.sqrt(float(external.dot(external)))
     if size <= above * math.sqrt(float(np.vdot(jacobian, jacobian)) / 3.0):
         return 0.0
     largest = math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1]))

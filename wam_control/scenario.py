@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from wam_control.contact_position import torque_of_position
 from wam_control.motion import LineMotion, PostureMotion
 from wam_control.scenario_values import known, number, numbers
 from wam_control.task import TaskCommand
@@ -17,7 +18,7 @@ from wam_description.arm import Arm, Shared
 from wam_description.configuration import packaged
 from wam_description.parameters import ParameterError, flatten, parameter, require
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import Contact, ForceCommand, PathPoint, PosturePath, Triple
+from wam_description.signals import BASE, Contact, ForceCommand, PathPoint, PosturePath, Triple
 
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
@@ -220,7 +221,8 @@ class Scenario:
             return step.force
         share = swept_sine(step.chirp, self._elapsed, step.seconds) / math.hypot(*step.force.force)
         x, y, z = (newtons * (1.0 + share) for newtons in step.force.force)
-        return ForceCommand(step.force.frame, (x, y, z))
+        tx, ty, tz = (torque * (1.0 + share) for torque in step.force.torque)
+        return ForceCommand(step.force.frame, (x, y, z), (tx, ty, tz))
 
     def _on_path(self, step: ScenarioStep) -> list[float]:
         s = min(self._elapsed / step.seconds, 1.0)
@@ -339,11 +341,20 @@ def _posture(where: str, body: Any, arm: Arm) -> tuple[float, ...]:
 
 
 def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
-    known(where + ", force", body, ("frame", "newtons"), ("frame", "newtons"))
+    known(where + ", force", body, ("frame", "newtons", "place"), ("frame", "newtons"))
     frames = ("base", *arm.covers.names)
-    require(body["frame"] in frames, f"{where}: frame is {body['frame']!r}; allowed: {', '.join(frames)}")
+    frame = body["frame"]
+    require(frame in frames, f"{where}: frame is {frame!r}; allowed: {', '.join(frames)}")
     x, y, z = numbers(where, "newtons", body["newtons"], 3)
-    return ForceCommand(body["frame"], (x, y, z))
+    if "place" not in body:
+        return ForceCommand(frame, (x, y, z))
+    place = number(where, "place", body["place"])
+    require(
+        frame != BASE and any((y, z)), f"{where}: place is given; it needs the frame of a link and a force across it"
+    )
+    length = arm.covers.length_of(frame)
+    require(0.0 < place <= length, f"{where}: place is {place:g} m; allowed: above 0, up to {length:g} m of {frame}")
+    return ForceCommand(frame, (x, y, z), torque_of_position((x, y, z), place))
 
 
 def _chirp(where: str, body: Any) -> Chirp:

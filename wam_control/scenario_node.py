@@ -6,7 +6,7 @@ from wam_control.contact_table import contact_of
 from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, Setting, load, script_file
 from wam_control.task import table_of
 from wam_description.arm import Shared
-from wam_description.signals import BASE, ZERO, Level, NodeStatus, State, Wrench
+from wam_description.signals import BASE, Level, NodeStatus, State, Wrench
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Call, Input, Outputs, SetParameters, reaction
 
@@ -55,7 +55,7 @@ class ScenarioNode:
         force = out.force
         outputs: dict[str, Any] = {
             "joint_posture_command": State(out.posture, list(out.rate), []),
-            "force_command": Wrench(force.frame, force.force, ZERO),
+            "force_command": Wrench(force.frame, force.force, force.torque),
             "task_command": table_of(out.task, self._covers),
             "sim/disturbance": Wrench(out.push_cover or BASE, out.push_force, out.push_torque),
         }

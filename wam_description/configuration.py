@@ -110,7 +110,7 @@ class Configuration(NamedTuple):
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
                     f"{meant}it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
                 )
-            flat[parameter] = _like(flat.get(parameter), value)
+            flat[parameter] = like(flat.get(parameter), value)
         return Configuration(self.path, _text(sections), _frozen(sections))
 
     def _overlaid(self, path: Path, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
@@ -218,7 +218,7 @@ def _folders() -> Iterator[Path]:
         yield prefix / "share" / "wam_stack" / "config"
 
 
-def _like(present: Any, value: Any) -> Any:
+def like(present: Any, value: Any) -> Any:
     """A new value in the place of a present one: in that of a list, a number is each of its values."""
     if isinstance(present, list | tuple) and isinstance(value, int | float) and not isinstance(value, bool):
         return [value] * max(len(present), 1)

@@ -8,6 +8,7 @@ REAL_TIME_FACTOR, BEHIND, SLIPS = "real-time factor", "behind [ms]", "slips"
 AWAITED = "waits for"  # fact: topics that a node lacks for its next step, separated by blanks
 PAUSED = "time"  # fact of the driver while the arm's time is stopped: "paused"
 CHANGES = "parameter changes"  # fact: how often live parameters were taken, with those that were taken last
+REFUSED = "refused"  # fact: topics whose present command a node does not obey
 WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 
 _CONNECTED = ("waiting", "connected")

@@ -12,6 +12,7 @@ from wam_ros.messages import message_type
 from wam_ros.qos import qos
 from wam_ros.wire import encoder
 
+KEYS: Final = {"sim/disturbance": "key push", "force_command": "key force"}
 DELIVERY: Final = 0.2  # s, in which the last message has arrived
 
 
@@ -42,7 +43,11 @@ class HeldTopic:
         others = self._node.count_publishers(self._topic) - self.is_on
         if others > 0:
             self.end()
-            return f"another program publishes {self._topic}, as a scenario does"
+            return (
+                f"another program publishes {self._topic}, as a scenario does, with or without one of its own; the arm "
+                f"takes it from one program alone: put it into a step of the scenario ({KEYS[self._topic]}), or start "
+                "the stack without one: wam up"
+            )
         if self._publisher is None:
             row = BY_NAME[self._topic]
             self._publisher = self._node.create_publisher(message_type(row), self._topic, qos(row))

@@ -10,11 +10,11 @@ from wam_bag import safe_yaml
 from wam_bag.bag import Bag, BagError
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_description.arm import Shared
-from wam_description.configuration import PARAMETERS
+from wam_description.configuration import PARAMETERS, like
 from wam_description.interface import declared
 from wam_description.nodes import NODES
 from wam_description.parameter_history import Completed, complete
-from wam_description.parameters import ParameterError, build_part, flatten
+from wam_description.parameters import ParameterError, build_part, flatten, require
 
 T = TypeVar("T")
 Values = Mapping[str, Any]
@@ -83,6 +83,23 @@ class RecordedParameters(NamedTuple):
             for node, values in self.nodes.items()
         }
         return self._replace(nodes=nodes)
+
+    def with_options(self, values: Mapping[str, Any]) -> "RecordedParameters":
+        """The same with some values replaced as an option gives them: 'node:parameter', or one that nodes share.
+
+        Raises
+        ------
+        ParameterError
+            if no node in the bag has such a parameter.
+        """
+        settings: dict[str, Any] = {}
+        for key, value in values.items():
+            node, colon, name = key.rpartition(":")
+            owners = [own for own, flat in self.nodes.items() if name in flat and (own == node or not colon)]
+            who = f"node '{node}' has no" if colon else "no node has"
+            require(bool(owners), f"{self.source}: {who} parameter '{name}' in the bag; write [node:]parameter=value")
+            settings |= {f"{own}:{name}": like(self.nodes[own][name], value) for own in owners}
+        return self.with_values(settings)
 
     @property
     def shared(self) -> Shared:

@@ -41,6 +41,7 @@ from wam_sim.bus import TopicValue, flat
 from wam_sim.recording import RecordedRun, recorded_run
 
 _AXES = ("x", "y", "z")
+NOTHING: Mapping[str, Any] = {}
 Numbers = JointColumns | WrenchColumns | PointColumns | TableColumns
 
 
@@ -111,7 +112,9 @@ class Replay(NamedTuple):
 REPLAYED = tuple(name for name in NODES if name not in ("driver", "scenario", "recorder"))
 
 
-def replay(path: str | Path, node: str, configuration: Configuration | None = None) -> Replay:
+def replay(
+    path: str | Path, node: str, configuration: Configuration | None = None, values: Mapping[str, Any] = NOTHING
+) -> Replay:
     """Feed the recorded inputs of a node through it and compare its outputs with the recorded ones.
 
     The driver and the scenario are enabled, paused and answered by services, which no bag holds:
@@ -122,6 +125,7 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
     path : bag; of several arms in it the first is taken.
     node : one of `REPLAYED`, or 'module:Class' of a node of your own.
     configuration : values to use instead of those in the bag.
+    values : to be replaced among those in the bag, by 'node:parameter' or the name of a shared parameter.
 
     Raises
     ------
@@ -140,16 +144,17 @@ def replay(path: str | Path, node: str, configuration: Configuration | None = No
     if not any(name.endswith(f"/{topic}") for name in bag.topics for topic in (*inputs, *outputs)):
         raise BagError(f"{bag.path} has no topic of the node {node}; it has no arm, or another one recorded it")
     run = recorded_run(bag)
+    run = run._replace(parameters=run.parameters.with_options(values))
     namespace = run.namespace
     shared, own = _parameters(run, declaration, configuration)
     triggers = [reaction.trigger.topic for reaction in declaration.reactions]
     missing = [trigger for trigger in triggers if f"{namespace}/{trigger}" not in bag.topics]
     if missing:
         raise BagError(f"{path} lacks the topic {missing[0]}, without which {declaration.name} does nothing")
-    values = (
+    present = (
         configuration.sections.get(declaration.name, {}) if configuration else run.parameters.nodes[declaration.name]
     )
-    changes, lost_changes = _changes(run, shared, declaration, values)
+    changes, lost_changes = _changes(run, shared, declaration, present)
     published = _run(bag, namespace, shared, declaration, own, changes)
     names = _names(shared)
     compared = []

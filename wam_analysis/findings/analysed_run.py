@@ -1,12 +1,14 @@
 """A bag prepared for analysis: its run, parameters, signals and the constant forces that were commanded."""
 
 import itertools
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.demo_summary import DemoSummary, summary_of
+from wam_analysis.reactions import BRIEF, RecordedReaction, within
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_bag.bag import Bag, JointColumns
 from wam_sim.recording import RecordedRun, recorded_run
@@ -30,6 +32,9 @@ class Hold(NamedTuple):
     commanded : its magnitude, N.
     before : force commanded before, along the same direction, N.
     disturbed : whether the scenario pushed the arm meanwhile.
+    cover : on which a task commands it, '' where none does.
+    axis : of a task with several forces, from 0; -1 where it is the only force.
+    reactions : what the force loop did meanwhile instead of what was commanded.
     """
 
     name: str
@@ -40,6 +45,14 @@ class Hold(NamedTuple):
     commanded: float
     before: float
     disturbed: bool
+    cover: str = ""
+    axis: int = -1
+    reactions: tuple[RecordedReaction, ...] = ()
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the force was not controlled in the end: there is nothing to measure of it."""
+        return any(one.holds and one.end >= self.end - BRIEF for one in self.reactions)
 
 
 class AnalysedRun(NamedTuple):
@@ -87,31 +100,50 @@ def analysed_run(bag: Bag) -> AnalysedRun:
 
 def _holds(run: RecordedRun, summary: DemoSummary) -> tuple[Hold, ...]:
     """Intervals with one commanded force, within one step of the scenario."""
+    holds: list[Hold] = []
+    for hold in sorted((*_forces(run, summary), *_forces_of_tasks(summary)), key=lambda one: (one.begin, one.axis)):
+        name = next((step.name for step in summary.steps if step.begin <= (hold.begin + hold.end) // 2 < step.end), "")
+        taken = [hold.name for hold in holds]
+        name = (name or f"{hold.commanded:.3g} N") + f", axis {hold.axis + 1}" * (hold.axis >= 0)
+        name = name if name not in taken else f"{name} ({hold.begin / 1e9:.1f} s)"
+        pushed = summary.traces.during(hold.begin, hold.end) & summary.traces.push.acts
+        reactions = within(summary.reactions, hold.begin, hold.end)
+        holds.append(hold._replace(name=name, disturbed=bool(np.any(pushed)), reactions=reactions))
+    return tuple(holds)
+
+
+def _forces(run: RecordedRun, summary: DemoSummary) -> Iterator[Hold]:
+    """Those of force_command, without names."""
     commands = run.wrench("force_command")
     if commands is None:
-        return ()
+        return
     frames = np.array(commands.frames)
     changed = np.any(np.abs(np.diff(commands.force, axis=0)) > SMALL, axis=1) | (frames[1:] != frames[:-1])
     steps = np.searchsorted(commands.stamp_ns, [step.begin for step in summary.steps])
     inner = {*(np.flatnonzero(changed) + 1).tolist(), *steps.tolist()} - {0, len(frames)}
     bounds = [0, *sorted(inner), len(frames)]
     period = int(np.median(np.diff(commands.stamp_ns))) if len(frames) > 1 else 0
-    holds: list[Hold] = []
     before = np.zeros(3)
     for a, b in itertools.pairwise(bounds):
         force = commands.force[a]
         commanded = float(np.linalg.norm(force))
         begin, end = int(commands.stamp_ns[a]), int(commands.stamp_ns[b - 1]) + period
         if commanded > SMALL and end - begin >= SHORTEST_HOLD * 1e9:
-            name = next((step.name for step in summary.steps if step.begin <= (begin + end) // 2 < step.end), "")
-            taken = [hold.name for hold in holds]
-            name = name or f"{commanded:.3g} N"
-            name = name if name not in taken else f"{name} ({begin / 1e9:.1f} s)"
-            pushed = summary.traces.during(begin, end) & summary.traces.push.acts
             along = float(before @ force) / commanded
-            holds.append(Hold(name, begin, end, str(frames[a]), force, commanded, along, bool(np.any(pushed))))
+            yield Hold("", begin, end, str(frames[a]), force, commanded, along, False)
         before = force
-    return tuple(holds)
+
+
+def _forces_of_tasks(summary: DemoSummary) -> Iterator[Hold]:
+    """Those of tasks, without names."""
+    starts = [step.begin for step in summary.steps]
+    for task in summary.tasks:
+        commanded = float(np.linalg.norm(task.force))
+        bounds = [task.begin, *(at for at in starts if task.begin < at < task.end), task.end]
+        for begin, end in itertools.pairwise(bounds):
+            if commanded > SMALL and end - begin >= SHORTEST_HOLD * 1e9:
+                axis = -1 if task.is_only else task.number
+                yield Hold("", begin, end, task.frame, task.force, commanded, 0.0, False, task.cover, axis)
 
 
 def at_stamps(columns: JointColumns, stamps: Times) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:

@@ -1,7 +1,7 @@
 """Sections about force: how it was reached and held, stability and limit cycles."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,7 +15,10 @@ from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
 from wam_analysis.measures.stability import StabilityVerdict
+from wam_analysis.reactions import FAULT, RecordedReaction, within
+from wam_analysis.reactions import sentences as reaction_sentences
 from wam_control.stability_guard import LARGEST
+from wam_description.signals import BASE
 
 SURE = 0.8  # confidence from which a limit cycle is reported as one
 UNLIKE = "The prediction leaves out friction, inertia and feed-forward."
@@ -28,14 +31,39 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     sentences, findings = [], []
     for one in held:
         sentences.append(_press_sentence(one))
+        sentences += [f"{text}." for text in reaction_sentences(one.hold.name, one.hold.reactions)]
         findings += _press_findings(one)
     if not held:
         sentences.append("No constant force was commanded.")
+    other = _other_reactions(recording)
+    sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found)]
     range_said, range_findings = _dynamic_range(held)
-    verdict = _forces_verdict(held)
+    verdict = (*_reaction_verdict({one.hold.name: one.hold.reactions for one in held} | other), *_forces_verdict(held))
     flagged = [f"{text} {UNLIKE}" for text in deviations(tuple(findings))]
     every = (*findings, *range_findings)
     return Section("force", "Force", (*sentences, *flagged, *range_said), every, lacking, verdict)
+
+
+def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction, ...]]:
+    """What was not simply obeyed besides constant forces, by step of the scenario, or of the run."""
+    spans = [(hold.begin, hold.end) for hold in recording.holds]
+    reactions = [one for one in recording.summary.reactions if one.name != FAULT]
+    rest = [one for one in reactions if not any(within([one], *span) for span in spans)]
+    steps = {step.name: within(rest, step.begin, step.end) for step in recording.summary.steps}
+    return {name: found for name, found in (steps or {"force loop": tuple(rest)}).items() if found}
+
+
+def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]]) -> list[str]:
+    """What was refused or held, and what was doubted, in a sentence each."""
+    verdict = []
+    for holds, what in ((True, "REFUSED or held"), (False, "Reported while pressing")):
+        named = [
+            f"{name} ({one.name} at {one.begin / 1e9:.2f} s)"
+            for name, reactions in found.items()
+            for one in {one.name: one for one in reversed(reactions) if one.holds is holds}.values()
+        ]
+        verdict += [f"{what}: {'; '.join(named)}."] if named else []
+    return verdict
 
 
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
@@ -45,8 +73,9 @@ def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
         return ()
     worst, bias = max(known, key=lambda item: abs(item[1]) / item[0].hold.commanded)
     whose = "true" if len(worst.true) else "measured"
+    what = "controlled" if any(one.hold.is_refused for one in held) else "recorded"
     text = (
-        f"{len(known)} of {len(held)} commanded forces were recorded; the worst {whose} one in the steady state is "
+        f"{len(known)} of {len(held)} commanded forces were {what}; the worst {whose} one in the steady state is "
         f"{100.0 * bias / worst.hold.commanded:+.1f} % off ({worst.hold.name}, "
         f"{shown(worst.hold.commanded, 'N')} commanded)."
     )
@@ -91,7 +120,12 @@ def _press_sentence(one: HeldForce) -> str:
     hold, response = one.hold, one.response
     accuracy = _accuracy(one)
     whose = "true" if len(one.true) else "measured"
-    text = f"{hold.name}: {shown(hold.commanded, 'N')} commanded on {hold.frame}"
+    where = hold.cover or hold.frame
+    text = (
+        f"{hold.name}: {shown(hold.commanded, 'N')} commanded {'in the base frame' if where == BASE else f'on {where}'}"
+    )
+    if hold.is_refused:
+        return f"{text}, and not controlled, so nothing of it is measured."
     if math.isnan(accuracy.bias):
         return f"{text}; the resulting force was not recorded."
     text += f", {whose} force {shown(hold.commanded + accuracy.bias, 'N')} in the steady state"
@@ -119,7 +153,10 @@ def _touched(one: HeldForce) -> str:
 
 def _press_findings(one: HeldForce) -> list[Finding]:
     name, response = one.hold.name, one.response
-    found = []
+    seconds = sum(reaction.end - reaction.begin for reaction in one.hold.reactions if reaction.holds) / 1e9
+    found = [Finding(f"{name}: refused or held for", "s", seconds)] if seconds else []
+    if one.hold.is_refused:
+        return found
     if one.predicted is not None:
         rise = math.log(9.0) * one.predicted.time_constant
         note = "predicted without friction, inertia and feed-forward, (5.2)"
@@ -154,11 +191,15 @@ def cycle_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     findings: list[Finding] = []
     verdict: list[str] = []
     seen: set[str] = set()
+    refused = [one.hold.name for one in held if one.hold.is_refused]
+    held = [one for one in held if not one.hold.is_refused]
+    if refused:
+        sentences.append(f"Not controlled, so without a stability: {', '.join(refused)}.")
     for one in held:
         sentences += [sentence for sentence in _cycle_sentences(one) if sentence not in sentences]
         verdict += filter(None, [_fate(one)[1]])
         findings += [*_cycle_findings(one), *_theory_findings(one, seen)]
-    if not held:
+    if not held and not refused:
         sentences.append("No constant force was commanded, so stability cannot be evaluated.")
     settled = sum(one.is_recorded and one.stability.verdict is StabilityVerdict.SETTLES for one in held)
     if settled and not verdict:

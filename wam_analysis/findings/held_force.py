@@ -18,6 +18,9 @@ from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
 from wam_analysis.measures.stability import Stability, StabilityVerdict, stability
+from wam_analysis.task_forces import measured_force
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
 
 Numbers = NDArray[np.float64]
@@ -78,14 +81,34 @@ class HeldForce(NamedTuple):
 
 
 def held_forces(recording: AnalysedRun) -> tuple[HeldForce, ...]:
-    """Evaluate every hold of a recording."""
-    return tuple(_held(recording, hold) for hold in recording.holds)
+    """Evaluate every hold of a recording; of a force that was not controlled its signals are all there is."""
+    return tuple(
+        _refused(_held(recording, hold)) if hold.is_refused else _held(recording, hold) for hold in recording.holds
+    )
+
+
+def _refused(held: HeldForce) -> HeldForce:
+    nothing = force_accuracy(np.empty(0), np.empty(0))
+    return held._replace(
+        response=None,
+        touched=math.nan,
+        measured_accuracy=nothing,
+        true_accuracy=nothing,
+        cycle=NO_CYCLE,
+        stability=UNDECIDED,
+        node=None,
+        predicted=None,
+        largest=None,
+        guarded=None,
+        swinging=None,
+        moved_at_contact=math.nan,
+    )
 
 
 def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
     time, measured = _measured(recording, hold)
     traces = recording.summary.traces
-    rows = traces.during(hold.begin, hold.end) & traces.commanded.acts
+    rows = traces.during(hold.begin, hold.end) & traces.commanded.acts & (hold.axis < 0)
     time_true = (traces.stamp[rows] - hold.begin) / 1e9
     true = traces.along(traces.true, -1.0)[rows]
     if not np.any(np.isfinite(true)):
@@ -134,6 +157,9 @@ def _moved(recording: AnalysedRun, node: Node | None, found: Swinging | None) ->
 
 
 def _measured(recording: AnalysedRun, hold: Hold) -> tuple[Numbers, Numbers]:
+    if hold.axis >= 0:
+        stamps, value = measured_force(recording.run, hold.axis, hold.begin, hold.end)
+        return (stamps - hold.begin) / 1e9, value
     columns = recording.run.wrench("force_measured")
     if columns is None:
         return np.empty(0), np.empty(0)
@@ -164,7 +190,8 @@ def _touch_down(recording: AnalysedRun, hold: Hold) -> float:
     for signal in (traces.true, traces.estimated):
         if first >= last or not np.any(signal.is_known[first:last]):
             continue
-        acts = signal.acts & ((signal.frame == hold.frame) | (hold.frame not in signal.frame))
+        cover = hold.cover or hold.frame
+        acts = signal.acts & ((signal.frame == cover) | (cover not in signal.frame))
         free = np.flatnonzero(~acts[:first]) if acts[first] else np.array([first + int(np.argmax(acts[first:])) - 1])
         if not np.any(acts[first:last]) or not len(free) or not signal.is_known[free[-1]]:
             return math.nan
@@ -233,11 +260,15 @@ def _theory(recording: AnalysedRun, hold: Hold, cover: str, position: float) -> 
     middle = (hold.begin + hold.end) // 2
     row = max(int(np.searchsorted(joints.stamp_ns, middle, side="right")) - 1, 0)
     q = positions[row].tolist()
-    direction = hold.force
-    if hold.frame not in arm.covers.names or not np.all(np.isfinite(q)):
+    if not np.all(np.isfinite(q)):
         return NO_THEORY
-    node = node_at(parameters, arm, q, hold.frame, position, direction) if hold.frame == cover else None
-    largest = largest_force(arm, q, hold.frame, position, direction)
+    link, direction = hold.cover or (cover if hold.frame == BASE else hold.frame), hold.force
+    if hold.frame != link:
+        body = RigidBody(arm)
+        rotation = np.eye(3) if hold.frame == BASE else body.cover_pose(q, hold.frame).rotation
+        direction = body.cover_pose(q, link).rotation.T @ rotation @ direction
+    node = node_at(parameters, arm, q, link, position, direction) if link == cover else None
+    largest = largest_force(arm, q, link, position, direction)
     loop, timing = parameters.force_loop, parameters.timing
     predicted = None
     if node is not None and loop is not None and timing is not None and loop.mode == "hybrid":

@@ -78,13 +78,18 @@ def take_configuration(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config", default=BASE_CONFIGURATION, help="configuration: a YAML file, or the name of one that is installed"
     )
+    take_values(parser)
+
+
+def take_values(parser: argparse.ArgumentParser) -> None:
+    """Give a command the option --set."""
     parser.add_argument(
         "--set",
         dest="values",
         action="append",
         default=[],
         metavar="[NODE:]PARAMETER=VALUE",
-        help="change a number of it, e.g. force_loop:force_gain=[0.01] or timing.period=0.002; may be repeated",
+        help="change a parameter, e.g. force_loop:force_gain=[0.01] or timing.period=0.002; may be repeated",
     )
 
 

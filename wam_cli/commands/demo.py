@@ -120,12 +120,14 @@ def _report_of_demonstration(bag: Path) -> str:
 
 
 def _report_of_task(task: Experiment, bag: Path) -> str:
-    from wam_experiments.tasks.pictures import save  # for the same reason
+    from wam_analysis.demo_report import reaction_report  # for the same reason
+    from wam_experiments.tasks.pictures import save
     from wam_experiments.thesis.evaluation import evaluate, text
 
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
-    return f"{text(task, result)}\nbag      {bag}\npicture  {bag / 'task.png'}"
+    told = "\n".join(filter(None, (text(task, result), reaction_report(bag))))
+    return f"{told}\n\nbag      {bag}\npicture  {bag / 'task.png'}"
 
 
 def _cause(bag: Path) -> str:

@@ -65,7 +65,7 @@ def run(given: argparse.Namespace) -> int:
         print(report(given.seed, _code(given), trials))
     if given.write:
         _write(given, trials)
-    return 0 if all(met for _, _, _, met in required(trials)) else 1
+    return 0 if all(met for _, _, _, met, _ in required(trials)) else 1
 
 
 def _trials(given: argparse.Namespace) -> list[ForceTrial]:

@@ -2,7 +2,8 @@
 
 import argparse
 
-from wam_cli.commands import configuration_of
+from wam_cli.commands import configuration_of, take_values
+from wam_description.configuration import option_values
 from wam_sim.replay import REPLAYED, Compared, Replay, replay
 
 EXIT_CODES = "Exit code: 0 if every topic is the same bit for bit, 1 if one is not or the bag cannot be used."
@@ -17,11 +18,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config", help="values instead of those in the bag: a YAML file, or the name of an installed one"
     )
+    take_values(parser)
 
 
 def run(given: argparse.Namespace) -> int:
     """Replay and print the comparison of each topic; 0 if all are the same bit for bit, else 1."""
-    done = replay(given.bag, given.node, configuration_of(given) if given.config else None)
+    configuration = configuration_of(given) if given.config else None
+    done = replay(given.bag, given.node, configuration, {} if given.config else option_values(given.values))
     for line in (*(f"INCOMPLETE: {line}" for line in done.lost), *map(told, done.topics), *reasons(done)):
         print(line)
     return 0 if done.is_same else 1

@@ -19,12 +19,12 @@ from wam_experiments.contact_benchmark.score import (
     further_metrics,
     required_metrics,
 )
-from wam_experiments.contact_benchmark.statistics import Interval
+from wam_experiments.contact_benchmark.statistics import FEW, Interval, counted
 
 # every seed that was looked at while the estimator, its configuration or the benchmark was changed
 TUNED = (1, 2, 3, 11, 21, 22, 101, 102, 103, 201, 202, 203, 301, 302, 401, 41)
 MET, TARGET_MET, MARGINAL, MISSED = "met", "**target met**", "met, marginal", "**MISSED**"
-MISSED_MARGINAL, FEW, TARGET_MISSED = "**MISSED**, marginal", "too few", "target missed"
+MISSED_MARGINAL, TARGET_MISSED = "**MISSED**, marginal", "target missed"
 
 
 def holds(value: float, bound: Bound) -> bool:
@@ -86,7 +86,8 @@ def table(result: BenchmarkResult, arm: Arm, metrics: Sequence[Metric]) -> str:
         single = [number(metric.of(result.scores[seed]).value, metric.scale) for seed in result.seeds]
         span = f"{number(found.low, metric.scale)} to {number(found.high, metric.scale)}"
         bounds = [bound_text(metric.required, metric.scale), bound_text(metric.target, metric.scale)]
-        value, judged = number(found.value, metric.scale), mark(metric.required, metric.target, found)
+        value = number(found.value, metric.scale)
+        judged = counted(mark(metric.required, metric.target, found), found.observed)
         rows.append([metric.name, metric.unit, *bounds, *single, value, span, str(found.observed), judged])
     return markdown(head, rows)
 

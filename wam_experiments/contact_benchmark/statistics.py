@@ -23,6 +23,13 @@ class Interval(NamedTuple):
 
 
 NONE = Interval(math.nan, math.nan, math.nan, 0)
+FEW = "too few"
+FEWEST = 20  # observations, below which a verdict is not one on the quantity
+
+
+def counted(verdict: str, observed: int) -> str:
+    """A verdict, with a remark where it is one on too few observations; '' stays ''."""
+    return f"{verdict} (n={observed}: {FEW})" if verdict and observed < FEWEST and FEW not in verdict else verdict
 
 
 def share(hits: int, count: int) -> Interval:

@@ -9,7 +9,7 @@ import numpy as np
 from wam_analysis.table import markdown
 from wam_experiments.contact_benchmark.page import MET, bound_text, mark, number
 from wam_experiments.contact_benchmark.score import ANY, Bound
-from wam_experiments.contact_benchmark.statistics import NONE, Interval, events, quantile, rms, share
+from wam_experiments.contact_benchmark.statistics import NONE, Interval, counted, events, quantile, rms, share
 from wam_experiments.contact_robustness.replay import SECOND_WITHIN, ReplayScore, TouchOutcome
 from wam_experiments.contact_robustness.rows import SMALL_SD, SURE, Scores, near, outcomes
 from wam_experiments.identification.evaluation import IdentificationResult
@@ -44,6 +44,7 @@ class RequiredRow(NamedTuple):
         span = "" if found.low == found.high else f"{number(found.low, scale)} to {number(found.high, scale)}"
         judged = mark(self.must, ANY, found)
         judged = mark(self.must, self.aim, found) if judged == MET else judged
+        judged = counted(judged, found.observed) if span else judged  # a mean over a whole run is one observation
         return [number(found.value, scale), span, str(found.observed), judged]
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from wam_analysis.table import markdown, plain
-from wam_experiments.contact_benchmark.statistics import Interval, share
+from wam_experiments.contact_benchmark.statistics import Interval, counted, share
 from wam_experiments.force_benchmark.evaluation import ForceTrial
 from wam_experiments.force_benchmark.outcome import OVERSHOOT, TOLERANCE, TaskEnd
 from wam_experiments.force_benchmark.surfaces import GAP
@@ -85,8 +85,8 @@ def of_class(trials: Sequence[ForceTrial], grouping: TaskGrouping, name: str) ->
     return [trial for trial in trials if grouping.of(trial.task) == name]
 
 
-def required(trials: Sequence[ForceTrial]) -> list[tuple[str, str, str, bool]]:
-    """What is required: name, required and found value, and whether it is met."""
+def required(trials: Sequence[ForceTrial]) -> list[tuple[str, str, str, bool, int]]:
+    """What is required: name, required and found value, whether it is met, and of how many tasks that is."""
     rows = []
     for name, least in REQUIRED.items():
         own = of_class(trials, GROUPINGS[0], name)
@@ -98,22 +98,32 @@ def required(trials: Sequence[ForceTrial]) -> list[tuple[str, str, str, bool]]:
             accepted = [trial for trial in own if trial.result.outcome not in declined]
             if accepted:
                 found = share(sum(t.result.outcome is TaskEnd.DONE for t in accepted), len(accepted))
-                rows.append((title + more, needed, _text(found), not needed or found.value >= least))
+                rows.append((title + more, needed, _text(found), not needed or found.value >= least, len(accepted)))
     for title, count in (
         (f"true force above {OVERSHOOT:g} times the commanded plus the impact (3.1)", sum(map(_is_over, trials))),
         ("limit cycles that nothing reports", sum(trial.result.cycles_silently for trial in trials)),
         ("wrong force without a reason", len(silent(trials))),
     ):
-        rows.append((title, "0", str(count), count == 0))
+        rows.append((title, "0", str(count), count == 0, len(trials)))
     done = [trial for trial in trials if trial.result.outcome is TaskEnd.DONE]
     warned = sum(bool(trial.result.reason) for trial in done)
-    rows.append(("tasks within 10 % of which a warning is reported all the same", "", f"{warned} of {len(done)}", True))
+    rows.append(
+        (
+            "tasks within 10 % of which a warning is reported all the same",
+            "",
+            f"{warned} of {len(done)}",
+            True,
+            len(done),
+        )
+    )
     believed = [t for t in trials if not t.result.reason]
     right = share(sum(t.result.outcome is TaskEnd.DONE for t in believed), max(len(believed), 1))
-    rows.append((f"of the tasks without any reason reported, within {TOLERANCE:.0%}", "", _text(right), True))
+    rows.append(
+        (f"of the tasks without any reason reported, within {TOLERANCE:.0%}", "", _text(right), True, len(believed))
+    )
     for end in (TaskEnd.REFUSED, TaskEnd.GIVEN_UP):
         found = share(sum(trial.result.outcome is end for trial in trials), len(trials))
-        rows.append((f"tasks {end.value}", "", f"{found.value:.1%} of {found.observed}", True))
+        rows.append((f"tasks {end.value}", "", f"{found.value:.1%} of {found.observed}", True, len(trials)))
     return rows
 
 
@@ -168,7 +178,8 @@ def report(seed: int, code: str, trials: Sequence[ForceTrial]) -> str:
     """The output of the command: what is required, shares, and the failures with their commands."""
     lines = [f"code and configuration: {code}"]
     lines += [
-        f"{title}: {found}" + (f"; required {needed}" if needed else "") for title, needed, found, _ in required(trials)
+        f"{title}: {found}" + (f"; required {needed}" if needed else "")
+        for title, needed, found, *_ in required(trials)
     ]
     lines += ["", *plain([HEAD], [_counts("all", trials)])]
     failures = [t for t in trials if t.result.outcome is TaskEnd.SILENT or t.result.is_over or t.result.cycles_silently]
@@ -221,8 +232,8 @@ def page(trials: Sequence[ForceTrial], seed: int, code: str, repeat: str, pictur
     picture : the figure's path relative to the page.
     """
     rows = [
-        [title, needed, found, "" if not needed else "met" if is_met else "**MISSED**"]
-        for title, needed, found, is_met in required(trials)
+        [title, needed, found, counted("" if not needed else "met" if is_met else "**MISSED**", number)]
+        for title, needed, found, is_met, number in required(trials)
     ]
     parts = [
         PREFACE.format(command=repeat, count=len(trials), code=code),
@@ -236,8 +247,8 @@ def page(trials: Sequence[ForceTrial], seed: int, code: str, repeat: str, pictur
     ]
     for grouping in GROUPINGS:
         head = (grouping.title, *HEAD[1:])
-        counted = [_counts(name, of_class(trials, grouping, name)) for name in grouping.classes]
-        parts += [markdown(head, [*counted, _counts("all", trials)])]
+        tally = [_counts(name, of_class(trials, grouping, name)) for name in grouping.classes]
+        parts += [markdown(head, [*tally, _counts("all", trials)])]
     parts += [
         "## Reasons",
         "",

@@ -1,0 +1,121 @@
+"""Forces and tasks that were refused, held or doubted are seen in analysis and report, with reason and time."""
+
+from pathlib import Path
+
+import pytest
+
+from wam_analysis.demo_report import text
+from wam_analysis.demo_summary import DemoSummary, SteadyPress, summarize
+from wam_analysis.findings.analysis import Analysis, analyse_bag
+from wam_analysis.reactions import RecordedReaction, sentences, within
+from wam_bag.bag import TableColumns, read
+from wam_control.scenario import load
+from wam_description.configuration import Configuration, packaged
+from wam_sim.simulated_bag import record
+
+SAMPLES = Path(__file__).parents[1] / "bags" / "sample"
+STEPS = """
+- {name: release the brakes, seconds: 0.3, request: enable}
+- {name: nearly straight, seconds: 1.5, posture: [0.0, -1.2, 0.0, 0.05]}
+- {name: along the arm, seconds: 1.0, force: {frame: base, newtons: [4.0, 0.0, 3.0]}}
+- {name: no force, seconds: 0.4}
+- {name: above the limit, seconds: 0.6, force: {frame: outer_link, newtons: [0.0, -80.0, 0.0]}}
+- name: one place twice
+  seconds: 0.6
+  task:
+    axes:
+      - {force: 8.0, along: [0, 0, -1], cover: outer_link, place: 0.28}
+      - {force: 8.0, along: [0, 0, -1], cover: outer_link, place: 0.27}
+- {name: to the box, seconds: 2.0, posture: [0.0, -1.9, 0.0, 1.45]}
+- {name: lower, seconds: 4.0, posture: [0.0, -2.1, 0.0, 1.45], until_force: 1.5}
+- {name: press across, seconds: 1.2, force: {frame: outer_link, newtons: [0.0, -8.0, 0.0]}}
+- name: press across by a task
+  seconds: 1.2
+  task: {frame: outer_link, axes: [{force: 8.0, along: [0, -1, 0], cover: outer_link, place: 0.26}]}
+- {name: brake, seconds: 0.2, request: disable}
+"""
+REFUSED = {
+    "along the arm": ("not_sensed", "standard deviation"),
+    "above the limit": ("refused", "allowed: up to force_limit, 60 N"),
+    "one place twice": ("task_refused", "here they can do 1 at once"),
+}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSummary, Analysis]:
+    folder = tmp_path_factory.mktemp("reactions")
+    script = folder / "script.yaml"
+    script.write_text(f"steps:\n{STEPS}", encoding="utf-8")
+    base = Configuration.load(packaged("wam"))
+    names = [name for name in base.shared.nodes if name not in ("scenario", "recorder")]
+    configuration = base.with_values({"nodes": [*names, "scenario"]})
+    assert not record(configuration, load(script, base.shared.arm), folder / "bag")
+    bag = read(folder / "bag")
+    return summarize(bag), analyse_bag(bag, lambda stage: None)
+
+
+def press(summary: DemoSummary, name: str) -> SteadyPress:
+    (one,) = (one for one in summary.presses if one.step == name)
+    return one
+
+
+def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[DemoSummary, Analysis]) -> None:
+    summary, analysis = found
+    begins = {step.name: step.begin / 1e9 for step in summary.steps}
+    sections = {section.key: section for section in analysis.sections}
+    (said,) = (line for line in sections["verdict"].sentences if line.startswith("REFUSED or held"))
+    for name, (kind, reason) in REFUSED.items():
+        assert any(line.startswith(name) and reason in line for line in sections["force"].sentences), name
+        assert f"({kind} at {begins[name]:.2f} s)" in said or f"({kind} at {begins[name] + 0.005:.2f} s)" in said
+    assert "press across" not in said
+
+
+def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: tuple[DemoSummary, Analysis]) -> None:
+    _, analysis = found
+    sections = {section.key: section for section in analysis.sections}
+    measured = {one.name for key in ("force", "stability") for one in sections[key].findings}
+    for name in REFUSED:
+        assert {one.partition(": ")[2] for one in measured if one.startswith(name)} == {"refused or held for"}
+    assert "press across: overshoot" in measured
+    assert not any("MISSED" in line for line in sections["verdict"].sentences)
+
+
+def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[DemoSummary, Analysis]) -> None:
+    told = text(found[0])
+    assert "force within 10 %: NO (4 of 6 refused or held)" in told
+    rows = {line.strip().split("  ")[0]: line for line in told.split("Contacts, ")[0].splitlines()}
+    for name in ("along the arm", "above the limit", "one place twice, axis 1"):
+        assert "held" in rows[name]
+        assert "%" not in rows[name]
+    for name, (kind, _) in REFUSED.items():
+        assert f"  {name}: {kind if kind == 'refused' else f'held ({kind})'} from" in told
+
+
+def test_a_force_of_a_task_is_assessed_as_one_of_force_command(found: tuple[DemoSummary, Analysis]) -> None:
+    summary, analysis = found
+    one, other = press(summary, "press across"), press(summary, "press across by a task")
+    assert one.commanded == other.commanded == pytest.approx(8.0)
+    for value in (one.measured, one.true, one.estimated, other.measured, other.true, other.estimated):
+        assert value == pytest.approx(8.0, rel=0.15)
+    assert {"press across by a task: bias of the true force"} <= {
+        finding.name for section in analysis.sections for finding in section.findings
+    }
+
+
+def test_the_true_force_along_an_axis_of_the_base_is_that_of_the_arm_on_the_object() -> None:
+    """The sample has the force on the tube in the base frame, without a link and its rotation."""
+    bag = read(SAMPLES / "hold-tube")
+    (one,) = summarize(bag).presses
+    objects = bag.topics["/wam/sim/objects"]
+    assert isinstance(objects, TableColumns)
+    stamps, columns = objects.row_stamp_ns, objects.columns
+    tube = (columns["object"] == 0) & (stamps >= one.begin) & (stamps < one.end)
+    assert one.true == pytest.approx(-float(columns["arm_force_x"][tube].mean()), rel=1e-3)
+
+
+def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:
+    late = RecordedReaction(0, 1_005_000_000, "not_reached", "why")
+    assert within([late], 1_000_000_000, 2_000_000_000) == ()
+    assert len(within([late], 0, 1_000_000_000)) == 1
+    again = [late, late._replace(begin=2_000_000_000, end=3_000_000_000)]
+    assert sentences("press", again) == ["press: reported (not_reached) from 0.00 to 1.00 s and 1 times more: why"]

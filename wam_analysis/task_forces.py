@@ -1,0 +1,84 @@
+"""Forces that a task commands, each as long as it was commanded, and what was measured of it."""
+
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_bag.bag import BagError, TableColumns
+from wam_control.task import AxisKind, task_of
+from wam_description.arm import Arm
+from wam_description.parameters import ParameterError
+from wam_description.signals import Table
+from wam_sim.recording import RecordedRun
+from wam_sim.replay import tables
+
+Numbers = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+
+class TaskForce(NamedTuple):
+    """A force of a task.
+
+    Attributes
+    ----------
+    begin, end : ns.
+    number : of its axis, from 0.
+    is_only : whether it is the only force of the task.
+    cover : on which it acts.
+    frame : of the task, 'base' or a cover.
+    force : of the arm on the world in that frame (3,), N.
+    """
+
+    begin: int
+    end: int
+    number: int
+    is_only: bool
+    cover: str
+    frame: str
+    force: Numbers
+
+
+def arm_of(run: RecordedRun) -> Arm | None:
+    """The arm of a run, None if its parameters are not in the bag."""
+    try:
+        return run.parameters.part("driver", Arm, "arm.")
+    except BagError:
+        return None
+
+
+def task_forces(run: RecordedRun) -> list[TaskForce]:
+    """The forces at points of links in all tasks of a run, in the order of time; none if the arm is not known."""
+    columns, arm = run.bag.topics.get(f"{run.namespace}/task_command"), arm_of(run)
+    if not isinstance(columns, TableColumns) or not len(columns.stamp_ns) or arm is None:
+        return []
+    stamps = columns.stamp_ns.tolist()
+    parts = [next(part) for _, part in groupby(zip(stamps, tables(columns), strict=True), lambda one: str(one[1]))]
+    ends = [*(stamp for stamp, _ in parts[1:]), stamps[-1]]
+    return [force for (begin, table), end in zip(parts, ends, strict=True) for force in _of(table, begin, end, arm)]
+
+
+def _of(table: Table, begin: int, end: int, arm: Arm) -> list[TaskForce]:
+    try:
+        task = task_of(table, arm)
+    except ParameterError:  # refused when it was commanded, too
+        return []
+    axes = task.axes if task else ()
+    forces = [(i, axis) for i, axis in enumerate(axes) if axis.kind is AxisKind.FORCE and axis.cover and axis.value]
+    return [
+        TaskForce(begin, end, i, len(forces) == 1, axis.cover, table.frame, np.array(axis.direction) * axis.value)
+        for i, axis in forces
+        if axis.value
+    ]
+
+
+def measured_force(run: RecordedRun, number: int, begin: int, end: int) -> tuple[Times, Numbers]:
+    """Stamps, ns, and the force that was measured along an axis of a task, N, between two times."""
+    columns = run.bag.topics.get(f"{run.namespace}/task_axes")
+    if not isinstance(columns, TableColumns) or "measured" not in columns.columns:
+        return np.empty(0, np.int64), np.empty(0)
+    place = np.arange(len(columns.message)) - np.searchsorted(columns.message, columns.message)  # within its message
+    stamps = columns.row_stamp_ns
+    rows = (place == number) & (stamps >= begin) & (stamps < end)
+    return stamps[rows], np.asarray(columns.columns["measured"][rows], float)
