@@ -134,7 +134,8 @@ class ForceAxis(NamedTuple):
     move : joint velocity per commanded velocity along the direction (n,), 1/m.
     force_sd : standard deviation of the sensed force, N; infinite where the force has no lever.
     free_sd : the same if its position along the cover has to be known from the same torques, N.
-    apparent_mass : sensed force per acceleration along the direction, kg.
+    carried : sensed force per acceleration of each joint (n,), kg m: of the arm itself, nothing touched.
+    apparent_mass : the same per acceleration along the direction, kg.
     impact_mass : mass that hits a surface, with rotors, as the arm moves along the direction, kg.
     speed_fraction : velocity along the direction per commanded one, 0 to 1.
     compliance : of the cables along the direction, m/N.
@@ -147,6 +148,7 @@ class ForceAxis(NamedTuple):
     move: Array
     force_sd: float
     free_sd: float
+    carried: Array
     apparent_mass: float
     impact_mass: float
     speed_fraction: float
@@ -266,7 +268,7 @@ class ForceAxes:
         if square <= REACH * REACH:
             zero = np.zeros(n)
             return ForceAxis(
-                lever, zero, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n))
+                lever, zero, zero, zero, math.inf, math.inf, zero, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n))
             )
         size = max(force, SMALLEST_FORCE)
         length = self._covers.length_of(cover)
@@ -290,7 +292,8 @@ class ForceAxes:
         precision = float(press @ weighted)
         sense: Array = weighted / precision
         inertia = self.inertia(q)
-        mass = float(sense @ inertia @ lever) / square
+        carried: Array = sense @ inertia
+        mass = float(carried @ lever) / square
         impact = float(lever @ (inertia + self._rotors) @ lever) / (square * square)
         damped = square
         if parameters.apparent_mass_limit:
@@ -302,7 +305,7 @@ class ForceAxes:
         sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ np.linalg.solve(anywhere, press))))
         yielding = float(lever @ self._compliance @ lever)
         return ForceAxis(
-            lever, press, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse
+            lever, press, sense, lever / damped, sd, free_sd, carried, mass, impact, square / damped, yielding, inverse
         )
 
 

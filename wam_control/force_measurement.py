@@ -26,6 +26,8 @@ class ForceMeasurement:
         self._n = len(body.arm.joints.names)
         self._tare, self._zero = np.zeros(self._n), np.zeros(self._n)
         self._steady = LowPass()
+        self._before: Array | None = None
+        self.acceleration = np.zeros(self._n)
         self.external = np.zeros(self._n)
 
     def tare(self) -> None:
@@ -58,6 +60,10 @@ class ForceMeasurement:
         dt : outer period, s.
         """
         torque = self._torque(parameters, sensors, estimated)
+        velocity = None if sensors is None or parameters.is_estimated else np.array(sensors.velocity)
+        is_known = velocity is not None and self._before is not None
+        self.acceleration = (velocity - self._before) / dt if is_known else np.zeros(self._n)
+        self._before = velocity
         self._steady.step(torque, STEADY, dt)
         self.external = torque - self._tare - self._zero
 
