@@ -106,7 +106,7 @@ class ForceLoop:
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
-        self._acceleration, self._inertial = LowPass(), np.zeros(self._n)
+        self._inertia = LowPass()
         self._feed_forward = FeedForward(arm)
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
@@ -246,7 +246,7 @@ class ForceLoop:
         is_touched = not own.is_estimated or bool(contact.cover) or self._hold.is_touching
         present = self._measurement.external if is_touched else np.zeros(self._n)
         self._external = self._filter.step(present, own.force_filter, dt)
-        self._inertial, _ = self._acceleration.step(self._measurement.acceleration, own.force_filter, dt)
+        self._acceleration, _ = self._inertia.step(self._measurement.acceleration, own.force_filter, dt)
         if task is not None:
             out = self._task(joints.position, contact, task, commands.posture, dt)
         elif own.mode == "joint_torque":
@@ -308,8 +308,9 @@ class ForceLoop:
         point = self._point(contact, command, direction)
         force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
         measured, before = (-float(force_axis.sense @ torques) for torques in self._external)
-        if not self._hold.is_touching:
-            measured = 0.5 * (measured + before) - float(force_axis.carried @ self._inertial)
+        if not self._hold.is_touching and own.feedback == "joint_sensors":
+            # mean of the period, as the acceleration is
+            measured = 0.5 * (measured + before) - float(force_axis.carried @ self._acceleration)
             before = measured
         scalar = law.along(axis)
         error = desired - measured

@@ -19,6 +19,7 @@ class ForceMeasurement:
     Attributes
     ----------
     external : torques of the world on the joints (n,), N m, less the tare and the zero of the present command.
+    acceleration : of the joints by their sensors (n,), rad/s^2, mean over the last period.
     """
 
     def __init__(self, body: RigidBody) -> None:
@@ -26,8 +27,7 @@ class ForceMeasurement:
         self._n = len(body.arm.joints.names)
         self._tare, self._zero = np.zeros(self._n), np.zeros(self._n)
         self._steady = LowPass()
-        self._before: Array | None = None
-        self.acceleration = np.zeros(self._n)
+        self.acceleration = self._velocity = np.zeros(self._n)
         self.external = np.zeros(self._n)
 
     def tare(self) -> None:
@@ -60,10 +60,9 @@ class ForceMeasurement:
         dt : outer period, s.
         """
         torque = self._torque(parameters, sensors, estimated)
-        velocity = None if sensors is None or parameters.is_estimated else np.array(sensors.velocity)
-        is_known = velocity is not None and self._before is not None
-        self.acceleration = (velocity - self._before) / dt if is_known else np.zeros(self._n)
-        self._before = velocity
+        velocity = np.zeros(self._n) if sensors is None else np.array(sensors.velocity)
+        self.acceleration = (velocity - self._velocity) / dt
+        self._velocity = velocity
         self._steady.step(torque, STEADY, dt)
         self.external = torque - self._tare - self._zero
 
