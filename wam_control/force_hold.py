@@ -92,7 +92,7 @@ class ForceHold:
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
             self._has_settled
         ) = False
-        self._other = ""
+        self._is_slow, self._other = False, ""
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = self._identified = 0.0
         self._forget_swings()
@@ -341,7 +341,8 @@ class ForceHold:
             return ForceReaction.NONE, ""
         stiffness = 1.0 / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
         pace = max(parameters.force_gain) * axis.speed_fraction * stiffness
-        if pace * parameters.limits.settling_time < SETTLED:
+        self._is_slow = pace * parameters.limits.settling_time < SETTLED / (RESUME if self._is_slow else 1.0)
+        if self._is_slow:
             return ForceReaction.TOO_SLOW, (
                 f"with {axis.speed_fraction:.2g} of the commanded speed (sensing.apparent_mass_limit) the force would "
                 f"settle with a time constant of {1.0 / pace:.2g} s, and at most 1/{SETTLED:g} of "

@@ -107,6 +107,7 @@ class ForceLoop:
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
         self._inertia = LowPass()
+        self._approached = [0.0] * self._n
         self._feed_forward = FeedForward(arm)
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
@@ -177,6 +178,7 @@ class ForceLoop:
         if not self._has_left:
             return "the arm still is where it pressed: free it first"
         self._measurement.tare()
+        self._filter.reset()
         return ""
 
     @property
@@ -282,6 +284,7 @@ class ForceLoop:
         self._feed_forward.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
         self._axes = axes
+        self._approached = [0.0] * self._n  # along the force: as its lever turns, the posture would pull this back
         self._held_at = None
         self._transfer.restart()
         limit = self.parameters.sensing.zero_limit
@@ -299,7 +302,8 @@ class ForceLoop:
         axes = command.frame if command is not None and desired else ""
         if axes != self._axes:
             self._begin(axes)
-        held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, self._rate)
+        goal = [a + b for a, b in zip(posture, self._approached, strict=True)]
+        held = posture_velocity(goal, q, own.posture_gain, own.joint_speed_limit, self._rate)
         if command is None or not desired:
             return ForceOutput([] if is_open else held, [0.0] * self._n, frame=command.frame if command else BASE)
         rotation = np.eye(3) if command.frame == "base" else self._body.cover_pose(q, command.frame).rotation
@@ -360,7 +364,11 @@ class ForceLoop:
         speed *= self._hold.share
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
-        self._hold.travel(float(force_axis.lever @ velocity) * dt)
+        along = float(force_axis.lever @ velocity) * dt
+        self._hold.travel(along)
+        if not self._hold.is_touching:
+            way = force_axis.lever * (along / float(force_axis.lever @ force_axis.lever))
+            self._approached = [a + b for a, b in zip(self._approached, way.tolist(), strict=True)]
         fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
         return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
 
