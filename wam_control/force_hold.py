@@ -91,7 +91,7 @@ class ForceHold:
         self._way = self._watched = self._shaking = self._blocked = 0.0
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
             self._has_settled
-        ) = False
+        ) = self._has_begun = False
         self._is_slow, self._other = False, ""
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = self._identified = 0.0
@@ -202,6 +202,7 @@ class ForceHold:
         signal: float = math.inf,
         elsewhere: float = math.inf,
         torque_error: float = 0.0,
+        unknown: tuple[float, str] = (0.0, ""),
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
@@ -216,11 +217,14 @@ class ForceHold:
         signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
         elsewhere : the same if another link is touched.
         torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
+        unknown : force, N, of torques that were there before and are not those of a force along it, and what they mean.
         """
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
         limit = parameters.sensing.sd_limit(desired, point.is_pinned)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
-        self.is_touching = measured >= TOUCH * desired
+        is_loaded = not self._has_begun and abs(unknown[0]) > TOLERANCE * desired
+        self.is_touching = measured >= TOUCH * desired and not is_loaded
+        self._has_begun = self._has_begun or self.is_touching
         if self.is_touching and not self._has_touched:
             self._has_touched = True
             self._forget_swings()
@@ -234,6 +238,8 @@ class ForceHold:
             touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
             self._other = f"{touched}; the arm goes back to where it was free until the command ends"
         weak = self._too_weak(point, desired, signal, elsewhere, parameters)
+        if is_loaded:
+            return ForceReaction.NOT_SENSED, _loaded(*unknown, desired)
         held = self._held(axis, point, desired, limit, weak, parameters)
         if held[0].holds:
             return held
@@ -250,7 +256,7 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        force_sd = math.hypot(axis.force_sd, torque_error)
+        force_sd = math.hypot(axis.force_sd, torque_error, unknown[0])
         is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
@@ -447,6 +453,14 @@ class ForceHold:
 def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
     """Error, N, up to which a force counts as reached."""
     return max(TOLERANCE * desired, parameters.limits.least_tolerance)
+
+
+def _loaded(force: float, meaning: str, desired: float) -> str:
+    return (
+        f"the arm at rest already measures {force:.3g} N along the force, and {desired:.3g} N are commanded: {meaning}; "
+        f"allowed: {TOLERANCE:g} of the commanded; the arm holds its position: declare what it carries (arm.payload), "
+        "or end the command and tare in free space"
+    )
 
 
 def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) -> str:

@@ -18,7 +18,7 @@ from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_command import CommandAdmission
-from wam_control.force_hold import ForceHold, ForceReaction
+from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, require_fit, sensing_of
 from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
@@ -44,6 +44,7 @@ BACK = 3e-3  # m, way back from another link than commanded
 NEAR, MIDDLE = 0.1, 0.5  # of a link that is perhaps touched: where its force is taken to be
 FAINT = 0.25  # of a link that may be touched, where its force has to be detected
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
+ALIKE = 0.05  # of the torques at rest: what a payload may leave of them, as the masses are not known better
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
@@ -112,6 +113,8 @@ class ForceLoop:
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
         self._is_free = False
+        self._resting: Array | None = None
+        self._unknown, self._meaning = np.zeros(self._n), ""
         self._external_sd: Sequence[float] | None = None
         self._transfer = BumplessTransfer(self._n)
         self._hold = ForceHold()
@@ -283,14 +286,17 @@ class ForceLoop:
         self._delay.reset()
         self._feed_forward.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
+        self._resting = None
         self._axes = axes
         self._approached = [0.0] * self._n  # along the force: as its lever turns, the posture would pull this back
         self._held_at = None
         self._transfer.restart()
         limit = self.parameters.sensing.zero_limit
-        if axes and limit and self._is_free and self._is_at_rest and self._has_left and self._measurement.zero(limit):
-            self._filter.reset()
-            self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
+        if axes and limit and self._is_at_rest and self._has_left:
+            if self._is_free and self._measurement.zero(limit):
+                self._filter.reset()
+                self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
+            self._resting = self._measurement.resting
 
     def _force(
         self, q: Sequence[float], contact: Contact, command: ForceCommand | None, posture: list[float], dt: float
@@ -335,8 +341,20 @@ class ForceLoop:
         signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
         torque_error = force_axis.error(self._external_sd) if self._external_sd else 0.0
         elsewhere = math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired)
+        if self._resting is not None:
+            self._judge(q, point, direction, self._resting)
         reaction, reason = self._hold.step(
-            force_axis, point, self._external[0], measured, desired, own, dt, signal, elsewhere, torque_error
+            force_axis,
+            point,
+            self._external[0],
+            measured,
+            desired,
+            own,
+            dt,
+            signal,
+            elsewhere,
+            torque_error,
+            (-float(force_axis.sense @ self._unknown), self._meaning),
         )
         self._react(reaction, reason)
         self._remember(q, moved, contact, point)
@@ -371,6 +389,26 @@ class ForceLoop:
             self._approached = [a + b for a, b in zip(self._approached, way.tolist(), strict=True)]
         fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
         return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
+
+    def _judge(self, q: Sequence[float], point: ForcePoint, direction: Array, resting: Array) -> None:
+        """Whether torques that are there as a force begins (n,), N m, are those of a surface that is touched already.
+
+        Otherwise they are an error of the force.  What a mass at the tool explains may always be one.
+        """
+        self._resting, self._unknown, self._meaning = None, np.zeros(self._n), ""
+        axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, 0.0)
+        force = -float(axis.sense @ resting)
+        axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, abs(force))
+        sensing = sensing_of(self.parameters)
+        sd = np.hypot(sensing.torque_sd, ALIKE * float(np.abs(resting).max()))
+        mass, left = self._measurement.payload(q, resting, np.full(self._n, sd))
+        is_payload = mass > 0.0 and left <= UNEXPLAINED
+        if force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED and not is_payload:
+            return
+        self._unknown = resting
+        self._meaning = (
+            f"as with {mass:.2g} kg at the tool" if is_payload else "not the force of a surface that is touched there"
+        )
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""

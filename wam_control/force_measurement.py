@@ -12,6 +12,8 @@ from wam_description.signals import State
 Array = NDArray[np.float64]
 STEADY = 0.1  # s, time constant of the torques that are taken as zero
 
+TINY = 1e-12  # 1/kg^2, of a weight that no joint carries
+
 
 class ForceMeasurement:
     """External torques of the joints, and what of them counts as zero.
@@ -33,6 +35,26 @@ class ForceMeasurement:
     def tare(self) -> None:
         """Take the present external torques as zero."""
         self._tare = self._tare + self.external
+
+    @property
+    def resting(self) -> Array:
+        """Steady torques of the world on the joints (n,), N m, of which nobody has said that they are zero."""
+        steady = self._steady.value
+        return self.external if steady is None else steady - self._tare - self._zero
+
+    def payload(self, q: Sequence[float], torques: Array, torque_sd: Array) -> tuple[float, float]:
+        """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        torques, torque_sd : torques and their standard deviations (n,), N m.
+        """
+        weight = np.array(self._body.arm.gravity) @ self._body.tool_jacobian(q)[:3] / torque_sd
+        scaled = torques / torque_sd
+        mass = float(weight @ scaled) / max(float(weight @ weight), TINY)
+        left = scaled - mass * weight
+        return mass, float(left @ left)
 
     def zero(self, limit: float) -> bool:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
