@@ -202,6 +202,7 @@ class ForceHold:
         signal: float = math.inf,
         elsewhere: float = math.inf,
         torque_error: float = 0.0,
+        pushed: float | None = None,
         unknown: tuple[float, str] = (0.0, ""),
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
@@ -217,13 +218,15 @@ class ForceHold:
         signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
         elsewhere : the same if another link is touched.
         torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
-        unknown : force, N, of torques that were there before and are not those of a force along it, and what they mean.
+        pushed : force, N, without the inertia of the arm, by which something is touched; None: the measured one.
+        unknown : force, N, of torques at rest before, which no touched surface gives, and what they mean.
         """
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
         limit = parameters.sensing.sd_limit(desired, point.is_pinned)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
         is_loaded = not self._has_begun and abs(unknown[0]) > TOLERANCE * desired
-        self.is_touching = measured >= TOUCH * desired and not is_loaded
+        pushed = measured if pushed is None else pushed
+        self.is_touching = pushed >= TOUCH * desired and not is_loaded
         self._has_begun = self._has_begun or self.is_touching
         if self.is_touching and not self._has_touched:
             self._has_touched = True
@@ -457,8 +460,8 @@ def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
 
 def _loaded(force: float, meaning: str, desired: float) -> str:
     return (
-        f"the arm at rest already measures {force:.3g} N along the force, and {desired:.3g} N are commanded: {meaning}; "
-        f"allowed: {TOLERANCE:g} of the commanded; the arm holds its position: declare what it carries (arm.payload), "
+        f"the arm at rest already measures {force:.3g} N along the force of {desired:.3g} N, {meaning}; allowed: "
+        f"{TOLERANCE:g} of the commanded; the arm holds its position: declare what it carries (arm.payload), "
         "or end the command and tare in free space"
     )
 

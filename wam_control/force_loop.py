@@ -39,6 +39,7 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
+SHORTEST = 1e-12  # m^2, square of a lever
 SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
 NEAR, MIDDLE = 0.1, 0.5  # of a link that is perhaps touched: where its force is taken to be
@@ -113,6 +114,7 @@ class ForceLoop:
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
         self._is_free = False
+        self._external = np.zeros(self._n), np.zeros(self._n)
         self._resting: Array | None = None
         self._unknown, self._meaning = np.zeros(self._n), ""
         self._external_sd: Sequence[float] | None = None
@@ -286,6 +288,7 @@ class ForceLoop:
         self._delay.reset()
         self._feed_forward.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
+        self._external = self._external[0], self._external[0]
         self._resting = None
         self._axes = axes
         self._approached = [0.0] * self._n  # along the force: as its lever turns, the posture would pull this back
@@ -317,11 +320,7 @@ class ForceLoop:
         axis = (rotation.T @ direction).tolist()
         point = self._point(contact, command, direction)
         force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
-        measured, before = (-float(force_axis.sense @ torques) for torques in self._external)
-        if not self._hold.is_touching and own.feedback == "joint_sensors":
-            # mean of the period, as the acceleration is
-            measured = 0.5 * (measured + before) - float(force_axis.carried @ self._acceleration)
-            before = measured
+        measured, before, free = self._measured(force_axis)
         scalar = law.along(axis)
         error = desired - measured
         out = ForceOutput(
@@ -338,26 +337,9 @@ class ForceLoop:
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
-        signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
-        torque_error = force_axis.error(self._external_sd) if self._external_sd else 0.0
-        elsewhere = math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired)
-        if self._resting is not None:
-            self._judge(q, point, direction, self._resting)
-        reaction, reason = self._hold.step(
-            force_axis,
-            point,
-            self._external[0],
-            measured,
-            desired,
-            own,
-            dt,
-            signal,
-            elsewhere,
-            torque_error,
-            (-float(force_axis.sense @ self._unknown), self._meaning),
-        )
+        reaction, reason = self._reaction(q, force_axis, point, direction, (measured, free), desired, dt)
         self._react(reaction, reason)
-        self._remember(q, moved, contact, point)
+        self._remember(q, moved, contact, point, force_axis)
         if reaction.holds:
             self.refusals["force_command"] = reason
             self._hold.fed = 0.0
@@ -382,13 +364,50 @@ class ForceLoop:
         speed *= self._hold.share
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
-        along = float(force_axis.lever @ velocity) * dt
-        self._hold.travel(along)
-        if not self._hold.is_touching:
-            way = force_axis.lever * (along / float(force_axis.lever @ force_axis.lever))
-            self._approached = [a + b for a, b in zip(self._approached, way.tolist(), strict=True)]
+        self._hold.travel(float(force_axis.lever @ velocity) * dt)
         fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
         return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
+
+    def _measured(self, axis: ForceAxis) -> tuple[float, float, float]:
+        """Force along an axis, N, now and one period before, and now without the inertia of the arm itself.
+
+        The last one shows whether something is touched, and is the measured one until then: near a straight elbow the
+        apparent mass of the arm has either sign, and the arm would chatter in free space.
+        """
+        measured, before = (-float(axis.sense @ torques) for torques in self._external)
+        if self.parameters.feedback != "joint_sensors":
+            return measured, before, measured
+        # the acceleration is the mean of a period
+        free = 0.5 * (measured + before) - float(axis.carried @ self._acceleration)
+        return (measured, before, free) if self._hold.is_touching else (free, free, free)
+
+    def _reaction(
+        self,
+        q: Sequence[float],
+        axis: ForceAxis,
+        point: ForcePoint,
+        direction: Array,
+        measured: tuple[float, float],
+        desired: float,
+        dt: float,
+    ) -> tuple[ForceReaction, str]:
+        """What the loop does instead of the command, and why; forces in N, the measured one without inertia, too."""
+        if self._resting is not None:
+            self._judge(q, point, direction, self._resting)
+        return self._hold.step(
+            axis,
+            point,
+            self._external[0],
+            measured[0],
+            desired,
+            self.parameters,
+            dt,
+            signal=axis.signal(desired, self._external_sd) if self._external_sd else math.inf,
+            elsewhere=math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired),
+            torque_error=axis.error(self._external_sd) if self._external_sd else 0.0,
+            pushed=measured[1],
+            unknown=(-float(axis.sense @ self._unknown), self._meaning),
+        )
 
     def _judge(self, q: Sequence[float], point: ForcePoint, direction: Array, resting: Array) -> None:
         """Whether torques that are there as a force begins (n,), N m, are those of a surface that is touched already.
@@ -417,13 +436,15 @@ class ForceLoop:
             return False
         return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
 
-    def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint) -> None:
-        """Keep where the arm presses, how far it has slid there, and where it was free."""
+    def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint, axis: ForceAxis) -> None:
+        """Keep where the arm presses, how far it has slid there, its way there, and where it was free."""
         if self._hold.is_touching:
             self._pressed_at = list(q)
             self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
         else:
             self._position.touch_again()
+            way = axis.lever * (float(axis.lever @ moved) / max(float(axis.lever @ axis.lever), SHORTEST))
+            self._approached = [a + b for a, b in zip(self._approached, way.tolist(), strict=True)]
         if not contact.cover or not self._free_at:
             self._free_at = list(q)
 
