@@ -116,7 +116,7 @@ class ForceLoop:
         self._is_free = False
         self._external = np.zeros(self._n), np.zeros(self._n)
         self._resting: Array | None = None
-        self._unknown, self._meaning = np.zeros(self._n), ""
+        self._unknown: tuple[Array, str] = np.zeros(self._n), ""  # torques at rest that no surface gives
         self._external_sd: Sequence[float] | None = None
         self._transfer = BumplessTransfer(self._n)
         self._hold = ForceHold()
@@ -406,7 +406,7 @@ class ForceLoop:
             elsewhere=math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired),
             torque_error=axis.error(self._external_sd) if self._external_sd else 0.0,
             pushed=measured[1],
-            unknown=(-float(axis.sense @ self._unknown), self._meaning),
+            unknown=(-float(axis.sense @ self._unknown[0]), self._unknown[1]),
         )
 
     def _judge(self, q: Sequence[float], point: ForcePoint, direction: Array, resting: Array) -> None:
@@ -414,20 +414,19 @@ class ForceLoop:
 
         Otherwise they are an error of the force.  What a mass at the tool explains may always be one.
         """
-        self._resting, self._unknown, self._meaning = None, np.zeros(self._n), ""
         axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, 0.0)
         force = -float(axis.sense @ resting)
         axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, abs(force))
-        sensing = sensing_of(self.parameters)
-        sd = np.hypot(sensing.torque_sd, ALIKE * float(np.abs(resting).max()))
-        mass, left = self._measurement.payload(q, resting, np.full(self._n, sd))
-        is_payload = mass > 0.0 and left <= UNEXPLAINED
-        if force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED and not is_payload:
-            return
-        self._unknown = resting
-        self._meaning = (
-            f"as with {mass:.2g} kg at the tool" if is_payload else "not the force of a surface that is touched there"
-        )
+        carried = self._carried(q, resting)
+        is_contact = force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED and not carried
+        meaning = carried or "not the force of a surface that is touched there"
+        self._resting, self._unknown = None, (np.zeros(self._n), "") if is_contact else (resting, meaning)
+
+    def _carried(self, q: Sequence[float], resting: Array) -> str:
+        """What a mass at the tool would be called that explains torques at rest (n,), N m; '' where none does."""
+        sd = math.hypot(sensing_of(self.parameters).torque_sd, ALIKE * float(np.abs(resting).max()))
+        mass, left = self._measurement.payload(q, resting, sd)
+        return f"as with {mass:.2g} kg at the tool" if mass > 0.0 and left <= UNEXPLAINED else ""
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
@@ -499,7 +498,11 @@ class ForceLoop:
         if self._axes != TASK:
             self._begin(TASK)
             self._tasks.restart()
-        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt)
+        if (resting := self._resting) is not None:
+            # what no mass at the tool explains may be several surfaces that are touched already
+            carried = self._carried(q, resting)
+            self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
+        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown)
         self._react(found.reaction, found.reason)
         if found.reaction.holds:
             self.refusals["task_command"] = found.reason

@@ -42,13 +42,13 @@ class ForceMeasurement:
         steady = self._steady.value
         return self.external if steady is None else steady - self._tare - self._zero
 
-    def payload(self, q: Sequence[float], torques: Array, torque_sd: Array) -> tuple[float, float]:
+    def payload(self, q: Sequence[float], torques: Array, torque_sd: float) -> tuple[float, float]:
         """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
 
         Parameters
         ----------
         q : joint angles (n,), rad.
-        torques, torque_sd : torques and their standard deviations (n,), N m.
+        torques, torque_sd : torques (n,), N m, and the standard deviation of each, N m.
         """
         weight = np.array(self._body.arm.gravity) @ self._body.tool_jacobian(q)[:3] / torque_sd
         scaled = torques / torque_sd

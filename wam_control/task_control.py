@@ -92,6 +92,7 @@ class TaskControl:
         posture: Sequence[float],
         rate: Sequence[float] | None,
         dt: float,
+        unknown: tuple[Array, str],
     ) -> TaskOutput:
         """One outer period.
 
@@ -103,6 +104,7 @@ class TaskControl:
         contact : estimated contact.
         posture, rate : joint angles to hold in what the task leaves (n,), rad, and their velocity, rad/s.
         dt : outer period, s.
+        unknown : torques at rest before that no touched surface gives (n,), N m, and what they mean.
         """
         own = self._parameters
         has_changed = self._begin(task)
@@ -114,7 +116,7 @@ class TaskControl:
         reaction, reason = (
             (ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")
             if self._refusal
-            else self._watch(states, forces, torques[0], dt)
+            else self._watch(states, forces, torques[0], dt, unknown)
         )
         if reaction.holds != (self._held_at is not None):
             self._held_at, has_changed = (list(q) if reaction.holds else None), True
@@ -191,14 +193,21 @@ class TaskControl:
         return ""
 
     def _watch(
-        self, states: Sequence[AxisState], forces: Sequence[float], external: Array, dt: float
+        self,
+        states: Sequence[AxisState],
+        forces: Sequence[float],
+        external: Array,
+        dt: float,
+        unknown: tuple[Array, str],
     ) -> tuple[ForceReaction, str]:
         """What the force axes report, the most serious first."""
         found = [(ForceReaction.NONE, "")]
         for state, force, hold in zip(states, forces, self._holds, strict=True):
             desired = _desired(state)
             if state.sensed and state.point and desired:
-                found.append(hold.step(state.sensed, state.point, external, force, desired, self._parameters, dt))
+                error = -float(state.sensed.sense @ unknown[0]), unknown[1]
+                own, sensed = self._parameters, state.sensed
+                found.append(hold.step(sensed, state.point, external, force, desired, own, dt, unknown=error))
         return max(found, key=lambda one: (one[0].holds, one[0] is not ForceReaction.NONE))
 
     def _points(self, task: TaskCommand, contact: Contact) -> list[ForcePoint]:
