@@ -153,6 +153,13 @@ class ForceHold:
         """Count a way along the force, m."""
         self._travel += distance
 
+    def excess(self, axis: ForceAxis, measured: float, desired: float, torque_error: float = 0.0) -> float:
+        """Force above the commanded one, N, beyond the uncertainty of the measured one; 0 where it is not.
+
+        An arm that holds its position goes back by it: it must not press harder than commanded either.
+        """
+        return max(measured - desired - math.hypot(axis.force_sd, torque_error), 0.0)
+
     def watch_shaking(self, axis: ForceAxis, moved: Array, frequency: float, dt: float) -> bool:
         """Watch the motion of the joints in a period (n,), rad, under a dither, rad/s; False where it is known.
 

@@ -103,6 +103,7 @@ class ForceLoop:
         self._contact_rejected = False
         self._held_at: list[float] | None = None
         self._goes_back = False
+        self._way_back = 0.0  # m, that an arm which holds may still go back from what it presses too hard
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
@@ -332,14 +333,12 @@ class ForceLoop:
         self._remember(q, moved, contact, point)
         if reaction.holds:
             self.refusals["force_command"] = reason
-            self._hold.fed = 0.0
-            goes_back = reaction is ForceReaction.OTHER_LINK
-            if self._held_at is None or goes_back != self._goes_back:
-                self._held_at, self._goes_back = self._free_of(force_axis) if goes_back else list(q), goes_back
-                self._transfer.restart()
-            return out._replace(
-                velocity=[] if is_open else posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
-            )
+            speed, excess = 0.0, self._hold.excess(force_axis, measured, desired, torque_error)
+            if excess:
+                factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
+                speed = factor * scalar.velocity(0, -excess, -excess, dt)
+            velocity, effort = self._held(q, force_axis, speed, dt)
+            return out._replace(velocity=[] if is_open else velocity, effort=effort)
         if self._held_at is not None:
             self._held_at = None
             self._transfer.restart()
@@ -358,6 +357,21 @@ class ForceLoop:
         fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
         return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
 
+    def _held(self, q: Sequence[float], axis: ForceAxis, speed: float, dt: float) -> tuple[list[float], list[float]]:
+        """Velocities and torques of an arm that holds: to where it does, or back along the force at a speed, m/s."""
+        own, still = self.parameters, [0.0] * self._n
+        self._hold.fed = 0.0
+        goes_back = self.reaction is ForceReaction.OTHER_LINK
+        if self._held_at is None or goes_back != self._goes_back:
+            self._held_at, self._goes_back = self._free_of(axis) if goes_back else list(q), goes_back
+            self._way_back = 0.0 if goes_back or self._has_left else own.limits.free_travel
+            self._transfer.restart()
+        if not speed or self._way_back <= 0.0:
+            return posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit), still
+        self._way_back, self._held_at = self._way_back + speed * dt, list(q)
+        velocity = hybrid_velocity(still, axis, speed, own.joint_speed_limit)
+        return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt)
+
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
         cycle = self._timing.dither_cycle
@@ -368,11 +382,12 @@ class ForceLoop:
     def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint) -> None:
         """Keep where the arm presses, how far it has slid there, and where it was free."""
         if self._hold.is_touching:
-            self._pressed_at = list(q)
+            if not self.reaction.holds:
+                self._pressed_at = list(q)
             self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
         else:
             self._position.touch_again()
-        if not contact.cover or not self._free_at:
+        if not (contact.cover or self._hold.is_touching) or not self._free_at:
             self._free_at = list(q)
 
     def _at_rest(self, held: list[float]) -> list[float]:
