@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 from wam_control.contact_position import ForcePoint
 from wam_control.force_axis import ForceAxis
 from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.force_measurement import STEADY, LowPass
 from wam_control.force_swing import Reversals, Shake
 
 Array = NDArray[np.float64]
 TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
 TOUCH = 0.2  # of the commanded force, from which something is touched
 UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the commanded force
+TURNED, BACK_AGAIN = 3.0, 1.0  # chi^2 of a change of the torques at a settled force: something else acts, or no more
 CONFLICT = 0.1  # s, after which another contact counts
 DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
@@ -81,7 +83,7 @@ class ForceHold:
     """
 
     def __init__(self) -> None:
-        self._turns, self._shake = Reversals(), Shake(SHAKE_SAMPLES)
+        self._turns, self._shake, self._pattern = Reversals(), Shake(SHAKE_SAMPLES), LowPass()
         self.reset()
 
     def reset(self) -> None:
@@ -94,7 +96,9 @@ class ForceHold:
         ) = self._has_begun = False
         self._is_slow, self._other = False, ""
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
-        self._uncertain = self._missed = self._identified = 0.0
+        self._uncertain = self._missed = self._identified = self._desired = self._turned = 0.0
+        self._settled: Array | None = None  # torques per force, 1/m, once it has settled
+        self._pattern.reset()
         self._forget_swings()
 
     def _forget_swings(self) -> None:
@@ -152,6 +156,13 @@ class ForceHold:
     def travel(self, distance: float) -> None:
         """Count a way along the force, m."""
         self._travel += distance
+
+    def excess(self, axis: ForceAxis, measured: float, desired: float, torque_error: float = 0.0) -> float:
+        """Force above the commanded one, N, beyond the uncertainty of the measured one; 0 where it is not.
+
+        An arm that holds its position goes back by it: it must not press harder than commanded either.
+        """
+        return max(measured - desired - math.hypot(axis.force_sd, torque_error), 0.0)
 
     def watch_shaking(self, axis: ForceAxis, moved: Array, frequency: float, dt: float) -> bool:
         """Watch the motion of the joints in a period (n,), rad, under a dither, rad/s; False where it is known.
@@ -265,6 +276,7 @@ class ForceHold:
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
         missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
+        turned = self._has_turned(axis, external, measured, desired, parameters, dt)
         is_late = parameters.is_estimated and self.share > SLOWED
         if is_late and is_touching and self._turns.count > FEW:
             self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
@@ -273,6 +285,8 @@ class ForceHold:
             return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
         if missed:
             return ForceReaction.NOT_REACHED, missed
+        if turned:
+            return ForceReaction.NOT_EXPLAINED, turned
         return self._doubted(axis, point, force_sd, desired, unexplained, parameters)
 
     def _too_weak(
@@ -411,6 +425,40 @@ class ForceHold:
                 "or pose"
             )
         return ForceReaction.NONE, ""
+
+    def _has_turned(
+        self,
+        axis: ForceAxis,
+        external: Array,
+        measured: float,
+        desired: float,
+        parameters: ForceLoopParameters,
+        dt: float,
+    ) -> str:
+        """Why something else seems to act since the force has settled, '' where nothing does.
+
+        The torques of one contact keep their proportions while the arm rests, unless its friction turns.
+        """
+        if not self.is_touching or (desired != self._desired and self._turned <= CONFLICT):
+            self._settled, self._turned = None, 0.0
+            self._pattern.reset()
+        self._desired = desired
+        if not self.is_touching:
+            return ""
+        if self._settled is None:
+            pattern, _ = self._pattern.step(external / measured, STEADY, dt)
+            self._settled = pattern if self._within >= LEFT * parameters.limits.settling_time else None
+            return ""
+        change = axis.turned(external - measured * self._settled)
+        lasts = change > (BACK_AGAIN if self._turned > CONFLICT else TURNED)
+        self._turned = self._turned + dt if lasts else 0.0
+        if self._turned <= CONFLICT:
+            return ""
+        return (
+            f"the torques are no longer those with which the force of {desired:.3g} N has settled (chi^2 of the "
+            f"change {change:.3g}; allowed: {TURNED:g}): something else acts on the arm, and the measured force is "
+            "that of both together, or the friction of the surface has turned; free the arm, or command the force again"
+        )
 
     def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
         """A reason, or the last one until the force has been within the tolerance for as long as it may be off."""

@@ -105,6 +105,7 @@ class ForceLoop:
         self._contact_rejected = False
         self._held_at: list[float] | None = None
         self._goes_back = False
+        self._way_back = 0.0  # m, that an arm which holds may still go back from what it presses too hard
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
@@ -342,14 +343,12 @@ class ForceLoop:
         self._remember(q, moved, contact, point, force_axis)
         if reaction.holds:
             self.refusals["force_command"] = reason
-            self._hold.fed = 0.0
-            goes_back = reaction is ForceReaction.OTHER_LINK
-            if self._held_at is None or goes_back != self._goes_back:
-                self._held_at, self._goes_back = self._free_of(force_axis) if goes_back else list(q), goes_back
-                self._transfer.restart()
-            return out._replace(
-                velocity=[] if is_open else posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
-            )
+            speed, excess = 0.0, self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
+            if excess:
+                factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
+                speed = factor * scalar.velocity(0, -excess, -excess, dt)
+            velocity, effort = self._held(q, force_axis, speed, dt)
+            return out._replace(velocity=[] if is_open else velocity, effort=effort)
         if self._held_at is not None:
             self._held_at = None
             self._transfer.restart()
@@ -404,10 +403,14 @@ class ForceLoop:
             dt,
             signal=axis.signal(desired, self._external_sd) if self._external_sd else math.inf,
             elsewhere=math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired),
-            torque_error=axis.error(self._external_sd) if self._external_sd else 0.0,
+            torque_error=self._torque_error(axis),
             pushed=measured[1],
             unknown=(-float(axis.sense @ self._unknown[0]), self._unknown[1]),
         )
+
+    def _torque_error(self, axis: ForceAxis) -> float:
+        """Standard deviation of the force by those of the estimated torques, N; 0 with sensors."""
+        return axis.error(self._external_sd) if self._external_sd else 0.0
 
     def _judge(self, q: Sequence[float], point: ForcePoint, direction: Array, resting: Array) -> None:
         """Whether torques that are there as a force begins (n,), N m, are those of a surface that is touched already.
@@ -428,6 +431,21 @@ class ForceLoop:
         mass, left = self._measurement.payload(q, resting, sd)
         return f"as with {mass:.2g} kg at the tool" if mass > 0.0 and left <= UNEXPLAINED else ""
 
+    def _held(self, q: Sequence[float], axis: ForceAxis, speed: float, dt: float) -> tuple[list[float], list[float]]:
+        """Velocities and torques of an arm that holds: to where it does, or back along the force at a speed, m/s."""
+        own, still = self.parameters, [0.0] * self._n
+        self._hold.fed = 0.0
+        goes_back = self.reaction is ForceReaction.OTHER_LINK
+        if self._held_at is None or goes_back != self._goes_back:
+            self._held_at, self._goes_back = self._free_of(axis) if goes_back else list(q), goes_back
+            self._way_back = 0.0 if goes_back or self._has_left else own.limits.free_travel
+            self._transfer.restart()
+        if not speed or self._way_back <= 0.0:
+            return posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit), still
+        self._way_back, self._held_at = self._way_back + speed * dt, list(q)
+        velocity = hybrid_velocity(still, axis, speed, own.joint_speed_limit)
+        return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt)
+
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
         cycle = self._timing.dither_cycle
@@ -438,13 +456,14 @@ class ForceLoop:
     def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint, axis: ForceAxis) -> None:
         """Keep where the arm presses, how far it has slid there, its way there, and where it was free."""
         if self._hold.is_touching:
-            self._pressed_at = list(q)
+            if not self.reaction.holds:
+                self._pressed_at = list(q)
             self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
         else:
             self._position.touch_again()
             way = axis.lever * (float(axis.lever @ moved) / max(float(axis.lever @ axis.lever), SHORTEST))
             self._approached = [a + b for a, b in zip(self._approached, way.tolist(), strict=True)]
-        if not contact.cover or not self._free_at:
+        if not (contact.cover or self._hold.is_touching) or not self._free_at:
             self._free_at = list(q)
 
     def _at_rest(self, held: list[float]) -> list[float]:

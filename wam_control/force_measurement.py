@@ -38,7 +38,7 @@ class ForceMeasurement:
 
     @property
     def resting(self) -> Array:
-        """Steady torques of the world on the joints (n,), N m, of which nobody has said that they are zero."""
+        """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
         steady = self._steady.value
         return self.external if steady is None else steady - self._tare - self._zero
 

@@ -37,6 +37,8 @@ RELEASE = 0.5  # s, until the force is commanded
 SECONDS = 4.0  # s of the whole force
 FULL_FRICTION = 0.5  # sd of the friction of a surface that moves, which is there in full: rms of `FRICTIONS`
 AT_REST = 1.5  # s of the whole force, until a surface moves
+STEPPED, DOWN, CHANGES, FIRST_HELD = 0.1, 0.7, (2.0, 4.0), 2.5  # share; of these down; factor; s of the first force
+LONG, LONGER, SMALL_FORCES = 0.1, 5.0, (1.0, 3.0)  # share; of `SECONDS`; N
 
 
 class TaskConditions(NamedTuple):
@@ -75,6 +77,8 @@ class Task(NamedTuple):
     conditions : see there.
     pose : its class.
     second : another surface and its force, N.
+    before : force that is commanded at first, N; 0 for none, and then the command does not step.
+    longer : factor of the time for which the force is held.
     """
 
     q: tuple[float, ...]
@@ -83,6 +87,8 @@ class Task(NamedTuple):
     conditions: TaskConditions = NOMINAL
     pose: str = "any"
     second: tuple[Surface, float] | None = None
+    before: float = 0.0
+    longer: float = 1.0
 
     @property
     def forces(self) -> list[tuple[Surface, float]]:
@@ -132,7 +138,21 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
         q = _pose(arm, elbow, random)
         surface = _surface(body, q, random)
     task = Task(q, _moving(surface, conditions, random), force, conditions, elbow.pose(q))
-    return _doubled(body, task, random) if random.random() < DOUBLED else task
+    if random.random() < DOUBLED:
+        return _doubled(body, task, random)
+    return _in_time(task, np.random.Generator(np.random.PCG64((seed, number, 1))))
+
+
+def _in_time(task: Task, random: np.random.Generator) -> Task:
+    """The task as it is, with a step of the command, or with a small force that is held for long."""
+    share = random.random()
+    if share < STEPPED:
+        change = _log_uniform(random, *CHANGES)
+        first = task.force * (change if random.random() < DOWN else 1.0 / change)
+        return task._replace(before=min(max(first, FORCES[0]), FORCES[1]))
+    if share < STEPPED + LONG:
+        return task._replace(force=_log_uniform(random, *SMALL_FORCES), longer=LONGER)
+    return task
 
 
 def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
@@ -256,14 +276,16 @@ def _mismatch(conditions: TaskConditions) -> dict[str, tuple[float, ...]]:
 
 
 def steps(task: Task, seconds: float) -> list[ScenarioStep]:
-    """Release, ramp in small steps, and `seconds` of the whole force."""
+    """Release, ramp in small steps, the first force if there is one, and `seconds` of the whole force, or longer."""
     count = round(task.conditions.ramp / RAMP_STEP)
     rising = [FIRST + (1.0 - FIRST) * i / count for i in range(count)]
-    ramp = [ScenarioStep("ramp", RAMP_STEP, **_command(task, fraction)) for fraction in rising]
+    before = task.before / task.force if task.before else 1.0
+    ramp = [ScenarioStep("ramp", RAMP_STEP, **_command(task, before * fraction)) for fraction in rising]
     return [
         ScenarioStep("release", RELEASE, request="enable"),
         *ramp,
-        ScenarioStep("press", seconds, **_command(task, 1.0)),
+        *([ScenarioStep("press first", FIRST_HELD, **_command(task, before))] if task.before else []),
+        ScenarioStep("press", task.longer * seconds, **_command(task, 1.0)),
     ]
 
 
