@@ -82,8 +82,8 @@ def test_proportional_action_moves_by_its_gain_times_the_change_of_force_and_not
 def test_a_delayed_velocity_comes_so_many_periods_later(samples: int) -> None:
     loop = force_loop(ARM, replace(OWN, delay_samples=samples))
     along = lever(POSE)
-    reported = [float(along @ ask(loop, World(400.0, force=f), down(9.0)).velocity) for f in (1.0, 2.0, 3.0, 4.0, 5.0)]
-    expected = [0.0] * samples + [GAIN * (9.0 - f) for f in (1.0, 2.0, 3.0, 4.0, 5.0)]
+    reported = [float(along @ ask(loop, World(400.0, force=f), down(9.0)).velocity) for f in (2.0, 3.0, 4.0, 5.0, 6.0)]
+    expected = [0.0] * samples + [GAIN * (9.0 - f) for f in (2.0, 3.0, 4.0, 5.0, 6.0)]
     assert reported == pytest.approx(expected[:5], rel=1e-6, abs=1e-9)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from arms import CONFIGURATION, WAM
 
+from wam_control.force_hold import ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters, force_law, sensing_of, task_of
 from wam_control.scenario import Push, ScenarioStep
 from wam_control.stability_guard import StabilityGuard
@@ -62,6 +63,30 @@ def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...
     assert np.abs(pressed).max() < 1.2, "rad/s"
     signs = np.sign(np.where(np.abs(pressed) < 0.3, 0.0, pressed)).T
     assert max(np.count_nonzero(np.diff(sign[sign != 0.0])) for sign in signs) <= 2, "turns at more than 0.3 rad/s"
+
+
+@pytest.mark.parametrize(
+    ("q", "place", "newtons"),
+    [
+        ((0.0, -1.5, 0.0, 1.3), 0.4064, (10.0, 0.0, 0.0)),
+        ((-0.57, 1.55, 0.41, 1.16), 0.39, (-23.5, 24.9, 2.4)),
+        ((-0.34, -1.08, -2.46, 2.17), 0.4, (27.6, -7.9, 4.9)),
+    ],
+)
+def test_ahead_of_a_nearly_straight_arm_its_own_inertia_is_no_force(
+    q: tuple[float, ...], place: float, newtons: tuple[float, ...]
+) -> None:
+    """Up to 240 N were measured in free space, at up to 2.4 rad/s, as the apparent mass has either sign here."""
+    given = {"force_loop:contact_source": "pinned", "force_loop:contact_position": place}
+    run = free_arm(q, ScenarioStep("press", 2.5, force=ForceCommand("base", triple(np.array(newtons)))), **given)
+    speeds, loop = [], run.nodes["force_loop"]
+    while not run.step():
+        speeds.append(run.driver.plant.qd)
+        assert loop.force_reaction not in (ForceReaction.CYCLE, ForceReaction.CONTACT_FORCE)
+    measured = [math.hypot(*row.values[:3]) for row in run.rows["force_measured"]]
+    assert max(measured) < 0.2 * math.hypot(*newtons), "nothing is touched"
+    signs = np.sign(np.where(np.abs(speeds) < 0.3, 0.0, speeds)).T
+    assert max(np.count_nonzero(np.diff(sign[sign != 0.0])) for sign in signs) <= 1, "turns at more than 0.3 rad/s"
 
 
 def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:

@@ -1,24 +1,33 @@
 """A payload that is declared, `arm.payload`: one fact for gravity, guard, force loop, estimator and plant."""
 
 import dataclasses
+import math
+import re
 
 import mujoco
+import numpy as np
 import pytest
 from arms import CONFIGURATION, NOWHERE, WAM, ideal_mjcf
 
 from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.momentum_observer import MomentumObserver
+from wam_control.scenario import ScenarioStep
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import State
+from wam_description.signals import ForceCommand, State
 from wam_driver.driver import DriverParameters
+from wam_experiments.force_benchmark import surfaces
+from wam_experiments.force_benchmark.outcome import TaskEnd
 from wam_experiments.force_benchmark.surfaces import Surface
-from wam_experiments.force_benchmark.tasks import Task, triple
-from wam_experiments.force_benchmark.trial import perform
+from wam_experiments.force_benchmark.tasks import RELEASE, Task, configured, triple
+from wam_experiments.force_benchmark.trial import perform, with_accepted_gain
+from wam_sim.simulation import Simulation
 
 MASS = 0.5  # kg
 STEP = CONFIGURATION.shared.timing.substep
 LOADED = dataclasses.replace(WAM, payload=MASS)
+DEMO = (0.0, -1.8, 0.0, 1.45)
+PINNED = {"force_loop:contact_source": "pinned"}
 POSE = (0.4, -1.1, 0.3, 0.9)
 
 
@@ -56,14 +65,52 @@ def test_the_estimator_feels_nothing_of_it() -> None:
         assert (max(map(abs, observer.torques()[0])) > 0.5) is feels
 
 
+@pytest.mark.parametrize(("mass", "side", "force"), [(0.1, -1.0, 10.0), (0.3, 1.0, 10.0), (2.0, 1.0, 30.0)])
+def test_a_force_is_refused_by_the_mass_that_nobody_knows_of(mass: float, side: float, force: float) -> None:
+    """10 N were 11.2 N with 0.1 kg, and 13.5 N with 0.3 kg, without a reason."""
+    direction = triple(side * RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
+    task = Task(DEMO, Surface("outer_link", 0.28, direction, 4000.0, 0.3, False), force)
+    found = perform(CONFIGURATION, task, 0.6, {**PINNED, "driver:mismatch.payload": mass})
+    assert re.search(r"already measures .* as with [\d.]+ kg at the tool", found.reason)
+    assert found.peak < 0.1 * force
+
+
+def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded() -> None:
+    """0.05 kg are 0.6 N."""
+    direction = triple(-RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
+    given = configured(CONFIGURATION, Task(DEMO, Surface("outer_link", 0.28, direction, 4000.0, 0.3, False), 8.0))
+    run = Simulation(
+        with_accepted_gain(given.with_values({**PINNED, "driver:mismatch.payload": 0.05})),
+        [
+            ScenarioStep("release", RELEASE, request="enable"),
+            *(
+                ScenarioStep(f"{force} N", seconds, force=ForceCommand("base", triple(force * np.array(direction))))
+                for force, seconds in ((8.0, 0.8), (2.0, 2.5))
+            ),
+        ],
+    )
+    reasons, node = [], run.nodes["force_loop"]
+    while not run.step():
+        reasons.append(node.reason)
+    assert "the force is known to +-0.5" in reasons[-500]
+
+
+@pytest.mark.parametrize("about", [0.0, 120.0])
+def test_a_press_that_starts_in_contact_goes_on(about: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(surfaces, "GAP", -1e-3)
+    local = np.array([0.0, -math.cos(math.radians(about)), math.sin(math.radians(about))])
+    direction = triple(RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation @ local)
+    task = Task(DEMO, Surface("outer_link", 0.28, direction, 4000.0, 0.3, False), 10.0)
+    assert perform(CONFIGURATION, task, 1.5, PINNED).mean == pytest.approx(10.0, rel=0.05)
+
+
 @pytest.mark.slow
 def test_one_newton_is_pressed_with_half_a_kilogram_at_the_tool() -> None:
-    """Not declared, it makes an error of 4.6 N."""
-    q = (0.0, -1.8, 0.0, 1.45)
-    direction = triple(-RigidBody(WAM).cover_pose(q, "outer_link").rotation[:, 1])
-    task = Task(q, Surface("outer_link", 0.28, direction, 4000.0, 0.3, False), 1.0)
-    pinned = {"force_loop:contact_source": "pinned"}
-    known = perform(CONFIGURATION, task, 2.5, {**pinned, "arm.payload": MASS})
+    """Not declared, it would make an error of 4.6 N, and is refused."""
+    direction = triple(-RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
+    task = Task(DEMO, Surface("outer_link", 0.28, direction, 4000.0, 0.3, False), 1.0)
+    known = perform(CONFIGURATION, task, 2.5, {**PINNED, "arm.payload": MASS})
     assert known.mean == pytest.approx(1.0, abs=0.2)
-    unknown = perform(CONFIGURATION, task, 1.0, {**pinned, "driver:mismatch.payload": MASS})
-    assert abs(unknown.mean - 1.0) > 2.0
+    unknown = perform(CONFIGURATION, task, 1.0, {**PINNED, "driver:mismatch.payload": MASS})
+    assert unknown.outcome is TaskEnd.REFUSED
+    assert "as with 0.48 kg at the tool" in unknown.reason

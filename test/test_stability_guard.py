@@ -26,7 +26,9 @@ from wam_theory.stick_slip import FrictionNode, IntegralLoop, Verdict, assess
 
 WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))
 ARM, CLOCK = WAM.shared.arm, WAM.shared.timing
-OWN = WAM.node("force_loop", ForceLoopParameters)
+PACKAGED = WAM.node("force_loop", ForceLoopParameters)
+# the sensors of these tests are those of no arm at rest: no zero
+OWN = replace(PACKAGED, sensing=replace(PACKAGED.sensing, zero_limit=0.0))
 SERVO = WAM.shared.servo
 Loop = partial(ForceLoop, ARM, SERVO, timing=CLOCK)
 UNSURE = anywhere_sd(ARM.covers, "outer_link", 0.28)

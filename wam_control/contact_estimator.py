@@ -97,6 +97,7 @@ NOTHING = (0.0, 0.0, 0.0)
 SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
 SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
 ALONE = 1.3  # times the threshold: detected in one period; below that in two, because noise exceeds it now and then
+LEFT = 0.05  # rad, motion of a joint after which the arm has left what it pressed on
 TOO_EARLY = "too few samples yet"
 
 
@@ -137,6 +138,7 @@ class ContactEstimator:
         self._second = SecondContact(parameters.second)
         self._in_contact = self._is_above = self._is_blind = False
         self._ended = -math.inf  # by the age of the observer, s
+        self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
         self.refused = 0
 
     def brake(self, on: bool) -> None:
@@ -178,8 +180,14 @@ class ContactEstimator:
             self.refused += 1
         return is_taken
 
-    def estimate(self) -> ContactEstimate:
-        """Estimate the contact from the samples so far."""
+    def estimate(self, is_pressing: bool = False) -> ContactEstimate:
+        """Estimate the contact from the samples so far.
+
+        Parameters
+        ----------
+        is_pressing : whether a force is commanded.  What it has touched lasts until the arm leaves, though it may be
+            too small to be detected: taken for an error of the model, it would be held ever larger.
+        """
         observer, parameters = self._observer, self._parameters
         residual, covariance = observer.torques()
         torques = tuple(residual)
@@ -199,7 +207,7 @@ class ContactEstimator:
         was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic)
         if was_in_contact and not self._in_contact:
             self._ended = observer.age
-        observer.follow(statistic, self._in_contact)
+        observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
             self._second.reset()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
@@ -226,6 +234,15 @@ class ContactEstimator:
             reason=best.reason,
             warning=observer.warning,
         )
+
+    def _is_touched(self, is_pressing: bool) -> bool:
+        """Whether something is detected, or was while the arm pressed on it, and the arm has not left it since."""
+        q, at = self._observer.q, self._pressed_at
+        if is_pressing and (self._in_contact or at):
+            self._pressed_at = q
+        elif at and any(abs(a - b) > LEFT for a, b in zip(at, q, strict=True)):
+            self._pressed_at = []
+        return self._in_contact or bool(self._pressed_at)
 
     def _is_detected(self, statistic: float) -> bool:
         detect, was_above = self._parameters.detect, self._is_above

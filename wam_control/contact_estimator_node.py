@@ -5,6 +5,7 @@ from typing import Any
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact_inference import SECOND
 from wam_control.contact_table import hypothesis_table
+from wam_control.task import is_pressing
 from wam_description.arm import Shared
 from wam_description.signals import (
     BASE,
@@ -39,12 +40,15 @@ class ContactEstimatorNode:
         self._in_contact: bool | None = None
         self._warned = ""
         self._doubted = 0.0
-        self.unused = frozenset() if own.use_joint_sensors else frozenset({"joint_sensors"})
+        commands = {"force_command", "task_command"}  # the errors of the model are tracked from the motors alone
+        self.unused = frozenset(commands if own.use_joint_sensors else {"joint_sensors"})
         self.estimate = self._estimator.estimate()
 
     @reaction(
         Input("motor_states"),
         Input("joint_sensors", absent="zero"),
+        Input("force_command", age="command", answers=True),
+        Input("task_command", age="command", answers=True),
         outputs=(
             "external_joint_torques",
             "external_joint_torques_sd",
@@ -61,7 +65,7 @@ class ContactEstimatorNode:
         if not self._timing.is_outer(inputs.stamp):
             return {}
         self._observe()
-        self.estimate = estimate = self._estimator.estimate()
+        self.estimate = estimate = self._estimator.estimate(_is_pressing(inputs))
         frame = estimate.link or BASE
         outputs: dict[str, Any] = {
             "external_joint_torques": State([], [], list(estimate.external_torques)),
@@ -107,6 +111,12 @@ class ContactEstimatorNode:
         self._observe()
         reason = self._estimator.tare()
         return Answer(not reason, reason or "the payload has been identified from the present external torques")
+
+
+def _is_pressing(inputs: Inputs) -> bool:
+    """Whether a force is commanded, alone or along an axis of a task."""
+    force, task = inputs["force_command"], inputs["task_command"]
+    return bool(force and any(force.force)) or bool(task and is_pressing(task))
 
 
 def _view(estimate: ContactEstimate) -> ContactView:

@@ -134,11 +134,13 @@ class ForceAxis(NamedTuple):
     move : joint velocity per commanded velocity along the direction (n,), 1/m.
     force_sd : standard deviation of the sensed force, N; infinite where the force has no lever.
     free_sd : the same if its position along the cover has to be known from the same torques, N.
-    apparent_mass : sensed force per acceleration along the direction, kg.
+    carried : sensed force per acceleration of each joint (n,), kg m: of the arm itself, nothing touched.
+    apparent_mass : the same per acceleration along the direction, kg.
     impact_mass : mass that hits a surface, with rotors, as the arm moves along the direction, kg.
     speed_fraction : velocity along the direction per commanded one, 0 to 1.
     compliance : of the cables along the direction, m/N.
     precision : (n, n), inverse covariance of the torques apart from the force, 1/(N m)^2.
+    precision_there : (n, n), the same at a position that is known.
     """
 
     lever: Array
@@ -147,11 +149,13 @@ class ForceAxis(NamedTuple):
     move: Array
     force_sd: float
     free_sd: float
+    carried: Array
     apparent_mass: float
     impact_mass: float
     speed_fraction: float
     compliance: float
     precision: Array
+    precision_there: Array
 
     def signal(self, force: float, torque_sd: Sequence[float]) -> float:
         """Size of the torques of a force, N, in standard deviations of the estimated torques (n,), N m."""
@@ -166,6 +170,12 @@ class ForceAxis(NamedTuple):
         weighted = self.precision @ torques
         force = float(self.sense @ torques)
         return float(torques @ weighted) - force * force / (self.force_sd * self.force_sd)
+
+    def turned(self, change: Array) -> float:
+        """chi^2 of a change of the torques (n,), N m, which the force does not explain, at the same position."""
+        weighted = self.precision_there @ change
+        force = float(self.press @ weighted)
+        return float(change @ weighted) - force * force / float(self.press @ self.precision_there @ self.press)
 
 
 class ForceAxes:
@@ -265,8 +275,9 @@ class ForceAxes:
         square = float(lever @ lever)
         if square <= REACH * REACH:
             zero = np.zeros(n)
+            none = np.zeros((n, n))
             return ForceAxis(
-                lever, zero, zero, zero, math.inf, math.inf, math.inf, math.inf, 0.0, 0.0, np.zeros((n, n))
+                lever, zero, zero, zero, math.inf, math.inf, zero, math.inf, math.inf, 0.0, 0.0, none, none
             )
         size = max(force, SMALLEST_FORCE)
         length = self._covers.length_of(cover)
@@ -285,12 +296,14 @@ class ForceAxes:
         spread += tangential.T @ tangential
         for torque in others:
             spread += np.outer(torque, torque)
-        inverse = np.asarray(np.linalg.inv(spread + position_sd**2 * moved), np.float64)
+        there = np.asarray(np.linalg.inv(spread), np.float64)
+        inverse = np.asarray(np.linalg.inv(spread + position_sd**2 * moved), np.float64) if position_sd else there
         weighted = inverse @ press
         precision = float(press @ weighted)
         sense: Array = weighted / precision
         inertia = self.inertia(q)
-        mass = float(sense @ inertia @ lever) / square
+        carried: Array = sense @ inertia
+        mass = float(carried @ lever) / square
         impact = float(lever @ (inertia + self._rotors) @ lever) / (square * square)
         damped = square
         if parameters.apparent_mass_limit:
@@ -302,7 +315,19 @@ class ForceAxes:
         sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ np.linalg.solve(anywhere, press))))
         yielding = float(lever @ self._compliance @ lever)
         return ForceAxis(
-            lever, press, sense, lever / damped, sd, free_sd, mass, impact, square / damped, yielding, inverse
+            lever,
+            press,
+            sense,
+            lever / damped,
+            sd,
+            free_sd,
+            carried,
+            mass,
+            impact,
+            square / damped,
+            yielding,
+            inverse,
+            there,
         )
 
 

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 from wam_control.contact_position import ForcePoint
 from wam_control.force_axis import ForceAxis
 from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.force_measurement import STEADY, LowPass
 from wam_control.force_swing import Reversals, Shake
 
 Array = NDArray[np.float64]
 TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
 TOUCH = 0.2  # of the commanded force, from which something is touched
 UNEXPLAINED = 16.0  # chi^2 of torques above which they are not those of the commanded force
+TURNED, BACK_AGAIN = 3.0, 1.0  # chi^2 of a change of the torques at a settled force: something else acts, or no more
 CONFLICT = 0.1  # s, after which another contact counts
 DOUBTED = 0.5  # s, after which a contact counts of which it is not known on which link it is
 IDENTIFIED = 0.3  # s, in which the force on the stiffest surface may rise to the commanded one at an unknown position
@@ -82,7 +84,7 @@ class ForceHold:
     """
 
     def __init__(self) -> None:
-        self._turns, self._shake = Reversals(), Shake(SHAKE_SAMPLES)
+        self._turns, self._shake, self._pattern = Reversals(), Shake(SHAKE_SAMPLES), LowPass()
         self.reset()
 
     def reset(self) -> None:
@@ -92,10 +94,12 @@ class ForceHold:
         self._way = self._watched = self._shaking = self._blocked = 0.0
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
             self._has_settled
-        ) = False
-        self._other = ""
+        ) = self._has_begun = False
+        self._is_slow, self._other = False, ""
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
-        self._uncertain = self._missed = self._identified = 0.0
+        self._uncertain = self._missed = self._identified = self._desired = self._turned = 0.0
+        self._settled: Array | None = None  # torques per force, 1/m, once it has settled
+        self._pattern.reset()
         self._forget_swings()
 
     def _forget_swings(self) -> None:
@@ -154,6 +158,13 @@ class ForceHold:
         """Count a way along the force, m."""
         self._travel += distance
 
+    def excess(self, axis: ForceAxis, measured: float, desired: float, torque_error: float = 0.0) -> float:
+        """Force above the commanded one, N, beyond the uncertainty of the measured one; 0 where it is not.
+
+        An arm that holds its position goes back by it: it must not press harder than commanded either.
+        """
+        return max(measured - desired - math.hypot(axis.force_sd, torque_error), 0.0)
+
     def watch_shaking(self, axis: ForceAxis, moved: Array, frequency: float, dt: float) -> bool:
         """Watch the motion of the joints in a period (n,), rad, under a dither, rad/s; False where it is known.
 
@@ -203,6 +214,8 @@ class ForceHold:
         signal: float = math.inf,
         elsewhere: float = math.inf,
         torque_error: float = 0.0,
+        pushed: float | None = None,
+        unknown: tuple[float, str] = (0.0, ""),
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
@@ -217,11 +230,16 @@ class ForceHold:
         signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
         elsewhere : the same if another link is touched.
         torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
+        pushed : force, N, without the inertia of the arm, by which something is touched; None: the measured one.
+        unknown : force, N, of torques at rest before, which no touched surface gives, and what they mean.
         """
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
         limit = parameters.sensing.sd_limit(desired, point.is_pinned)
         self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
-        self.is_touching = measured >= TOUCH * desired
+        is_loaded = not self._has_begun and abs(unknown[0]) > TOLERANCE * desired
+        pushed = measured if pushed is None else pushed
+        self.is_touching = pushed >= TOUCH * desired and not is_loaded
+        self._has_begun = self._has_begun or self.is_touching
         if self.is_touching and not self._has_touched:
             self._has_touched = True
             self._forget_swings()
@@ -235,6 +253,8 @@ class ForceHold:
             touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
             self._other = f"{touched}; the arm goes back to where it was free until the command ends"
         weak = self._too_weak(point, desired, signal, elsewhere, parameters)
+        if is_loaded:
+            return ForceReaction.NOT_SENSED, _loaded(*unknown, desired)
         held = self._held(axis, point, desired, limit, weak, parameters)
         if held[0].holds:
             return held
@@ -251,12 +271,13 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        force_sd = math.hypot(axis.force_sd, torque_error)
+        force_sd = math.hypot(axis.force_sd, torque_error, unknown[0])
         is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
         is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
         missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
+        turned = self._has_turned(axis, external, measured, desired, parameters, dt)
         is_late = parameters.is_estimated and self.share > SLOWED
         if is_late and is_touching and self._turns.count > FEW:
             self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
@@ -265,6 +286,8 @@ class ForceHold:
             return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
         if missed:
             return ForceReaction.NOT_REACHED, missed
+        if turned:
+            return ForceReaction.NOT_EXPLAINED, turned
         return self._doubted(axis, point, force_sd, desired, unexplained, parameters)
 
     def _too_weak(
@@ -342,7 +365,8 @@ class ForceHold:
             return ForceReaction.NONE, ""
         stiffness = 1.0 / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
         pace = max(parameters.force_gain) * axis.speed_fraction * stiffness
-        if pace * parameters.limits.settling_time < SETTLED:
+        self._is_slow = pace * parameters.limits.settling_time < SETTLED / (RESUME if self._is_slow else 1.0)
+        if self._is_slow:
             return ForceReaction.TOO_SLOW, (
                 f"the force would settle with a time constant of {1.0 / pace:.2g} s{_slowed(axis)}; allowed: "
                 f"1/{SETTLED:g} of limits.settling_time; the arm holds its position: bend the arm, or command another "
@@ -402,6 +426,40 @@ class ForceHold:
             )
         return ForceReaction.NONE, ""
 
+    def _has_turned(
+        self,
+        axis: ForceAxis,
+        external: Array,
+        measured: float,
+        desired: float,
+        parameters: ForceLoopParameters,
+        dt: float,
+    ) -> str:
+        """Why something else seems to act since the force has settled, '' where nothing does.
+
+        The torques of one contact keep their proportions while the arm rests, unless its friction turns.
+        """
+        if not self.is_touching or (desired != self._desired and self._turned <= CONFLICT):
+            self._settled, self._turned = None, 0.0
+            self._pattern.reset()
+        self._desired = desired
+        if not self.is_touching:
+            return ""
+        if self._settled is None:
+            pattern, _ = self._pattern.step(external / measured, STEADY, dt)
+            self._settled = pattern if self._within >= LEFT * parameters.limits.settling_time else None
+            return ""
+        change = axis.turned(external - measured * self._settled)
+        lasts = change > (BACK_AGAIN if self._turned > CONFLICT else TURNED)
+        self._turned = self._turned + dt if lasts else 0.0
+        if self._turned <= CONFLICT:
+            return ""
+        return (
+            f"the torques are no longer those with which the force of {desired:.3g} N has settled (chi^2 of the "
+            f"change {change:.3g}; allowed: {TURNED:g}): something else acts on the arm, and the measured force is "
+            "that of both together, or the friction of the surface has turned; free the arm, or command the force again"
+        )
+
     def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
         """A reason, or the last one until the force has been within the tolerance for as long as it may be off."""
         if missed or self._within >= LEFT * parameters.limits.settling_time:
@@ -454,6 +512,14 @@ def _slowed(axis: ForceAxis) -> str:
     return (
         f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
         "apparent mass is large in this pose (sensing.apparent_mass_limit)"
+    )
+
+
+def _loaded(force: float, meaning: str, desired: float) -> str:
+    return (
+        f"the arm at rest already measures {force:.3g} N along the force of {desired:.3g} N, {meaning}; allowed: "
+        f"{TOLERANCE:g} of the commanded; the arm holds its position: declare what it carries (arm.payload), "
+        "or end the command and tare in free space"
     )
 
 

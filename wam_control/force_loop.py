@@ -18,7 +18,7 @@ from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, ForceAxis
 from wam_control.force_command import CommandAdmission
-from wam_control.force_hold import ForceHold, ForceReaction
+from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, require_fit, sensing_of
 from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
@@ -39,11 +39,13 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
+SHORTEST = 1e-12  # m^2, square of a lever
 SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
 NEAR, MIDDLE = 0.1, 0.5  # of a link that is perhaps touched: where its force is taken to be
 FAINT = 0.25  # of a link that may be touched, where its force has to be detected
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
+ALIKE = 0.05  # of the torques at rest: what a payload may leave of them, as the masses are not known better
 LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
@@ -103,13 +105,19 @@ class ForceLoop:
         self._contact_rejected = False
         self._held_at: list[float] | None = None
         self._goes_back = False
+        self._way_back = 0.0  # m, that an arm which holds may still go back from what it presses too hard
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
+        self._inertia = LowPass()
+        self._approached = [0.0] * self._n
         self._feed_forward = FeedForward(arm)
         self._pressed_at: list[float] | None = None
         self._free_at: list[float] = []
         self._is_free = False
+        self._external = np.zeros(self._n), np.zeros(self._n)
+        self._resting: Array | None = None
+        self._unknown: tuple[Array, str] = np.zeros(self._n), ""  # torques at rest that no surface gives
         self._external_sd: Sequence[float] | None = None
         self._transfer = BumplessTransfer(self._n)
         self._hold = ForceHold()
@@ -176,6 +184,7 @@ class ForceLoop:
         if not self._has_left:
             return "the arm still is where it pressed: free it first"
         self._measurement.tare()
+        self._filter.reset()
         return ""
 
     @property
@@ -245,6 +254,7 @@ class ForceLoop:
         is_touched = not own.is_estimated or bool(contact.cover) or self._hold.is_touching
         present = self._measurement.external if is_touched else np.zeros(self._n)
         self._external = self._filter.step(present, own.force_filter, dt)
+        self._acceleration, _ = self._inertia.step(self._measurement.acceleration, own.force_filter, dt)
         if task is not None:
             out = self._task(joints.position, contact, task, commands.posture, dt)
         elif own.mode == "joint_torque":
@@ -279,13 +289,18 @@ class ForceLoop:
         self._delay.reset()
         self._feed_forward.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
+        self._external = self._external[0], self._external[0]
+        self._resting = None
         self._axes = axes
+        self._approached = [0.0] * self._n  # along the force: as its lever turns, the posture would pull this back
         self._held_at = None
         self._transfer.restart()
         limit = self.parameters.sensing.zero_limit
-        if axes and limit and self._is_free and self._is_at_rest and self._has_left and self._measurement.zero(limit):
-            self._filter.reset()
-            self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
+        if axes and limit and self._is_at_rest and self._has_left:
+            if self._is_free and self._measurement.zero(limit):
+                self._filter.reset()
+                self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
+            self._resting = self._measurement.resting
 
     def _force(
         self, q: Sequence[float], contact: Contact, command: ForceCommand | None, posture: list[float], dt: float
@@ -297,7 +312,8 @@ class ForceLoop:
         axes = command.frame if command is not None and desired else ""
         if axes != self._axes:
             self._begin(axes)
-        held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, self._rate)
+        goal = [a + b for a, b in zip(posture, self._approached, strict=True)]
+        held = posture_velocity(goal, q, own.posture_gain, own.joint_speed_limit, self._rate)
         if command is None or not desired:
             return ForceOutput([] if is_open else held, [0.0] * self._n, frame=command.frame if command else BASE)
         rotation = np.eye(3) if command.frame == "base" else self._body.cover_pose(q, command.frame).rotation
@@ -305,7 +321,7 @@ class ForceLoop:
         axis = (rotation.T @ direction).tolist()
         point = self._point(contact, command, direction)
         force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
-        measured, before = (-float(force_axis.sense @ torques) for torques in self._external)
+        measured, before, free = self._measured(force_axis)
         scalar = law.along(axis)
         error = desired - measured
         out = ForceOutput(
@@ -322,24 +338,17 @@ class ForceLoop:
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
-        signal = force_axis.signal(desired, self._external_sd) if self._external_sd else math.inf
-        torque_error = force_axis.error(self._external_sd) if self._external_sd else 0.0
-        elsewhere = math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired)
-        reaction, reason = self._hold.step(
-            force_axis, point, self._external[0], measured, desired, own, dt, signal, elsewhere, torque_error
-        )
+        reaction, reason = self._reaction(q, force_axis, point, direction, (measured, free), desired, dt)
         self._react(reaction, reason)
-        self._remember(q, moved, contact, point)
+        self._remember(q, moved, contact, point, force_axis)
         if reaction.holds:
             self.refusals["force_command"] = reason
-            self._hold.fed = 0.0
-            goes_back = reaction is ForceReaction.OTHER_LINK
-            if self._held_at is None or goes_back != self._goes_back:
-                self._held_at, self._goes_back = self._free_of(force_axis) if goes_back else list(q), goes_back
-                self._transfer.restart()
-            return out._replace(
-                velocity=[] if is_open else posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
-            )
+            speed, excess = 0.0, self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
+            if excess:
+                factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
+                speed = factor * scalar.velocity(0, -excess, -excess, dt)
+            velocity, effort = self._held(q, force_axis, speed, dt)
+            return out._replace(velocity=[] if is_open else velocity, effort=effort)
         if self._held_at is not None:
             self._held_at = None
             self._transfer.restart()
@@ -358,6 +367,85 @@ class ForceLoop:
         fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
         return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
 
+    def _measured(self, axis: ForceAxis) -> tuple[float, float, float]:
+        """Force along an axis, N, now and one period before, and now without the inertia of the arm itself.
+
+        The last one shows whether something is touched, and is the measured one until then: near a straight elbow the
+        apparent mass of the arm has either sign, and the arm would chatter in free space.
+        """
+        measured, before = (-float(axis.sense @ torques) for torques in self._external)
+        if self.parameters.feedback != "joint_sensors":
+            return measured, before, measured
+        # the acceleration is the mean of a period
+        free = 0.5 * (measured + before) - float(axis.carried @ self._acceleration)
+        return (measured, before, free) if self._hold.is_touching else (free, free, free)
+
+    def _reaction(
+        self,
+        q: Sequence[float],
+        axis: ForceAxis,
+        point: ForcePoint,
+        direction: Array,
+        measured: tuple[float, float],
+        desired: float,
+        dt: float,
+    ) -> tuple[ForceReaction, str]:
+        """What the loop does instead of the command, and why; forces in N, the measured one without inertia, too."""
+        if self._resting is not None:
+            self._judge(q, point, direction, self._resting)
+        return self._hold.step(
+            axis,
+            point,
+            self._external[0],
+            measured[0],
+            desired,
+            self.parameters,
+            dt,
+            signal=axis.signal(desired, self._external_sd) if self._external_sd else math.inf,
+            elsewhere=math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired),
+            torque_error=self._torque_error(axis),
+            pushed=measured[1],
+            unknown=(-float(axis.sense @ self._unknown[0]), self._unknown[1]),
+        )
+
+    def _torque_error(self, axis: ForceAxis) -> float:
+        """Standard deviation of the force by those of the estimated torques, N; 0 with sensors."""
+        return axis.error(self._external_sd) if self._external_sd else 0.0
+
+    def _judge(self, q: Sequence[float], point: ForcePoint, direction: Array, resting: Array) -> None:
+        """Whether torques that are there as a force begins (n,), N m, are those of a surface that is touched already.
+
+        Otherwise they are an error of the force.  What a mass at the tool explains may always be one.
+        """
+        axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, 0.0)
+        force = -float(axis.sense @ resting)
+        axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, abs(force))
+        carried = self._carried(q, resting)
+        is_contact = force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED and not carried
+        meaning = carried or "not the force of a surface that is touched there"
+        self._resting, self._unknown = None, (np.zeros(self._n), "") if is_contact else (resting, meaning)
+
+    def _carried(self, q: Sequence[float], resting: Array) -> str:
+        """What a mass at the tool would be called that explains torques at rest (n,), N m; '' where none does."""
+        sd = math.hypot(sensing_of(self.parameters).torque_sd, ALIKE * float(np.abs(resting).max()))
+        mass, left = self._measurement.payload(q, resting, sd)
+        return f"as with {mass:.2g} kg at the tool" if mass > 0.0 and left <= UNEXPLAINED else ""
+
+    def _held(self, q: Sequence[float], axis: ForceAxis, speed: float, dt: float) -> tuple[list[float], list[float]]:
+        """Velocities and torques of an arm that holds: to where it does, or back along the force at a speed, m/s."""
+        own, still = self.parameters, [0.0] * self._n
+        self._hold.fed = 0.0
+        goes_back = self.reaction is ForceReaction.OTHER_LINK
+        if self._held_at is None or goes_back != self._goes_back:
+            self._held_at, self._goes_back = self._free_of(axis) if goes_back else list(q), goes_back
+            self._way_back = 0.0 if goes_back or self._has_left else own.limits.free_travel
+            self._transfer.restart()
+        if not speed or self._way_back <= 0.0:
+            return posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit), still
+        self._way_back, self._held_at = self._way_back + speed * dt, list(q)
+        velocity = hybrid_velocity(still, axis, speed, own.joint_speed_limit)
+        return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt)
+
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
         cycle = self._timing.dither_cycle
@@ -365,14 +453,17 @@ class ForceLoop:
             return False
         return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
 
-    def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint) -> None:
-        """Keep where the arm presses, how far it has slid there, and where it was free."""
+    def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint, axis: ForceAxis) -> None:
+        """Keep where the arm presses, how far it has slid there, its way there, and where it was free."""
         if self._hold.is_touching:
-            self._pressed_at = list(q)
+            if not self.reaction.holds:
+                self._pressed_at = list(q)
             self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
         else:
             self._position.touch_again()
-        if not contact.cover or not self._free_at:
+            way = axis.lever * (float(axis.lever @ moved) / max(float(axis.lever @ axis.lever), SHORTEST))
+            self._approached = [a + b for a, b in zip(self._approached, way.tolist(), strict=True)]
+        if not (contact.cover or self._hold.is_touching) or not self._free_at:
             self._free_at = list(q)
 
     def _at_rest(self, held: list[float]) -> list[float]:
@@ -426,7 +517,11 @@ class ForceLoop:
         if self._axes != TASK:
             self._begin(TASK)
             self._tasks.restart()
-        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt)
+        if (resting := self._resting) is not None:
+            # what no mass at the tool explains may be several surfaces that are touched already
+            carried = self._carried(q, resting)
+            self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
+        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown)
         self._react(found.reaction, found.reason)
         if found.reaction.holds:
             self.refusals["task_command"] = found.reason

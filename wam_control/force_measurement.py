@@ -12,6 +12,8 @@ from wam_description.signals import State
 Array = NDArray[np.float64]
 STEADY = 0.1  # s, time constant of the torques that are taken as zero
 
+TINY = 1e-12  # 1/kg^2, of a weight that no joint carries
+
 
 class ForceMeasurement:
     """External torques of the joints, and what of them counts as zero.
@@ -19,6 +21,7 @@ class ForceMeasurement:
     Attributes
     ----------
     external : torques of the world on the joints (n,), N m, less the tare and the zero of the present command.
+    acceleration : of the joints by their sensors (n,), rad/s^2, mean over the last period.
     """
 
     def __init__(self, body: RigidBody) -> None:
@@ -26,11 +29,32 @@ class ForceMeasurement:
         self._n = len(body.arm.joints.names)
         self._tare, self._zero = np.zeros(self._n), np.zeros(self._n)
         self._steady = LowPass()
+        self.acceleration = self._velocity = np.zeros(self._n)
         self.external = np.zeros(self._n)
 
     def tare(self) -> None:
         """Take the present external torques as zero."""
         self._tare = self._tare + self.external
+
+    @property
+    def resting(self) -> Array:
+        """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
+        steady = self._steady.value
+        return self.external if steady is None else steady - self._tare - self._zero
+
+    def payload(self, q: Sequence[float], torques: Array, torque_sd: float) -> tuple[float, float]:
+        """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
+
+        Parameters
+        ----------
+        q : joint angles (n,), rad.
+        torques, torque_sd : torques (n,), N m, and the standard deviation of each, N m.
+        """
+        weight = np.array(self._body.arm.gravity) @ self._body.tool_jacobian(q)[:3] / torque_sd
+        scaled = torques / torque_sd
+        mass = float(weight @ scaled) / max(float(weight @ weight), TINY)
+        left = scaled - mass * weight
+        return mass, float(left @ left)
 
     def zero(self, limit: float) -> bool:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
@@ -58,6 +82,9 @@ class ForceMeasurement:
         dt : outer period, s.
         """
         torque = self._torque(parameters, sensors, estimated)
+        velocity = np.zeros(self._n) if sensors is None else np.array(sensors.velocity)
+        self.acceleration = (velocity - self._velocity) / dt
+        self._velocity = velocity
         self._steady.step(torque, STEADY, dt)
         self.external = torque - self._tare - self._zero
 

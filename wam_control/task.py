@@ -12,6 +12,7 @@ from typing import NamedTuple
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError, require
 from wam_description.signals import BASE, ZERO, Table, Triple
+from wam_description.topics import TASK_COLUMNS
 
 
 class AxisKind(IntEnum):
@@ -132,6 +133,12 @@ def task_of(table: Table | None, arm: Arm) -> TaskCommand | None:
     return checked_task(
         TaskCommand(table.frame, tuple(_axis(f"row {i + 1}", row, arm) for i, row in enumerate(table.rows)))
     )
+
+
+def is_pressing(table: Table) -> bool:
+    """Whether the task of a message commands a force."""
+    kind, value = (TASK_COLUMNS.index(name) for name in ("kind", "value"))
+    return any(row[kind] == AxisKind.FORCE and row[value] for row in table.rows)
 
 
 def _axis(where: str, row: Sequence[float], arm: Arm) -> TaskAxis:

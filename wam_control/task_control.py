@@ -79,6 +79,7 @@ class TaskControl:
         self._slid: dict[tuple[str, float], float] = {}  # m, by cover and place, since something is touched there
         self._q_before: list[float] = []
         self._held_at: list[float] | None = None
+        self._has_pressed, self._way_back = False, 0.0  # m, that an arm which holds may still go back
         self._feed_forward.reset()
         self._refusal = ""
         self._places: dict[str, tuple[float, float]] = {}  # m, of the last certain estimate, and its sd, by cover
@@ -92,6 +93,7 @@ class TaskControl:
         posture: Sequence[float],
         rate: Sequence[float] | None,
         dt: float,
+        unknown: tuple[Array, str],
     ) -> TaskOutput:
         """One outer period.
 
@@ -103,6 +105,7 @@ class TaskControl:
         contact : estimated contact.
         posture, rate : joint angles to hold in what the task leaves (n,), rad, and their velocity, rad/s.
         dt : outer period, s.
+        unknown : torques at rest before that no touched surface gives (n,), N m, and what they mean.
         """
         own = self._parameters
         has_changed = self._begin(task)
@@ -114,10 +117,12 @@ class TaskControl:
         reaction, reason = (
             (ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")
             if self._refusal
-            else self._watch(states, forces, torques[0], dt)
+            else self._watch(states, forces, torques[0], dt, unknown)
         )
         if reaction.holds != (self._held_at is not None):
             self._held_at, has_changed = (list(q) if reaction.holds else None), True
+            self._way_back = own.limits.free_travel if self._has_pressed else 0.0
+        self._has_pressed = self._has_pressed or (not reaction.holds and any(h.is_touching for h in self._holds))
         factor, is_other = self._supervision.factor(lambda: self._guarded(states, q), dt)
         speeds = [
             self._speed(state, force, anchor, torques[1], hold, factor, dt)
@@ -127,8 +132,12 @@ class TaskControl:
         resolved = self._frame.resolve(states, speeds, held, q)
         velocity = _limited(resolved.velocity, own.joint_speed_limit)
         fed = np.sum([self._fed(*pair, dt) for pair in zip(states, self._holds, strict=True)], axis=0)
-        if self._held_at is not None:
-            velocity = posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
+        if self._held_at is not None:  # never pressing harder than commanded
+            velocity = self._back(states, forces, factor, dt)
+            if any(velocity):
+                self._held_at = list(q)
+            else:
+                velocity = posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
             effort = [0.0] * len(q)
         else:
             effort = self._feed_forward.step(fed, velocity, own, dt)
@@ -191,14 +200,21 @@ class TaskControl:
         return ""
 
     def _watch(
-        self, states: Sequence[AxisState], forces: Sequence[float], external: Array, dt: float
+        self,
+        states: Sequence[AxisState],
+        forces: Sequence[float],
+        external: Array,
+        dt: float,
+        unknown: tuple[Array, str],
     ) -> tuple[ForceReaction, str]:
         """What the force axes report, the most serious first."""
         found = [(ForceReaction.NONE, "")]
         for state, force, hold in zip(states, forces, self._holds, strict=True):
             desired = _desired(state)
             if state.sensed and state.point and desired:
-                found.append(hold.step(state.sensed, state.point, external, force, desired, self._parameters, dt))
+                error = -float(state.sensed.sense @ unknown[0]), unknown[1]
+                own, sensed = self._parameters, state.sensed
+                found.append(hold.step(sensed, state.point, external, force, desired, own, dt, unknown=error))
         return max(found, key=lambda one: (one[0].holds, one[0] is not ForceReaction.NONE))
 
     def _points(self, task: TaskCommand, contact: Contact) -> list[ForcePoint]:
@@ -263,6 +279,19 @@ class TaskControl:
             speed = min(speed, hold.approach_speed(state.sensed, state.point, desired, self._parameters))
         fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
         return min(max(speed, -fastest), fastest)
+
+    def _back(self, states: Sequence[AxisState], forces: Sequence[float], factor: float, dt: float) -> list[float]:
+        """Velocities (n,), rad/s, of an arm that holds, away from what it presses harder than commanded."""
+        velocity, law = np.zeros(len(self._q_before)), self._supervision.force_law
+        for state, force, hold in zip(states, forces, self._holds, strict=True):
+            desired = _desired(state)
+            if not (state.sensed and state.point and desired and self._way_back > 0.0):
+                continue
+            if excess := hold.excess(state.sensed, force, desired):
+                speed = factor * law.along(state.axis.direction).velocity(0, -excess, -excess, dt)
+                velocity += state.sensed.move * speed
+                self._way_back += speed * dt
+        return _limited(velocity, self._parameters.joint_speed_limit)
 
     def _fed(self, state: AxisState, hold: ForceHold, dt: float) -> Array:
         """Torque of a commanded force that is fed forward (n,), N m."""

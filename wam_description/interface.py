@@ -181,7 +181,7 @@ class Interface:
         return Synchroniser(self._timing, trigger, specs, is_outer, reaction.thinned)
 
     def _spec(self, item: Input) -> InputSpec:
-        delay = self._timing.outer_delay if item.delayed else 0
+        delay = max(self._timing.outer_delay if item.delayed else 0, item.answers)
         limit = self._ages.limit_ns(item.age)
         is_outer, is_streamed = self.topics[item.topic].rate != "inner", self.is_streamed(item.topic)
         return InputSpec(is_outer, delay, is_streamed, limit, item.age == "command")

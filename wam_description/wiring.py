@@ -61,6 +61,7 @@ class Input(NamedTuple):
     absent : what absence means, of an input that is not there or too old; the step sees None.
         hold: the arm stays where it is; zero: nothing is added; brake: as zero or hold, and the driver brakes
         where it was there before and another node of the bring-up streams it.
+    answers : whether it may be an answer to what this step publishes; it is used in the next outer period then.
     """
 
     topic: str
@@ -68,6 +69,7 @@ class Input(NamedTuple):
     delayed: bool = False
     age: str = "feedback"
     absent: str = "zero"
+    answers: bool = False
 
     def check(self) -> None:
         """Refuse what is no input: an array given as `delayed`, a word that means nothing.

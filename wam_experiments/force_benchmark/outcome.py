@@ -69,6 +69,7 @@ class TaskResult(NamedTuple):
     cycle_is_reported : whether the loop reports a reason, or the guard a cycle of this size.
     gain : force gain in use, m/s/N.
     reason : of a refusal, an end or a warning.
+    is_over : whether the true force was above the largest allowed, or at the end above that of the last command.
     """
 
     outcome: TaskEnd
@@ -80,11 +81,7 @@ class TaskResult(NamedTuple):
     cycle_is_reported: bool
     gain: float
     reason: str
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the true force was above the largest allowed."""
-        return self.peak > self.limit
+    is_over: bool
 
     @property
     def cycles_silently(self) -> bool:
@@ -95,24 +92,25 @@ class TaskResult(NamedTuple):
 def refused(task: Task, reason: str) -> TaskResult:
     """The result of a task that is refused before the start."""
     limit = OVERSHOOT * task.force
-    return TaskResult(TaskEnd.REFUSED, 0.0, 0.0, 0.0, limit, 0.0, False, 0.0, reason)
+    return TaskResult(TaskEnd.REFUSED, 0.0, 0.0, 0.0, limit, 0.0, False, 0.0, reason, is_over=False)
 
 
 def evaluated(task: Task, trace: TaskTrace) -> TaskResult:
     """The result of a task that was played."""
     last = trace.forces[-EVALUATED:]
     mean, peak = float(last.mean()), float(trace.forces.max())
-    cycle = _cycle(task, trace)
+    cycle, limit = _cycle(task, trace), OVERSHOOT * max(task.force, task.before) + trace.impact
     return TaskResult(
         outcome=_outcome(task, trace, mean, peak),
         mean=mean,
         sd=float(last.std()),
         peak=peak,
-        limit=OVERSHOOT * task.force + trace.impact,
+        limit=limit,
         cycle=cycle,
         cycle_is_reported=bool(trace.reason) or trace.predicted_cycle >= 0.5 * cycle > 0.0,
         gain=trace.gain,
         reason=trace.reason,
+        is_over=peak > limit or mean > OVERSHOOT * task.force + trace.impact,
     )
 
 
@@ -127,7 +125,9 @@ def _outcome(task: Task, trace: TaskTrace, mean: float, peak: float) -> TaskEnd:
         return TaskEnd.REFUSED
     if abs(mean - task.force) <= TOLERANCE * task.force and not trace.is_stopped:
         return TaskEnd.DONE
-    if trace.is_stopped and not trace.is_fault and peak <= task.force:
+    # the first command was obeyed, the second one is declined
+    is_declined = task.before and peak <= OVERSHOOT * task.before and mean <= (1.0 + TOLERANCE) * task.force
+    if trace.is_stopped and not trace.is_fault and (peak <= task.force or is_declined):
         return TaskEnd.GIVEN_UP
     return TaskEnd.ENDED if trace.reason else TaskEnd.SILENT
 

@@ -11,20 +11,31 @@ from wam_experiments.force_benchmark.evaluation import ForceTrial
 from wam_experiments.force_benchmark.outcome import OVERSHOOT, TOLERANCE, TaskEnd
 from wam_experiments.force_benchmark.surfaces import GAP
 from wam_experiments.force_benchmark.tasks import (
+    ASYMMETRY,
     AT_REST,
     CABLES,
+    CHANGES,
     DOUBLED,
+    DOWN,
     FARTHEST,
+    FIRST_HELD,
     FORCES,
     FREQUENCIES,
     FRICTION,
     FRICTIONS,
     FULL_FRICTION,
+    LOADED,
+    LONG,
+    LONGER,
     MASS,
     MOVING,
+    OTHERWISE,
+    PAYLOADS,
     POSES,
     SECONDS,
+    SMALL_FORCES,
     SPEEDS,
+    STEPPED,
     STIFFNESSES,
     TORQUE,
     Task,
@@ -35,6 +46,8 @@ REQUIRED = {SENSORS: 0.95, MOTORS: 0.9}  # share of accepted tasks within the to
 STIFFNESS_ENDS = {"400 to 4000": 4e3, "4000 to 40 000": 4e4, "40 000 to 400 000": 4e5}  # N/m
 FORCE_ENDS = {"1 to 3": 3.0, "3 to 10": 10.0, "10 to 40": 40.0}  # N
 MOTIONS = ("at rest", "moves along the force", "moves across it")
+UNKNOWNS = ("masses, friction, cables, constants", "a payload, too", "the law of friction, too")
+COURSES = ("one force", "another force first", "small force for long")
 STEADY = 1e-6  # m/s along the force, of a surface that moves across it
 LISTED = 40  # failures of one kind
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -64,6 +77,15 @@ def _motion(task: Task) -> str:
     return MOTIONS[0] if not surface.frequency else MOTIONS[1] if surface.speed > STEADY else MOTIONS[2]
 
 
+def _unknown(task: Task) -> str:
+    conditions = task.conditions
+    return UNKNOWNS[1] if conditions.payload else UNKNOWNS[2] if conditions.asymmetry else UNKNOWNS[0]
+
+
+def _course(task: Task) -> str:
+    return COURSES[2] if task.longer > 1.0 else COURSES[bool(task.before)]
+
+
 GROUPINGS = (
     TaskGrouping("feedback", (SENSORS, MOTORS), lambda task: MOTORS if task.conditions.is_dithered else SENSORS),
     TaskGrouping("stiffness [N/m]", tuple(STIFFNESS_ENDS), lambda task: _below(STIFFNESS_ENDS, task.surface.stiffness)),
@@ -77,6 +99,8 @@ GROUPINGS = (
     TaskGrouping("surface", MOTIONS, _motion),
     TaskGrouping("forces", ("one", "two at once"), lambda task: "two at once" if task.second else "one"),
     TaskGrouping("command", ("step", "ramp"), lambda task: "ramp" if task.conditions.ramp else "step"),
+    TaskGrouping("course", COURSES, _course),
+    TaskGrouping("not known", UNKNOWNS, _unknown),
 )
 
 
@@ -214,6 +238,7 @@ def details(seed: int, trial: ForceTrial) -> str:
         f"task {trial.number} of seed {seed}: {result.outcome.value}; {_numbers(trial)}",
         f"  pose ({', '.join(f'{angle:.3f}' for angle in task.q)}) rad, {task.pose}; {_contact(task)}: {place}",
         f"  surface of {surface.stiffness:.4g} N/m, friction {surface.friction:.2f}; ramp of {conditions.ramp:.2g} s",
+        f"  {_course(task)}{f': {task.before:.3g} N' if task.before else ''}; not known: {_unknown(task)}",
         f"  feedback from {GROUPINGS[0].of(task)}; contact position {GROUPINGS[5].of(task)}; {GROUPINGS[6].of(task)}",
         f"  force gain {result.gain:.3g} m/s/N",
     ]
@@ -308,4 +333,11 @@ RULES = f"""## Method
   (`contact_position_sd`).
 * {DOUBLED:.0%} of the tasks have a second force elsewhere, commanded at the same time by a task frame of two axes at
   known positions. Such a task has ended as the force with the greater failure.
+* Of the other tasks {STEPPED:.0%} command another force first, for {FIRST_HELD:g} s: {CHANGES[0]:g} to {CHANGES[1]:g}
+  times the force that is evaluated in {DOWN:.0%} of them, else as much less. The largest force allowed is that of the
+  larger command, and at the end that of the last one. Where the first command was obeyed and the second one is
+  declined with a reason, the task is given up if the true force is not above the second. {LONG:.0%} are
+  {SMALL_FORCES[0]:g} to {SMALL_FORCES[1]:g} N for {LONGER:g} times as long, {LONGER * SECONDS:g} s.
+* {LOADED:.0%} of the arms carry {PAYLOADS[0]:g} to {PAYLOADS[1]:g} kg that nobody declares, and in {OTHERWISE:.0%}
+  friction falls with the speed as Stribeck's and is up to {ASYMMETRY:.0%} larger in one direction.
 """

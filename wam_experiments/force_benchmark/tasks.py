@@ -28,6 +28,8 @@ NEAR = 0.3  # rad, of a singular pose
 RIGHT, ROUNDING = math.pi / 2.0, 1e-12  # rad; of the angle of a straight elbow
 POSES = {"elbow nearly straight": 0.15, "theta2 near 0": 0.1, "elbow near 90 deg": 0.1, "any": 0.65}  # shares
 ON_OUTER, AT_A_PLANE, DITHERED, PINNED, TARED, RAMPED = 0.85, 0.3, 0.4, 0.5, 0.5, 0.5  # shares
+LOADED, PAYLOADS = 0.05, (0.05, 2.0)  # share of arms with a payload that is not declared, kg, uniform in the logarithm
+OTHERWISE, ASYMMETRY = 0.05, 0.15  # share of arms with another law of friction, and with more of it in one direction
 MOVING, ALONG = 0.15, 0.5  # share of surfaces that move, and of these along the force, else across it
 SPEEDS, FREQUENCIES, FARTHEST = (0.002, 0.05), (0.1, 1.0), 0.02  # m/s and Hz, uniform in the logarithm; m
 LONGEST_RAMP, FIRST = 1.0, 0.2  # s, and the fraction of the force that it starts with
@@ -37,6 +39,8 @@ RELEASE = 0.5  # s, until the force is commanded
 SECONDS = 4.0  # s of the whole force
 FULL_FRICTION = 0.5  # sd of the friction of a surface that moves, which is there in full: rms of `FRICTIONS`
 AT_REST = 1.5  # s of the whole force, until a surface moves
+STEPPED, DOWN, CHANGES, FIRST_HELD = 0.1, 0.7, (2.0, 4.0), 2.5  # share; of these down; factor; s of the first force
+LONG, LONGER, SMALL_FORCES = 0.1, 5.0, (1.0, 3.0)  # share; of `SECONDS`; N
 
 
 class TaskConditions(NamedTuple):
@@ -49,6 +53,8 @@ class TaskConditions(NamedTuple):
     is_tared : whether the external torques are tared before the force is commanded.
     ramp : time in which the commanded force rises, s.
     mass, motor_friction, joint_friction, cables, torque_constant : factors of the true arm; () for none.
+    payload : mass at the tool that nobody declares, kg.
+    asymmetry : of all friction, which then falls with the speed as Stribeck's, too; 0 for friction as configured.
     """
 
     is_dithered: bool
@@ -60,6 +66,8 @@ class TaskConditions(NamedTuple):
     joint_friction: tuple[float, ...] = ()
     cables: tuple[float, ...] = ()
     torque_constant: tuple[float, ...] = ()
+    payload: float = 0.0
+    asymmetry: float = 0.0
 
 
 NOMINAL = TaskConditions(is_dithered=False, is_pinned=True, is_tared=False, ramp=0.0)
@@ -75,6 +83,8 @@ class Task(NamedTuple):
     conditions : see there.
     pose : its class.
     second : another surface and its force, N.
+    before : force that is commanded at first, N; 0 for none, and then the command does not step.
+    longer : factor of the time for which the force is held.
     """
 
     q: tuple[float, ...]
@@ -83,6 +93,8 @@ class Task(NamedTuple):
     conditions: TaskConditions = NOMINAL
     pose: str = "any"
     second: tuple[Surface, float] | None = None
+    before: float = 0.0
+    longer: float = 1.0
 
     @property
     def forces(self) -> list[tuple[Surface, float]]:
@@ -123,7 +135,7 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
     """The task of a number: it depends on the seed and the number alone."""
     random = np.random.Generator(np.random.PCG64((seed, number)))
     body = RigidBody(arm)
-    conditions = _conditions(arm, random)
+    conditions = _with_unknowns(_conditions(arm, random), np.random.Generator(np.random.PCG64((seed, number, 2))))
     force = _log_uniform(random, *FORCES)
     elbow = ElbowJoint.of(body)
     q = _pose(arm, elbow, random)
@@ -132,7 +144,31 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
         q = _pose(arm, elbow, random)
         surface = _surface(body, q, random)
     task = Task(q, _moving(surface, conditions, random), force, conditions, elbow.pose(q))
-    return _doubled(body, task, random) if random.random() < DOUBLED else task
+    if random.random() < DOUBLED:
+        return _doubled(body, task, random)
+    return _in_time(task, np.random.Generator(np.random.PCG64((seed, number, 1))))
+
+
+def _in_time(task: Task, random: np.random.Generator) -> Task:
+    """The task as it is, with a step of the command, or with a small force that is held for long."""
+    share = random.random()
+    if share < STEPPED:
+        change = _log_uniform(random, *CHANGES)
+        first = task.force * (change if random.random() < DOWN else 1.0 / change)
+        return task._replace(before=min(max(first, FORCES[0]), FORCES[1]))
+    if share < STEPPED + LONG:
+        return task._replace(force=_log_uniform(random, *SMALL_FORCES), longer=LONGER)
+    return task
+
+
+def _with_unknowns(conditions: TaskConditions, random: np.random.Generator) -> TaskConditions:
+    """The conditions, with a payload or a law of friction of which the controllers know nothing in some of them."""
+    share = random.random()
+    if share < LOADED:
+        return conditions._replace(payload=_log_uniform(random, *PAYLOADS))
+    if share < LOADED + OTHERWISE:
+        return conditions._replace(asymmetry=float(random.uniform(-ASYMMETRY, ASYMMETRY)))
+    return conditions
 
 
 def _conditions(arm: Arm, random: np.random.Generator) -> TaskConditions:
@@ -226,6 +262,11 @@ def configured(base: Configuration, task: Task) -> Configuration:
         **obstacles(RigidBody(base.shared.arm), task.q, [surface for surface, _ in task.forces]),
         **{f"driver:mismatch.{name}": list(factors) for name, factors in _mismatch(conditions).items() if factors},
     }
+    if conditions.payload:
+        values["driver:mismatch.payload"] = conditions.payload
+    if conditions.asymmetry:
+        values |= {f"driver:friction.{one}_asymmetry": [conditions.asymmetry] for one in ("motor", "joint")}
+        values["driver:friction.law"] = "stribeck"
     if conditions.is_pinned:
         values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": surface.place}
     if surface.frequency:
@@ -256,14 +297,16 @@ def _mismatch(conditions: TaskConditions) -> dict[str, tuple[float, ...]]:
 
 
 def steps(task: Task, seconds: float) -> list[ScenarioStep]:
-    """Release, ramp in small steps, and `seconds` of the whole force."""
+    """Release, ramp in small steps, the first force if there is one, and `seconds` of the whole force, or longer."""
     count = round(task.conditions.ramp / RAMP_STEP)
     rising = [FIRST + (1.0 - FIRST) * i / count for i in range(count)]
-    ramp = [ScenarioStep("ramp", RAMP_STEP, **_command(task, fraction)) for fraction in rising]
+    before = task.before / task.force if task.before else 1.0
+    ramp = [ScenarioStep("ramp", RAMP_STEP, **_command(task, before * fraction)) for fraction in rising]
     return [
         ScenarioStep("release", RELEASE, request="enable"),
         *ramp,
-        ScenarioStep("press", seconds, **_command(task, 1.0)),
+        *([ScenarioStep("press first", FIRST_HELD, **_command(task, before))] if task.before else []),
+        ScenarioStep("press", task.longer * seconds, **_command(task, 1.0)),
     ]
 
 
