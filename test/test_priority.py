@@ -1,10 +1,12 @@
 """Priority: what is reported is what the system has granted, to every thread."""
 
+import os
 import subprocess
 import sys
 
 import pytest
 
+OWN = f"{{{os.getpriority(os.PRIO_PROCESS, 0)}}}"  # niceness of the tests, which a started program inherits
 PROGRAM = """
 import ctypes, os, resource, sys, threading
 from wam_ros.priority import SESSION, raise_priority
@@ -41,10 +43,10 @@ def told(fifo: int, niceness: int, permitted: bool = True) -> tuple[str, ...]:
 @pytest.mark.parametrize("asked", [(0, 0), (0, -15), (10, 0), (10, -15)])
 def test_what_is_reported_is_what_every_thread_has(asked: tuple[int, int]) -> None:
     answers = {
-        "SCHED_FIFO 10": ("SCHED_FIFO 10", "{True}", "{0}", "0"),
+        "SCHED_FIFO 10": ("SCHED_FIFO 10", "{True}", OWN, "0"),
         "nice -15 with its session": ("nice -15 with its session", "{False}", "{-15}", "-15"),
         "nice -15": ("nice -15", "{False}", "{-15}", "0"),
-        "usual": ("usual", "{False}", "{0}", "0"),
+        "usual": ("usual", "{False}", OWN, "0"),
     }
     found = told(*asked)
     assert found == answers[found[0]]
@@ -55,4 +57,4 @@ def test_what_is_reported_is_what_every_thread_has(asked: tuple[int, int]) -> No
 
 
 def test_without_permission_everything_is_as_usual() -> None:
-    assert told(10, -15, permitted=False) == ("usual", "{False}", "{0}", "0")
+    assert told(10, -15, permitted=False) == ("usual", "{False}", OWN, "0")
