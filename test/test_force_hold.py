@@ -593,6 +593,19 @@ def test_the_least_force_is_a_lower_bound() -> None:
         assert there <= np.linalg.norm(force) * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize(("later", "allowed"), [(8.0, 0.5), (2.0, 0.125)])
+def test_more_that_is_commanded_takes_its_time_again_and_less_does_not(later: float, allowed: float) -> None:
+    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), force_gain=(1e-6,), contact_source="pinned")
+    loop = force_loop(ARM, own)
+    for _ in range(60):
+        ask(loop, World(400.0, force=5.0), down(5.0))
+    periods = 1
+    while ask(loop, World(400.0, force=5.0), down(later)) and loop.reaction is ForceReaction.NONE:
+        periods += 1
+    assert loop.reaction is ForceReaction.NOT_REACHED
+    assert periods * DT == pytest.approx(allowed, abs=2.5 * DT)
+
+
 def test_a_force_that_is_not_reached_is_reported() -> None:
     own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), force_gain=(1e-6,), contact_source="pinned")
     loop = force_loop(ARM, own)

@@ -97,7 +97,7 @@ class ForceHold:
         ) = self._has_begun = False
         self._is_slow, self._other = False, ""
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
-        self._uncertain = self._missed = self._identified = self._desired = self._turned = 0.0
+        self._uncertain = self._missed = self._reached = self._identified = self._desired = self._turned = 0.0
         self._settled: Array | None = None  # torques per force, 1/m, once it has settled
         self._pattern.reset()
         self._forget_swings()
@@ -473,7 +473,10 @@ class ForceHold:
         error, lasting = desired - measured, parameters.limits.settling_time
         is_off = abs(error) > tolerance(desired, parameters)
         self._within = 0.0 if is_off else self._within + dt
-        self._has_settled = self._has_settled or (self._has_touched and not is_off)
+        if self._has_settled and desired - self._reached > tolerance(desired, parameters):
+            self._has_settled, self._missed = False, 0.0  # more is commanded: that takes its time again
+        if self._has_touched and not is_off:
+            self._has_settled, self._reached = True, desired
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
