@@ -117,6 +117,7 @@ class ForceLoop:
         self._is_free = False
         self._external = np.zeros(self._n), np.zeros(self._n)
         self._resting: Array | None = None
+        self._is_moving = False
         self._unknown: tuple[Array, str] = np.zeros(self._n), ""  # torques at rest that no surface gives
         self._external_sd: Sequence[float] | None = None
         self._transfer = BumplessTransfer(self._n)
@@ -296,11 +297,18 @@ class ForceLoop:
         self._held_at = None
         self._transfer.restart()
         limit = self.parameters.sensing.zero_limit
-        if axes and limit and self._is_at_rest and self._has_left:
-            if self._is_free and self._measurement.zero(limit):
-                self._filter.reset()
-                self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
-            self._resting = self._measurement.resting
+        self._is_moving = not self._is_at_rest
+        if not (axes and limit and self._has_left):
+            return
+        if self._is_moving:
+            self._resting = self._external[0]
+            if self.parameters.feedback == "joint_sensors":
+                self._resting = self._resting + self._force_axes.inertia(self._joints) @ self._acceleration
+            return
+        if self._is_free and self._measurement.zero(limit):
+            self._filter.reset()
+            self._external = np.zeros(self._n), np.zeros(self._n)  # not a touch, as it would be without this zero
+        self._resting = self._measurement.resting
 
     def _force(
         self, q: Sequence[float], contact: Contact, command: ForceCommand | None, posture: list[float], dt: float
@@ -421,7 +429,8 @@ class ForceLoop:
         force = -float(axis.sense @ resting)
         axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, abs(force))
         carried = self._carried(q, resting)
-        is_contact = force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED and not carried
+        is_pressed = force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED
+        is_contact = (is_pressed or self._is_moving) and not carried
         meaning = carried or "not the force of a surface that is touched there"
         self._resting, self._unknown = None, (np.zeros(self._n), "") if is_contact else (resting, meaning)
 
