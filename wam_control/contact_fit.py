@@ -36,7 +36,9 @@ class Fit(NamedTuple):
 
     Attributes
     ----------
-    place, position_sd : m, mean and standard deviation of the contact position.
+    place : m, mean contact position, of the likelier ones of forces from the side and along the tube: a mean of both
+        would be where neither is.
+    position_sd : m, root mean square distance of the contact from there, by both.
     force : (2,), N, most likely components across the link at `place`.
     force_sd : N, standard deviation of the size of the force, the position unknown.
     direction_sd : rad, standard deviation of its direction about the link, the position unknown.
@@ -188,12 +190,12 @@ class ContactFit:
         return link.log_density(x - near), link.log_density(x), link.log_density(x + near)
 
     def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float, float]]:
-        """Of each link: probability, mean and variance of the position, ends of the 90 % set, fraction of forces along.
+        """Of each link: probability, place and variance, ends of the 90 % set, fraction of forces along; see `Fit`.
 
         The set takes the most probable positions first: `cells` are in this order.
         """
         top = cells[0][0]
-        sums = [[0.0, 0.0, 0.0, 0.0] for _ in self._ends]
+        sums = [[0.0, 0.0, 0.0, 0.0, 0.0] for _ in self._ends]
         weights = []
         for value, x, width, i, is_along in cells:
             weight = math.exp(value - top) * width
@@ -204,6 +206,7 @@ class ContactFit:
             mine[2] += weight * (x * x + width * width / 12.0)
             if is_along:
                 mine[3] += weight
+                mine[4] += weight * x
         total, passed = sum(weights), 0.0
         enough = SET * total
         inside = [[math.inf, -math.inf] for _ in self._ends]
@@ -222,13 +225,15 @@ class ContactFit:
             elif high - unused > part[1]:
                 part[1] = high - unused
         result = []
-        for (mass, first, second, along), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
+        for (mass, first, second, *along), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
             if mass == 0.0:
                 result.append((0.0, 0.5 * (start + end), (end - start) ** 2 / 12.0, math.nan, math.nan, 0.0))
                 continue
-            mean = min(max(first / mass, start), end)
+            own, where = along if along[0] > 0.5 * mass else (mass - along[0], first - along[1])
+            place = min(max(where / own, start), end)
+            variance = max(0.0, (second - 2.0 * place * first) / mass + place * place)
             ends = (max(low, start), min(high, end)) if low < high else (math.nan, math.nan)
-            result.append((mass / total, mean, max(0.0, second / mass - mean * mean), *ends, along / mass))
+            result.append((mass / total, place, variance, *ends, along[0] / mass))
         return result
 
     def _at_ends(self, i: int, link: "_Link", floor: float) -> list[Cell]:
@@ -354,10 +359,10 @@ def _log_evidence(
     c11, c12, c22, r1, r2, a1, a2 = across
     n11, n22 = 1.0 + variance * c11, 1.0 + variance * c22
     n12 = variance * c12
-    determinant = n11 * n22 - n12 * n12
+    determinant = max(n11 * n22 - n12 * n12, 1.0 + variance * (c11 + c22))  # at least this, but for rounding
     w11, w12, w22 = variance * n22 / determinant, -variance * n12 / determinant, variance * n11 / determinant
     rr -= w11 * r1 * r1 + 2.0 * w12 * r1 * r2 + w22 * r2 * r2
-    aa -= w11 * a1 * a1 + 2.0 * w12 * a1 * a2 + w22 * a2 * a2
+    aa = max(0.0, aa - (w11 * a1 * a1 + 2.0 * w12 * a1 * a2 + w22 * a2 * a2))
     ra -= w11 * r1 * a1 + w12 * (r1 * a2 + r2 * a1) + w22 * r2 * a2
     return -0.5 * (rr - ra * ra / (aa + precision) + math.log(1.0 + aa / precision) + math.log(determinant))
 
