@@ -257,7 +257,7 @@ class ContactFit:
             return []
         start, end = self._ends[i]
         size = abs(ra) / (aa + precision) + LEAST_FORCE
-        base = math.log(weight / precision)
+        base, precision = math.log(weight), min(precision, size**-2)
         surface = (g3[3], g3[4], g4[4], rb1, rb2, g3[6], g4[6])
         value = base + _log_evidence(rr, ra, aa, precision, surface, 0.5 * (self._radius[i] * size) ** 2)
         value, width = value - math.log(end - start), self._widths[i]
@@ -302,7 +302,7 @@ class ContactFit:
             direction_sd=min(math.sqrt(about) / size, math.pi),
             torque_position_sd=link.torque_position_sd(place, force),
             force_at_end=link.force(self._ends[i][1])[0],
-            residual=max(0.0, link.rr - explained - self._precision * size * size),
+            residual=max(0.0, link.rr - explained - link.precision * size * size),
             probability=probability,
             low=low,
             high=high,
@@ -426,11 +426,10 @@ def _with_tangential_force(
     (r, g1, g2, g3, g4, t, a) = gram
     triangle = (*r[:5], *g1[1:5], *g2[2:5], *g3[3:5], g4[4])
     terms = _terms(triangle, precision)
-    likely = [
-        (explained + math.log(s11 * s22 - s12 * s12), *force)
-        for force, explained, (s11, s12, s22) in [_force(terms, x) for x in places]
-    ]
-    _, f1, f2 = max(likely)
+    found = [_force(terms, x) for x in places]
+    _, best = max((explained, force) for force, explained, _ in found)
+    precision = min(precision, 1.0 / (best[0] * best[0] + best[1] * best[1] + LEAST_FORCE))
+    _, (f1, f2) = max((explained + math.log(s11 * s22 - s12 * s12), force) for force, explained, (s11, s12, s22) in found)
     size = math.hypot(f1, f2) + LEAST_FORCE
     sd, arm, turn = friction * size, offset * size, friction * radius
     b1, b2 = turn * f1, turn * f2
@@ -467,4 +466,4 @@ def _with_tangential_force(
         b12 - u3 * p4 - v3 * q4,
         b22 - u4 * p4 - v4 * q4,
     )
-    return wide, precision, math.log(determinant)
+    return wide, precision, math.log(determinant) - 2.0 * math.log(precision)
