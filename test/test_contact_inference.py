@@ -132,9 +132,12 @@ def test_a_push_on_the_inner_link_is_told_from_one_on_the_outer() -> None:
     """Along the tube, which is 1.6 in off at the elbow, and off its axis by what friction of a third does."""
     for off in (-0.3, 0.0, 0.3):
         aside = 0.04064 * 0.4 / L3 + off * ARM.covers.radius[0]
-        for force in ((0.0, 8.0, 0.0), (0.0, 0.0, 8.0), (0.0, -5.0, 6.0)):
+        for force in ((0.0, 8.0, 0.0), (0.0, -5.0, 6.0)):
             found = infer(POSE, "inner_link", (0.4, 0.0, aside), force)
             assert found[0].cover == "inner_link"
+        in_plane = infer(POSE, "inner_link", (0.4, 0.0, aside), (0.0, 0.0, 8.0))  # as one along the outer link
+        assert of(in_plane, "inner_link").probability > 0.4
+        assert in_plane[0].probability < 0.95
 
 
 POSE_BENT = (0.25, -1.3, 0.0, 1.0)
@@ -403,3 +406,41 @@ def test_odds_of_a_force_along_the_tube_are_those_of_quadrature() -> None:
     ]
     found = np.logaddexp.reduce(logs) - math.log(2) + 0.5 * g[0, 0]
     assert found == pytest.approx(along_by_quadrature(q, tau), abs=1e-3)
+
+
+def test_torques_that_are_said_to_be_exact_are_no_more_certain_than_rounding() -> None:
+    rng, exact = np.random.default_rng(5), 1e12 * np.eye(4)
+    wrong = 0
+    for k in range(400):
+        q = tuple(rng.uniform(ARM.joints.lower, ARM.joints.upper))
+        cover, length = (("outer_link", L4), ("inner_link", L3))[k % 2]
+        angle = rng.uniform(-3.0, 3.0)
+        force = 10.0 ** rng.uniform(0.0, 1.7) * np.array([0.0, math.cos(angle), math.sin(angle)])
+        tau = torques(q, cover, (rng.uniform(0.02, length - 0.02), 0, 0), tuple(force))
+        best = INFERENCE.infer(q, tau.tolist(), exact)[0]
+        wrong += best.probability > 0.95 and best.cover != cover
+    assert wrong == 0  # 36 where rounding decides
+
+
+def test_certain_torques_of_a_pose_that_is_nearly_singular_are_explained() -> None:
+    q, force = (0.0, -1.22, -0.631, 0.424), (0, 8.4, 5.4)
+    tau = torques(q, "outer_link", (0.376, 0, 0), force).tolist()
+    best = INFERENCE.infer(q, tau, np.diag([1e12, 50.0, 1e12, 1e12]))[0]
+    assert best.cover == "outer_link"
+    assert best.place == pytest.approx(0.376, abs=0.01)
+
+
+def test_evidence_is_finite_where_rounding_would_make_a_determinant_negative() -> None:
+    products = (1e12, 1e12 * (1.0 + 1e-13), 1e12, 1e6, 1e6, 1e9, 1e9)
+    assert math.isfinite(contact_fit._log_evidence(1e3, 1e3, 1e3, 1e-2, products, 25.0))
+
+
+def test_a_place_is_not_between_those_of_a_push_from_the_side_and_of_one_on_the_end() -> None:
+    """As on foam: the mass of the links makes joint 2 uncertain, and 0.15 of the probability is on the end."""
+    q, x = (0.0, -2.1, 0.0, 1.45), 0.26
+    tau = torques(q, "outer_link", (x, 0, 0), (0, 5, 0))
+    found = INFERENCE.infer(q, tau.tolist(), np.diag(np.array([0.02, 0.14, 0.02, 0.025]) ** -2.0))[0]
+    assert found.cover == "outer_link"
+    assert found.high == pytest.approx(L4, abs=1e-6)
+    assert found.place == pytest.approx(x, abs=0.01)
+    assert found.position_sd > 0.02, "the end counts in the spread"

@@ -27,6 +27,7 @@ KNOWN = dataclasses.replace(
     moving_uncertainty=0.0,
     asymmetry_uncertainty=0.0,
     load_uncertainty=0.0,
+    torque_scale_uncertainty=0.0,
     payload_uncertainty=0.0,
     motor_torque_sd=0.003,
     motor_torque_fraction=0.0,

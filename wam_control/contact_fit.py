@@ -36,7 +36,9 @@ class Fit(NamedTuple):
 
     Attributes
     ----------
-    place, position_sd : m, mean and standard deviation of the contact position.
+    place : m, mean contact position, of the likelier ones of forces from the side and along the tube: a mean of both
+        would be where neither is.
+    position_sd : m, root mean square distance of the contact from there, by both.
     force : (2,), N, most likely components across the link at `place`.
     force_sd : N, standard deviation of the size of the force, the position unknown.
     direction_sd : rad, standard deviation of its direction about the link, the position unknown.
@@ -188,12 +190,12 @@ class ContactFit:
         return link.log_density(x - near), link.log_density(x), link.log_density(x + near)
 
     def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float, float]]:
-        """Of each link: probability, mean and variance of the position, ends of the 90 % set, fraction of forces along.
+        """Of each link: probability, place and variance, ends of the 90 % set, fraction of forces along; see `Fit`.
 
         The set takes the most probable positions first: `cells` are in this order.
         """
         top = cells[0][0]
-        sums = [[0.0, 0.0, 0.0, 0.0] for _ in self._ends]
+        sums = [[0.0, 0.0, 0.0, 0.0, 0.0] for _ in self._ends]
         weights = []
         for value, x, width, i, is_along in cells:
             weight = math.exp(value - top) * width
@@ -204,6 +206,7 @@ class ContactFit:
             mine[2] += weight * (x * x + width * width / 12.0)
             if is_along:
                 mine[3] += weight
+                mine[4] += weight * x
         total, passed = sum(weights), 0.0
         enough = SET * total
         inside = [[math.inf, -math.inf] for _ in self._ends]
@@ -222,13 +225,15 @@ class ContactFit:
             elif high - unused > part[1]:
                 part[1] = high - unused
         result = []
-        for (mass, first, second, along), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
+        for (mass, first, second, *along), (low, high), (start, end) in zip(sums, inside, self._ends, strict=True):
             if mass == 0.0:
                 result.append((0.0, 0.5 * (start + end), (end - start) ** 2 / 12.0, math.nan, math.nan, 0.0))
                 continue
-            mean = min(max(first / mass, start), end)
+            own, where = along if along[0] > 0.5 * mass else (mass - along[0], first - along[1])
+            place = min(max(where / own, start), end)
+            variance = max(0.0, (second - 2.0 * place * first) / mass + place * place)
             ends = (max(low, start), min(high, end)) if low < high else (math.nan, math.nan)
-            result.append((mass / total, mean, max(0.0, second / mass - mean * mean), *ends, along / mass))
+            result.append((mass / total, place, variance, *ends, along[0] / mass))
         return result
 
     def _at_ends(self, i: int, link: "_Link", floor: float) -> list[Cell]:
@@ -252,7 +257,7 @@ class ContactFit:
             return []
         start, end = self._ends[i]
         size = abs(ra) / (aa + precision) + LEAST_FORCE
-        base = math.log(weight / precision)
+        base, precision = math.log(weight), min(precision, size**-2)
         surface = (g3[3], g3[4], g4[4], rb1, rb2, g3[6], g4[6])
         value = base + _log_evidence(rr, ra, aa, precision, surface, 0.5 * (self._radius[i] * size) ** 2)
         value, width = value - math.log(end - start), self._widths[i]
@@ -297,7 +302,7 @@ class ContactFit:
             direction_sd=min(math.sqrt(about) / size, math.pi),
             torque_position_sd=link.torque_position_sd(place, force),
             force_at_end=link.force(self._ends[i][1])[0],
-            residual=max(0.0, link.rr - explained - self._precision * size * size),
+            residual=max(0.0, link.rr - explained - link.precision * size * size),
             probability=probability,
             low=low,
             high=high,
@@ -354,10 +359,10 @@ def _log_evidence(
     c11, c12, c22, r1, r2, a1, a2 = across
     n11, n22 = 1.0 + variance * c11, 1.0 + variance * c22
     n12 = variance * c12
-    determinant = n11 * n22 - n12 * n12
+    determinant = max(n11 * n22 - n12 * n12, 1.0 + variance * (c11 + c22))  # at least this, but for rounding
     w11, w12, w22 = variance * n22 / determinant, -variance * n12 / determinant, variance * n11 / determinant
     rr -= w11 * r1 * r1 + 2.0 * w12 * r1 * r2 + w22 * r2 * r2
-    aa -= w11 * a1 * a1 + 2.0 * w12 * a1 * a2 + w22 * a2 * a2
+    aa = max(0.0, aa - (w11 * a1 * a1 + 2.0 * w12 * a1 * a2 + w22 * a2 * a2))
     ra -= w11 * r1 * a1 + w12 * (r1 * a2 + r2 * a1) + w22 * r2 * a2
     return -0.5 * (rr - ra * ra / (aa + precision) + math.log(1.0 + aa / precision) + math.log(determinant))
 
@@ -421,11 +426,12 @@ def _with_tangential_force(
     (r, g1, g2, g3, g4, t, a) = gram
     triangle = (*r[:5], *g1[1:5], *g2[2:5], *g3[3:5], g4[4])
     terms = _terms(triangle, precision)
-    likely = [
-        (explained + math.log(s11 * s22 - s12 * s12), *force)
-        for force, explained, (s11, s12, s22) in [_force(terms, x) for x in places]
-    ]
-    _, f1, f2 = max(likely)
+    found = [_force(terms, x) for x in places]
+    _, best = max((explained, force) for force, explained, _ in found)
+    precision = min(precision, 1.0 / (best[0] * best[0] + best[1] * best[1] + LEAST_FORCE))
+    _, (f1, f2) = max(
+        (explained + math.log(s11 * s22 - s12 * s12), force) for force, explained, (s11, s12, s22) in found
+    )
     size = math.hypot(f1, f2) + LEAST_FORCE
     sd, arm, turn = friction * size, offset * size, friction * radius
     b1, b2 = turn * f1, turn * f2
@@ -462,4 +468,4 @@ def _with_tangential_force(
         b12 - u3 * p4 - v3 * q4,
         b22 - u4 * p4 - v4 * q4,
     )
-    return wide, precision, math.log(determinant)
+    return wide, precision, math.log(determinant) - 2.0 * math.log(precision)

@@ -23,6 +23,7 @@ Triple = tuple[float, float, float]
 
 NEAR = math.cos(math.radians(20.0))  # how close to an ambiguous pose or direction that is given as the reason
 
+SMALLEST_SD = 1e-4  # N m, of external torques: below that rounding decides where a contact is, or on which link
 NOTED = 0.05  # probability of a force along the tube above which that is a reason why the link is not identified
 
 MOMENT_ONLY = "measures only the moment: the contact position is unknown, the force is a lower bound"
@@ -190,13 +191,17 @@ class ContactInference:
         ----------
         q : (n,), joint angles, rad.
         torques : (n,), external torques, N m.
-        precision : (n, n), the inverse of their covariance, 1/(N^2 m^2).
+        precision : (n, n), the inverse of their covariance, 1/(N^2 m^2); of smaller ones than `SMALLEST_SD` that.
 
         Returns
         -------
         tuple of Hypothesis
             one per cover, the most probable first; probabilities add up to 1.
         """
+        if precision.trace() > SMALLEST_SD**-2:
+            precision = np.asarray(
+                np.linalg.inv(np.linalg.inv(precision) + SMALLEST_SD**2 * np.eye(len(torques))), np.float64
+            )
         at = np.array(q)
         self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
         rows = np.empty((len(self._covers), 7, len(torques)))

@@ -8,21 +8,25 @@ from numpy.typing import NDArray
 from wam_control.observer_parameters import ObserverParameters
 from wam_description.arm import Arm
 from wam_description.model import ArmModel
+from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 WAYS = ("positive", "negative")
-TOLERABLE = (0.2, 0.04, 0.05, 0.05)  # friction, masses and load friction per torque; payload, kg: beyond, a warning
+# friction, masses, load friction and torque constants per torque; payload, kg: beyond, a warning
+TOLERABLE = (0.2, 0.04, 0.05, 0.05, 0.05)
 INFLATED = 2.0  # of identified standard deviations: those stated are too small by up to that (docs/identify.md)
 LEAST = 0.02  # sd of an identified friction, per friction
 
 
 class ModelPrior(NamedTuple):
-    """Errors of the model: friction of motors and joints in positive, then in negative motion; masses; load; payload.
+    """Errors of the model: friction in positive, then in negative motion; masses; load; torque constants; payload.
+
+    Friction and its share of the load are those of motors, then joints.
 
     Attributes
     ----------
     names : of the k errors.
-    errors : (k,), friction per dynamic friction, masses and load friction per torque, payload in kg.
+    errors : (k,), friction per dynamic friction, payload in kg, the others per torque.
     covariance : (k, k).
     limit : (k,), largest variances.
     tolerable : (k,), errors above which the model is off.
@@ -39,12 +43,16 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
     """The errors of the model of an arm; `payload_sd` in kg; `model` is the identified one, if there is any."""
     n = len(arm.joints.names)
     motors, joints = arm.motors.names, arm.joints.names
+    # the load friction of a joint that one motor drives is that of the motor
+    driven_by = np.count_nonzero(TransmissionMap.of(arm).joint_from_motor, axis=1)
     covariance = np.diag(
         np.square(
             [
                 *[np.hypot(given.moving_uncertainty, given.asymmetry_uncertainty)] * (4 * n),
                 *[given.mass_uncertainty] * n,
                 *[given.load_uncertainty] * n,
+                *np.where(driven_by > 1, given.load_uncertainty, 0.0),
+                *[given.torque_scale_uncertainty] * n,
                 payload_sd,
             ]
         )
@@ -58,10 +66,11 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
     names = (
         *(f"friction of {name} in {way} motion" for way in WAYS for name in shafts),
         *(f"masses at {name}" for name in joints),
-        *(f"load friction of {name}" for name in motors),
+        *(f"load friction of {name}" for name in shafts),
+        *(f"torque constant of {name}" for name in motors),
         "payload",
     )
-    return ModelPrior(names, errors, covariance, limit, np.repeat(TOLERABLE, [4 * n, n, n, 1]))
+    return ModelPrior(names, errors, covariance, limit, np.repeat(TOLERABLE, [4 * n, n, 2 * n, n, 1]))
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:
@@ -87,10 +96,13 @@ def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> No
         scale = INFLATED / np.array(levels)
         covariance[rows] = covariance[:, rows] = 0.0
         covariance[np.ix_(rows, rows)] = known * np.outer(scale, scale) + LEAST**2 * np.eye(len(rows))
+    at_joints = [j for j, name in enumerate(arm.joints.names) if f"joints.load.{name}" in model.covariance.parameters]
     load = [f"motors.load_{way}.{name}" for way in WAYS for name in motors]
-    known = model.covariance_of(load)
+    known = model.covariance_of([*load, *(f"joints.load.{arm.joints.names[j]}" for j in at_joints)])
     if known is not None:
-        rows = list(range(5 * n, 6 * n))
-        mean = 0.5 * np.hstack((np.eye(n), np.eye(n)))
-        errors[rows] = mean @ np.array([*model.motors.load_positive, *model.motors.load_negative])
+        rows = [*range(5 * n, 6 * n), *(6 * n + j for j in at_joints)]
+        mean = np.zeros((len(rows), len(known)))
+        mean[:n, : 2 * n], mean[n:, 2 * n :] = 0.5 * np.hstack((np.eye(n), np.eye(n))), np.eye(len(at_joints))
+        at_joint = [model.joints.load[j] for j in at_joints]
+        errors[rows] = mean @ np.array([*model.motors.load_positive, *model.motors.load_negative, *at_joint])
         covariance[np.ix_(rows, rows)] = INFLATED**2 * mean @ known @ mean.T

@@ -25,7 +25,6 @@ from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 SETTLED = 2.0  # time constants from the first sample until the estimate is ready
-UNTRACKED = 2.0  # of `motor_torque_fraction`: for torques of a contact, whose error no free motion shows
 
 
 class MomentumObserver:
@@ -103,8 +102,8 @@ class MomentumObserver:
         self._rest_sd, self._shape_sd = parameters.rest_uncertainty * statics, parameters.shape_uncertainty * statics
         self._through = np.hstack((inverse.T, np.eye(n)))  # joint torques of torques at motors and joints
         # the same of the errors of the model, and their sizes
-        self._through_errors = np.hstack((-self._through, self._through, np.eye(n), -inverse.T))
-        self._sizes = np.concatenate((half_levels, half_levels, np.ones(2 * n)))
+        self._through_errors = np.hstack((-self._through, self._through, np.eye(n), -self._through, inverse.T))
+        self._sizes = np.concatenate((half_levels, half_levels, np.ones(4 * n)))
         payload_sd = 0.0
         if self._load is not None:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
@@ -118,11 +117,11 @@ class MomentumObserver:
         """Forget all samples."""
         n = self._n
         self.q: list[float] = [0.0] * n
-        # of each filter the residual and the torque of the model, (2 n,), N m, then the signals of the shafts, (9 n,)
+        # of each filter the residual and the torque of the model, (2 n,), N m, then the signals of the shafts, (10 n,)
         # strain gauges lie behind the friction: no signals
-        self._filtered = np.zeros((len(self._times), 2 * n if self._link_side else 11 * n))
+        self._filtered = np.zeros((len(self._times), 2 * n if self._link_side else 12 * n))
         self._decay = _Decay.over(math.inf, self._times, self._filtered.shape[1])
-        self._ring = np.zeros((max(1, self._cycle), 10 * n))
+        self._ring = np.zeros((max(1, self._cycle), 11 * n))
         self._filled = 0
         if self._load is not None:
             self._load.reset()
@@ -180,7 +179,9 @@ class MomentumObserver:
         through = self._map.joint_torques(motor.friction)
         friction = [through[i] + joint.friction[i] for i in range(self._n)]
         sliding = motor.sliding + joint.sliding
-        loaded = [abs(tau - f) * share for tau, f, share in zip(tau_motor, motor.friction, motor.sliding, strict=True)]
+        tau = self._map.joint_torques(tau_motor)
+        transmitted = [each - f for each, f in zip([*tau_motor, *tau], [*motor.friction, *through], strict=True)]
+        loaded = [abs(torque) * share for torque, share in zip(transmitted, sliding, strict=True)]
         signals = [
             *sliding,
             *map(abs, sliding),
@@ -190,7 +191,7 @@ class MomentumObserver:
             *joint.shape,
             *loaded,
         ]
-        return self._update(q, qd, self._map.joint_torques(tau_motor), friction, signals, dt)
+        return self._update(q, qd, tau, friction, signals, dt)
 
     def _update(
         self, q: list[float], qd: list[float], tau: list[float], friction: list[float], signals: list[float], dt: float
@@ -325,8 +326,11 @@ class MomentumObserver:
             # a shaft that slips in both directions within a cycle stops at both limits of its stiction
             resting, shape = resting * resting, np.minimum(shape, np.abs(sliding))
         load = self._load
-        effects = np.zeros((n, 6 * n + 1))
-        sizes = self._sizes * np.concatenate((moving + sliding, moving - sliding, model, signals[8 * n :]))
+        effects = np.zeros((n, 8 * n + 1))
+        modelled = self._map.motor_torques(model)
+        pairs = zip(modelled, self._map.motor_torques(residual.tolist()), strict=True)
+        driving = [torque - external for torque, external in pairs]
+        sizes = self._sizes * np.concatenate((moving + sliding, moving - sliding, model, signals[8 * n :], driving))
         np.multiply(self._through_errors, sizes, out=effects[:, :-1])
         if load is not None:
             effects[:, -1] = load.torque
@@ -334,10 +338,8 @@ class MomentumObserver:
         variance = np.square(self._rest_sd * resting) + np.square(self._shape_sd * shape)
         # a faster filter averages less of what is noise
         less, least = self._times[0] / self._times[which], given.motor_torque_sd**2
-        sds = [given.motor_torque_fraction * torque for torque in self._map.motor_torques(model)]
+        sds = [given.motor_torque_fraction * torque for torque in modelled]
         variance[:n] += [less * (least + sd * sd) for sd in sds]
-        untracked = UNTRACKED * given.motor_torque_fraction
-        variance[:n] += [(untracked * torque) ** 2 / self.size for torque in self._map.motor_torques(residual.tolist())]
         rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
         momentum = self._inertia.dot(speed)

@@ -29,7 +29,13 @@ class ObserverParameters:
         "sd of the difference from that in each direction, per dynamic friction", low=0.0, high=10.0, before=0.0
     )
     load_uncertainty: float = parameter(
-        "sd of the friction of a motor per transmitted torque", low=0.0, high=1.0, before=0.0
+        "sd of the friction of a motor, and of a joint that several drive, per transmitted torque",
+        low=0.0,
+        high=1.0,
+        before=0.0,
+    )
+    torque_scale_uncertainty: float = parameter(
+        "sd of a motor's torque constant, per constant", low=0.0, high=1.0, before=0.02
     )
     shape_uncertainty: float = parameter(
         "sd of the friction of a shaft that has just reversed or is slow, per static friction",
