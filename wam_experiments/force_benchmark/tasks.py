@@ -40,7 +40,7 @@ SECONDS = 4.0  # s of the whole force
 FULL_FRICTION = 0.5  # sd of the friction of a surface that moves, which is there in full: rms of `FRICTIONS`
 AT_REST = 1.5  # s of the whole force, until a surface moves
 STEPPED, DOWN, CHANGES, FIRST_HELD = 0.1, 0.7, (2.0, 4.0), 2.5  # share; of these down; factor; s of the first force
-LONG, LONGER, SMALL_FORCES = 0.1, 5.0, (1.0, 3.0)  # share; of `SECONDS`; N
+LONG, LONGER, SMALL_FORCES, SOFT = 0.1, 5.0, (1.0, 3.0), 4e3  # share; of `SECONDS`; N; N/m, of the surface at most
 
 
 class TaskConditions(NamedTuple):
@@ -150,14 +150,20 @@ def draw(arm: Arm, seed: int, number: int) -> Task:
 
 
 def _in_time(task: Task, random: np.random.Generator) -> Task:
-    """The task as it is, with a step of the command, or with a small force that is held for long."""
+    """The task as it is, with a step of the command, or with a small force that is held for long.
+
+    From the motors most small forces on hard surfaces or at estimated positions are refused.
+    """
     share = random.random()
     if share < STEPPED:
         change = _log_uniform(random, *CHANGES)
         first = task.force * (change if random.random() < DOWN else 1.0 / change)
         return task._replace(before=min(max(first, FORCES[0]), FORCES[1]))
     if share < STEPPED + LONG:
-        return task._replace(force=_log_uniform(random, *SMALL_FORCES), longer=LONGER)
+        surface = task.surface._replace(stiffness=_log_uniform(random, STIFFNESSES[0], SOFT))
+        conditions = task.conditions._replace(is_pinned=True)
+        small = _log_uniform(random, *SMALL_FORCES)
+        return task._replace(surface=surface, force=small, conditions=conditions, longer=LONGER)
     return task
 
 
