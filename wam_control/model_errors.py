@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 LEARN_EVERY = 0.01  # s
 HINDSIGHT = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
-CORRELATED = 16.0  # of R: the rest stays for so many samples, of which each is learned from
+CORRELATED = 8.0  # of R: the rest stays for so many samples, of which each is learned from
 GATE = 12.0  # of the detection statistic, above which nothing is learned
 HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after it nothing is learned
 NOISE_TIME = 1.0  # s, in which the noise of the motors is followed
