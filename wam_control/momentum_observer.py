@@ -263,7 +263,9 @@ class MomentumObserver:
             sized = np.array(load.torque) * load.sd
             covariance = covariance + np.outer(sized, sized)
             effects = np.column_stack((effects, sized))
-        self.seen = Observation(np.array(residual), effects, self._sensors, self._at_rest)
+        self.seen = Observation(
+            np.array(residual), effects, self._sensors, self._at_rest, self._filtered[0, 2 * self._n :].copy()
+        )
         return residual, covariance
 
     def change(self, then: Observation) -> tuple[Array, Array]:
@@ -294,11 +296,8 @@ class MomentumObserver:
 
     @property
     def pose(self) -> list[float]:
-        """Joint angles, (n,), rad, as late as the torques: the same filter, and the same mean over a dither's cycle."""
-        n = self._n
-        if self._cycle and self._filled:
-            return np.asarray(self._ring[: self._filled, n : 2 * n].mean(axis=0), np.float64).tolist()
-        return self._filtered[0, 2 * n : 3 * n].tolist()
+        """Joint angles, (n,), rad, as late as the torques last given: through their filter."""
+        return self.q if self.seen is None else self.seen.pose.tolist()
 
     @property
     def size(self) -> float:
@@ -325,10 +324,11 @@ class MomentumObserver:
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
         n, given, filtered = self._n, self._parameters, self._filtered[which]
-        residual, model, signals = filtered[:n].copy(), filtered[n : 2 * n].tolist(), filtered[3 * n :]
+        residual, model = filtered[:n].copy(), filtered[n : 2 * n].tolist()
+        pose, signals = filtered[2 * n : 3 * n].copy(), filtered[3 * n :]
         if self._cycle and self._filled:
             mean = self._ring[: self._filled].mean(axis=0)
-            residual, signals = mean[:n], mean[2 * n :]
+            residual, pose, signals = mean[:n], mean[n : 2 * n], mean[2 * n :]
         sliding, moving, resting, shape = signals[: 8 * n].reshape(4, 2 * n)
         if self._cycle:
             # a shaft that slips in both directions within a cycle stops at both limits of its stiction
@@ -351,12 +351,15 @@ class MomentumObserver:
         rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
         momentum = self._inertia.dot(speed)
-        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n])
+        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n], pose)
 
     def identify_payload(self) -> str:
-        """Identify the payload from the present external torques; '' or why that is not possible."""
-        if self._load is None or not self._is_payload_declared:
+        """Identify the payload from the torques of joint sensors; '' or why that is not possible."""
+        if self._load is None or (self._link_side and not self._is_payload_declared):
             return "no payload is declared; set observer.payload to the smallest and the largest mass"
+        if not self._link_side:
+            mass, sd = self._load.mass + self._errors.errors[-1], math.sqrt(self._errors.covariance[-1, -1])
+            return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {sd:.2f} kg now"
         if not self.is_ready:
             return "too few samples yet"
         torques, covariance = self.torques()
