@@ -323,9 +323,9 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        n, given, filtered = self._n, self._parameters, self._filtered[which]
-        residual, model = filtered[:n].copy(), filtered[n : 2 * n].tolist()
-        pose, signals = filtered[2 * n : 3 * n].copy(), filtered[3 * n :]
+        n, given, filtered = self._n, self._parameters, self._filtered[which].copy()
+        residual, model = filtered[:n], filtered[n : 2 * n].tolist()
+        pose, signals = filtered[2 * n : 3 * n], filtered[3 * n :]
         if self._cycle and self._filled:
             mean = self._ring[: self._filled].mean(axis=0)
             residual, pose, signals = mean[:n], mean[n : 2 * n], mean[2 * n :]
