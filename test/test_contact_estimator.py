@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from contact_truth import motor_from_joint
+from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact_estimator_node import ContactEstimatorNode
@@ -128,6 +128,23 @@ def test_a_push_on_the_inner_link_whose_torques_are_those_of_one_along_the_outer
     assert inner.moment[1] == pytest.approx(-2.4, rel=0.05)
 
 
+def test_joint_sensors_locate_a_push_on_an_arm_in_motion() -> None:
+    """In the pose of now, 20 ms later than that of the torques, the place was off by 17 mm."""
+    arm, estimator = RigidArm(ARM, (0.2, -1.05, 0.3, 0.5), friction=0.0), ContactEstimator(ARM, TIMING, SENSORS)
+    drive = np.array([joint_torques(one) for one in np.eye(4)]).T
+    errors = []
+    for tick in range(500):
+        pushed = torques(arm.data.qpos, "outer_link", (0.28, 0.0, 0.0), (0.0, 24.0, 32.0))
+        swing = np.array([1.2, 1.6, 0.6, 0.4]) * np.sin(2.0 * math.pi * np.array([1.1, 1.3, 1.7, 2.1]) * tick * DT)
+        arm.step(np.linalg.solve(drive, swing + arm.gravity() - pushed), pushed)
+        assert estimator.observe(State(ZERO, ZERO, ZERO), State(*arm.sensors()), DT)
+        if tick % OUTER == 0 and tick > 200:
+            found = estimator.estimate()
+            assert found.link == "outer_link"
+            errors.append(abs(found.place - 0.28))
+    assert max(errors) < 0.005
+
+
 TILTED = (0.0, -1.05, 0.3, 0.9)
 FIRST = ("outer_link", 0.3, (0.0, 0.0, 8.0))
 
@@ -240,6 +257,7 @@ def test_vibration_after_a_contact_is_no_new_one() -> None:
     def play(estimator: ContactEstimator, span: float, force: float, vibration: float) -> list[ContactEstimate]:
         found = []
         for tick in range(round(span / DT)):
+            np.add(pose, DT * np.array(transmission.joint_velocities(speed)), out=pose)
             pushed = force + vibration * min(1.0, tick / 100) * math.sin(2.0 * math.pi * 60.0 * tick * DT)
             torque = transmission.motor_torques((body.gravity_torque(pose) + rest - pushed * lever).tolist())
             assert estimator.observe(State(transmission.motor_positions(pose.tolist()), speed, torque), None, DT)
@@ -391,8 +409,8 @@ def test_sets_that_do_not_fit_are_refused() -> None:
         ContactEstimator(ARM, TIMING, hasty)
 
 
-def loaded(mass: float) -> Plant:
-    """The plant with a mass at the tool, which lies on the x axis of the last link as its centre does."""
+def carrying(mass: float) -> Arm:
+    """The arm with a mass at the tool, which lies on the x axis of the last link as its centre does."""
     links, lever = ARM.links, ARM.tool[0] - ARM.links.centre[-3]
     total = links.mass[-1] + mass
     moved = mass * links.mass[-1] / total * lever * lever
@@ -400,11 +418,11 @@ def loaded(mass: float) -> Plant:
     inertia = (*links.inertia[:-2], links.inertia[-2] + moved, links.inertia[-1] + moved)
     heavy = dataclasses.replace(links, mass=(*links.mass[:-1], total), centre=centre, inertia=inertia)
     start = dataclasses.replace(ARM.joints, start=(0.0, -1.05, 0.0, 0.5))
-    return Plant(dataclasses.replace(ARM, links=heavy, joints=start), NOTHING, no_effects(ARM), DT / SUBSTEPS)
+    return dataclasses.replace(ARM, links=heavy, joints=start)
 
 
 def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> None:
-    arm, felt = loaded(0.3), {}
+    arm, felt = Plant(carrying(0.3), NOTHING, no_effects(ARM), DT / SUBSTEPS), {}
     for name, payload in (("none", (0.0, 0.0)), ("declared", (0.0, 0.4))):
         observer = dataclasses.replace(SENSORS.observer, payload=payload)
         estimator = ContactEstimator(ARM, TIMING, dataclasses.replace(SENSORS, observer=observer))
@@ -421,6 +439,25 @@ def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> Non
     assert reason == ""
     assert before.torque_sd[3] > 3.0 * after.torque_sd[3]
     assert abs(after.external_torques[3]) < 0.1 * abs(before.external_torques[3])
+
+
+def test_from_the_motors_a_payload_is_tracked_and_not_tared() -> None:
+    """Taken twice, as the tracked payload and as the tared one, its weight was a contact at once."""
+    arm = RigidArm(carrying(0.3), (0.2, -1.05, 0.3, 0.5), friction=0.0)
+    observer = dataclasses.replace(MOTORS.observer, payload=(0.0, 0.5), mass_scale=(1.0,) * 4)
+    frictionless = dataclasses.replace(observer, friction_scale=0.0)
+    estimator = ContactEstimator(ARM, TIMING, dataclasses.replace(MOTORS, observer=frictionless))
+    drive = np.array([joint_torques(one) for one in np.eye(4)]).T
+    for tick in range(3000):
+        swing = np.array([6.0, 8.0, 3.0, 2.0]) * np.sin(2.0 * math.pi * np.array([1.1, 1.3, 1.7, 2.1]) * tick * DT)
+        motor = np.linalg.solve(drive, 0.5 * swing + arm.gravity())
+        arm.step(motor, np.zeros(4))
+        assert estimator.observe(State(*arm.motors(motor)), None, DT)
+        if tick % OUTER == 0:
+            estimator.estimate()
+    before = estimator.estimate()
+    assert "the payload is tracked while the arm moves: 0.3" in estimator.tare()
+    assert estimator.estimate().external_torques == before.external_torques
 
 
 def test_held_motors_feel_nothing_and_joint_sensors_feel_on() -> None:

@@ -14,6 +14,7 @@ from wam_control.model_errors import (
     LARGEST,
     LEARN_EVERY,
     MARGIN,
+    MOVED,
     TRUST_TIME,
     ModelErrors,
     Observation,
@@ -37,7 +38,7 @@ def seen(random: np.random.Generator, external: tuple[float, float] = (0.0, 0.0)
     """One moment of some motion, its residual with the true errors, an external torque and noise of 0.05 N m."""
     effects = random.uniform(-1.0, 1.0, (2, 3))
     residual = effects @ TRUE + external + 0.05 * random.standard_normal(2)
-    return Observation(residual, effects, 0.05**2 * np.eye(2), np.ones(2))
+    return Observation(residual, effects, 0.05**2 * np.eye(2), np.ones(2), random.uniform(-1.0, 1.0, 2))
 
 
 def follow(
@@ -93,15 +94,31 @@ def test_in_contact_the_errors_become_less_certain_but_never_less_than_before_an
     assert np.linalg.eigvalsh(tracked.covariance).min() > 0.0
 
 
+def test_of_one_pose_no_more_is_learned_however_long_it_is_held() -> None:
+    """Its error stays as it is: taken for many, it would be learned as one of the model, and that as certain."""
+    tracked, random = errors(), np.random.default_rng(5)
+    held = seen(random)
+    for count in (20, 1000):
+        for _ in range(count):
+            shaken = held.pose + 0.4 * MOVED * random.uniform(-1.0, 1.0, 2)
+            tracked.follow(held._replace(pose=shaken), QUIET, False, LEARN_EVERY)
+        if count == 20:
+            errors_then, covariance_then = tracked.errors.copy(), tracked.covariance.copy()
+    assert errors_then.any()
+    assert np.array_equal(tracked.errors, errors_then)
+    assert np.array_equal(tracked.covariance, covariance_then)
+
+
 def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
     tracked, random = errors(), np.random.default_rng(3)
     effects = np.zeros((2, 3))
     for _ in range(400):
         residual = np.array([30.0 * 0.01 * random.standard_normal(), 0.0])
-        tracked.follow(Observation(residual, effects, 1e-4 * np.eye(2), np.ones(2)), QUIET, False, LEARN_EVERY)
+        pose = random.uniform(-1.0, 1.0, 2)
+        tracked.follow(Observation(residual, effects, 1e-4 * np.eye(2), np.ones(2), pose), QUIET, False, LEARN_EVERY)
     assert np.sqrt(tracked.noise[0]) == pytest.approx(0.01, rel=0.3)
     assert tracked.noise[1] == 0.0
-    _, covariance = tracked.corrected(Observation(np.zeros(2), effects, 1e-4 * np.eye(2), np.ones(2)))
+    _, covariance = tracked.corrected(Observation(np.zeros(2), effects, 1e-4 * np.eye(2), np.ones(2), np.zeros(2)))
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.3, rel=0.3)
 
 

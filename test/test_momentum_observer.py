@@ -77,6 +77,33 @@ def test_residual_reaches_63_percent_of_a_step_after_the_time_constant() -> None
         np.testing.assert_allclose(rows[99 + ticks], expected, atol=0.02)
 
 
+@pytest.mark.parametrize(("sensors", "cycle"), [(True, 0), (False, 0), (False, 40)])
+def test_the_pose_is_as_late_as_the_torques(sensors: bool, cycle: int) -> None:
+    """In the pose of now the same force has other torques: a contact would be found elsewhere."""
+    at = ("outer_link", (0.28, 0, 0), (0, 24, 32))
+    observer = MomentumObserver(ARM, FREE, sensors, cycle)
+    plant = RigidArm(ARM, POSE, friction=0.0)
+    late, now = [], []
+
+    def push(time: float) -> np.ndarray:
+        if time > 0.2:
+            found = observer.torques()[0]
+            late.append(np.abs(found - torques(observer.pose, *at)).max())
+            now.append(np.abs(found - torques(observer.q, *at)).max())
+        return torques(plant.data.qpos, *at)
+
+    swing(
+        observer,
+        plant,
+        0.5,
+        external=push,
+        sensors=sensors,
+        torque=lambda t: 0.2 * wave(t) - torques(plant.data.qpos, *at),
+    )
+    assert max(late) < 0.06
+    assert max(now) > 0.8
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("sensors", [False, True])
 def test_motion_alone_gives_no_external_torque(sensors: bool) -> None:

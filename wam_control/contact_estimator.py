@@ -211,7 +211,7 @@ class ContactEstimator:
         if not self._in_contact:
             self._second.reset()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
-        hypotheses = self._inference.infer(observer.q, torques, precision / observer.size)
+        hypotheses = self._inference.infer(observer.pose, torques, precision / observer.size)
         self._second.step(observer.age, hypotheses, observer, self._inference)
         if self._second.is_suspected:
             why = CERTAIN_SECOND if self._second.is_certain else SECOND

@@ -2,7 +2,8 @@
 
 The residual of the momentum observer is r = tau_ext + H x + e: H the torques of the model's errors of size one through
 the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
-r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.
+r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.  In one pose e stays as it
+is, however many samples there are, with a dither, too: only of a pose that is another is anything learned.
 
 How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, positions are
 less certain.  Never more: on a better arm, links that are wrong by friction of the contact would seem certain.
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 
 LEARN_EVERY = 0.01  # s
 HINDSIGHT = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
+MOVED = 2e-3  # rad, of any joint, since what was learned last
 CORRELATED = 8.0  # of R: the rest stays for so many samples, of which each is learned from
 GATE = 12.0  # of the detection statistic, above which nothing is learned
 HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after it nothing is learned
@@ -41,12 +43,14 @@ class Observation(NamedTuple):
     effects : (n, k), N m, H.
     rest : (n, n), N^2 m^2, R without the noise of the motors that is followed here.
     moving : (n,), fraction to which each motor moves; more for a filter that averages less of the noise.
+    pose : (n,), joint angles, rad, as late as the residual.
     """
 
     residual: Array
     effects: Array
     rest: Array
     moving: Array
+    pose: Array
 
 
 class ModelErrors:
@@ -74,6 +78,7 @@ class ModelErrors:
         self.noise, self.size = noise.copy(), 1.0
         self.beyond = self._beyond()
         self._waiting: deque[tuple[Observation, float]] = deque()
+        self._learned_at = np.full(len(through), np.inf)
         self._since = self._contact = self._hold = 0.0
 
     @property
@@ -121,11 +126,9 @@ class ModelErrors:
             self._waiting.append((seen, statistic))
             if len(self._waiting) > HINDSIGHT / LEARN_EVERY and statistic < GATE:
                 before, its = self._waiting.popleft()
-                self._learn(before, self._since)
-                # of a shaft at rest stiction hides the errors
-                rate = self._since / TRUST_TIME * float(before.moving.min())
-                size = self.size + rate * (MARGIN * its / len(before.residual) - self.size)
-                self.size = min(max(size, 1.0), LARGEST)
+                if np.abs(before.pose - self._learned_at).max() > MOVED:
+                    self._learned_at = before.pose
+                    self._learn(before, its, self._since)
         self._since = 0.0
 
     def _grow(self, span: float) -> None:
@@ -135,7 +138,11 @@ class ModelErrors:
         covariance *= scale
         covariance *= scale[:, None]
 
-    def _learn(self, seen: Observation, span: float) -> None:
+    def _learn(self, seen: Observation, statistic: float, span: float) -> None:
+        # of a shaft at rest stiction hides the errors
+        rate = span / TRUST_TIME * float(seen.moving.min())
+        size = self.size + rate * (MARGIN * statistic / len(seen.residual) - self.size)
+        self.size = min(max(size, 1.0), LARGEST)
         innovation, covariance = self.corrected(seen)
         rate = span / NOISE_TIME
         at_motors = self._to_motors @ innovation

@@ -58,7 +58,7 @@ class MomentumObserver:
 
     Attributes
     ----------
-    q : (n,), joint angles, rad.
+    q : (n,), joint angles of the last sample, rad.
     age : s, since the first sample.
     is_ready : whether enough samples came.
     seen : the moment of which torques were last given; from joint sensors the effects are those of one sd.
@@ -117,11 +117,11 @@ class MomentumObserver:
         """Forget all samples."""
         n = self._n
         self.q: list[float] = [0.0] * n
-        # of each filter the residual and the torque of the model, (2 n,), N m, then the signals of the shafts, (10 n,)
-        # strain gauges lie behind the friction: no signals
-        self._filtered = np.zeros((len(self._times), 2 * n if self._link_side else 12 * n))
+        # of each filter the residual and the torque of the model, (2 n,), N m, the pose, (n,), rad, then the signals of
+        # the shafts, (10 n,); strain gauges lie behind the friction: no signals
+        self._filtered = np.zeros((len(self._times), 3 * n if self._link_side else 13 * n))
         self._decay = _Decay.over(math.inf, self._times, self._filtered.shape[1])
-        self._ring = np.zeros((max(1, self._cycle), 11 * n))
+        self._ring = np.zeros((max(1, self._cycle), 12 * n))
         self._filled = 0
         if self._load is not None:
             self._load.reset()
@@ -214,17 +214,17 @@ class MomentumObserver:
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        filtered, present = self._filtered, np.array([external + model + signals])
+        filtered, present = self._filtered, np.array([external + model + q + signals])
         if span != self._decay.span:
             self._decay = _Decay.over(span, self._times, present.size)
         if before is None:
             filtered[:] = present
         else:
-            torques = filtered[:, : 2 * n].copy() if span > self._parameters.time_constant else None
+            before_gap = filtered[:, : 3 * n].copy() if span > self._parameters.time_constant else None
             filtered *= self._decay.keeps
             filtered += self._decay.takes * present
-            if torques is not None:  # the torques in so long a gap are unknown: continue from here
-                filtered[:, : 2 * n] = torques
+            if before_gap is not None:  # the torques in so long a gap are unknown: continue from here
+                filtered[:, : 3 * n] = before_gap
         if self._load is not None:
             keep = 0.0 if before is None else self._decay.keep
             self._load.observe(q, qd, span, keep)
@@ -263,7 +263,9 @@ class MomentumObserver:
             sized = np.array(load.torque) * load.sd
             covariance = covariance + np.outer(sized, sized)
             effects = np.column_stack((effects, sized))
-        self.seen = Observation(np.array(residual), effects, self._sensors, self._at_rest)
+        self.seen = Observation(
+            np.array(residual), effects, self._sensors, self._at_rest, self._filtered[0, 2 * self._n :].copy()
+        )
         return residual, covariance
 
     def change(self, then: Observation) -> tuple[Array, Array]:
@@ -293,6 +295,11 @@ class MomentumObserver:
             self._followed = self.age
 
     @property
+    def pose(self) -> list[float]:
+        """Joint angles, (n,), rad, as late as the torques last given: through their filter."""
+        return self.q if self.seen is None else self.seen.pose.tolist()
+
+    @property
     def size(self) -> float:
         """How much larger the variances of the torques are in free motion than stated; of joint sensors not known."""
         return 1.0 if self._link_side else self._errors.size
@@ -316,11 +323,12 @@ class MomentumObserver:
 
     def _observation(self, which: int = 0) -> Observation:
         """The present residual, the effects of the errors of the model on it, and the covariance of the rest."""
-        n, given, filtered = self._n, self._parameters, self._filtered[which]
-        residual, model, signals = filtered[:n].copy(), filtered[n : 2 * n].tolist(), filtered[2 * n :]
+        n, given, filtered = self._n, self._parameters, self._filtered[which].copy()
+        residual, model = filtered[:n], filtered[n : 2 * n].tolist()
+        pose, signals = filtered[2 * n : 3 * n], filtered[3 * n :]
         if self._cycle and self._filled:
             mean = self._ring[: self._filled].mean(axis=0)
-            residual, signals = mean[:n], mean[n:]
+            residual, pose, signals = mean[:n], mean[n : 2 * n], mean[2 * n :]
         sliding, moving, resting, shape = signals[: 8 * n].reshape(4, 2 * n)
         if self._cycle:
             # a shaft that slips in both directions within a cycle stops at both limits of its stiction
@@ -343,12 +351,15 @@ class MomentumObserver:
         rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
         momentum = self._inertia.dot(speed)
-        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n])
+        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n], pose)
 
     def identify_payload(self) -> str:
-        """Identify the payload from the present external torques; '' or why that is not possible."""
-        if self._load is None or not self._is_payload_declared:
+        """Identify the payload from the torques of joint sensors; '' or why that is not possible."""
+        if self._load is None or (self._link_side and not self._is_payload_declared):
             return "no payload is declared; set observer.payload to the smallest and the largest mass"
+        if not self._link_side:
+            mass, sd = self._load.mass + self._errors.errors[-1], math.sqrt(self._errors.covariance[-1, -1])
+            return f"from the motors the payload is tracked while the arm moves: {mass:.2f} +- {sd:.2f} kg now"
         if not self.is_ready:
             return "too few samples yet"
         torques, covariance = self.torques()

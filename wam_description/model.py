@@ -97,9 +97,6 @@ class MotorModel:
     load_negative: tuple[float, ...] = parameter(
         "the same in negative motion", low=0.0, high=0.9, before=one_each("arm.motors.names", 0.0)
     )
-    torque_offset: tuple[float, ...] = parameter(
-        "measured less true torque", "N m", low=-10.0, high=10.0, before=one_each("arm.motors.names", 0.0)
-    )
 
 
 @dataclass(frozen=True)

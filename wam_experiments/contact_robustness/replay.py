@@ -34,7 +34,6 @@ class TouchOutcome(NamedTuple):
     latency : s to the detection, inf without, NaN if there was one already.
     detected, probability, right_link : when evaluated, 0.2 s after the start.
     error, position_sd : m; inf on the wrong link or without an estimate; NaN sd without a position.
-    late_error : m, 0.45 s after the start.
     in_set, set_length : whether the 90 % set holds the truth, and its length, m.
     reason : as reported.
     """
@@ -51,7 +50,6 @@ class TouchOutcome(NamedTuple):
     right_link: bool
     error: float
     position_sd: float
-    late_error: float
     in_set: bool
     set_length: float
     reason: str
@@ -243,7 +241,6 @@ def _outcome(touch: Touch, rows: Sequence[_Row], moving: np.ndarray, lengths: di
         right_link=right,
         error=_error(now, touch.cover, true),
         position_sd=now.position_sd if right else math.nan,
-        late_error=_error(rows[late].estimate, touch.cover, touch.place_at(rows[late].time)),
         in_set=any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
         set_length=sum(sizes),
         reason=now.reason,
