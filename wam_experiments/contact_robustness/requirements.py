@@ -158,7 +158,7 @@ def required_table(rows: Sequence[RequiredRow]) -> str:
     return markdown(head, [row.cells for row in rows])
 
 
-LATE = "it begins while a motor is at rest or turns round, whose stiction holds the push; where all slide there is no bound"
+LATE = "it begins while a motor is at rest or turns round, whose stiction holds the push: with all sliding, no bound"
 FRICTION = "friction of motors is known to some per cent, that of the contact not at all: four torques leave that open"
 CAREFUL = "the same, and an arm that errs more in free motion than stated has up to twice the standard deviation"
 UNEXPECTED = "an error that the estimator does not expect is not in its sets; one row of twenty is outside by chance"
