@@ -429,9 +429,7 @@ def _with_tangential_force(
     found = [_force(terms, x) for x in places]
     _, best = max((explained, force) for force, explained, _ in found)
     precision = min(precision, 1.0 / (best[0] * best[0] + best[1] * best[1] + LEAST_FORCE))
-    _, (f1, f2) = max(
-        (explained + math.log(s11 * s22 - s12 * s12), force) for force, explained, (s11, s12, s22) in found
-    )
+    _, (f1, f2) = max((explained + math.log(sd[0] * sd[2] - sd[1] * sd[1]), force) for force, explained, sd in found)
     size = math.hypot(f1, f2) + LEAST_FORCE
     sd, arm, turn = friction * size, offset * size, friction * radius
     b1, b2 = turn * f1, turn * f2

@@ -232,8 +232,8 @@ errors and no others, and with just their covariance. The rows of the requiremen
 takes errors at rest, where stiction hides a force, as frequent as any. Friction of the contact is in all of them:
 four torques do not distinguish it from position and force. The first row is that friction alone: it makes the 95 %
 error, the medians are those of the torques' errors. So is the inner link near the shoulder, where 10 N have hardly a
-moment: what is missed there is missed by any detector with these errors. They are those of friction and stay longer
-than the time in which a contact is to be found, so that a longer window does not average them."""
+moment: the last column is what a threshold finds on torques with these errors. They are those of friction and stay
+longer than the time in which a contact is to be found, so that a longer window does not average them."""
 
 METHOD = """## Method
 
