@@ -14,8 +14,9 @@ from wam_experiments.contact_benchmark.statistics import share
 from wam_experiments.contact_robustness.degradations import NAMES, drawn
 from wam_experiments.contact_robustness.evaluation import RobustnessResult, drives, evaluate, page, report_text
 from wam_experiments.contact_robustness.recording import Drive, record
-from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults
+from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, TouchOutcome
 from wam_experiments.contact_robustness.requirements import COVERAGE, USUAL, contacts_needed, required_rows
+from wam_experiments.contact_robustness.rows import kinds_table
 from wam_experiments.contact_robustness.touches import axis_of
 
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
@@ -53,6 +54,16 @@ def test_the_worst_degradation_is_the_one_with_the_most_false_alarms_even_if_the
     row = required_rows(wide, {}, [], [], 0.0)[0]
     assert row.of == f"the worst: {LOADED}"
     assert row.found.value == 0.01
+
+
+def test_the_sets_are_counted_by_force_too() -> None:
+    """Of all forces together the sets of strong ones, a third of which held the truth, were hidden by the others."""
+    light = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, "")
+    strong = light._replace(force=40.0, in_set=False)
+    score = ReplayScore(STATED, [light, strong, strong], 0.0, 0, 0.0, 0.0, [], 0.0, 0, [], [], "")
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in kinds_table([score]).splitlines()]
+    held = {row[0]: row[3] for row in rows}
+    assert (held["outer"], held["0 to 7.5 N"], held["30 to 80 N"]) == ("33 (3)", "100 (1)", "0 (2)")
 
 
 def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
