@@ -14,7 +14,7 @@ from wam_experiments.contact_benchmark.statistics import Interval, share
 from wam_experiments.contact_robustness.degradations import NAMES, drawn
 from wam_experiments.contact_robustness.evaluation import RobustnessResult, drives, evaluate, page, report_text
 from wam_experiments.contact_robustness.recording import Drive, record
-from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults
+from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, TouchOutcome
 from wam_experiments.contact_robustness.requirements import (
     COVERAGE,
     REASONS,
@@ -24,6 +24,7 @@ from wam_experiments.contact_robustness.requirements import (
     missed_table,
     required_rows,
 )
+from wam_experiments.contact_robustness.rows import kinds_table
 from wam_experiments.contact_robustness.touches import axis_of
 
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
@@ -76,6 +77,16 @@ def test_a_row_that_is_missed_has_its_reason_and_its_bound() -> None:
     assert missed_table([met], bounds) == "Nothing."
     rows = required_rows({}, {}, [], [], 0.0)
     assert all(any(row.name.startswith(begin) for row in rows) for begin, *_ in REASONS), "each is of a row that exists"
+
+
+def test_the_sets_are_counted_by_force_too() -> None:
+    """Of all forces together the sets of strong ones, a third of which held the truth, were hidden by the others."""
+    light = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, "")
+    strong = light._replace(force=40.0, in_set=False)
+    score = ReplayScore(STATED, [light, strong, strong], 0.0, 0, 0.0, 0.0, [], 0.0, 0, [], [], "")
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in kinds_table([score]).splitlines()]
+    held = {row[0]: row[3] for row in rows}
+    assert (held["outer"], held["0 to 7.5 N"], held["30 to 80 N"]) == ("33 (3)", "100 (1)", "0 (2)")
 
 
 def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:

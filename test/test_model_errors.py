@@ -8,6 +8,7 @@ from arms import CONFIGURATION, WAM
 
 from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.model_errors import (
+    AWAY,
     CORRELATED,
     GATE,
     HINDSIGHT,
@@ -94,19 +95,25 @@ def test_in_contact_the_errors_become_less_certain_but_never_less_than_before_an
     assert np.linalg.eigvalsh(tracked.covariance).min() > 0.0
 
 
-def test_of_one_pose_no_more_is_learned_however_long_it_is_held() -> None:
+def test_what_is_learned_of_one_pose_by_holding_it_long_is_forgotten_elsewhere() -> None:
     """Its error stays as it is: taken for many, it would be learned as one of the model, and that as certain."""
-    tracked, random = errors(), np.random.default_rng(5)
+    random = np.random.default_rng(5)
     held = seen(random)
+    found = []
     for count in (20, 1000):
+        tracked = errors()
         for _ in range(count):
             shaken = held.pose + 0.4 * MOVED * random.uniform(-1.0, 1.0, 2)
             tracked.follow(held._replace(pose=shaken), QUIET, False, LEARN_EVERY)
-        if count == 20:
-            errors_then, covariance_then = tracked.errors.copy(), tracked.covariance.copy()
-    assert errors_then.any()
-    assert np.array_equal(tracked.errors, errors_then)
-    assert np.array_equal(tracked.covariance, covariance_then)
+        there = tracked.covariance.trace()
+        tracked.follow(held._replace(pose=held.pose + 1.1 * AWAY), QUIET, True, LEARN_EVERY)
+        assert tracked.covariance.trace() == there, "a push that moves the arm does not hide itself"
+        tracked.follow(held._replace(pose=held.pose + 1.1 * AWAY), QUIET, False, LEARN_EVERY)
+        found.append((tracked.errors, tracked.covariance))
+    assert there < 0.8 * tracked.covariance.trace() < 0.8 * 3 * SD**2
+    assert found[0][0].any()
+    for few, many in zip(*found, strict=True):
+        assert np.array_equal(few, many)
 
 
 def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:

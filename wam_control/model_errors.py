@@ -3,7 +3,8 @@
 The residual of the momentum observer is r = tau_ext + H x + e: H the torques of the model's errors of size one through
 the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
 r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.  In one pose e stays as it
-is, however many samples there are, with a dither, too: only of a pose that is another is anything learned.
+is, with a dither, too, however many samples there are: they tell more and more of that pose, which x and P then take
+in, but of others no more than one sample of R. The rest is forgotten where the arm is away from there without contact.
 
 How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, positions are
 less certain.  Never more: on a better arm, links that are wrong by friction of the contact would seem certain.
@@ -21,7 +22,8 @@ Array = NDArray[np.float64]
 
 LEARN_EVERY = 0.01  # s
 HINDSIGHT = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
-MOVED = 2e-3  # rad, of any joint, since what was learned last
+MOVED = 2e-3  # rad, of any joint: another pose
+AWAY = 0.05  # rad, from a pose where the arm has rested: what was learned there is no longer true
 CORRELATED = 8.0  # of R: the rest stays for so many samples, of which each is learned from
 GATE = 12.0  # of the detection statistic, above which nothing is learned
 HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after it nothing is learned
@@ -78,7 +80,8 @@ class ModelErrors:
         self.noise, self.size = noise.copy(), 1.0
         self.beyond = self._beyond()
         self._waiting: deque[tuple[Observation, float]] = deque()
-        self._learned_at = np.full(len(through), np.inf)
+        self._at, self._of_pose, self._rested = np.full(len(through), np.inf), 0, 0.0
+        self._elsewhere: tuple[Array, Array] | None = None  # errors and covariance as they are for other poses
         self._since = self._contact = self._hold = 0.0
 
     @property
@@ -121,15 +124,28 @@ class ModelErrors:
         if self._since < LEARN_EVERY:
             return
         self._grow(self._since)
+        self._rested += self._since
+        if not in_contact and np.abs(seen.pose - self._at).max() > (AWAY if self._elsewhere else MOVED):
+            self._leave(seen.pose)
         if not in_contact and self._hold <= 0.0:
             self._contact = 0.0
             self._waiting.append((seen, statistic))
             if len(self._waiting) > HINDSIGHT / LEARN_EVERY and statistic < GATE:
                 before, its = self._waiting.popleft()
-                if np.abs(before.pose - self._learned_at).max() > MOVED:
-                    self._learned_at = before.pose
-                    self._learn(before, its, self._since)
+                self._of_pose += 1
+                if self._of_pose > CORRELATED and self._elsewhere is None:
+                    self._elsewhere, self._rested = (self.errors.copy(), self.covariance.copy()), 0.0
+                self._learn(before, its, self._since)
         self._since = 0.0
+
+    def _leave(self, pose: Array) -> None:
+        """Forget what is true of one pose alone."""
+        self._at, self._of_pose = pose, 0
+        if self._elsewhere is not None:
+            (self.errors, self.covariance), self._elsewhere = self._elsewhere, None
+            self._grow(self._rested)
+            self.beyond = self._beyond()
+            self._waiting.clear()
 
     def _grow(self, span: float) -> None:
         covariance = self.covariance

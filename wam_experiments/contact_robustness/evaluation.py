@@ -194,7 +194,7 @@ def report_text(result: RobustnessResult) -> str:
         ("Each degradation", f"{size}\n\n{alone_table(result.wide)}"),
         ("Detection", table(DETECTION, result.wide)),
         ("Position on the outer link, and the link", table(POSITION, result.wide)),
-        ("By kind of contact, all degradations", kinds_table(every)),
+        ("By kind of contact and by force, all degradations", kinds_table(every)),
         ("Second contact", table(SECOND, seconds)),
         ("After an identification", table(DETECTION, named) + "\n" + table(POSITION, named)),
         ("What torques leave open", OPEN + "\n\n" + markdown(BOUNDS, result.bounds)),

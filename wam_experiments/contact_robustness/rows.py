@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from wam_analysis.table import markdown
@@ -10,6 +11,7 @@ from wam_experiments.contact_robustness.replay import SECOND_WITHIN, ReplayScore
 
 NEAR = 0.2  # of a force: 5 N are 4 to 6 N
 SURE, SMALL_SD = 0.95, 0.02
+FORCES = (0.0, 7.5, 15.0, 30.0, 80.0)  # N, between the rows by force
 Scores = Sequence[ReplayScore]
 
 
@@ -77,8 +79,7 @@ def covered(*kinds: str) -> Callable[[Scores], str]:
     """Detected contacts that the 90 % set holds."""
 
     def of(scores: Scores) -> str:
-        found = [one for one in outcomes(scores, *kinds) if one.detected]
-        return percent(sum(one.in_set for one in found), len(found))
+        return _covered(outcomes(scores, *kinds))
 
     return of
 
@@ -93,8 +94,7 @@ def wrong(least: float, *kinds: str) -> Callable[[Scores], str]:
     """Wrong links among the detected contacts with at least a probability."""
 
     def of(scores: Scores) -> str:
-        found = [one for one in outcomes(scores, *kinds) if one.detected and one.probability > least]
-        return percent(sum(not one.right_link for one in found), len(found))
+        return _wrong(outcomes(scores, *kinds), least)
 
     return of
 
@@ -178,15 +178,27 @@ def table(columns: Sequence[ScoreColumn], groups: dict[str, list[ReplayScore]]) 
 
 
 def kinds_table(scores: Scores) -> str:
-    """Markdown table by kind of contact, all degradations together."""
-    names = sorted({one.kind for one in outcomes(scores)})
+    """Markdown table by kind of contact, then by force, all degradations together."""
+    every = outcomes(scores)
+    groups = [(kind, [one for one in every if one.kind == kind]) for kind in sorted({one.kind for one in every})]
+    groups += [
+        (f"{low:g} to {high:g} N", [one for one in every if low <= one.force < high]) for low, high in pairwise(FORCES)
+    ]
     rows = [
-        (kind, wrong(0.0, kind)(scores), wrong(SURE, kind)(scores), covered(kind)(scores), _detected(scores, kind))
-        for kind in names
+        (name, _wrong(found, 0.0), _wrong(found, SURE), _covered(found), _detected(found)) for name, found in groups
     ]
     return markdown(("contact", "wrong link, %", "wrong, p > .95, %", "90 % set holds, %", "detected, %"), rows)
 
 
-def _detected(scores: Scores, kind: str) -> str:
-    found = outcomes(scores, kind)
+def _covered(found: Sequence[TouchOutcome]) -> str:
+    detected = [one.in_set for one in found if one.detected]
+    return percent(sum(detected), len(detected))
+
+
+def _wrong(found: Sequence[TouchOutcome], least: float) -> str:
+    likely = [not one.right_link for one in found if one.detected and one.probability > least]
+    return percent(sum(likely), len(likely))
+
+
+def _detected(found: Sequence[TouchOutcome]) -> str:
     return percent(sum(one.latency < math.inf or math.isnan(one.latency) for one in found), len(found))
