@@ -10,6 +10,7 @@ from arms import CONFIGURATION, WAM
 from wam_control.scenario import ScenarioStep
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, line_axes, unit
 from wam_description.rigid_body import RigidBody
+from wam_description.signals import ForceCommand
 from wam_experiments.force_benchmark.surfaces import Surface
 from wam_experiments.force_benchmark.tasks import RELEASE, Task, configured, triple
 from wam_experiments.force_benchmark.trial import TaskWatch, with_accepted_gain
@@ -27,11 +28,14 @@ def force(surface: Surface, newtons: float) -> TaskAxis:
 class Played:
     """A task that was played: true forces (T, p), N, along those of its surfaces, and the node at the end."""
 
-    def __init__(self, task: Task, axes: Sequence[TaskAxis], seconds: float, **changes: Any) -> None:
+    def __init__(
+        self, task: Task, axes: Sequence[TaskAxis], seconds: float, *later: ScenarioStep, **changes: Any
+    ) -> None:
         configuration = with_accepted_gain(configured(CONFIGURATION, task).with_values(changes))
         steps = [
             ScenarioStep("release", RELEASE, request="enable"),
             ScenarioStep("press", seconds, task=TaskCommand("base", tuple(axes))),
+            *later,
         ]
         run = Simulation(configuration, steps)
         traces = TaskWatch(configuration, task, run).traces()
@@ -61,6 +65,26 @@ def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_
     slid = BODY.point(played.q, OUTER, (0.0, 0.0, 0.0)) - BODY.point(LEVEL, OUTER, (0.0, 0.0, 0.0))
     assert slid @ along == pytest.approx(2.5 * speed, rel=0.1), "m"
     assert played.forces[1000:, 0] == pytest.approx(np.full(1500, 5.0), rel=0.05)
+
+
+@pytest.mark.parametrize("is_task", [True, False])
+def test_a_force_stays_right_when_the_link_slides_back_under_other_axes(is_task: bool) -> None:
+    """The way back counted from zero: 5.8 N of 5.  What a task presses was taken for 0.5 kg at the tool."""
+    q = (0.0, -1.0, 0.0, 0.6)
+    rotation = BODY.cover_pose(q, OUTER).rotation
+    surface = Surface(OUTER, 0.35, triple(rotation[:, 1]), 4000.0, 0.04, is_plane=False)
+    slide = TaskAxis(AxisKind.VELOCITY, -1, OUTER, 0.35, triple(rotation[:, 0]), 0.03)
+    alone = (force(surface, 6.5),)
+    after = (
+        {"task": TaskCommand("base", alone)}
+        if is_task
+        else {"force": ForceCommand("base", triple(6.5 * rotation[:, 1]))}
+    )
+    ends = [ScenarioStep("slide", 2.0, task=TaskCommand("base", (*alone, slide)))] if is_task else []
+    last = ScenarioStep("alone", 2.0, **after)
+    played = Played(Task(q, surface, 6.5), alone, 2.0, *ends, last)
+    assert played.forces[-200:, 0].mean() == pytest.approx(6.5, rel=0.05)
+    assert not played.reason
 
 
 @pytest.mark.parametrize("mode", ["warn", "refuse"])

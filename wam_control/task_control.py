@@ -23,6 +23,7 @@ from wam_description.signals import Contact
 
 Array = NDArray[np.float64]
 AxisRow = tuple[float, float, float, float, float, float]  # under TASK_AXIS_COLUMNS
+LOST = 0.5  # s without a touch, after which another one begins
 
 
 class TaskOutput(NamedTuple):
@@ -76,7 +77,8 @@ class TaskControl:
         self._task: TaskCommand | None = None
         self._anchors: dict[object, float] = {}
         self._holds: list[ForceHold] = []
-        self._slid: dict[tuple[str, float], float] = {}  # m, by cover and place, since something is touched there
+        # by cover and place: m since something is touched there, s since it is no more
+        self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
         self._held_at: list[float] | None = None
         self._has_pressed, self._way_back = False, 0.0  # m, that an arm which holds may still go back
@@ -108,7 +110,7 @@ class TaskControl:
         unknown : torques at rest before that no touched surface gives (n,), N m, and what they mean.
         """
         own = self._parameters
-        self._slide(q)
+        self._slide(q, dt)
         has_changed = self._begin(task)
         states = self._frame.states(task, q, self._points(task, contact))
         anchors = self._find_anchors(states)
@@ -159,19 +161,21 @@ class TaskControl:
         self._holds = [ForceHold() for _ in task.axes]
         return True
 
-    def _slide(self, q: Sequence[float]) -> None:
+    def _slide(self, q: Sequence[float], dt: float) -> None:
         """Count how far the link has slid along what each force presses, which stays where it is.
 
-        Other axes change nothing of that as long as a force acts there.
+        Other axes, and a touch that is lost for a moment, change nothing of that.
         """
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
-        pressed = {
-            (axis.cover, axis.place)
-            for axis, hold in zip(self._task.axes if self._task else (), self._holds, strict=True)
-            if axis.kind is AxisKind.FORCE and axis.place is not None and hold.is_touching
-        }
-        self._slid = {at: self._slid.get(at, 0.0) + self._force_axes.slide(q, *at, moved) for at in pressed}
+        for axis, hold in zip(self._task.axes if self._task else (), self._holds, strict=True):
+            if axis.kind is not AxisKind.FORCE or not axis.cover or axis.place is None:
+                continue
+            at = axis.cover, axis.place
+            slid, lost = self._slid.get(at, (0.0, math.inf))
+            lost = 0.0 if hold.is_touching else lost + dt
+            slid += self._force_axes.slide(q, *at, moved)
+            self._slid[at] = (slid, lost) if lost < LOST else (0.0, math.inf)
 
     @property
     def is_touching(self) -> bool:
@@ -243,7 +247,7 @@ class TaskControl:
         found = []
         for axis in task.axes:
             if axis.place is not None:
-                slid = self._slid.get((axis.cover, axis.place), 0.0)
+                slid, _ = self._slid.get((axis.cover, axis.place), (0.0, 0.0))
                 place = slid_position(self._covers, axis.cover, axis.place, slid) if slid else axis.place
                 sd = own.contact_position_sd
                 found.append(ForcePoint(axis.cover, place, sd, True, True, True, False, "", conflict, is_single))
