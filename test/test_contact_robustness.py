@@ -10,12 +10,20 @@ from wam_control.contact_estimator import ContactEstimator, ContactEstimatorPara
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_experiments.contact_benchmark.scenarios import base_values
-from wam_experiments.contact_benchmark.statistics import share
+from wam_experiments.contact_benchmark.statistics import Interval, share
 from wam_experiments.contact_robustness.degradations import NAMES, drawn
 from wam_experiments.contact_robustness.evaluation import RobustnessResult, drives, evaluate, page, report_text
 from wam_experiments.contact_robustness.recording import Drive, record
 from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, TouchOutcome
-from wam_experiments.contact_robustness.requirements import COVERAGE, USUAL, contacts_needed, required_rows
+from wam_experiments.contact_robustness.requirements import (
+    COVERAGE,
+    REASONS,
+    USUAL,
+    RequiredRow,
+    contacts_needed,
+    missed_table,
+    required_rows,
+)
 from wam_experiments.contact_robustness.rows import kinds_table
 from wam_experiments.contact_robustness.touches import axis_of
 
@@ -54,6 +62,21 @@ def test_the_worst_degradation_is_the_one_with_the_most_false_alarms_even_if_the
     row = required_rows(wide, {}, [], [], 0.0)[0]
     assert row.of == f"the worst: {LOADED}"
     assert row.found.value == 0.01
+
+
+def test_a_row_that_is_missed_has_its_reason_and_its_bound() -> None:
+    name = "position on the outer link, moving, 10 N, median"
+    missed, met = (
+        RequiredRow(name, "cm", 100.0, "", (0.0, 0.012), (0.0, 0.005), Interval(value, value, value, 30), "")
+        for value in (0.013, 0.012)
+    )
+    bounds = [["", "1 / 2 / 3", "4 / 5 / 6", "7", "8", "9"], ["", "10 / 20 / 30", "40 / 50 / 60", "70", "80", "90"]]
+    shown = missed_table([missed, met], bounds)
+    assert shown.count(name) == 1
+    assert "| 2 to 20 |" in shown
+    assert missed_table([met], bounds) == "Nothing."
+    rows = required_rows({}, {}, [], [], 0.0)
+    assert all(any(row.name.startswith(begin) for row in rows) for begin, *_ in REASONS), "each is of a row that exists"
 
 
 def test_the_sets_are_counted_by_force_too() -> None:

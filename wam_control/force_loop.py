@@ -534,6 +534,8 @@ class ForceLoop:
         self._react(found.reaction, found.reason)
         if found.reaction.holds:
             self.refusals["task_command"] = found.reason
+        elif self._tasks.is_touching:
+            self._pressed_at = list(q)
         if found.has_changed:
             self._transfer.restart()
         measured, error = _triple(found.measured.tolist()), _triple(found.error.tolist())

@@ -108,8 +108,8 @@ class TaskControl:
         unknown : torques at rest before that no touched surface gives (n,), N m, and what they mean.
         """
         own = self._parameters
+        self._slide(q)
         has_changed = self._begin(task)
-        self._slide(task, q)
         states = self._frame.states(task, q, self._points(task, contact))
         anchors = self._find_anchors(states)
         forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
@@ -122,7 +122,7 @@ class TaskControl:
         if reaction.holds != (self._held_at is not None):
             self._held_at, has_changed = (list(q) if reaction.holds else None), True
             self._way_back = own.limits.free_travel if self._has_pressed else 0.0
-        self._has_pressed = self._has_pressed or (not reaction.holds and any(h.is_touching for h in self._holds))
+        self._has_pressed = self._has_pressed or (not reaction.holds and self.is_touching)
         factor, is_other = self._supervision.factor(lambda: self._guarded(states, q), dt)
         speeds = [
             self._speed(state, force, anchor, torques[1], hold, factor, dt)
@@ -157,19 +157,26 @@ class TaskControl:
             return False
         self._anchors = {key: self._anchors[key] for key in _axes(task) if key in self._anchors}
         self._holds = [ForceHold() for _ in task.axes]
-        self._slid = {}
         return True
 
-    def _slide(self, task: TaskCommand, q: Sequence[float]) -> None:
-        """Count how far the link has slid along what each force presses, which stays where it is."""
+    def _slide(self, q: Sequence[float]) -> None:
+        """Count how far the link has slid along what each force presses, which stays where it is.
+
+        Other axes change nothing of that as long as a force acts there.
+        """
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
         pressed = {
             (axis.cover, axis.place)
-            for axis, hold in zip(task.axes, self._holds, strict=True)
+            for axis, hold in zip(self._task.axes if self._task else (), self._holds, strict=True)
             if axis.kind is AxisKind.FORCE and axis.place is not None and hold.is_touching
         }
         self._slid = {at: self._slid.get(at, 0.0) + self._force_axes.slide(q, *at, moved) for at in pressed}
+
+    @property
+    def is_touching(self) -> bool:
+        """Whether one of the forces shows that something is touched."""
+        return any(hold.is_touching for hold in self._holds)
 
     def _find_anchors(self, states: Sequence[AxisState]) -> list[float]:
         """Commanded position of each axis; where none is, the position at which it has begun."""

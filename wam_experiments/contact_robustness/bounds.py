@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.table import markdown
 from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.contact_inference import ContactInference
 from wam_description.configuration import Configuration
@@ -25,6 +24,9 @@ COUNT = 1200  # contacts
 EXACT = 2e-3  # N m, sd that stands for none
 CONSTANT = 0.02  # largest error of a torque constant, as in the realistic mix
 SMALL_SD, NEAR = 0.02, 0.2  # m; of a force
+BOUNDS = (
+    "errors of the torques", "median 5/10/20 N, cm", "95 %", "sd < 2 cm, %", "90 % set holds, %", "inner link, 10 N, %",
+)  # fmt: skip
 
 
 class BoundRow(NamedTuple):
@@ -72,8 +74,8 @@ class BoundRow(NamedTuple):
         return [self.name, middle, most, *shares, f"{100.0 * np.mean(detected):.0f}"]
 
 
-def bounds_table(configuration: Configuration, seed: int, errors: Array) -> str:
-    """Markdown table; `errors` as `ReplayScore.torque_errors`."""
+def bounds(configuration: Configuration, seed: int, errors: Array) -> list[list[str]]:
+    """Rows of `BOUNDS` as text; `errors` as `ReplayScore.torque_errors`."""
     exact = np.full(errors.shape[1], EXACT)
     rows = [
         BoundRow("none", exact, 0.0),
@@ -81,8 +83,4 @@ def bounds_table(configuration: Configuration, seed: int, errors: Array) -> str:
         BoundRow("and those in free motion, all motors sliding", errors[0], CONSTANT),
         BoundRow("and those in free motion, some at rest", errors[1], CONSTANT),
     ]
-    head = (
-        "errors of the torques", "median 5/10/20 N, cm", "95 %", "sd < 2 cm, %", "90 % set holds, %",
-        "inner link, 10 N, %",
-    )  # fmt: skip
-    return markdown(head, [row.cells(configuration, seed) for row in rows])
+    return [row.cells(configuration, seed) for row in rows]

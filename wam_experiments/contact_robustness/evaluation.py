@@ -10,19 +10,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.table import markdown
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
 from wam_description.signals import State
 from wam_experiments.contact_benchmark.scenarios import base_values
 from wam_experiments.contact_robustness import degradations
-from wam_experiments.contact_robustness.bounds import bounds_table
+from wam_experiments.contact_robustness.bounds import BOUNDS, bounds
 from wam_experiments.contact_robustness.recording import Drive, DriveRecording, record
 from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, replay
 from wam_experiments.contact_robustness.requirements import (
     MIX,
     alone_table,
     contacts_needed,
+    missed_table,
     required_rows,
     required_table,
     seconds_needed,
@@ -63,7 +65,7 @@ class RobustnessResult(NamedTuple):
     identified: Groups
     identifications: list[IdentificationResult]
     average: float
-    bounds: str = ""
+    bounds: list[list[str]] = []  # noqa: RUF012 - none is added
 
 
 class DriveTrial(NamedTuple):
@@ -167,10 +169,10 @@ def _average_update(configured: Configuration, samples: Sequence[tuple[int, Stat
     return spent / periods if periods else math.nan
 
 
-def bounds_of(configuration: Configuration, seed: int, identified: Groups) -> str:
-    """The table of bounds with the errors of the torques of identified arms, '' without any."""
+def bounds_of(configuration: Configuration, seed: int, identified: Groups) -> list[list[str]]:
+    """The bounds with the errors of the torques of identified arms, none without any."""
     errors = [score.torque_errors for own in identified.values() for score in own]
-    return bounds_table(configuration, seed, np.sqrt(np.mean(np.square(errors), axis=0))) if errors else ""
+    return bounds(configuration, seed, np.sqrt(np.mean(np.square(errors), axis=0))) if errors else []
 
 
 def report_text(result: RobustnessResult) -> str:
@@ -188,13 +190,14 @@ def report_text(result: RobustnessResult) -> str:
     size = SIZE.format(needed=contacts_needed(), quiet=seconds_needed())
     parts = [
         ("Required", required_table(rows)),
+        ("What is missed, and why", missed_table(rows, result.bounds)),
         ("Each degradation", f"{size}\n\n{alone_table(result.wide)}"),
         ("Detection", table(DETECTION, result.wide)),
         ("Position on the outer link, and the link", table(POSITION, result.wide)),
         ("By kind of contact and by force, all degradations", kinds_table(every)),
         ("Second contact", table(SECOND, seconds)),
         ("After an identification", table(DETECTION, named) + "\n" + table(POSITION, named)),
-        ("What torques leave open", BOUNDS + "\n\n" + result.bounds),
+        ("What torques leave open", OPEN + "\n\n" + markdown(BOUNDS, result.bounds)),
     ]
     text = "\n".join(f"## {head}\n\n{body}" for head, body in parts)
     return "\n".join([text, *(f"\nEnded early: {failure}" for failure in failures)])
@@ -227,7 +230,7 @@ fewer a row can only be marginal. Contacts of one arm share its errors, so these
 false alarm in {quiet:.0f} s or more shows less than 1 a minute (Poisson). Of the rows with a fitting share one of
 twenty is outside its interval by chance: the worst of many rows is no measure of all."""
 
-BOUNDS = """The inference alone, in poses and on contacts drawn as after an identification, with torques that have these
+OPEN = """The inference alone, in poses and on contacts drawn as after an identification, with torques that have these
 errors and no others, and with just their covariance. The rows of the requirement lie between the last two: the last
 takes errors at rest, where stiction hides a force, as frequent as any. Friction of the contact is in all of them:
 four torques do not distinguish it from position and force. The first row is that friction alone: it makes the 95 %

@@ -335,7 +335,7 @@ RULES = f"""## Method
 * {DOUBLED:.0%} of the tasks have a second force elsewhere, commanded at the same time by a task frame of two axes at
   known positions. Such a task has ended as the force with the greater failure.
 * Of the other tasks {STEPPED:.0%} command another force first, for {FIRST_HELD:g} s: {CHANGES[0]:g} to {CHANGES[1]:g}
-  times the force that is evaluated in {DOWN:.0%} of them, else as much less. The largest force allowed is that of the
+  times the force that is assessed in {DOWN:.0%} of them, else as much less. The largest force allowed is that of the
   larger command, and at the end that of the last one. Where the first command was obeyed and the second one is
   declined with a reason, the task is given up if the true force is not above the second. {LONG:.0%} are
   {SMALL_FORCES[0]:g} to {SMALL_FORCES[1]:g} N for {LONGER:g} times as long, {LONGER * SECONDS:g} s, at a pinned
