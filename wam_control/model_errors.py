@@ -3,7 +3,7 @@
 The residual of the momentum observer is r = tau_ext + H x + e: H the torques of the model's errors of size one through
 the observer's filter, x the errors, e the rest, of covariance R.  Without contact r measures x.  External torques are
 r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen and P grows.  In one pose e stays as it
-is, with a dither, too, however many samples there are: they tell more and more of that pose, which x and P then take
+is, with a dither, too, however many samples there are: they show more and more of that pose, which x and P then take
 in, but of others no more than one sample of R. The rest is forgotten where the arm is away from there without contact.
 
 How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, positions are
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 LEARN_EVERY = 0.01  # s
 HINDSIGHT = 0.1  # s; what is learned is so old, so that a contact is noticed before its beginning is learned
 MOVED = 2e-3  # rad, of any joint: another pose
-AWAY = 0.05  # rad, from a pose where the arm has rested: what was learned there is no longer true
+AWAY = 0.005  # rad, from a pose where the arm has rested: what was learned there is no longer true
 CORRELATED = 8.0  # of R: the rest stays for so many samples, of which each is learned from
 GATE = 12.0  # of the detection statistic, above which nothing is learned
 HOLD_OFF, LONGEST_HOLD_OFF = 0.25, 0.5  # of the length of a contact, s: after it nothing is learned
