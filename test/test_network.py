@@ -307,7 +307,8 @@ def test_a_link_that_is_cut_brakes_by_name_and_the_operator_alone_ends_the_fault
     subprocess.run([*here, "ip", "link", "set", "there", "up"], check=True)
     mode, without_current, fault = operator.stdout.readline().strip().split(maxsplit=2)
     assert (mode, without_current) == ("fault", "True"), fault
-    assert fault.startswith("command stale")
+    # the driver misses the command; on a loaded machine the velocity loop may miss its own before the link is cut
+    assert fault.startswith(("command stale", "velocity_loop: transform has stopped"))
     assert "velocity_loop" in fault
     print("go on", file=operator.stdin, flush=True)
     assert operator.stdout.readline() == "fault True False\n", "the arm is enabled again only after reset_fault"
