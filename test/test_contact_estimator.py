@@ -422,7 +422,7 @@ def carrying(mass: float) -> Arm:
 
 
 def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> None:
-    arm, felt = Plant(carrying(0.3), NOTHING, no_effects(ARM), DT / SUBSTEPS), {}
+    arm, found = Plant(carrying(0.3), NOTHING, no_effects(ARM), DT / SUBSTEPS), {}
     for name, payload in (("none", (0.0, 0.0)), ("declared", (0.0, 0.4))):
         observer = dataclasses.replace(SENSORS.observer, payload=payload)
         estimator = ContactEstimator(ARM, TIMING, dataclasses.replace(SENSORS, observer=observer))
@@ -430,11 +430,11 @@ def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> Non
             for _ in range(SUBSTEPS):
                 arm.step(ZERO)
             sense(estimator, arm, ZERO)
-        felt[name] = (estimator.estimate(), estimator.tare(), estimator.estimate())
-    before, reason, _ = felt["none"]
+        found[name] = (estimator.estimate(), estimator.tare(), estimator.estimate())
+    before, reason, _ = found["none"]
     assert before.in_contact
     assert "observer.payload" in reason
-    before, reason, after = felt["declared"]
+    before, reason, after = found["declared"]
     assert not before.in_contact
     assert reason == ""
     assert before.torque_sd[3] > 3.0 * after.torque_sd[3]

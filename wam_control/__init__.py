@@ -14,6 +14,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``force_command``                 - which commands are admitted: limits and age
 ``contact_position``              - where the force acts: estimated or configured contact position
 ``force_measurement``             - the external torques, by the feedback that is chosen; low pass
+``pressed_pose``                  - when the arm has left what it pressed on, for the contact estimator, too
 ``force_axis``                    - how a force along a direction is sensed, how the arm moves along it, how well
 ``force_hold``                    - when the arm holds its position instead, and why
 ``feed_forward``                  - torques of the forces and dry friction, fed forward

@@ -17,6 +17,7 @@ from wam_control.contact_inference import (
 )
 from wam_control.momentum_observer import MomentumObserver
 from wam_control.observer_parameters import ObserverParameters
+from wam_control.pressed_pose import has_left
 from wam_control.second_contact import SecondContact
 from wam_description.arm import Arm, Timing
 from wam_description.model import ArmModel
@@ -97,7 +98,6 @@ NOTHING = (0.0, 0.0, 0.0)
 SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
 SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
 ALONE = 1.3  # times the threshold: detected in one period; below that in two, because noise exceeds it now and then
-LEFT = 0.05  # rad, motion of a joint after which the arm has left what it pressed on
 TOO_EARLY = "too few samples yet"
 
 
@@ -240,7 +240,7 @@ class ContactEstimator:
         q, at = self._observer.q, self._pressed_at
         if is_pressing and (self._in_contact or at):
             self._pressed_at = q
-        elif at and any(abs(a - b) > LEFT for a, b in zip(at, q, strict=True)):
+        elif at and has_left(at, q):
             self._pressed_at = []
         return self._in_contact or bool(self._pressed_at)
 

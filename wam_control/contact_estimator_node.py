@@ -6,7 +6,7 @@ from wam_control.contact_estimator import ContactEstimate, ContactEstimator, Con
 from wam_control.contact_inference import SECOND
 from wam_control.contact_table import hypothesis_table
 from wam_control.task import is_pressing
-from wam_description.arm import Shared
+from wam_description.arm import Shared, seconds
 from wam_description.signals import (
     BASE,
     NO_CONTACT,
@@ -79,7 +79,7 @@ class ContactEstimatorNode:
         if estimate.in_contact is not self._in_contact:
             self._in_contact = estimate.in_contact
             outputs["contact/in_contact"] = estimate.in_contact
-        self._doubted += (estimate.contacts > 1) * self._timing.outer_period_ns / 1e9
+        self._doubted += (estimate.contacts > 1) * seconds(self._timing.outer_period_ns)
         self._doubted *= estimate.in_contact
         warning = SECOND if self._doubted > DOUBTED else estimate.warning
         if warning != self._warned:

@@ -140,7 +140,7 @@ class ForceAxis(NamedTuple):
     speed_fraction : velocity along the direction per commanded one, 0 to 1.
     compliance : of the cables along the direction, m/N.
     precision : (n, n), inverse covariance of the torques apart from the force, 1/(N m)^2.
-    precision_there : (n, n), the same at a position that is known.
+    covariance_there : (n, n), of the torques apart from the force at a position that is known, (N m)^2.
     """
 
     lever: Array
@@ -155,7 +155,7 @@ class ForceAxis(NamedTuple):
     speed_fraction: float
     compliance: float
     precision: Array
-    precision_there: Array
+    covariance_there: Array
 
     def signal(self, force: float, torque_sd: Sequence[float]) -> float:
         """Size of the torques of a force, N, in standard deviations of the estimated torques (n,), N m."""
@@ -173,9 +173,10 @@ class ForceAxis(NamedTuple):
 
     def turned(self, change: Array) -> float:
         """chi^2 of a change of the torques (n,), N m, which the force does not explain, at the same position."""
-        weighted = self.precision_there @ change
+        precision = np.asarray(np.linalg.inv(self.covariance_there), np.float64)
+        weighted = precision @ change
         force = float(self.press @ weighted)
-        return float(change @ weighted) - force * force / float(self.press @ self.precision_there @ self.press)
+        return float(change @ weighted) - force * force / float(self.press @ precision @ self.press)
 
 
 class ForceAxes:
@@ -296,8 +297,7 @@ class ForceAxes:
         spread += tangential.T @ tangential
         for torque in others:
             spread += np.outer(torque, torque)
-        there = np.asarray(np.linalg.inv(spread), np.float64)
-        inverse = np.asarray(np.linalg.inv(spread + position_sd**2 * moved), np.float64) if position_sd else there
+        inverse = np.asarray(np.linalg.inv(spread + position_sd**2 * moved), np.float64)
         weighted = inverse @ press
         precision = float(press @ weighted)
         sense: Array = weighted / precision
@@ -327,7 +327,7 @@ class ForceAxes:
             square / damped,
             yielding,
             inverse,
-            there,
+            spread,
         )
 
 

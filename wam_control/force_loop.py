@@ -27,6 +27,7 @@ from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
 from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits
+from wam_control.pressed_pose import has_left
 from wam_control.stability_guard import GuardAssessment
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_control import AxisRow, TaskControl
@@ -46,7 +47,6 @@ NEAR, MIDDLE = 0.1, 0.5  # of a link that is perhaps touched: where its force is
 FAINT = 0.25  # of a link that may be touched, where its force has to be detected
 VAGUE = 2.0  # times the largest sd of a measured force, up to which it is taken for a force on another link
 ALIKE = 0.05  # of the torques at rest: what a payload may leave of them, as the masses are not known better
-LEFT = 0.05  # rad, motion of a joint after which the arm has left what it touched
 
 
 class ForceOutput(NamedTuple):
@@ -197,7 +197,7 @@ class ForceLoop:
     def _has_left(self) -> bool:
         """Whether the arm has moved away from where it last pressed on something."""
         at = self._pressed_at
-        return at is None or any(abs(a - b) > LEFT for a, b in zip(at, self._joints, strict=True))
+        return at is None or has_left(at, self._joints)
 
     def step(
         self,
