@@ -11,10 +11,10 @@ from wam_control.contact_inference import (
     SECOND,
     ContactInference,
     Hypothesis,
-    InferenceParameters,
     detection_statistic,
     with_second,
 )
+from wam_control.inference_parameters import InferenceParameters
 from wam_control.momentum_observer import MomentumObserver
 from wam_control.observer_parameters import ObserverParameters
 from wam_control.pressed_pose import has_left
