@@ -2,7 +2,6 @@
 
 import math
 import struct
-import sys
 from array import array
 from typing import Any
 
@@ -34,14 +33,7 @@ FRAMES = ("base", "inner_link", "outer_link")
 ALL = "position velocity effort"
 STATE = State([1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0], [-1.0, -2.0, -3.0, -4.0])
 STAMP = 1_234_567_890_123
-
-
-@pytest.fixture(autouse=True)
-def checked_fields(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What ROS_PYTHON_CHECK_FIELDS=1 does: a field of a wrong type fails."""
-    for name, module in list(sys.modules.items()):
-        if ".msg._" in name and hasattr(module, "ros_python_check_fields"):
-            monkeypatch.setattr(module, "ros_python_check_fields", "1")
+pytestmark = pytest.mark.usefixtures("checked_fields")
 
 
 def test_fields_are_checked_in_these_tests() -> None:
