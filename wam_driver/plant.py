@@ -22,6 +22,7 @@ from wam_description.mjcf import mjcf
 from wam_description.signals import Load, ObjectState
 from wam_description.world import World
 from wam_driver.circuits import CableCircuits
+from wam_driver.compiled_steps import compiled_steps
 from wam_driver.dry_friction import DryFriction
 from wam_driver.friction import COULOMB_STICTION, FrictionParameters
 from wam_driver.loads import CoverLoads
@@ -102,6 +103,8 @@ class Plant:
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
         self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
+        is_plain = self._friction.is_steady and not self._movers  # what the steps in C do
+        self._advance = compiled_steps(model, data) if is_plain else None
         self._rest()
         self._kept = self._position.tolist(), self._plastic.tolist()
         if set(effects.pretension_share) != {1.0}:
@@ -213,6 +216,19 @@ class Plant:
         """
         model, data, pushes, circuits = self.model, self.data, self._loads.pushes, self._circuits
         self._write_torque(0, *torque)
+        if self._advance is not None:
+            self._velocity = self._advance(
+                count,
+                self._is_set,
+                *self._friction.bounds,
+                self._friction.direction,
+                circuits,
+                circuits.each if circuits.depends_on_torque else [],
+                self._set_friction,
+                self._loads.apply_pushes if pushes else None,
+                self._surfaces.apply,
+            )
+            return
         for _ in range(count):
             self._set_friction()
             for mover in self._movers:
