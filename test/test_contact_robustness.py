@@ -12,7 +12,15 @@ from wam_description.transmission_map import TransmissionMap
 from wam_experiments.contact_benchmark.scenarios import base_values
 from wam_experiments.contact_benchmark.statistics import Interval, share
 from wam_experiments.contact_robustness.degradations import NAMES, drawn
-from wam_experiments.contact_robustness.evaluation import RobustnessResult, drives, evaluate, page, report_text
+from wam_experiments.contact_robustness.evaluation import (
+    DriveTrial,
+    RobustnessResult,
+    drives,
+    evaluate,
+    evaluate_trial,
+    page,
+    report_text,
+)
 from wam_experiments.contact_robustness.recording import Drive, record
 from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, TouchOutcome
 from wam_experiments.contact_robustness.requirements import (
@@ -24,7 +32,7 @@ from wam_experiments.contact_robustness.requirements import (
     missed_table,
     required_rows,
 )
-from wam_experiments.contact_robustness.rows import kinds_table
+from wam_experiments.contact_robustness.rows import kinds_table, masses_table
 from wam_experiments.contact_robustness.touches import axis_of
 
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
@@ -56,10 +64,10 @@ def test_with_the_contacts_that_the_page_names_a_share_in_the_middle_is_shown_to
 @pytest.mark.slow
 def test_the_worst_degradation_is_the_one_with_the_most_false_alarms_even_if_they_are_allowed() -> None:
     def score(name: str, alarms: int) -> ReplayScore:
-        return ReplayScore(name, [], 100.0, alarms, 0.0, 0.0, [], 0.0, 0, [], [], "")
+        return ReplayScore(name, [], 100.0, alarms, 0.0, 0.0, [], 0.0, 0, [], [], [], "")
 
     wide = {name: [score(name, alarms)] for name, alarms in ((COARSE, 0), (LOADED, 1))}
-    row = required_rows(wide, {}, [], [], 0.0)[0]
+    row = required_rows(wide, {}, {}, [], [], 0.0)[0]
     assert row.of == f"the worst: {LOADED}"
     assert row.found.value == 0.01
 
@@ -75,7 +83,7 @@ def test_a_row_that_is_missed_has_its_reason_and_its_bound() -> None:
     assert shown.count(name) == 1
     assert "| 2 to 20 |" in shown
     assert missed_table([met], bounds) == "Nothing."
-    rows = required_rows({}, {}, [], [], 0.0)
+    rows = required_rows({}, {}, {}, [], [], 0.0)
     assert all(any(row.name.startswith(begin) for row in rows) for begin, *_ in REASONS), "each is of a row that exists"
 
 
@@ -83,7 +91,7 @@ def test_the_sets_are_counted_by_force_too() -> None:
     """Of all forces together the sets of strong ones, a third of which held the truth, were hidden by the others."""
     light = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, "")
     strong = light._replace(force=40.0, in_set=False)
-    score = ReplayScore(STATED, [light, strong, strong], 0.0, 0, 0.0, 0.0, [], 0.0, 0, [], [], "")
+    score = ReplayScore(STATED, [light, strong, strong], 0.0, 0, 0.0, 0.0, [], 0.0, 0, [], [], [], "")
     rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in kinds_table([score]).splitlines()]
     held = {row[0]: row[3] for row in rows}
     assert (held["outer"], held["0 to 7.5 N"], held["30 to 80 N"]) == ("33 (3)", "100 (1)", "0 (2)")
@@ -124,5 +132,20 @@ def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_pa
     assert believing[LOADED][0].alarms > 0
     assert groups[LOADED][0].warnings > 0.5
     assert groups[COARSE][0].warnings == 0.0
-    text = page(report_text(RobustnessResult(groups, groups, {}, {}, [], 70e-6)), "wam evaluate robustness")
+    text = page(report_text(RobustnessResult(groups, groups, {}, {}, {}, [], 70e-6)), "wam evaluate robustness")
     assert all(f"| {name} | " in text for name in (COARSE, LOADED))
+
+
+def test_a_mass_that_is_picked_up_is_in_the_plant_while_it_is_carried_and_its_report_is_counted() -> None:
+    """0.9 kg are 9 N at the tool, which nobody overlooks."""
+    drive = Drive(CONFIGURATION, STATED, 3402, 14.0, "masses")
+    score = evaluate_trial(DriveTrial(drive, ""))
+    assert not score.failure
+    (carried,), (outcome,) = score.masses, score.outcomes
+    assert carried.mass > 0.8
+    assert carried.detected
+    assert outcome.kind == "picking up"
+    rows = masses_table([score]).splitlines()
+    assert "| all | " in rows[-1]
+    assert "(1)" in rows[-1]
+    assert "| picking up |" in kinds_table([score])

@@ -45,9 +45,9 @@ def run(given: argparse.Namespace) -> int:
     with batch_of(given) as batch:
         groups = [evaluate(each, *batch, recordings=given.recordings) for each in chosen]
         identifications = results(run_trial, friction_trials(configuration, given.seed), *batch)
-    wide, second, level, identified = groups
+    wide, second, masses, level, identified = groups
     average, bounds = average_update(configuration, given.seed[0]), bounds_of(configuration, given.seed[0], identified)
-    text = report_text(RobustnessResult(wide, second, level, identified, identifications, average, bounds))
+    text = report_text(RobustnessResult(wide, second, masses, level, identified, identifications, average, bounds))
     print(text)
     if given.write:
         seeds = " ".join(map(str, given.seed))

@@ -29,7 +29,7 @@ from wam_experiments.contact_robustness.requirements import (
     required_table,
     seconds_needed,
 )
-from wam_experiments.contact_robustness.rows import DETECTION, POSITION, SECOND, kinds_table, table
+from wam_experiments.contact_robustness.rows import DETECTION, POSITION, SECOND, kinds_table, masses_table, table
 from wam_experiments.identification import plants
 from wam_experiments.identification.evaluation import IdentificationResult, IdentificationTrial
 from wam_sim import pieces
@@ -37,7 +37,7 @@ from wam_sim.batch import Report, results
 
 Groups = dict[str, list[ReplayScore]]  # scores by degradation
 ARMS = 3  # of each seed, that are identified
-SECOND_SHARE = 0.4  # of the length of a recording, with second contacts
+SECOND_SHARE = 0.4  # of the length of a recording, with second contacts or with masses
 SHORTEST = 10.0  # s, with one contact
 RUNS = 4  # of which the fastest counts
 EXCITATION = 40.0  # s of motion of the plants that are identified for their friction
@@ -46,12 +46,14 @@ EXCITATION = 40.0  # s of motion of the plants that are identified for their fri
 class DrivePlan(NamedTuple):
     """What is recorded.
 
-    A drive for each degradation and seed; the same arms with many second contacts; arms of some degradations with
-    contacts of three forces, whose models are not identified; the same, identified before.
+    A drive for each degradation and seed; the same arms with many second contacts; the same arms picking up masses;
+    arms of some degradations with contacts of three forces, whose models are not identified; the same, identified
+    before.
     """
 
     wide: list[Drive]
     second: list[Drive]
+    masses: list[Drive]
     level: list[Drive]
     identified: list[Drive]
 
@@ -61,6 +63,7 @@ class RobustnessResult(NamedTuple):
 
     wide: Groups
     second: Groups
+    masses: Groups
     level: Groups
     identified: Groups
     identifications: list[IdentificationResult]
@@ -88,13 +91,14 @@ def drives(configuration: Configuration, seeds: Sequence[int], names: Sequence[s
             raise ValueError(f"no degradation is named '{name}'; degradations: {', '.join(degradations.NAMES)}")
     wide = [Drive(configuration, name, seed, seconds) for seed in seeds for name in names]
     second = [drive._replace(contacts="second", seconds=max(SHORTEST, SECOND_SHARE * seconds)) for drive in wide]
+    masses = [drive._replace(contacts="masses") for drive in second]
     level = [
         drive._replace(contacts="level", seed=ARMS * drive.seed + arm)
         for drive in wide
         if drive.degradation in degradations.IDENTIFIED
         for arm in range(ARMS)
     ]
-    return DrivePlan(wide, second, level, [drive._replace(is_identified=True) for drive in level])
+    return DrivePlan(wide, second, masses, level, [drive._replace(is_identified=True) for drive in level])
 
 
 def evaluate_trial(trial: DriveTrial) -> ReplayScore:
@@ -180,7 +184,8 @@ def report_text(result: RobustnessResult) -> str:
     every = [score for own in result.wide.values() for score in own]
     after = result.identified.get(MIX, [])
     failures = sorted({f"{score.degradation}: {score.failure}" for score in every if score.failure})
-    rows = required_rows(result.wide, result.second, after, result.identifications, result.average)
+    masses = [score for own in result.masses.values() for score in own]
+    rows = required_rows(result.wide, result.second, result.masses, after, result.identifications, result.average)
     named = {
         f"{name}, {how}": own
         for name in result.level
@@ -194,7 +199,8 @@ def report_text(result: RobustnessResult) -> str:
         ("Each degradation", f"{size}\n\n{alone_table(result.wide)}"),
         ("Detection", table(DETECTION, result.wide)),
         ("Position on the outer link, and the link", table(POSITION, result.wide)),
-        ("By kind of contact and by force, all degradations", kinds_table(every)),
+        ("By kind of contact and by force, all degradations", kinds_table([*every, *masses])),
+        ("Picking up", masses_table(masses)),
         ("Second contact", table(SECOND, seconds)),
         ("After an identification", table(DETECTION, named) + "\n" + table(POSITION, named)),
         ("What torques leave open", OPEN + "\n\n" + markdown(BOUNDS, result.bounds)),
@@ -250,6 +256,10 @@ METHOD = """## Method
 * Second contact: other recordings of the same arms, two of five contacts with a second one 0.5 s later, on the same
   link or on the other, of 4 to 60 N; the others are single for 1 s, constant, sliding at 0.2 m/s, or growing to 1.5 to
   3 times their force within 50 to 400 ms. False: reported while there is one, from 0.1 s after its start.
+* Picking up: other recordings of the same arms, whose tool carries a mass for 3 of every 6 s of its motion, a point of
+  0.1 to 1 kg in the plant's inertia. While it is carried: whether a payload is reported, as hypothesis or warning;
+  whether a link that the tool is not on ever has a probability above 0.95; what is reported at the end. By kind above:
+  0.2 s after the start, as for contacts; the payload and the tool's link are right.
 * After an identification: three more arms of each seed, with contacts of 5, 10 and 20 N on both links. Their models
   come from `wam identify` on 20 s of exciting motion; torque constant, delay and noise of the mix are not in that
   motion.

@@ -11,6 +11,7 @@ from wam_control.contact_estimator import ContactEstimate, ContactEstimator, Con
 from wam_description.arm import seconds
 from wam_description.configuration import Configuration
 from wam_description.signals import State
+from wam_description.units import STANDARD_GRAVITY
 from wam_experiments.contact_benchmark.contacts import EDGE, MOVING
 from wam_experiments.contact_benchmark.scenarios import base_values
 from wam_experiments.contact_robustness.recording import DriveRecording
@@ -22,6 +23,9 @@ HIT = 0.1  # s after the start of a contact in which a change is its own
 START_AFTER = 0.1  # s, of an estimator that starts in contact
 START_WITHIN = 0.3  # s
 SLIDING = 0.3  # rad/s, slowest motor
+PAYLOAD = "payload"  # how hypotheses, reasons and warnings name a mass at the tool
+SURE = 0.95  # probability of a link
+SETTING_DOWN = 0.5  # s after a mass is set down, in which the model is still that with it
 
 
 class TouchOutcome(NamedTuple):
@@ -29,7 +33,7 @@ class TouchOutcome(NamedTuple):
 
     Attributes
     ----------
-    kind, cover, place, force, friction : true, of the contact; m, N.
+    kind, cover, place, force, friction : true, of the contact; m, N; the weight of a mass.
     moving : whether the arm moved at the start and when the estimate is evaluated.
     latency : s to the detection, inf without, NaN if there was one already.
     detected, probability, right_link : when evaluated, 0.2 s after the start.
@@ -62,6 +66,25 @@ class SecondOutcome(NamedTuple):
     latency: float
 
 
+class MassOutcome(NamedTuple):
+    """What was reported of a mass while the tool carried it.
+
+    Attributes
+    ----------
+    mass : kg.
+    detected : whether there was any report, of a contact or of a payload.
+    named : whether it was reported as a payload: the most probable hypothesis, its reason, or the warning.
+    wrong : whether a link was ever reported with more than `SURE` that the tool is not on.
+    lasting : whether it is reported as a contact of a link at the end.
+    """
+
+    mass: float
+    detected: bool
+    named: bool
+    wrong: bool
+    lasting: bool
+
+
 class ReplayScore(NamedTuple):
     """One recording, scored.
 
@@ -75,6 +98,7 @@ class ReplayScore(NamedTuple):
     torque_errors : (2, n), rms errors of the external torques in free motion, N m: with all motors sliding, and of all.
     steady_seconds, changes : time with one contact; second contacts that are reported in it.
     second : of each second contact.
+    masses : of each mass that was picked up.
     started : whether a contact in which the estimator starts is detected: (warm, cold) of each.
     failure : of the recording.
     """
@@ -89,6 +113,7 @@ class ReplayScore(NamedTuple):
     steady_seconds: float
     changes: int
     second: list[SecondOutcome]
+    masses: list[MassOutcome]
     started: list[tuple[bool, bool]]
     failure: str
 
@@ -172,7 +197,7 @@ def _scored(
     touches = [touch for touch in recording.touches if touch.end < ended]
     busy = np.zeros(len(rows), bool)
     for touch in touches:
-        busy |= _during(rows, touch.begin, touch.end + EDGE)
+        busy |= _during(rows, touch.begin, touch.end + (SETTING_DOWN if touch.mass else EDGE))
     moving = np.array([recording.speed[row.sample] > MOVING for row in rows])
     alarm = np.array([row.estimate.in_contact for row in rows])
     # a detection that continues from a true contact ends late, and is no new alarm
@@ -206,8 +231,31 @@ def _scored(
         steady_seconds=steady,
         changes=changes,
         second=second,
+        masses=[_mass_outcome(touch, rows) for touch in touches if touch.mass],
         started=started,
         failure=recording.failure,
+    )
+
+
+def names_payload(estimate: ContactEstimate) -> bool:
+    """Whether a mass at the tool is reported: as the most probable hypothesis, in its reason, or as a warning."""
+    best = estimate.hypotheses[:1]
+    return any(PAYLOAD in text for text in (estimate.warning, *(h.cover for h in best), *(h.reason for h in best)))
+
+
+def _mass_outcome(touch: Touch, rows: Sequence[_Row]) -> MassOutcome:
+    during = [row.estimate for row, take in zip(rows, _during(rows, touch.begin, touch.end), strict=True) if take]
+    linked = [one.in_contact and one.link != PAYLOAD for one in during]
+    named = [names_payload(one) for one in during]
+    return MassOutcome(
+        mass=touch.mass,
+        detected=any(linked) or any(named),
+        named=any(named),
+        wrong=any(
+            has_link and one.probability > SURE and one.link != touch.cover
+            for one, has_link in zip(during, linked, strict=True)
+        ),
+        lasting=linked[-1] and not named[-1],
     )
 
 
@@ -222,8 +270,10 @@ def _outcome(touch: Touch, rows: Sequence[_Row], moving: np.ndarray, lengths: di
     late = next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + LATE, touch.end)), len(rows) - 1)
     now = rows[due].estimate
     best = now.hypotheses[0] if now.hypotheses else None
-    right = best is not None and best.cover == touch.cover
+    links = (touch.cover, PAYLOAD) if touch.mass else (touch.cover,)
+    right = best is not None and best.cover in links
     own = [h for h in now.hypotheses if h.cover == touch.cover]
+    is_likely = any(h.cover == PAYLOAD and h.probability > 0.1 for h in now.hypotheses)  # in every 90 % set
     true = touch.place_at(rows[due].time)
     sizes = [h.high - h.low for h in now.hypotheses if not math.isnan(h.low)]
     already = first > 0 and rows[first - 1].estimate.in_contact
@@ -232,7 +282,7 @@ def _outcome(touch: Touch, rows: Sequence[_Row], moving: np.ndarray, lengths: di
         kind=touch.kind,
         cover=touch.cover,
         place=true,
-        force=float(np.linalg.norm(touch.force)),
+        force=float(np.linalg.norm(touch.force)) + STANDARD_GRAVITY * touch.mass,
         friction=touch.friction,
         moving=bool(moving[first] and moving[due]),
         latency=math.nan if already else times[0] if times else math.inf,
@@ -241,7 +291,8 @@ def _outcome(touch: Touch, rows: Sequence[_Row], moving: np.ndarray, lengths: di
         right_link=right,
         error=_error(now, touch.cover, true),
         position_sd=now.position_sd if right else math.nan,
-        in_set=any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
+        in_set=(bool(touch.mass) and is_likely)
+        or any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
         set_length=sum(sizes),
         reason=now.reason,
     )

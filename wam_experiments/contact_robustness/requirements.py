@@ -10,8 +10,8 @@ from wam_analysis.table import markdown
 from wam_experiments.contact_benchmark.page import MET, bound_text, mark, number
 from wam_experiments.contact_benchmark.score import ANY, Bound
 from wam_experiments.contact_benchmark.statistics import NONE, Interval, counted, events, quantile, rms, share
-from wam_experiments.contact_robustness.replay import SECOND_WITHIN, ReplayScore, TouchOutcome
-from wam_experiments.contact_robustness.rows import SMALL_SD, SURE, Scores, near, outcomes
+from wam_experiments.contact_robustness.replay import SECOND_WITHIN, SURE, ReplayScore, TouchOutcome
+from wam_experiments.contact_robustness.rows import SMALL_SD, Scores, near, outcomes
 from wam_experiments.identification.evaluation import IdentificationResult
 
 STATED, MIX = "as stated", "realistic mix"
@@ -88,6 +88,7 @@ def seconds_needed() -> float:
 def required_rows(
     wide: Mapping[str, Scores],
     second: Mapping[str, Scores],
+    masses: Mapping[str, Scores],
     identified: Scores,
     identifications: Sequence[IdentificationResult],
     average: float,
@@ -96,7 +97,8 @@ def required_rows(
 
     Parameters
     ----------
-    wide, second : scores by degradation, of the contacts of every kind and of those for second contacts.
+    wide, second, masses : scores by degradation, of the contacts of every kind, of those for second contacts, of
+        masses that are picked up.
     identified : scores of the realistic mix after an identification.
     identifications : of plants with every error of friction.
     average : s, of a whole update over the periods.
@@ -106,6 +108,7 @@ def required_rows(
     alone = {name: own for name, own in wide.items() if name not in (STATED, MIX)}
     realistic = f"{MIX}, identified"
     outer, moving = outcomes(identified, "outer"), outcomes(both)
+    masses_moving = outcomes([score for own in masses.values() for score in own])
     return [
         _worst("false alarms per minute, any degradation alone", "1/min", 60.0, "up to 687", _to(1 / 60),
                _to(0.1 / 60), alone, false_alarms),
@@ -122,8 +125,9 @@ def required_rows(
         _percent("90 % set at 20 N, mu 0.8", "78", 0.85, 0.88,
                  [one.in_set for one in moving
                   if one.detected and one.friction == ROUGH and abs(one.force - STRONG) <= WITHIN], "all"),
-        RequiredRow("wrong link where p > 0.95, tip and elbow included", "%", 100.0, "26 of 26", _to(0.01), _to(0.003),
-                    _share([not one.right_link for one in moving if one.detected and one.probability > SURE]), "all"),
+        RequiredRow("wrong link where p > 0.95, tip, elbow, masses included", "%", 100.0, "26 of 26", _to(0.01),
+                    _to(0.003), _share([not one.right_link for one in [*moving, *masses_moving]
+                                        if one.detected and one.probability > SURE]), "all"),
         _percent("inner link, 10 N moving, detected in 200 ms", "89", 0.95, 0.99,
                  _within(near(outcomes(both, "inner"), 10.0), 0.2, True), "all"),
         _percent("second contact detected within 250 ms", "12 to 38", 0.5, 0.8,

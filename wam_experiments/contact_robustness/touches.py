@@ -1,4 +1,4 @@
-"""Contacts drawn wider than the estimator's prior: strong, rough, on the ends, sliding, two at once, impacts."""
+"""Contacts drawn wider than the estimator's prior: strong, rough, at ends, sliding, two at once, impacts; masses."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -43,13 +43,17 @@ SECOND_KINDS = {
 }
 # how often in the recordings of an arm that was identified, whose forces are all of `LEVELS`
 LEVEL_KINDS = {"outer": 0.75, "inner": 0.25}
+PICKING_UP = "picking up"
+MASS_KINDS = {PICKING_UP: 1.0}  # in the recordings in which the tool picks up a mass, carries it and sets it down
+LIGHTEST, HEAVIEST = 0.1, 1.0  # kg, uniform in the logarithm
+HOLD_OF_MASS = 3.0  # s
 HOLD, HOLD_OF_FIRST, IMPACT = 0.5, 1.0, 0.03  # s
 HARDER, HARDER_AFTER, HARDER_WITHIN = (1.5, 3.0), 0.4, (0.05, 0.4)  # times the force, s after the start, s
 SECOND_AFTER, SECOND_HOLD = 0.5, 0.4  # s, of the second contact after the first
 
 
 class Touch(NamedTuple):
-    """One contact, an exact force.
+    """One contact, an exact force; or a mass at the tool, which is in the plant while it is carried.
 
     Attributes
     ----------
@@ -63,6 +67,7 @@ class Touch(NamedTuple):
     begin, end : s.
     friction : coefficient; tangential over normal force.
     harder, within : factor by which the force grows, `HARDER_AFTER` the start, and s that this takes.
+    mass : kg, picked up by the tool; its force is 0.
     """
 
     kind: str
@@ -77,6 +82,7 @@ class Touch(NamedTuple):
     friction: float
     harder: float = 1.0
     within: float = 0.1
+    mass: float = 0.0
 
     def share(self, time: float) -> float:
         """Fraction of the force that acts at a time, s."""
@@ -127,6 +133,10 @@ def _neighbours(arm: Arm, random: np.random.Generator) -> tuple[str, str]:
 def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_levels: float) -> list[Touch]:
     inner, outer = _neighbours(arm, random)
     size = _size(random, of_levels)
+    if kind == PICKING_UP:
+        mass = float(np.exp(random.uniform(math.log(LIGHTEST), math.log(HEAVIEST))))
+        none, end = (0.0, 0.0, 0.0), begin + HOLD_OF_MASS
+        return [Touch(kind, outer, _length(arm, outer), none, none, 0.0, 0.0, begin, end, 0.0, mass=mass)]
     if kind.startswith("second"):
         first_cover = str(random.choice((inner, outer)))
         same = kind.endswith("same link")
