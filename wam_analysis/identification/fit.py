@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import Unknowns, unknowns
+from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, unknowns
 from wam_analysis.identification.regressor import Equations, Regressor
 from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_velocities
 from wam_description.arm import Shared
@@ -60,6 +60,17 @@ class Identification(NamedTuple):
     condition: float
     rank: int
     both_directions: Array
+
+    @property
+    def offset_if_alike(self) -> tuple[Array, Array]:
+        """Torque offset of each motor if its friction were alike in both directions, and its standard error.
+
+        (n,) each, N m, true less reported torque.  No recording shows which of both a difference of the directions is.
+        """
+        positive, negative = (self.unknowns.places(f"motors.coulomb_{way}") for way in DIRECTIONS)
+        variance = self.covariance.diagonal()
+        both = variance[positive] + variance[negative] - 2.0 * self.covariance[positive, negative]
+        return 0.5 * (self.values[negative] - self.values[positive]), 0.5 * np.sqrt(np.maximum(both, 0.0))
 
     @property
     def is_identified(self) -> NDArray[np.bool_]:

@@ -21,12 +21,13 @@ LOAD = 0.06
 MASS = 0.03
 COUNTS = 16384  # of the encoder per turn
 CURRENT_NOISE = 0.02  # A
+OFFSET = 0.004  # N m, largest of a motor's torque
 
 
 class TrueFriction(NamedTuple):
     """Friction of the motors, with that of joints with a motor of their own, (n,) each; by direction (2, n)."""
 
-    coulomb: Array  # without link load, N m
+    coulomb: Array  # without link load; less the torque offset of the motor in positive motion, N m
     at_joint: Array  # friction of the joints among it, which the cables transmit, N m
     drop: Array  # F_s - F_c, N m
     load: Array
@@ -74,11 +75,12 @@ def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
     if kind == "all, real sensors":
         values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / COUNTS] * n
         values["driver:amplifier.current_noise"] = [CURRENT_NOISE] * n
+        values["driver:amplifier.torque_offset"] = random.uniform(-OFFSET, OFFSET, n).tolist()
     return configuration.with_values(values)
 
 
 def true_friction(configuration: Configuration) -> TrueFriction:
-    """What the motors of a plant resist with."""
+    """What the motors of a plant resist with, as far as their reported torques show it."""
     driver = configuration.node("driver", DriverParameters)
     shared, law = configuration.shared, driver.friction
     arm = true_arm(shared.arm, driver.mismatch)
@@ -87,7 +89,7 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(n)]
     lean, joint_lean = _each(law.motor_asymmetry, n), _each(law.joint_asymmetry, n)
     load, joint_load = _each(law.motor_load_factor, n), _each(law.joint_load_factor, n)
-    motors = driver.effects.dry(arm)
+    motors, offset = driver.effects.dry(arm), np.array(driver.amplifier.torque_offset)
     coulomb, joint_coulomb = np.array(motors.dynamic_friction), np.array(arm.joints.dynamic_friction)
     drop = np.subtract(motors.static_friction, coulomb) * (law.law == "stribeck")
     # alike in both directions; ripples average out in motion
@@ -100,7 +102,11 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     factor += signs * (np.sign(own.T * matrix.T) @ (joint_lean * joint_load))
     return TrueFriction(
         # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
-        coulomb * (1.0 + signs * lean) + by_tension + own.T @ joint_coulomb + signs * constant + factor * at_joint,
+        coulomb * (1.0 + signs * lean)
+        + by_tension
+        + own.T @ joint_coulomb
+        + signs * (constant - offset)
+        + factor * at_joint,
         at_joint,
         drop * (1.0 + signs * lean),
         factor,
