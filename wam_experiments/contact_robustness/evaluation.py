@@ -12,19 +12,21 @@ import numpy as np
 
 from wam_analysis.table import markdown
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
-from wam_description.arm import seconds
+from wam_description.arm import Arm, seconds
 from wam_description.configuration import Configuration
 from wam_description.signals import State
 from wam_experiments.contact_benchmark.scenarios import base_values
+from wam_experiments.contact_benchmark.score import ScenarioScore
 from wam_experiments.contact_robustness import degradations
 from wam_experiments.contact_robustness.bounds import BOUNDS, bounds
+from wam_experiments.contact_robustness.comparison import EXTENT, comparison_table
+from wam_experiments.contact_robustness.reasons import Evidence, missed_table
 from wam_experiments.contact_robustness.recording import Drive, DriveRecording, record
 from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, replay
 from wam_experiments.contact_robustness.requirements import (
     MIX,
     alone_table,
     contacts_needed,
-    missed_table,
     required_rows,
     required_table,
     seconds_needed,
@@ -59,7 +61,17 @@ class DrivePlan(NamedTuple):
 
 
 class RobustnessResult(NamedTuple):
-    """The scores of a plan, of identifications, the time of an update, average over the periods, s, and the bounds."""
+    """What was measured.
+
+    Attributes
+    ----------
+    wide, second, masses, level, identified : scores of a plan.
+    identifications : of plants with every error of friction.
+    average : time of an update, average over the periods, s.
+    bounds : rows of `bounds.bounds`.
+    reference : time of the reference workload on this computer, s.
+    first : scores of the first benchmark on the same seeds, none if it was not run.
+    """
 
     wide: Groups
     second: Groups
@@ -68,7 +80,9 @@ class RobustnessResult(NamedTuple):
     identified: Groups
     identifications: list[IdentificationResult]
     average: float
-    bounds: list[list[str]] = []  # noqa: RUF012 - none is added
+    bounds: Sequence[Sequence[str]] = ()
+    reference: float = math.nan
+    first: Sequence[ScenarioScore] = ()
 
 
 class DriveTrial(NamedTuple):
@@ -179,13 +193,16 @@ def bounds_of(configuration: Configuration, seed: int, identified: Groups) -> li
     return bounds(configuration, seed, np.sqrt(np.mean(np.square(errors), axis=0))) if errors else []
 
 
-def report_text(result: RobustnessResult) -> str:
+def report_text(result: RobustnessResult, arm: Arm) -> str:
     """The tables as text."""
     every = [score for own in result.wide.values() for score in own]
     after = result.identified.get(MIX, [])
     failures = sorted({f"{score.degradation}: {score.failure}" for score in every if score.failure})
     masses = [score for own in result.masses.values() for score in own]
     rows = required_rows(result.wide, result.second, result.masses, after, result.identifications, result.average)
+    evidence = Evidence(
+        result.wide, result.second, result.masses, after, result.identifications, result.bounds, result.reference
+    )
     named = {
         f"{name}, {how}": own
         for name in result.level
@@ -195,7 +212,12 @@ def report_text(result: RobustnessResult) -> str:
     size = SIZE.format(needed=contacts_needed(), quiet=seconds_needed())
     parts = [
         ("Required", required_table(rows)),
-        ("What is missed, and why", missed_table(rows, result.bounds)),
+        ("What is missed, and why", missed_table(rows, evidence)),
+        *(
+            [("Next to the first benchmark", FIRST + "\n\n" + comparison_table(result.first, arm, rows))]
+            if result.first
+            else []
+        ),
         ("Each degradation", f"{size}\n\n{alone_table(result.wide)}"),
         ("Detection", table(DETECTION, result.wide)),
         ("Position on the outer link, and the link", table(POSITION, result.wide)),
@@ -235,6 +257,10 @@ SIZE = """With {needed} contacts or more the 95 % interval (Wilson) of a share o
 fewer a row can only be marginal. Contacts of one arm share its errors, so these intervals are rather too narrow. No
 false alarm in {quiet:.0f} s or more shows less than 1 a minute (Poisson). Of the rows with a fitting share one of
 twenty is outside its interval by chance: the worst of many rows is no measure of all."""
+
+FIRST = f"""The benchmark of [contact.md](contact.md) on the seeds of this page, {EXTENT.contacts} contacts in motion,
+{EXTENT.resting} at rest and {EXTENT.free:g} s of free motion of each: there the arm is as the estimator states
+it, and the contacts are those of its prior. Quantities that both have; arms and contacts are others."""
 
 OPEN = """The inference alone, in poses and on contacts drawn as after an identification, with torques that have these
 errors and no others, and with just their covariance. The rows of the requirement lie between the last two: the last

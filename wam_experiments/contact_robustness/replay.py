@@ -3,6 +3,7 @@
 import copy
 import math
 from collections.abc import Iterator, Sequence
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,7 @@ class TouchOutcome(NamedTuple):
     ----------
     kind, cover, place, force, friction : true, of the contact; m, N; the weight of a mass.
     moving : whether the arm moved at the start and when the estimate is evaluated.
+    slowest : rad/s, of the slowest motor at the start.
     latency : s to the detection, inf without, NaN if there was one already.
     detected, probability, right_link : when evaluated, 0.2 s after the start.
     error, position_sd : m; inf on the wrong link or without an estimate; NaN sd without a position.
@@ -48,6 +50,7 @@ class TouchOutcome(NamedTuple):
     force: float
     friction: float
     moving: bool
+    slowest: float
     latency: float
     detected: bool
     probability: float
@@ -85,6 +88,21 @@ class MassOutcome(NamedTuple):
     lasting: bool
 
 
+class FalseAlarm(NamedTuple):
+    """A detection that starts without contact.
+
+    Attributes
+    ----------
+    after : s since the last contact, inf before the first one.
+    slowest : rad/s, of the slowest motor.
+    excess : greatest statistic per threshold.
+    """
+
+    after: float
+    slowest: float
+    excess: float
+
+
 class ReplayScore(NamedTuple):
     """One recording, scored.
 
@@ -92,7 +110,7 @@ class ReplayScore(NamedTuple):
     ----------
     degradation : its name.
     outcomes : of the contacts.
-    free_seconds, alarms : time without contact; detections that start in it.
+    free_seconds, alarms : time without contact; each detection that starts in it.
     warnings : share of that time with a warning that the model is off.
     torque_z : rms of error over stated sd of the external torques in free motion.
     torque_errors : (2, n), rms errors of the external torques in free motion, N m: with all motors sliding, and of all.
@@ -106,7 +124,7 @@ class ReplayScore(NamedTuple):
     degradation: str
     outcomes: list[TouchOutcome]
     free_seconds: float
-    alarms: int
+    alarms: list[FalseAlarm]
     warnings: float
     torque_z: float
     torque_errors: list[list[float]]
@@ -177,7 +195,7 @@ def replay(configuration: Configuration, name: str, recording: DriveRecording, s
                     started[number] = before[0] or now[0], before[1] or now[1]
         if i % outer == 0:
             rows.append(_Row(time, i, estimator.estimate()))
-    return _scored(name, recording, rows, list(started.values()), dict(_lengths(configured)))
+    return _scored(name, recording, rows, list(started.values()), dict(_lengths(configured)), own.detect)
 
 
 def _lengths(configuration: Configuration) -> Iterator[tuple[str, float]]:
@@ -191,6 +209,7 @@ def _scored(
     rows: Sequence[_Row],
     started: list[tuple[bool, bool]],
     lengths: dict[str, float],
+    threshold: float,
 ) -> ReplayScore:
     step = rows[1].time - rows[0].time
     ended = rows[-1].time
@@ -201,11 +220,12 @@ def _scored(
     moving = np.array([recording.speed[row.sample] > MOVING for row in rows])
     alarm = np.array([row.estimate.in_contact for row in rows])
     # a detection that continues from a true contact ends late, and is no new alarm
-    alarms = int((alarm[1:] & ~alarm[:-1] & ~busy[1:]).sum())
+    alarms = np.flatnonzero(alarm[1:] & ~alarm[:-1] & ~busy[1:]) + 1
     free = ~busy & moving & (np.array([row.time for row in rows]) > 1.0)
     found = np.array([row.estimate.external_torques for row in rows])
     z = (found / np.array([row.estimate.torque_sd for row in rows]))[free]
-    sliding = free & (np.abs(recording.thetad[[row.sample for row in rows]]).min(axis=1) > SLIDING)
+    slowest = np.abs(recording.thetad[[row.sample for row in rows]]).min(axis=1)
+    sliding = free & (slowest > SLIDING)
     warned = [bool(getattr(row.estimate, "warning", "")) for row, take in zip(rows, ~busy, strict=True) if take]
     reported = np.array([row.estimate.contacts > 1 for row in rows])
     reported[1:] &= ~reported[:-1]
@@ -222,9 +242,9 @@ def _scored(
         changes += int(reported[during].sum())
     return ReplayScore(
         degradation=name,
-        outcomes=[_outcome(touch, rows, moving, lengths) for touch in touches if touch.kind != "second"],
+        outcomes=[_outcome(touch, rows, moving, slowest, lengths) for touch in touches if touch.kind != "second"],
         free_seconds=step * int((~busy).sum()),
-        alarms=alarms,
+        alarms=[_alarm(rows, i, touches, float(slowest[i]), threshold) for i in alarms.tolist()],
         warnings=sum(warned) / max(1, len(warned)),
         torque_z=float(np.sqrt(np.mean(np.square(z)))) if len(z) else math.nan,
         torque_errors=[np.sqrt(np.mean(np.square(found[which]), axis=0)).tolist() for which in (sliding, free)],
@@ -235,6 +255,12 @@ def _scored(
         started=started,
         failure=recording.failure,
     )
+
+
+def _alarm(rows: Sequence[_Row], i: int, touches: Sequence[Touch], slowest: float, threshold: float) -> FalseAlarm:
+    during = takewhile(lambda row: row.estimate.in_contact, rows[i:])
+    ended = max((touch.end for touch in touches if touch.end <= rows[i].time), default=-math.inf)
+    return FalseAlarm(rows[i].time - ended, slowest, max(row.estimate.statistic for row in during) / threshold)
 
 
 def names_payload(estimate: ContactEstimate) -> bool:
@@ -264,7 +290,9 @@ def _during(rows: Sequence[_Row], begin: float, end: float) -> np.ndarray:
     return (time >= begin) & (time <= end)
 
 
-def _outcome(touch: Touch, rows: Sequence[_Row], moving: np.ndarray, lengths: dict[str, float]) -> TouchOutcome:
+def _outcome(
+    touch: Touch, rows: Sequence[_Row], moving: np.ndarray, slowest: np.ndarray, lengths: dict[str, float]
+) -> TouchOutcome:
     first = next(i for i, row in enumerate(rows) if row.time >= touch.begin)
     due = next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + SETTLED, touch.end)), len(rows) - 1)
     late = next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + LATE, touch.end)), len(rows) - 1)
@@ -285,6 +313,7 @@ def _outcome(touch: Touch, rows: Sequence[_Row], moving: np.ndarray, lengths: di
         force=float(np.linalg.norm(touch.force)) + STANDARD_GRAVITY * touch.mass,
         friction=touch.friction,
         moving=bool(moving[first] and moving[due]),
+        slowest=float(slowest[first]),
         latency=math.nan if already else times[0] if times else math.inf,
         detected=now.in_contact,
         probability=now.probability,

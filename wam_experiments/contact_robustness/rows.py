@@ -37,7 +37,7 @@ def percent(hits: int, count: int) -> str:
 def alarms(scores: Scores) -> str:
     """False alarms per minute without contact."""
     seconds = sum(score.free_seconds for score in scores)
-    return f"{60.0 * sum(score.alarms for score in scores) / seconds:.1f}" if seconds else "none"
+    return f"{60.0 * sum(len(score.alarms) for score in scores) / seconds:.1f}" if seconds else "none"
 
 
 def near(found: Sequence[TouchOutcome], force: float) -> list[TouchOutcome]:
