@@ -13,12 +13,13 @@ from wam_driver.driver import DriverParameters
 
 Array = NDArray[np.float64]
 
-KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, real sensors")
+KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, presliding", "all, real sensors")
 FACTOR = (0.8, 1.3)  # of the friction of each motor and joint
 STRIBECK = (0.5, 3.0)  # rad/s, v_s of the motors
 ASYMMETRY = 0.15
 LOAD = 0.06
 MASS = 0.03
+PRESLIDING = (4.0, 500.0)  # N m/rad, of motors and joints: a shape that the regression does not have
 COUNTS = 16384  # of the encoder per turn
 CURRENT_NOISE = 0.02  # A
 OFFSET = 0.004  # N m, largest of a motor's torque
@@ -72,6 +73,9 @@ def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
         values["driver:friction.joint_load_factor"] = random.uniform(0.0, LOAD, n).tolist()
     if every:
         values["driver:mismatch.mass"] = random.uniform(1.0 - MASS, 1.0 + MASS, n).tolist()
+    if kind == "all, presliding":
+        stiffness = zip(("motor", "joint"), PRESLIDING, strict=True)
+        values |= {f"driver:friction.{shaft}_presliding_stiffness": [each] for shaft, each in stiffness}
     if kind == "all, real sensors":
         values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / COUNTS] * n
         values["driver:amplifier.current_noise"] = [CURRENT_NOISE] * n
