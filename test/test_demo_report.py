@@ -580,12 +580,13 @@ def test_what_the_estimated_position_gains_is_the_force_of_the_same_torques_at_e
     topics = bag.topics | {"/wam/external_joint_torques": every, "/wam/force_axis": axis}
     summary = summarize(bag._replace(topics=topics, attachments=sample.attachments))
     found = summary.presses[0].positions
-    assert [one.position for one in found] == pytest.approx([0.28, 0.27, 0.25])
+    assert [one.position for one in found.forces] == pytest.approx([0.28, 0.27, 0.25])
     assert found.true.force == pytest.approx(8.4, rel=1e-6)
     assert found.configured.force < found.estimated.force < found.true.force - 0.1
     lines = text(summary).splitlines()
     table = next(i for i, line in enumerate(lines) if line.startswith("What the estimated contact position gains"))
     (row,) = [line for line in lines[table : table + 8] if line.strip().startswith("press 8 N")]
     assert "25.0  8.40" in row
+    assert "  used by the force loop [cm]: 28.0 +- 5.0, 28.0 +- 5.0" in lines
     assert all(len(line) <= 100 for line in lines)
     assert not any("position gains" in line for line in text(Recording().summary()).splitlines()), "nothing is invented"

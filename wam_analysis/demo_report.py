@@ -182,26 +182,25 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
 
 def _positions(presses: Sequence[SteadyPress]) -> list[str]:
     """What the estimated contact position is worth: the force that the same torques are at each position."""
-    rows = []
+    rows: list[list[str]] = []
+    used: list[str] = []
     for press in presses:
-        cells = []
-        for one in press.positions:
-            error = 100.0 * (one.force - press.true) / press.true
+        cells: list[str] = []
+        for one in press.positions.forces:
+            off = 100.0 * (one.force - press.true) / press.true
             cells += [_number(100.0 * one.position, 1), _number(one.force, 2)]
-            cells.append("-" if math.isnan(error) else f"{error:+.1f} %")
-        if any(not math.isnan(one.force) for one in press.positions):
+            cells.append("-" if math.isnan(off) else f"{off:+.1f} %")
+        if any(not math.isnan(one.force) for one in press.positions.forces):
+            used.append(f"{100.0 * press.positions.used:.1f} +- {100.0 * press.positions.used_sd:.1f}")
             rows.append([press.step, _number(press.true, 2), *cells])
     if not rows:
         return []
     first = ["", "", "configured", "[cm]", "", "estimated", "[cm]", "", "true", "[cm]", ""]
     head = ["step", "true", "at", "[N]", "error", "at", "[N]", "error", "at", "[N]", "error"]
     title = "What the estimated contact position gains: the same torques, measured as a force there"
-    return [
-        "",
-        title,
-        *_table(rows, first, head),
-        "  error: to the true force; at the true position, the error of the torques alone",
-    ]
+    error = "  error: to the true force; at the true position, the error of the torques alone"
+    places = _wrapped(f"  used by the force loop [cm]: {', '.join(used)}", "    ")
+    return ["", title, *_table(rows, first, head), error, *places]
 
 
 def _reactions(summary: DemoSummary) -> list[str]:

@@ -24,11 +24,21 @@ class PositionedForce(NamedTuple):
 
 
 class PressPositions(NamedTuple):
-    """What is measured at the configured position, at the estimated one, at the true one; NaN where it is unknown."""
+    """What is measured at the configured position, at the estimated one, at the true one; NaN where it is unknown.
+
+    `used` and `used_sd` are the position that the force loop measured with, and its standard deviation, m.
+    """
 
     configured: PositionedForce = PositionedForce()
     estimated: PositionedForce = PositionedForce()
     true: PositionedForce = PositionedForce()
+    used: float = NAN
+    used_sd: float = NAN
+
+    @property
+    def forces(self) -> tuple[PositionedForce, ...]:
+        """Those at the three positions."""
+        return self.configured, self.estimated, self.true
 
 
 NOWHERE = PressPositions()
@@ -85,7 +95,9 @@ def press_positions(run: RecordedRun, traces: Traces, steady: Mask, measured: fl
     configured = own.contact_position if own.contact_cover == cover else NAN
     true, estimated = traces.true, traces.estimated
     places = (configured, of(estimated.position, estimated.frame), of(true.position, true.frame))
-    return PressPositions(*map(at, places))
+    used, used_sd = present.mean(0).tolist()
+    configured_force, estimated_force, true_force = map(at, places)
+    return PressPositions(configured_force, estimated_force, true_force, used, used_sd)
 
 
 def _used(run: RecordedRun) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
