@@ -8,6 +8,7 @@ import pytest
 from arms import CONFIGURATION, WAM
 
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
+from wam_control.contact_inference import Hypothesis
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_experiments.contact_benchmark.evaluation import evaluate_scenario
@@ -26,7 +27,15 @@ from wam_experiments.contact_robustness.evaluation import (
 )
 from wam_experiments.contact_robustness.reasons import ACCOUNTS, Evidence, account_of, missed_table
 from wam_experiments.contact_robustness.recording import Drive, record
-from wam_experiments.contact_robustness.replay import FalseAlarm, ReplayScore, SecondOutcome, SignalFaults, TouchOutcome
+from wam_experiments.contact_robustness.replay import (
+    FalseAlarm,
+    ReplayScore,
+    SecondOutcome,
+    SignalFaults,
+    TouchOutcome,
+    names_payload,
+    payload_probability,
+)
 from wam_experiments.contact_robustness.requirements import (
     COVERAGE,
     USUAL,
@@ -39,6 +48,7 @@ from wam_experiments.contact_robustness.touches import axis_of
 from wam_experiments.identification.evaluation import IdentificationResult
 
 TOUCH = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 1.0, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, "")
+OWN = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
 ALARM = FalseAlarm(0.2, 0.1, 1.5)
 STATED, COARSE, LOADED = "as stated", "encoder 4096", "payload 0.3 kg"
 EXACT = ("moving", "asymmetry", "load", "shape", "payload", "mass")
@@ -211,3 +221,16 @@ def test_a_mass_that_is_picked_up_is_in_the_plant_while_it_is_carried_and_its_re
     assert "| all | " in rows[-1]
     assert "(1)" in rows[-1]
     assert "| picking up |" in kinds_table([score])
+
+
+def test_a_payload_is_known_by_what_the_links_lack_in_probability_and_named_by_reason_or_warning() -> None:
+    estimator = ContactEstimator(WAM, CONFIGURATION.shared.timing, OWN, CONFIGURATION.shared.model)
+    nothing = estimator.estimate()
+    link = Hypothesis("outer_link", 0.3, *[0.0] * 4, (0.0,) * 3, 0.0, False, 0.0, 0.0, (0.0,) * 3, 0.0, "", 0)
+    assert payload_probability(nothing) == 0.0
+    assert not names_payload(nothing)
+    assert payload_probability(nothing._replace(hypotheses=(link,))) == pytest.approx(0.7)
+    assert payload_probability(nothing._replace(hypotheses=(link._replace(cover="payload"),))) == 1.0
+    assert not names_payload(nothing._replace(hypotheses=(link,)))
+    assert names_payload(nothing._replace(hypotheses=(link._replace(reason="a payload may explain it"),)))
+    assert names_payload(nothing._replace(warning="the model is off: payload 0.3 kg"))

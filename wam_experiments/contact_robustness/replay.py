@@ -26,6 +26,7 @@ START_WITHIN = 0.3  # s
 SLIDING = 0.3  # rad/s, slowest motor
 PAYLOAD = "payload"  # how hypotheses, reasons and warnings name a mass at the tool
 SURE = 0.95  # probability of a link
+OUTSIDE = 0.1  # largest probability of what a 90 % set may lack
 SETTING_DOWN = 0.5  # s after a mass is set down, in which the model is still that with it
 
 
@@ -263,6 +264,12 @@ def _alarm(rows: Sequence[_Row], i: int, touches: Sequence[Touch], slowest: floa
     return FalseAlarm(rows[i].time - ended, slowest, max(row.estimate.statistic for row in during) / threshold)
 
 
+def payload_probability(estimate: ContactEstimate) -> float:
+    """Probability of a mass at the tool: what those of the links lack to 1; 0 without any hypothesis."""
+    links = [h.probability for h in estimate.hypotheses if h.cover != PAYLOAD]
+    return max(0.0, 1.0 - sum(links)) if estimate.hypotheses else 0.0
+
+
 def names_payload(estimate: ContactEstimate) -> bool:
     """Whether a mass at the tool is reported: as the most probable hypothesis, in its reason, or as a warning."""
     best = estimate.hypotheses[:1]
@@ -298,10 +305,9 @@ def _outcome(
     late = next((i for i, row in enumerate(rows) if row.time >= min(touch.begin + LATE, touch.end)), len(rows) - 1)
     now = rows[due].estimate
     best = now.hypotheses[0] if now.hypotheses else None
-    links = (touch.cover, PAYLOAD) if touch.mass else (touch.cover,)
-    right = best is not None and best.cover in links
+    carries = payload_probability(now) if touch.mass else 0.0
+    right = best is not None and (best.cover == touch.cover or carries > best.probability)
     own = [h for h in now.hypotheses if h.cover == touch.cover]
-    is_likely = any(h.cover == PAYLOAD and h.probability > 0.1 for h in now.hypotheses)  # in every 90 % set
     true = touch.place_at(rows[due].time)
     sizes = [h.high - h.low for h in now.hypotheses if not math.isnan(h.low)]
     already = first > 0 and rows[first - 1].estimate.in_contact
@@ -320,8 +326,7 @@ def _outcome(
         right_link=right,
         error=_error(now, touch.cover, true),
         position_sd=now.position_sd if right else math.nan,
-        in_set=(bool(touch.mass) and is_likely)
-        or any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
+        in_set=carries > OUTSIDE or any(h.low - 1e-6 <= min(true, lengths[h.cover]) <= h.high + 1e-6 for h in own),
         set_length=sum(sizes),
         reason=now.reason,
     )
