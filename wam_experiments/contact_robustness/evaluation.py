@@ -249,9 +249,9 @@ Written by `{command}`; nothing here is written by hand.
 
 What the estimator states is in the section `contact_estimator` of the configuration; what is drawn is in
 `wam_experiments/contact_robustness/degradations.py` (the arm and its signals) and `touches.py` (the contacts: 1 to
-60 N, friction to 0.8, tip, end cap, elbow, two at once, sliding, impacts, masses picked up). Neither is read by the other. Every row
-adds one degradation to friction within 10 % and masses within 2 %; contacts are drawn for each row. Numbers in
-brackets are counts."""
+60 N, friction to 0.8, tip, end cap, elbow, two at once, sliding, impacts, masses that are picked up). Neither is read
+by the other. Every row adds one degradation to friction within 10 % and masses within 2 %; contacts are drawn for each
+row. Numbers in brackets are counts."""
 
 SIZE = """With {needed} contacts or more the 95 % interval (Wilson) of a share of 91 % lies within 85 to 97 %; with
 fewer a row can only be marginal. Contacts of one arm share its errors, so these intervals are rather too narrow. No
