@@ -185,6 +185,8 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
     rows: list[list[str]] = []
     used: list[str] = []
     for press in presses:
+        if press.is_refused or not press.true:  # nothing was measured, or nothing touched
+            continue
         cells: list[str] = []
         for one in press.positions.forces:
             off = 100.0 * (one.force - press.true) / press.true
