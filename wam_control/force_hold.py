@@ -25,6 +25,8 @@ LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measure
 BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
 FED = 0.3  # s, in which the torque of the force is fed forward after the touch
 CREPT, LITTLE = 1.5, 9e-3  # settling times in which the arm has moved less, m, and touched nothing
+SLOPE = 0.01  # of a surface that moves across the force, or of the link on it, against the direction of its motion
+TURNING = 0.3  # s, in which the friction of the arm turns round on a surface that moves
 SETTLED = 3.0  # time constants within the settling time
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
@@ -105,7 +107,7 @@ class ForceHold:
     def _forget_swings(self) -> None:
         """What the force was before something was touched shows nothing of how it is held."""
         self._strayed = self._within = 0.0
-        self._report = ""
+        self._report, self._returns = "", LEFT
         self._turns.reset()
 
     def approach_speed(
@@ -380,14 +382,8 @@ class ForceHold:
                 "least, as the velocity loops wind up through friction for longer than limits.settling_time; the arm "
                 "holds its position: pin the position, command more force, or use joint sensors"
             )
-        lag = parameters.limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
-        most = parameters.sensing.reported_fraction * desired
-        if lag > most:
-            return ForceReaction.TOO_SLOW, (
-                f"a surface that moves with {parameters.limits.surface_speed:g} m/s (limits.surface_speed) would keep "
-                f"the force {lag:.2g} N off; allowed: {most:.2g} N (sensing.reported_fraction); the arm holds its "
-                "position: command more force, a larger force_gain, or let the surface move more slowly"
-            )
+        if moves := _left_behind(axis, desired, parameters):
+            return ForceReaction.TOO_SLOW, moves
         speed = self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < CREEP:
             return ForceReaction.TOO_SLOW, (
@@ -461,8 +457,13 @@ class ForceHold:
         )
 
     def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
-        """A reason, or the last one until the force has been within the tolerance for as long as it may be off."""
-        if missed or self._within >= LEFT * parameters.limits.settling_time:
+        """A reason, or the last one until the force has been within the tolerance for as long as it may be off.
+
+        A force that had been right before has to be right for the whole settling time: what takes it away comes again.
+        """
+        if missed:
+            self._returns = 1.0 if self._has_settled else LEFT
+        if missed or self._within >= self._returns * parameters.limits.settling_time:
             self._report = missed
         return self._report
 
@@ -516,6 +517,34 @@ def _slowed(axis: ForceAxis) -> str:
         f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
         "apparent mass is large in this pose (sensing.apparent_mass_limit)"
     )
+
+
+def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> str:
+    """Why a surface that moves would keep the force off, '' where it would not.
+
+    Along the force the integral law is v/G_I behind.  One that moves across it comes nearer by a slope that nobody
+    knows, on a stiff surface by more than the force allows before the friction of the arm has turned round.
+    """
+    limits = parameters.limits
+    lag = limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
+    most = parameters.sensing.reported_fraction * desired
+    if lag > most:
+        return (
+            f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) would keep the force "
+            f"{lag:.2g} N off; allowed: {most:.2g} N (sensing.reported_fraction); the arm holds its position: command "
+            "more force, a larger force_gain, or let the surface move more slowly"
+        )
+    nearer = TURNING * SLOPE * limits.slide_speed
+    off = nearer / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
+    if off > tolerance(desired, parameters):
+        return (
+            f"a surface that moves across the force with {limits.slide_speed:g} m/s (limits.slide_speed) comes nearer "
+            f"by {1e6 * nearer:.2g} um while the friction of the arm turns round, which is {off:.2g} N on "
+            f"{parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness); allowed: "
+            f"{tolerance(desired, parameters):.2g} N; the arm holds its position: command more force, or let the "
+            "surface move more slowly"
+        )
+    return ""
 
 
 def _loaded(force: float, meaning: str, desired: float) -> str:

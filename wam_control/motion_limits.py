@@ -91,6 +91,15 @@ class LimitParameters:
         live=True,
         before=0.0,
     )
+    slide_speed: float = parameter(
+        "largest speed across the force of the surface that will be touched: one that comes nearer by more of the "
+        "force than it may be off while the friction of the arm turns round is refused",
+        "m/s",
+        low=0.0,
+        high=10.0,
+        live=True,
+        before=0.0,
+    )
 
 
 class Limited(NamedTuple):

@@ -51,6 +51,12 @@ class Surface(NamedTuple):
         along = sum(a * b for a, b in zip(self.direction, self.motion, strict=True))
         return 2.0 * math.pi * self.frequency * abs(along)
 
+    @property
+    def slide_speed(self) -> float:
+        """Largest speed across the force, m/s."""
+        whole = 2.0 * math.pi * self.frequency * math.hypot(*self.motion)
+        return math.sqrt(max(whole * whole - self.speed * self.speed, 0.0))
+
     def slide(self, link: Array) -> float:
         """Standard deviation of the motion along a link, whose direction is given (3,), m."""
         return abs(float(link @ np.array(self.motion))) / math.sqrt(2.0)

@@ -280,6 +280,7 @@ def configured(base: Configuration, task: Task) -> Configuration:
         values |= {
             "force_loop:sensing.friction": FULL_FRICTION,
             "force_loop:limits.surface_speed": surface.speed,
+            "force_loop:limits.slide_speed": surface.slide_speed,
             "force_loop:contact_position_sd": surface.slide(along),
         }
     if conditions.is_dithered:
