@@ -61,8 +61,14 @@ def press(newtons: float, seconds: float, as_task: bool = False, **more: Any) ->
 
 
 def test_a_small_force_from_the_motors_does_not_creep_while_it_is_held() -> None:
-    """Below what ends a contact it was taken for an error of the model: 1 N became 8 N in 14 s, measured as 1.4 N."""
-    forces, _ = pressed(1500.0, press(1.0, 8.0), **MOTORS)
+    """Below what ends a contact it was taken for an error of the model: 1 N became 8 N in 14 s, measured as 1.4 N.
+
+    It is known to 26 %, so that it is refused where nobody allows that.
+    """
+    forces, reactions = pressed(1500.0, press(1.0, 1.0), **MOTORS)
+    assert reactions[-1] is ForceReaction.NOT_SENSED
+    assert not forces.any()
+    forces, _ = pressed(1500.0, press(1.0, 8.0), **{**MOTORS, "force_loop:sensing.stated_fraction": 0.3})
     assert abs(forces[-480:].mean() - 1.0) < 0.1
     assert forces.max() < 3.0
 

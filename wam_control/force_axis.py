@@ -80,6 +80,14 @@ class SensingParameters:
         live=True,
         before=0.0,
     )
+    stated_fraction: float = parameter(
+        "standard deviation of the measured force with what the contact estimator states of its torques, per commanded "
+        "force, up to which a force is begun with feedback contact_estimate",
+        low=0.0,
+        high=1e9,
+        live=True,
+        before=1e9,
+    )
     reported_fraction: float = parameter(
         "standard deviation of the measured force, per commanded force, above which it is reported",
         low=0.0,

@@ -132,7 +132,8 @@ class ForceHold:
             return max(desired * yielding / axis.speed_fraction / rise, slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
         if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
-            fastest = min(fastest, max(desired * yielding / DETECTED, slowest))
+            detected = BY_MOTORS if parameters.is_estimated else DETECTED
+            fastest = min(fastest, max(desired * yielding / detected, slowest))
         return fastest / axis.speed_fraction
 
     def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
@@ -236,8 +237,7 @@ class ForceHold:
         unknown : force, N, of torques at rest before, which no touched surface gives, and what they mean.
         """
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
-        limit = parameters.sensing.sd_limit(desired, point.is_pinned)
-        self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
+        blind = self._not_sensed(axis, point, desired, torque_error, parameters)
         is_loaded = not self._has_begun and abs(unknown[0]) > TOLERANCE * desired
         pushed = measured if pushed is None else pushed
         self.is_touching = pushed >= TOUCH * desired and not is_loaded
@@ -257,7 +257,7 @@ class ForceHold:
         weak = self._too_weak(point, desired, signal, elsewhere, parameters)
         if is_loaded:
             return ForceReaction.NOT_SENSED, _loaded(*unknown, desired)
-        held = self._held(axis, point, desired, limit, weak, parameters)
+        held = self._held(axis, point, desired, blind or weak, parameters)
         if held[0].holds:
             return held
         is_double = not point.is_single and (is_strange or not point.is_pinned)
@@ -291,6 +291,40 @@ class ForceHold:
         if turned:
             return ForceReaction.NOT_EXPLAINED, turned
         return self._doubted(axis, point, force_sd, desired, unexplained, parameters)
+
+    def _not_sensed(
+        self,
+        axis: ForceAxis,
+        point: ForcePoint,
+        desired: float,
+        torque_error: float,
+        parameters: ForceLoopParameters,
+    ) -> str:
+        """Why the force is not measured well enough, '' where it is.
+
+        What the estimator states of its torques counts until the force is controlled: it states more while the arm
+        moves and presses, which is reported.
+        """
+        sensing = parameters.sensing
+        limit, stated = sensing.sd_limit(desired, point.is_pinned), math.hypot(axis.force_sd, torque_error)
+        is_known = self._is_sensed or not torque_error or stated <= sensing.stated_fraction * desired
+        self._is_sensed = is_known and axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
+        if self._is_sensed:
+            return ""
+        if not is_known:
+            return (
+                f"the force is known to +-{stated:.3g} N from the motors at {point.position:.3g} m of {point.cover}; "
+                f"allowed to begin: {sensing.stated_fraction * desired:.3g} N, {sensing.stated_fraction:.0%} of the "
+                "commanded (sensing.stated_fraction); the arm holds its position: command more force, another "
+                "direction or position, use joint sensors, or allow more where less accuracy will do"
+            )
+        return (
+            f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
+            f"of {point.cover}; allowed: {limit:.3g} N, and {RESUME:g} of it to begin (sensing.force_sd_limit, "
+            "force_sd_fraction); the arm holds its position: bend the arm, or command more force, another "
+            "direction or position"
+            f"{'' if point.is_pinned else ', or pin the position'}"
+        )
 
     def _too_weak(
         self, point: ForcePoint, desired: float, signal: float, elsewhere: float, parameters: ForceLoopParameters
@@ -332,23 +366,14 @@ class ForceHold:
         axis: ForceAxis,
         point: ForcePoint,
         desired: float,
-        limit: float,
-        weak: str,
+        blind: str,
         parameters: ForceLoopParameters,
     ) -> tuple[ForceReaction, str]:
-        """Why the arm is held instead; `limit` of the standard deviation, N; `weak`: why the force is not detected."""
+        """Why the arm is held instead; `blind`: why the force is not sensed, or not detected."""
         if self._other:
             return ForceReaction.OTHER_LINK, self._other
-        if not self._is_sensed:
-            return ForceReaction.NOT_SENSED, (
-                f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
-                f"of {point.cover}; allowed: {limit:.3g} N, and {RESUME:g} of it to begin (sensing.force_sd_limit, "
-                "force_sd_fraction); the arm holds its position: bend the arm, or command more force, another "
-                "direction or position"
-                f"{'' if point.is_pinned else ', or pin the position'}"
-            )
-        if weak:
-            return ForceReaction.NOT_SENSED, weak
+        if blind:
+            return ForceReaction.NOT_SENSED, blind
         if self._travel > parameters.limits.free_travel:
             return ForceReaction.NOTHING_TOUCHED, (
                 f"the arm has moved {self._travel:.3g} m along the force and nothing is touched; allowed: "
