@@ -873,7 +873,7 @@ def test_from_the_motors_a_force_that_is_less_than_a_millimetre_needs_a_pinned_p
     assert any(abs(v) > 1e-9 for v in out.velocity) is not is_refused
 
 
-@pytest.mark.parametrize(("sd", "reaction"), [(0.1, ForceReaction.NONE), (1.2, ForceReaction.UNCERTAIN)])
+@pytest.mark.parametrize(("sd", "reaction"), [(0.1, ForceReaction.NONE), (2.0, ForceReaction.UNCERTAIN)])
 def test_what_the_estimator_states_of_its_torques_counts_in_what_is_reported(
     sd: float, reaction: ForceReaction
 ) -> None:

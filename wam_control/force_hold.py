@@ -28,6 +28,7 @@ CREPT, LITTLE = 1.5, 9e-3  # settling times in which the arm has moved less, m, 
 SLOPE = 0.01  # of a surface that moves across the force, or of the link on it, against the direction of its motion
 TURNING = 0.3  # s, in which the friction of the arm turns round on a surface that moves
 SETTLED = 3.0  # time constants within the settling time
+LIKELY = 0.6  # of the errors that are stated of torques; those of friction on a surface are as large as stated
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
 FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
@@ -273,7 +274,7 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        force_sd = math.hypot(axis.force_sd, torque_error, unknown[0])
+        force_sd = math.hypot(_likely_sd(axis, torque_error, parameters), unknown[0])
         is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
@@ -542,6 +543,15 @@ def _slowed(axis: ForceAxis) -> str:
         f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
         "apparent mass is large in this pose (sensing.apparent_mass_limit)"
     )
+
+
+def _likely_sd(axis: ForceAxis, torque_error: float, parameters: ForceLoopParameters) -> float:
+    """Standard deviation of the measured force, N, with `LIKELY` of what is stated of the torques themselves."""
+    sensing = parameters.sensing
+    each = sensing.estimated_torque_sd if parameters.is_estimated else sensing.torque_sd
+    stated = math.hypot(each * float(np.linalg.norm(axis.sense)), torque_error)
+    whole = math.hypot(axis.force_sd, torque_error)
+    return math.sqrt(max(whole * whole - (1.0 - LIKELY * LIKELY) * stated * stated, 0.0))
 
 
 def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> str:
