@@ -442,6 +442,20 @@ def test_a_surface_that_moves_faster_than_the_force_follows_is_refused(speed: fl
         assert "would keep the force 0.9 N off; allowed: 0.75 N" in loop.reason
 
 
+@pytest.mark.parametrize(("stiffness", "is_refused"), [(9.5e4, True), (2e4, False)])
+def test_a_stiff_surface_that_comes_faster_than_the_force_may_rise_is_refused(
+    stiffness: float, is_refused: bool
+) -> None:
+    """The whole 12.6 N are 0.3 mm: in 0.1 s the arm follows 3 mm/s; at 7 mm/s 7.8 N were true."""
+    guard = replace(PINNED.guard, contact_stiffness=stiffness)
+    sensing = replace(PINNED.sensing, reported_fraction=0.04)
+    limits = replace(PINNED.limits, surface_speed=0.00695)
+    loop = force_loop(ARM, replace(PINNED, force_gain=(0.0145,), limits=limits, guard=guard, sensing=sensing))
+    press(loop, POSE, np.array(DOWNWARDS), 12.6, 3)
+    assert (loop.reaction is ForceReaction.TOO_SLOW) is is_refused
+    assert ("goes faster than the arm follows" in loop.reason) is is_refused
+
+
 @pytest.mark.parametrize(("force", "is_refused"), [(1.7, True), (12.0, False)])
 def test_a_stiff_surface_that_moves_across_a_small_force_is_refused(force: float, is_refused: bool) -> None:
     """On 390 000 N/m 1.7 N became 0 and then 2.5 N, as the surface came nearer by some hundredths of a millimetre."""

@@ -557,10 +557,11 @@ def _likely_sd(axis: ForceAxis, torque_error: float, parameters: ForceLoopParame
 def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> str:
     """Why a surface that moves would keep the force off, '' where it would not.
 
-    Along the force the integral law is v/G_I behind.  One that moves across it comes nearer by a slope that nobody
-    knows, on a stiff surface by more than the force allows before the friction of the arm has turned round.
+    Along the force the integral law is v/G_I behind, and the force rises in no less than `LATE`.  A surface that moves
+    across it comes nearer by a slope that nobody knows, if it is stiff by more than the force allows before the
+    friction of the arm has turned round.
     """
-    limits = parameters.limits
+    limits, yielding = parameters.limits, 1.0 / parameters.guard.contact_stiffness + axis.compliance
     lag = limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
     most = parameters.sensing.reported_fraction * desired
     if lag > most:
@@ -569,8 +570,15 @@ def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameter
             f"{lag:.2g} N off; allowed: {most:.2g} N (sensing.reported_fraction); the arm holds its position: command "
             "more force, a larger force_gain, or let the surface move more slowly"
         )
+    fastest = desired * yielding / (BY_MOTORS if parameters.is_estimated else LATE)
+    if limits.impact and limits.surface_speed > fastest:
+        return (
+            f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) goes faster than the arm "
+            f"follows for {desired:.3g} N on {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness), "
+            f"{fastest:.2g} m/s; the arm holds its position: command more force, or let the surface move more slowly"
+        )
     nearer = TURNING * SLOPE * limits.slide_speed
-    off = nearer / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
+    off = nearer / yielding
     if off > tolerance(desired, parameters):
         return (
             f"a surface that moves across the force with {limits.slide_speed:g} m/s (limits.slide_speed) comes nearer "
