@@ -254,7 +254,7 @@ def test_a_contact_on_another_link_is_not_controlled_through_the_jacobian_of_thi
     touch = other_link(8.0)
     loop = force_loop(ARM, QUIET)
     state = State(POSE, STILL, DRIVEN)
-    pushed = BODY.gravity_torque(POSE) + 8.0 * lever(POSE, DOWNWARDS, "inner_link", 0.4)
+    pushed = BODY.gravity_torque(POSE) + 4.0 * lever(POSE, DOWNWARDS, "inner_link", 0.4)
     sensed = State(POSE, STILL, pushed.tolist())
     command = ForceCommand("base", down(5.0))
 
@@ -309,7 +309,7 @@ def test_a_force_held_for_a_second_contact_goes_back_where_another_link_is_touch
     """It stayed where it was, and pressed on."""
     loop, command = force_loop(ARM, QUIET), ForceCommand("base", down(5.0))
     vague = Contact("outer_link", 0.28, (0.0, 8.0, 0.0), 0.001, 0.99, is_single=False)
-    pushed = BODY.gravity_torque(POSE) + 8.0 * lever(POSE, DOWNWARDS, "inner_link", 0.4)
+    pushed = BODY.gravity_torque(POSE) + 4.0 * lever(POSE, DOWNWARDS, "inner_link", 0.4)
     moved = State([angle + 0.01 for angle in POSE], STILL, DRIVEN)
     loop.step(
         State(POSE, STILL, DRIVEN), State(POSE, STILL, pushed.tolist()), NO_CONTACT, None, command, None, None, DT
@@ -465,7 +465,7 @@ def test_a_way_through_free_space_ends_with_a_reason() -> None:
     moved = -(BODY.point(world.q, "outer_link", (0.28, 0, 0)) - BODY.point(POSE, "outer_link", (0.28, 0, 0)))[2]
     assert moved == pytest.approx(0.05, abs=0.005)
     assert loop.reaction is ForceReaction.NOTHING_TOUCHED
-    assert "nothing is touched; allowed: limits.free_travel, 0.05 m" in loop.reason
+    assert "nothing was touched; allowed: limits.free_travel, 0.05 m" in loop.reason
     ask(loop, world, None)
     assert max(map(abs, ask(loop, world, down(5.0)).velocity)) > 0.0, "commanded again, it goes on"
 

@@ -349,13 +349,13 @@ class ForceHold:
             return ForceReaction.NOT_SENSED, weak
         if self._travel > parameters.limits.free_travel:
             return ForceReaction.NOTHING_TOUCHED, (
-                f"the arm has moved {self._travel:.3g} m along the force and nothing is touched; allowed: "
+                f"the arm has moved {self._travel:.3g} m along the force and nothing was touched; allowed: "
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
         if not self._has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
             return ForceReaction.NOTHING_TOUCHED, (
-                f"nothing is touched {self._missed:.2g} s after the command: the arm creeps, and has moved "
+                f"nothing was touched {self._missed:.2g} s after the command: the arm creeps, and has moved "
                 f"{1e3 * self._travel:.2g} mm; it holds its position: go nearer, declare a softer surface "
                 "(guard.contact_stiffness), or pin the position; command no force, then again"
             )

@@ -25,6 +25,7 @@ from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
 from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
+from wam_control.held_arm import HeldArm, HeldPush, RetreatForce
 from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits
 from wam_control.pressed_pose import has_left
@@ -103,9 +104,8 @@ class ForceLoop:
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._position = ContactPosition(arm.covers)
         self._contact_rejected = False
-        self._held_at: list[float] | None = None
+        self._held = HeldArm(self._body)
         self._goes_back = False
-        self._way_back = 0.0  # m, that an arm which holds may still go back from what it presses too hard
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
@@ -187,6 +187,11 @@ class ForceLoop:
         self._measurement.tare()
         self._filter.reset()
         return ""
+
+    @property
+    def is_pushed(self) -> bool:
+        """Whether something has pushed the arm since it holds."""
+        return bool(self._held.push or self._tasks.is_pushed)
 
     @property
     def _is_at_rest(self) -> bool:
@@ -294,7 +299,7 @@ class ForceLoop:
         self._resting = None
         self._axes = axes
         self._approached = [0.0] * self._n  # along the force: as its lever turns, the posture would pull this back
-        self._held_at = None
+        self._held.release()
         self._transfer.restart()
         limit = self.parameters.sensing.zero_limit
         self._is_moving = not self._is_at_rest
@@ -350,15 +355,16 @@ class ForceLoop:
         self._react(reaction, reason)
         self._remember(q, moved, contact, point, force_axis)
         if reaction.holds:
-            self.refusals["force_command"] = reason
-            speed, excess = 0.0, self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
-            if excess:
-                factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
-                speed = factor * scalar.velocity(0, -excess, -excess, dt)
-            velocity, effort = self._held(q, force_axis, speed, dt)
+            measured -= -float(force_axis.sense @ self._unknown[0])
+            excess = self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
+            factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
+            force = RetreatForce(force_axis, factor * scalar.velocity(0, -excess, -excess, dt) if excess else 0.0)
+            velocity, effort = self._hold_still(q, contact, point, force, desired, factor, dt)
+            self._react(reaction, reason + self._held.push)
+            self.refusals["force_command"] = self.reason
             return out._replace(velocity=[] if is_open else velocity, effort=effort)
-        if self._held_at is not None:
-            self._held_at = None
+        if self._held.is_holding:
+            self._held.release()
             self._transfer.restart()
         if is_open:
             return out._replace(effort=(force_axis.lever * desired).tolist())
@@ -440,20 +446,40 @@ class ForceLoop:
         mass, left = self._measurement.payload(q, resting, sd)
         return f"as with {mass:.2g} kg at the tool" if mass > 0.0 and left <= UNEXPLAINED else ""
 
-    def _held(self, q: Sequence[float], axis: ForceAxis, speed: float, dt: float) -> tuple[list[float], list[float]]:
-        """Velocities and torques of an arm that holds: to where it does, or back along the force at a speed, m/s."""
+    def _hold_still(
+        self,
+        q: Sequence[float],
+        contact: Contact,
+        point: ForcePoint,
+        force: RetreatForce,
+        desired: float,
+        factor: float,
+        dt: float,
+    ) -> tuple[list[float], list[float]]:
+        """Velocities and torques of an arm that holds: to where it does, or away from what pushes too hard."""
         own, still = self.parameters, [0.0] * self._n
         self._hold.fed = 0.0
         goes_back = self.reaction is ForceReaction.OTHER_LINK
-        if self._held_at is None or goes_back != self._goes_back:
-            self._held_at, self._goes_back = self._free_of(axis) if goes_back else list(q), goes_back
-            self._way_back = 0.0 if goes_back or self._has_left else own.limits.free_travel
+        if not self._held.is_holding or goes_back != self._goes_back:
+            self._goes_back = goes_back
+            self._held.hold(self._free_of(force.axis) if goes_back else q, own.limits.free_travel)
             self._transfer.restart()
-        if not speed or self._way_back <= 0.0:
-            return posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit), still
-        self._way_back, self._held_at = self._way_back + speed * dt, list(q)
-        velocity = hybrid_velocity(still, axis, speed, own.joint_speed_limit)
-        return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt)
+        push = self._push(q, contact, _known_place(point, None))
+        push = push._replace(allowed=min(push.allowed, desired), gain=factor * push.gain)
+        velocity, is_yielding = self._held.step(q, [force], push, own.posture_gain, own.joint_speed_limit, dt)
+        return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt) if is_yielding else still
+
+    def _push(self, q: Sequence[float], contact: Contact, place: tuple[str, float] | None) -> HeldPush:
+        """What pushes an arm that holds: where it is estimated, if on another cover than that of the known place."""
+        own = self.parameters
+        torques = self._external[0] - self._unknown[0]
+        if own.feedback == "joint_sensors":
+            torques = torques + self._force_axes.inertia(q) @ self._acceleration
+        sd = np.array(self._external_sd or [sensing_of(own).torque_sd] * self._n)
+        if contact.cover and (place is None or place[0] != contact.cover):
+            middle = MIDDLE * self._arm.covers.length_of(contact.cover)
+            place = contact.cover, middle if math.isnan(contact.place) else contact.place
+        return HeldPush(torques, sd, place, own.limits.contact_force, max(own.force_gain))
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
@@ -530,7 +556,8 @@ class ForceLoop:
             # what no mass at the tool explains may be several surfaces that are touched already
             carried = self._carried(q, resting)
             self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
-        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown)
+        push = self._push(q, contact, _known_place(None, task))
+        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown, push)
         self._react(found.reaction, found.reason)
         if found.reaction.holds:
             self.refusals["task_command"] = found.reason
