@@ -92,3 +92,19 @@ def test_a_second_push_on_the_same_link_is_reported(place: float, newtons: float
     assert reactions[1799] is ForceReaction.NONE
     assert abs(forces[-100:].mean() - 8.0) > 2.0
     assert reactions[-1] is ForceReaction.NOT_EXPLAINED
+
+
+@pytest.mark.parametrize(("degrees", "friction", "as_task"), [(73.0, 0.3, False), (73.0, 0.3, True), (0.0, 0.8, False)])
+def test_the_force_in_all_stays_below_a_multiple_of_the_commanded_one(
+    degrees: float, friction: float, as_task: bool
+) -> None:
+    """Far off the normal of the surface: 45 N were true of 20.  Across the normal, friction alone is no reason."""
+    aside, angle = BODY.cover_pose(POSE, OUTER).rotation[:, 2], np.radians(degrees)
+    direction = triple(np.cos(angle) * np.array(DIRECTION) + np.sin(angle) * aside)
+    step = ScenarioStep("press", 1.5, force=ForceCommand("base", triple(20.0 * np.array(direction))))
+    if as_task:
+        axis = TaskAxis(AxisKind.FORCE, -1, OUTER, PLACE, direction, 20.0)
+        step = ScenarioStep("press", 1.5, task=TaskCommand("base", (axis,)))
+    forces, reactions = pressed(4000.0, step, **{"driver:world.obstacles.friction": [friction]})
+    assert forces.max() < 1.6 * 20.0
+    assert (ForceReaction.CONTACT_FORCE in reactions) is (degrees > 0.0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.feed_forward import FeedForward
-from wam_control.force_axis import ForceAxes, ForceAxis
+from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force_command import CommandAdmission
 from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
@@ -27,7 +27,7 @@ from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
 from wam_control.held_arm import HeldArm, HeldPush, RetreatForce
 from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
-from wam_control.motion_limits import MotionLimits
+from wam_control.motion_limits import MotionLimits, WholeForce
 from wam_control.pressed_pose import has_left
 from wam_control.stability_guard import GuardAssessment
 from wam_control.task import AxisKind, TaskCommand
@@ -67,6 +67,7 @@ class ForceOutput(NamedTuple):
     point: ForcePoint | None = None  # where it acts
     sd_limit: float = math.inf  # N, of its standard deviation
     rows: tuple[AxisRow, ...] = ()  # of the axes of a task
+    pressed: PressedForce | None = None  # where all of the commanded force acts at one known place
 
 
 class ForceLoop:
@@ -268,12 +269,19 @@ class ForceLoop:
         else:
             out = self._force(joints.position, contact, commands.force, commands.posture, dt)
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        limited = self._limits.step(velocity, joints.position, self._external[0], _known_place(out.point, task))
+        place = _known_place(out.point, task)
+        limited = self._limits.step(velocity, joints.position, self._external[0], place, self._whole(out.pressed))
         if not self.reaction.holds and limited.contact_force:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
         elif not self.reaction.holds and limited.joint_end:
             self._react(ForceReaction.JOINT_END, limited.joint_end)
         return out._replace(velocity=limited.velocity)
+
+    def _whole(self, pressed: PressedForce | None) -> WholeForce | None:
+        """How the force in all is known at the place of a commanded one; None where it is not."""
+        if pressed is None:
+            return None
+        return WholeForce(pressed.force, lambda: self._force_axes.whole(self._joints, pressed, self._external[0]))
 
     def _react(self, reaction: ForceReaction, reason: str) -> None:
         self.reaction, self.reason = reaction, reason
@@ -347,6 +355,7 @@ class ForceLoop:
             force_axis,
             point,
             own.sensing.sd_limit(desired, point.is_pinned),
+            pressed=PressedForce(*point[:3], direction, desired) if point.is_certain else None,
         )
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
@@ -566,7 +575,8 @@ class ForceLoop:
         if found.has_changed:
             self._transfer.restart()
         measured, error = _triple(found.measured.tolist()), _triple(found.error.tolist())
-        return ForceOutput(found.velocity, found.effort, measured, error, error, task.frame, rows=found.rows)
+        out = ForceOutput(found.velocity, found.effort, measured, error, error, task.frame)
+        return out._replace(rows=found.rows, pressed=found.pressed)
 
     def _joint_torque(self, contact: Contact, torque: Sequence[float] | None, dt: float) -> ForceOutput:
         """Torque of each joint; without a command the arm holds still."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wam_control.contact_position import ForcePoint, position_is_certain, slid_position
 from wam_control.feed_forward import FeedForward
-from wam_control.force_axis import ForceAxes
+from wam_control.force_axis import ForceAxes, PressedForce
 from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
@@ -37,6 +37,7 @@ class TaskOutput(NamedTuple):
     rows : of each axis, as the topic task_axes has them.
     reaction, reason : what is done instead of what is commanded, and why.
     has_changed : whether the law has changed since the period before.
+    pressed : the commanded force, where the task is nothing but forces at one known place.
     """
 
     velocity: list[float]
@@ -47,6 +48,7 @@ class TaskOutput(NamedTuple):
     reaction: ForceReaction
     reason: str
     has_changed: bool
+    pressed: PressedForce | None
 
 
 class TaskControl:
@@ -151,7 +153,9 @@ class TaskControl:
             hold.travel(float(state.row @ velocity) * dt)
         rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
         measured, error = _vectors(states, forces)
-        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed or is_other)
+        return TaskOutput(
+            velocity, effort, measured, error, rows, reaction, reason, has_changed or is_other, _pressed(states)
+        )
 
     def _begin(self, task: TaskCommand) -> bool:
         """Take a task; whether it has other axes than the one before."""
@@ -327,6 +331,20 @@ def _desired(state: AxisState) -> float:
     if axis.kind is not AxisKind.FORCE:
         return 0.0
     return (axis.value or 0.0) if axis.joint >= 0 else abs(axis.value or 0.0)
+
+
+def _pressed(states: Sequence[AxisState]) -> PressedForce | None:
+    """The commanded force, where all axes are forces at one position that is given."""
+    if {state.axis.kind for state in states} != {AxisKind.FORCE} or not all(state.point for state in states):
+        return None
+    points = [state.point for state in states if state.point and state.point.is_pinned]
+    if len(points) < len(states) or len({(point.cover, point.position) for point in points}) > 1:
+        return None
+    whole = np.sum([_desired(state) * state.direction for state in states], axis=0)
+    size = float(np.linalg.norm(whole))
+    return (
+        PressedForce(points[0].cover, points[0].position, points[0].position_sd, whole / size, size) if size else None
+    )
 
 
 def _limited(velocity: Array, limit: float) -> list[float]:
