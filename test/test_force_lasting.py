@@ -91,7 +91,7 @@ def test_a_second_push_on_the_same_link_is_reported(place: float, newtons: float
     forces, reactions = pressed(4000.0, *steps, **{"force_loop:contact_source": source})
     assert reactions[1799] is ForceReaction.NONE
     assert abs(forces[-100:].mean() - 8.0) > 2.0
-    assert reactions[-1] is ForceReaction.NOT_EXPLAINED
+    assert reactions[-1] in (ForceReaction.NOT_EXPLAINED, ForceReaction.CONTACT_FORCE)
 
 
 @pytest.mark.parametrize(("degrees", "friction", "as_task"), [(73.0, 0.3, False), (73.0, 0.3, True), (0.0, 0.8, False)])

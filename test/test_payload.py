@@ -114,3 +114,31 @@ def test_one_newton_is_pressed_with_half_a_kilogram_at_the_tool() -> None:
     unknown = perform(CONFIGURATION, task, 1.0, {**PINNED, "driver:mismatch.payload": MASS})
     assert unknown.outcome is TaskEnd.REFUSED
     assert "as with 0.48 kg at the tool" in unknown.reason
+
+
+@pytest.mark.parametrize(("mass", "expected"), [(0.0, ""), (0.1, "as with 0.1 kg at the tool")])
+def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at_rest(
+    mass: float, expected: str
+) -> None:
+    """At 1.6 rad/s the payload was taken for an error of the motion, and 11.1 N were true of 10."""
+    given = {
+        **PINNED,
+        "arm.joints.start": [-0.9, *DEMO[1:]],
+        "force_loop:guard.posture": list(DEMO),
+        "driver:world.obstacles.positions": [3.0, 3.0, 3.0],
+        "driver:mismatch.payload": mass,
+    }
+    down = triple(-10.0 * RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
+    steps = [
+        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("move", 0.4, posture=DEMO),
+        ScenarioStep("press", 1.1, posture=DEMO, force=ForceCommand("base", down)),
+    ]
+    run = Simulation(with_accepted_gain(CONFIGURATION.with_values(given)), steps)
+    loop, reasons = run.nodes["force_loop"], [""]
+    while not run.step():
+        if loop.reason != reasons[-1]:
+            reasons.append(loop.reason)
+    assert "it comes to rest first" in reasons[1]
+    assert expected in reasons[2]
+    assert bool(reasons[2]) is bool(expected)

@@ -79,6 +79,7 @@ class ForceHold:
     Attributes
     ----------
     is_touching : whether the measured force shows that something is touched.
+    has_touched : whether it was, since the force is commanded.
     share : of the speed along the force: less where the late force of the motors was seen to swing.
     fed : fraction of the torque of the commanded force that is fed forward.
     """
@@ -92,7 +93,7 @@ class ForceHold:
         self._shake.reset()
         self.share, self.fed = 1.0, 0.0
         self._way = self._watched = self._shaking = self._blocked = 0.0
-        self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
+        self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
             self._has_settled
         ) = self._has_begun = False
         self._is_slow, self._other = False, ""
@@ -240,8 +241,8 @@ class ForceHold:
         pushed = measured if pushed is None else pushed
         self.is_touching = pushed >= TOUCH * desired and not is_loaded
         self._has_begun = self._has_begun or self.is_touching
-        if self.is_touching and not self._has_touched:
-            self._has_touched = True
+        if self.is_touching and not self.has_touched:
+            self.has_touched = True
             self._forget_swings()
         if self.is_touching and self._travel <= parameters.limits.free_travel:
             self._travel = 0.0
@@ -300,7 +301,7 @@ class ForceHold:
             name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
         begins = RESUME if self._is_detectable else 1.0
         is_weak, is_unseen = signal < begins * least, elsewhere < begins * sensing.least_signal
-        self._is_detectable = self._has_touched or not (is_weak or is_unseen)
+        self._is_detectable = self.has_touched or not (is_weak or is_unseen)
         if self._is_detectable:
             return ""
         if is_weak:
@@ -353,7 +354,7 @@ class ForceHold:
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
-        if not self._has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
+        if not self.has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
             return ForceReaction.NOTHING_TOUCHED, (
                 f"nothing was touched {self._missed:.2g} s after the command: the arm creeps, and has moved "
                 f"{1e3 * self._travel:.2g} mm; it holds its position: go nearer, declare a softer surface "
@@ -475,14 +476,14 @@ class ForceHold:
         self._within = 0.0 if is_off else self._within + dt
         if self._has_settled and desired - self._reached > tolerance(desired, parameters):
             self._has_settled, self._missed = False, 0.0  # more is commanded: that takes its time again
-        if self._has_touched and not is_off:
+        if self.has_touched and not is_off:
             self._has_settled, self._reached = True, desired
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
         has_rested = not self._has_settled or self._within >= LEFT * lasting
         self._strayed = 0.0 if has_rested else self._strayed + dt * is_off
-        if not self._has_touched and abs(self._missed) > lasting:
+        if not self.has_touched and abs(self._missed) > lasting:
             return (
                 f"nothing is touched yet, {abs(self._missed):.2g} s after the command: the arm has moved "
                 f"{1e3 * self._travel:.2g} mm towards it; go nearer, declare a softer surface "

@@ -26,7 +26,7 @@ from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
 from wam_control.held_arm import HeldArm, HeldPush, RetreatForce
-from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
+from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits, WholeForce
 from wam_control.pressed_pose import has_left
 from wam_control.stability_guard import GuardAssessment
@@ -41,6 +41,8 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
+FAST = 0.3  # rad/s, above which a payload is not known from the torques of the motion
+RESTED = 3.0 * STEADY  # s at rest, after which it is
 SHORTEST = 1e-12  # m^2, square of a lever
 SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
@@ -118,7 +120,8 @@ class ForceLoop:
         self._is_free = False
         self._external = np.zeros(self._n), np.zeros(self._n)
         self._resting: Array | None = None
-        self._is_moving = False
+        self._is_moving = self._is_fast = False
+        self._rested = 0.0  # s
         self._unknown: tuple[Array, str] = np.zeros(self._n), ""  # torques at rest that no surface gives
         self._external_sd: Sequence[float] | None = None
         self._transfer = BumplessTransfer(self._n)
@@ -196,8 +199,13 @@ class ForceLoop:
 
     @property
     def _is_at_rest(self) -> bool:
+        return self._speed < REST
+
+    @property
+    def _speed(self) -> float:
+        """Mean speed of the fastest joint, rad/s; infinite where it is not known yet."""
         speed = self._motion.value
-        return speed is not None and float(np.abs(speed).max()) < REST
+        return math.inf if speed is None else float(np.abs(speed).max())
 
     @property
     def _has_left(self) -> bool:
@@ -249,6 +257,7 @@ class ForceLoop:
                 command = torque = None  # a force that is not measured would grow without bounds
         self._is_free = contact is not None and not contact.cover
         self._motion.step(np.array(joints.velocity), STEADY, dt)
+        self._rested = self._rested + dt if self._is_at_rest else 0.0
         contact = contact or NO_CONTACT
         if task is None and self._axes == TASK:
             self._reset(joints.position)
@@ -310,9 +319,10 @@ class ForceLoop:
         self._held.release()
         self._transfer.restart()
         limit = self.parameters.sensing.zero_limit
-        self._is_moving = not self._is_at_rest
+        self._is_moving, self._is_fast = not self._is_at_rest, False
         if not (axes and limit and self._has_left):
             return
+        self._is_fast = self._speed > FAST and axes != TASK
         if self._is_moving:
             self._resting = self._external[0]
             if self.parameters.feedback == "joint_sensors":
@@ -331,7 +341,7 @@ class ForceLoop:
         is_open = own.mode == "open_loop"
         desired = math.hypot(*command.force) if command is not None else 0.0
         axes = command.frame if command is not None and desired else ""
-        if axes != self._axes:
+        if axes != self._axes or (self._is_fast and self._rested > RESTED):
             self._begin(axes)
         goal = [a + b for a, b in zip(posture, self._approached, strict=True)]
         held = posture_velocity(goal, q, own.posture_gain, own.joint_speed_limit, self._rate)
@@ -344,7 +354,7 @@ class ForceLoop:
         force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
         measured, before, free = self._measured(force_axis)
         scalar = law.along(axis)
-        error = desired - measured
+        error, is_pressed = desired - measured, point.is_certain and self._hold.is_touching
         out = ForceOutput(
             [],
             [0.0] * self._n,
@@ -355,7 +365,7 @@ class ForceLoop:
             force_axis,
             point,
             own.sensing.sd_limit(desired, point.is_pinned),
-            pressed=PressedForce(*point[:3], direction, desired) if point.is_certain else None,
+            pressed=PressedForce(*point[:3], direction, desired) if is_pressed else None,
         )
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
@@ -385,10 +395,21 @@ class ForceLoop:
         speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
         speed *= self._hold.share
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
+        if self._hold.has_touched and self._rate is None:
+            held = self._followed(q, point, force_axis, held, desired, scalar.gain[0])
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
         fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
         return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
+
+    def _followed(
+        self, q: Sequence[float], point: ForcePoint, axis: ForceAxis, held: list[float], desired: float, gain: float
+    ) -> list[float]:
+        """Velocities of the posture (n,), rad/s, slower where the link would slide fast on what it presses."""
+        place = (point.position, *self._arm.covers.aside(point.cover, point.position))
+        across = np.array(hybrid_velocity(held, axis, 0.0, self.parameters.joint_speed_limit))
+        slow: list[float] = followed(across, self._body.point_jacobian(q, point.cover, place), desired, gain).tolist()
+        return slow
 
     def _measured(self, axis: ForceAxis) -> tuple[float, float, float]:
         """Force along an axis, N, now and one period before, and now without the inertia of the arm itself.
@@ -414,6 +435,11 @@ class ForceLoop:
         dt: float,
     ) -> tuple[ForceReaction, str]:
         """What the loop does instead of the command, and why; forces in N, the measured one without inertia, too."""
+        if self._is_fast:
+            return ForceReaction.NOT_SENSED, (
+                f"the arm moved faster than {FAST:g} rad/s as the force began, and it is not known what it carries: it "
+                "comes to rest first"
+            )
         if self._resting is not None:
             self._judge(q, point, direction, self._resting)
         return self._hold.step(

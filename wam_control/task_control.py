@@ -14,7 +14,7 @@ from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
 from wam_control.held_arm import HeldArm, HeldPush, RetreatForce
-from wam_control.hybrid_velocity import posture_velocity
+from wam_control.hybrid_velocity import followed, posture_velocity
 from wam_control.stability_guard import GuardedContact, GuardedForces
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_frame import HAND, AxisState, TaskFrame, force_speed
@@ -70,7 +70,7 @@ class TaskControl:
         self, arm: Arm, body: RigidBody, axes: ForceAxes, parameters: ForceLoopParameters, supervision: Supervision
     ) -> None:
         self._frame = TaskFrame(arm, body, axes, parameters.task, parameters.sensing)
-        self._force_axes, self._held = axes, HeldArm(body)
+        self._body, self._force_axes, self._held = body, axes, HeldArm(body)
         self._covers, self._parameters, self._supervision = arm.covers, parameters, supervision
         self._feed_forward = FeedForward(arm)
         self.restart()
@@ -138,7 +138,8 @@ class TaskControl:
         ]
         held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, rate)
         resolved = self._frame.resolve(states, speeds, held, q)
-        velocity = _limited(resolved.velocity, own.joint_speed_limit)
+        held_slowly = resolved.posture if rate else self._followed(states, resolved.posture, q)
+        velocity = _limited(resolved.velocity + held_slowly, own.joint_speed_limit)
         fed = np.sum([self._fed(*pair, dt) for pair in zip(states, self._holds, strict=True)], axis=0)
         if self._held.is_holding:
             allowed = math.fsum(map(_desired, states)) or push.allowed
@@ -153,9 +154,8 @@ class TaskControl:
             hold.travel(float(state.row @ velocity) * dt)
         rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
         measured, error = _vectors(states, forces)
-        return TaskOutput(
-            velocity, effort, measured, error, rows, reaction, reason, has_changed or is_other, _pressed(states)
-        )
+        pressed, has_changed = self._pressed(states), has_changed or is_other
+        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed, pressed)
 
     def _begin(self, task: TaskCommand) -> bool:
         """Take a task; whether it has other axes than the one before."""
@@ -304,6 +304,17 @@ class TaskControl:
         fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
         return min(max(speed, -fastest), fastest)
 
+    def _followed(self, states: Sequence[AxisState], posture: Array, q: Sequence[float]) -> Array:
+        """Velocities towards the posture (n,), rad/s, slower where a link would slide fast on what it presses."""
+        law = self._supervision.force_law
+        for state, hold in zip(states, self._holds, strict=True):
+            if hold.has_touched and state.point and state.axis.kind is AxisKind.FORCE:
+                gain = law.along(state.axis.direction).gain[0]
+                place = (state.point.position, *self._covers.aside(state.point.cover, state.point.position))
+                jacobian = self._body.point_jacobian(q, state.point.cover, place)
+                posture = followed(posture, jacobian, _desired(state), gain)
+        return posture
+
     def _back(self, state: AxisState, force: float, hold: ForceHold, factor: float, dt: float) -> RetreatForce | None:
         """How an arm that holds goes back along a force, N; None along other axes."""
         desired = _desired(state)
@@ -312,6 +323,16 @@ class TaskControl:
         excess = hold.excess(state.sensed, force, desired)
         law = self._supervision.force_law.along(state.axis.direction)
         return RetreatForce(state.sensed, factor * law.velocity(0, -excess, -excess, dt) if excess else 0.0)
+
+    def _pressed(self, states: Sequence[AxisState]) -> PressedForce | None:
+        """The commanded force, where all axes are forces at one position that is given, and it presses."""
+        points = [state.point for state in states if state.point and state.point.is_pinned]
+        is_one = len(points) == len(states) and len({point[:2] for point in points}) == 1
+        if not (is_one and self.is_touching and all(state.axis.kind is AxisKind.FORCE for state in states)):
+            return None
+        whole = np.sum([_desired(state) * state.direction for state in states], axis=0)
+        size = float(np.linalg.norm(whole))
+        return PressedForce(*points[0][:3], whole / size, size) if size else None
 
     def _fed(self, state: AxisState, hold: ForceHold, dt: float) -> Array:
         """Torque of a commanded force that is fed forward (n,), N m."""
@@ -331,20 +352,6 @@ def _desired(state: AxisState) -> float:
     if axis.kind is not AxisKind.FORCE:
         return 0.0
     return (axis.value or 0.0) if axis.joint >= 0 else abs(axis.value or 0.0)
-
-
-def _pressed(states: Sequence[AxisState]) -> PressedForce | None:
-    """The commanded force, where all axes are forces at one position that is given."""
-    if {state.axis.kind for state in states} != {AxisKind.FORCE} or not all(state.point for state in states):
-        return None
-    points = [state.point for state in states if state.point and state.point.is_pinned]
-    if len(points) < len(states) or len({(point.cover, point.position) for point in points}) > 1:
-        return None
-    whole = np.sum([_desired(state) * state.direction for state in states], axis=0)
-    size = float(np.linalg.norm(whole))
-    return (
-        PressedForce(points[0].cover, points[0].position, points[0].position_sd, whole / size, size) if size else None
-    )
 
 
 def _limited(velocity: Array, limit: float) -> list[float]:

@@ -26,6 +26,7 @@ from wam_description.signals import BASE
 Array = NDArray[np.float64]
 SHORT = 0.05  # m or 1, lever below which a motion along an axis is slowed down
 LOST = 1e-3  # part of an axis that the others have to leave it
+LEAST_FRICTION = 0.05  # of surfaces
 HAND = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
 
 
@@ -59,9 +60,10 @@ class AxisState(NamedTuple):
 
 
 class Resolved(NamedTuple):
-    """Joint velocities (n,), rad/s, and for each axis what was left of it, and its speed per commanded one."""
+    """Joint velocities (n,), rad/s, of the axes and the posture; of each axis what is left, and its speed fraction."""
 
     velocity: Array
+    posture: Array
     independence: tuple[float, ...]
     speed_fraction: tuple[float, ...]
 
@@ -139,6 +141,13 @@ class TaskFrame:
                     f"{state.axis.name}: its lever on the joints is {lever:.2g} m; allowed: {SHORT:g} m and above; "
                     "bend the arm, or command another axis"
                 )
+        forces = [state.axis for state in states if state.sensed and state.axis.kind is AxisKind.FORCE]
+        places = {(axis.cover, axis.place) for axis in forces}
+        if len(places) > 1 and self._sensing.friction < LEAST_FRICTION:
+            return (
+                f"{len(places)} forces at once: the friction of each is measured as a part of the others, and "
+                f"sensing.friction is {self._sensing.friction:g}; allowed: {LEAST_FRICTION:g} and above; declare it"
+            )
         limit = own.condition_limit
         rank, condition = rank_and_condition([state.row for state in states], limit)
         if rank < len(states):
@@ -219,7 +228,7 @@ class TaskFrame:
             velocity += a * ((speed - float(state.row @ velocity)) / damped)
             left -= np.outer(a, a) / square
             fractions.append(square / damped)
-        return Resolved(velocity + left @ np.array(posture), tuple(independence), tuple(fractions))
+        return Resolved(velocity, left @ np.array(posture), tuple(independence), tuple(fractions))
 
     def linear(
         self,
@@ -239,7 +248,7 @@ class TaskFrame:
         n, count = len(q), len(states)
         no_speed, no_posture = [0.0] * count, [0.0] * n
         move = np.array([self.resolve(states, unit, no_posture, q).velocity for unit in np.eye(count).tolist()]).T
-        left = np.array([self.resolve(states, no_speed, unit, q).velocity for unit in np.eye(n).tolist()]).T
+        left = np.array([self.resolve(states, no_speed, unit, q).posture for unit in np.eye(n).tolist()]).T
         hold, sense, gain = posture_gain * left, np.zeros((count, n)), np.zeros((2, count))
         for i, state in enumerate(states):
             axis = state.axis
