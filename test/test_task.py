@@ -328,7 +328,7 @@ def test_two_forces_without_friction_are_refused(friction: float, is_refused: bo
     world = Springs(springs={DOWN: 4000.0})
     world.loop.tune(replace(OWN, sensing=replace(OWN.sensing, friction=friction)))
     world.step(base(force(10.0, DOWN, 0.1), force(10.0, Y, 0.39)))
-    assert ("sensing.friction is 0; allowed: 0.05 and above" in world.loop.reason) is is_refused
+    assert ("sensing.friction is 0; allowed: 0.01 and above" in world.loop.reason) is is_refused
 
 
 def test_a_task_that_ends_leaves_the_arm_where_it_is() -> None:

@@ -26,7 +26,7 @@ from wam_description.signals import BASE
 Array = NDArray[np.float64]
 SHORT = 0.05  # m or 1, lever below which a motion along an axis is slowed down
 LOST = 1e-3  # part of an axis that the others have to leave it
-LEAST_FRICTION = 0.05  # of surfaces
+LEAST_FRICTION = 0.01  # of surfaces that two forces press on
 HAND = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
 
 
