@@ -102,9 +102,9 @@ def resting(newtons: float, seconds: float = 0.5, **values: object) -> tuple[Con
 
 
 @pytest.mark.slow
-def test_stiction_hides_5_newton_at_rest_and_the_estimate_says_so() -> None:
+def test_stiction_hides_2_newton_at_rest_and_the_estimate_says_so() -> None:
     """A test that pushes with 20 N only would not notice."""
-    light, _ = resting(5.0)
+    light, _ = resting(2.0)
     assert not light.in_contact
     assert min(light.torque_sd) > 0.3
     heavy, _ = resting(20.0)

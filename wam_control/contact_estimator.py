@@ -34,7 +34,7 @@ class ContactEstimatorParameters:
     inference: InferenceParameters
     use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
     detect: float = parameter(
-        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or 1.3 times it in one",
+        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or twice it in one",
         low=0.0,
         high=1e6,
     )
@@ -97,7 +97,7 @@ class ContactEstimate(NamedTuple):
 NOTHING = (0.0, 0.0, 0.0)
 SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
 SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
-ALONE = 1.3  # times the threshold: detected in one period; below that in two, because noise exceeds it now and then
+ALONE = 2.0  # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
 TOO_EARLY = "too few samples yet"
 
 
@@ -211,7 +211,7 @@ class ContactEstimator:
         if not self._in_contact:
             self._second.reset()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
-        hypotheses = self._inference.infer(observer.pose, torques, precision / observer.size)
+        hypotheses = self._inference.infer(observer.pose, torques, precision)
         self._second.step(observer.age, hypotheses, observer, self._inference)
         if self._second.is_suspected:
             why = CERTAIN_SECOND if self._second.is_certain else SECOND
