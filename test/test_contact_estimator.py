@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
-from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
+from wam_control.contact_estimator import ALONE, ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact_estimator_node import ContactEstimatorNode
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
 from wam_description.arm import Arm
@@ -92,8 +92,8 @@ def test_a_single_period_just_above_the_threshold_is_noise_and_the_second_one_a_
     above = [i for i, one in enumerate(weak) if one.statistic > SENSORS.detect]
     assert not weak[above[0]].in_contact
     assert all(weak[i].in_contact for i in above[1:])
-    strong = next(one for one in play(-size * math.sqrt(9.0 * SENSORS.detect)) if one.statistic > SENSORS.detect)
-    assert strong.statistic > 1.3 * SENSORS.detect
+    strong = next(one for one in play(-size * math.sqrt(60.0 * SENSORS.detect)) if one.statistic > SENSORS.detect)
+    assert strong.statistic > ALONE * SENSORS.detect
     assert strong.in_contact
 
 

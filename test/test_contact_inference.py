@@ -444,3 +444,21 @@ def test_a_place_is_not_between_those_of_a_push_from_the_side_and_of_one_on_the_
     assert found.high == pytest.approx(L4, abs=1e-6)
     assert found.place == pytest.approx(x, abs=0.01)
     assert found.position_sd > 0.02, "the end counts in the spread"
+
+
+def test_a_payload_that_is_picked_up_is_no_certain_contact() -> None:
+    """Its weight acts as a force at the tool, downwards: what the links lack to 1 is its probability."""
+    loaded = dataclasses.replace(ARM, payload=ARM.payload + 1.0)
+    load = np.subtract(RigidBody(ARM).gravity_torque(POSE), RigidBody(loaded).gravity_torque(POSE))
+    for mass, picked in ((0.5, True), (1.5, True), (-1.0, False)):
+        found = INFERENCE.infer(POSE, (mass * load).tolist(), W, load)
+        assert (sum(each.probability for each in found) < 0.5) == picked
+        assert (contact_inference.PAYLOAD in found[0].reason) == picked
+        alone = INFERENCE.infer(POSE, (mass * load).tolist(), W)
+        assert sum(each.probability for each in alone) == pytest.approx(1.0)
+        for with_it, without in zip(found, alone, strict=True):  # of a contact everything else is as it was
+            assert (with_it.cover, with_it.place, with_it.low) == (without.cover, without.place, without.low)
+    push = torques(POSE, "outer_link", (0.2, 0.0, 0.0), (0.0, 6.0, 4.0))
+    found = INFERENCE.infer(POSE, push.tolist(), W, load)
+    assert sum(each.probability for each in found) > 0.999
+    assert contact_inference.PAYLOAD not in found[0].reason

@@ -97,6 +97,7 @@ class ContactEstimate(NamedTuple):
 NOTHING = (0.0, 0.0, 0.0)
 SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
 SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
+SHAKEN = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
 ALONE = 2.0  # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
 TOO_EARLY = "too few samples yet"
 
@@ -204,14 +205,15 @@ class ContactEstimator:
         if fast is not None:
             quick = detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64))
             statistic = max(statistic, quick / SUDDEN)
-        was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic)
+        was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic, is_calm)
         if was_in_contact and not self._in_contact:
             self._ended = observer.age
         observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
             self._second.reset()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
-        hypotheses = self._inference.infer(observer.pose, torques, precision)
+        load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
+        hypotheses = self._inference.infer(observer.pose, torques, precision, load)
         self._second.step(observer.age, hypotheses, observer, self._inference)
         if self._second.is_suspected:
             why = CERTAIN_SECOND if self._second.is_certain else SECOND
@@ -244,12 +246,12 @@ class ContactEstimator:
             self._pressed_at = []
         return self._in_contact or bool(self._pressed_at)
 
-    def _is_detected(self, statistic: float) -> bool:
+    def _is_detected(self, statistic: float, is_calm: bool) -> bool:
         detect, was_above = self._parameters.detect, self._is_above
-        self._is_above = statistic > detect
+        self._is_above = statistic > (detect if is_calm else SHAKEN * detect)
         if self._in_contact:
             return statistic > self._parameters.release
-        return statistic > ALONE * detect or (self._is_above and was_above)
+        return (is_calm and statistic > ALONE * detect) or (self._is_above and was_above)
 
     @property
     def model_errors(self) -> dict[str, float]:

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.contact_fit import ContactFit, Fit
+from wam_control.contact_fit import ContactFit, Fit, log_evidence_of_weight
 from wam_description.arm import Arm
 from wam_description.parameters import lengths, parameter, require
 from wam_description.rigid_body import RigidBody
+from wam_description.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -38,8 +39,10 @@ MORE = "one contact does not explain the torques"
 ALONG = "a force along the tube and one at its start cannot be distinguished"
 SECOND = "a second contact is suspected: position and force are those of both together"
 CERTAIN_SECOND = "a second contact is nearly certain: position and force are those of both together"
+PAYLOAD = "a payload that was picked up may explain the torques; its probability is what those of the links lack to 1"
 REASONS = (  # as bits
     MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE, ALONG, SECOND, CERTAIN_SECOND,
+    PAYLOAD,
 )  # fmt: skip
 
 
@@ -63,6 +66,9 @@ class InferenceParameters:
         low=0.0,
         high=1e3,
         before=0.0,
+    )
+    payload_weight: float = parameter(
+        "relative frequency of a mass that is picked up at the tool", low=0.0, high=1e3, before=0.0
     )
     positions: int = parameter("contact positions tried along a link", low=9, high=200)
     identification_threshold: float = parameter(
@@ -184,7 +190,9 @@ class ContactInference:
         self._wrenches = np.array([cover.wrenches for cover in covers])
         self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
 
-    def infer(self, q: Sequence[float], torques: Sequence[float], precision: Array) -> tuple[Hypothesis, ...]:
+    def infer(
+        self, q: Sequence[float], torques: Sequence[float], precision: Array, load: Array | None = None
+    ) -> tuple[Hypothesis, ...]:
         """Explain external torques by one contact.
 
         Parameters
@@ -192,11 +200,12 @@ class ContactInference:
         q : (n,), joint angles, rad.
         torques : (n,), external torques, N m.
         precision : (n, n), the inverse of their covariance, 1/(N^2 m^2); of smaller ones than `SMALLEST_SD` that.
+        load : (n,), torques of a mass of 1 kg at the tool, N m; None if none may have been picked up.
 
         Returns
         -------
         tuple of Hypothesis
-            one per cover, the most probable first; probabilities add up to 1.
+            one per cover, the most probable first; what their probabilities lack to 1 is that of a payload.
         """
         if precision.trace() > SMALLEST_SD**-2:
             precision = np.asarray(
@@ -207,13 +216,19 @@ class ContactInference:
         rows = np.empty((len(self._covers), 7, len(torques)))
         rows[:, 0] = torques
         np.matmul(self._wrenches, self.jacobians, out=rows[:, 1:])
-        fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1))
+        picked, weight = -math.inf, self._parameters.payload_weight
+        if load is not None and weight:
+            least = (STANDARD_GRAVITY / self._parameters.force_scale) ** 2
+            picked = math.log(weight) + log_evidence_of_weight(rows[0, 0], load, precision, least)
+        fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1), picked)
+        is_payload = 1.0 - sum(fit.probability for fit in fits) > NOTED
         ambiguity = (
             self._ambiguity(q, fits)
             if max(fit.probability for fit in fits) < self._parameters.identification_threshold
             else ""
         )
-        found = [self._hypothesis(q, cover, fit, ambiguity) for cover, fit in zip(self._covers, fits, strict=True)]
+        each = zip(self._covers, fits, strict=True)
+        found = [self._hypothesis(q, cover, fit, ambiguity, is_payload) for cover, fit in each]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
 
     def slide(self, hypothesis: Hypothesis, force: Array) -> Array:
@@ -232,7 +247,7 @@ class ContactInference:
         sides[:, 2] -= place * chosen[:, 4]
         return sides
 
-    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str) -> Hypothesis:
+    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str, is_payload: bool) -> Hypothesis:
         start, end = cover.start, cover.end
         length = end[0] - start[0]
         is_unknown = cover.is_moment_only or fit.torque_position_sd > length
@@ -243,6 +258,8 @@ class ContactInference:
             reasons.append(ALONG)
         if fit.residual > self._parameters.largest_residual:
             reasons.append(MORE)
+        if is_payload:
+            reasons.append(PAYLOAD)
         place = end[0] if is_unknown else fit.place
         f1, f2 = fit.force_at_end if is_unknown else fit.force
         force = _triple([f1 * e1 + f2 * e2 for e1, e2 in cover.directions])

@@ -306,6 +306,11 @@ class MomentumObserver:
         return self.q if self.seen is None else self.seen.pose.tolist()
 
     @property
+    def load_torques(self) -> Array | None:
+        """External torques of a mass of 1 kg at the tool, (n,), N m, through the filter; None where not followed."""
+        return None if self._load is None else np.array(self._load.torque)
+
+    @property
     def model_errors(self) -> dict[str, float]:
         """The errors of the model that are tracked, by name: per torque of the model, the payload in kg."""
         return {} if self._link_side else self._errors.by_name
