@@ -4,21 +4,25 @@ import os
 import shutil
 import sys
 from glob import glob
+from importlib.util import find_spec
 from pathlib import Path
 from runpy import run_path
 from xml.etree import ElementTree
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
 
 HERE = Path(__file__).resolve().parent
 NODES = run_path(str(HERE / "wam_description" / "nodes.py"))["NODES"]
 PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 
-# The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (benchmarks/compiled.py)
+# The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (benchmarks/compiled.py).
+# The substeps of the plant are C then, too: wam_driver/fast_steps.c.
 COMPILED = (
     "wam_control/bumpless_transfer.py",
     "wam_control/contact_estimator.py",
     "wam_control/contact_fit.py",
+    "wam_control/contact_inference.py",
+    "wam_control/contact_table.py",
     "wam_control/force_axis.py",
     "wam_control/force_command.py",
     "wam_control/force_loop.py",
@@ -27,6 +31,7 @@ COMPILED = (
     "wam_control/model_errors.py",
     "wam_control/momentum_observer.py",
     "wam_control/motion_limits.py",
+    "wam_control/second_contact.py",
     "wam_control/shaft_friction.py",
     "wam_control/tool_load.py",
     "wam_control/transform.py",
@@ -41,6 +46,7 @@ COMPILED = (
     "wam_driver/driver.py",
     "wam_driver/dry_friction.py",
     "wam_driver/limit_watch.py",
+    "wam_driver/loads.py",
     "wam_driver/plant.py",
     "wam_driver/sensors.py",
     "wam_sim/bus.py",
@@ -56,8 +62,13 @@ def extensions():
     try:
         from mypyc.build import mypycify
     except ImportError:
-        sys.exit("WAM_COMPILE needs mypyc: pip install mypy, then pip install --no-build-isolation .")
+        sys.exit("WAM_COMPILE needs mypyc: pip install mypy mujoco, then pip install --no-build-isolation .")
+    mujoco = find_spec("mujoco")
+    if mujoco is None or mujoco.origin is None:
+        sys.exit("WAM_COMPILE needs the headers of MuJoCo: pip install mujoco")
     found = mypycify([*COMPILED, "--config-file", "pyproject.toml"], opt_level="2", multi_file=True)
+    headers = Path(mujoco.origin).parent / "include"
+    found.append(Extension("wam_driver.fast_steps", ["wam_driver/fast_steps.c"], include_dirs=[str(headers)]))
     for extension in found:
         extension.extra_compile_args.append("-ffp-contract=off")  # no fused operations: the bits of Python
     return found

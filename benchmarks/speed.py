@@ -33,7 +33,13 @@ ROWS = {  # must, aim
 
 def scenario(seconds: float) -> dict[str, Any]:
     """Steps of `seconds` in total."""
-    push = {"cover": "outer_link", "place": 0.28, "newtons": [0.0, 12.0, 0.0], "begin": 0.1, "end": 0.3 * seconds}
+    push = {
+        "cover": "outer_link",
+        "contact_position": 0.28,
+        "newtons": [0.0, 12.0, 0.0],
+        "begin": 0.1,
+        "end": 0.3 * seconds,
+    }
     return {
         "steps": [
             {"name": "release", "seconds": 0.1 * seconds, "request": "enable"},

@@ -372,7 +372,7 @@ def resting_pushes() -> str:
     rows = []
     for row in pushes():
         estimate = row.estimate
-        error = estimate.place - resting_push.POSITION if estimate.in_contact else math.nan
+        error = estimate.position - resting_push.POSITION if estimate.in_contact else math.nan
         sd = max(estimate.torque_sd)
         known = not math.isnan(error)
         rows.append(

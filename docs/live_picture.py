@@ -8,22 +8,18 @@ Needs viser (the extra 'live') and Chromium, which draws without a graphics card
 
 import argparse
 import base64
-import json
 import math
-import shutil
 import socket
 import subprocess
 import sys
 import tempfile
 import time
-import urllib.request
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from view_picture import FLAGS, ask
-from websockets.sync.client import connect
+from view_picture import FLAGS, ask, browser, opened
 
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
@@ -43,20 +39,6 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
-
-
-def opened(debug: int) -> Any:
-    """The browser's page, once it listens."""
-    for _ in range(60):
-        time.sleep(0.5)
-        try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{debug}/json") as answer:
-                pages = [tab for tab in json.load(answer) if tab["type"] == "page"]
-        except OSError:
-            continue
-        if pages:
-            return connect(pages[0]["webSocketDebuggerUrl"], max_size=2**26)
-    raise SystemExit("the browser did not start")
 
 
 def seen_at(point: Sequence[float], size: tuple[int, int]) -> tuple[float, float]:
@@ -97,9 +79,6 @@ def main() -> None:
     parser.add_argument("--at", type=float, default=0.0, help="time of the recording, s; default: %(default)s")
     parser.add_argument("--seconds", type=float, default=12.0, help="until the picture is taken; default: %(default)s")
     given = parser.parse_args()
-    browser = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
-    if browser is None:
-        raise SystemExit("no chromium or google-chrome; install one")
     port, debug = free_port(), free_port()
     flags = [flag for flag in FLAGS if "debugging-port" not in flag]
     with tempfile.TemporaryDirectory(prefix="wam_docs_", ignore_cleanup_errors=True) as folder:
@@ -109,7 +88,7 @@ def main() -> None:
         with subprocess.Popen(serve, stdout=subprocess.PIPE, text=True) as server:
             assert server.stdout is not None
             print(next(line for line in server.stdout if "http://" in line).strip())
-            look = [browser, *flags, f"--remote-debugging-port={debug}", f"--user-data-dir={folder}/profile"]
+            look = [browser(), *flags, f"--remote-debugging-port={debug}", f"--user-data-dir={folder}/profile"]
             look.append(f"http://127.0.0.1:{port}")
             with subprocess.Popen(look, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as window:
                 try:

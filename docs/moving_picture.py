@@ -65,7 +65,7 @@ def frame(figure, scene, now, summary, recorded, q, view, stamp) -> Image.Image:
     row = row_at(summary.traces.stamp, stamp)
     for signal, colour, width in ((summary.traces.true, TRUE, 5.0), (summary.traces.estimated, ESTIMATED, 2.0)):
         contact = contact_at(signal, row)
-        if contact.cover in recorded.arm.covers.names and np.isfinite(contact.place):
+        if contact.cover in recorded.arm.covers.names and np.isfinite(contact.position):
             point, force = arm_picture.contact_on_surface(recorded.arm, q, contact)
             start, end = view.project(np.array([point, point + METRES_PER_NEWTON * force]))
             arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0}

@@ -41,18 +41,26 @@ def ask(tab: Any, number: int, method: str, **values: Any) -> dict[str, Any]:
             return answer["result"]
 
 
-def opened() -> str:
-    """Address of the browser's page, once it listens."""
+def browser() -> str:
+    """The browser's program."""
+    found = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
+    if found is None:
+        raise SystemExit("no chromium or google-chrome; install one")
+    return found
+
+
+def opened(debug: int) -> Any:
+    """The browser's page, once it listens on its port for debugging."""
     for _ in range(60):
         time.sleep(0.5)
         try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{DEBUG}/json") as answer:
+            with urllib.request.urlopen(f"http://127.0.0.1:{debug}/json") as answer:
                 tabs = json.load(answer)
         except OSError:
             continue
         pages = [tab for tab in tabs if tab["type"] == "page"]
         if pages:
-            return str(pages[0]["webSocketDebuggerUrl"])
+            return connect(pages[0]["webSocketDebuggerUrl"], max_size=2**26)
     raise SystemExit("the browser did not start")
 
 
@@ -60,7 +68,7 @@ def picture(part: float, seconds: float) -> bytes:
     """PNG of the viewer at a part of the recording, after so many seconds of loading."""
     left, right, y = SLIDER
     place = {"x": left + part * (right - left), "y": y, "button": "left", "clickCount": 1}
-    with connect(opened(), max_size=2**26) as tab:
+    with opened(DEBUG) as tab:
         time.sleep(seconds)
         for number, kind in enumerate(("mousePressed", "mouseReleased"), 1):
             ask(tab, number, "Input.dispatchMouseEvent", type=kind, **place)
@@ -77,16 +85,13 @@ def main() -> None:
     parser.add_argument("--part", type=float, default=0.7, help="of the recording at which it is drawn, 0 to 1")
     parser.add_argument("--seconds", type=float, default=25.0, help="that the viewer takes to load")
     given = parser.parse_args()
-    browser = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
-    if browser is None:
-        raise SystemExit("no chromium or google-chrome; install one")
     with tempfile.TemporaryDirectory(prefix="wam_docs_", ignore_cleanup_errors=True) as folder:
         file = Path(folder) / "view.rrd"
         subprocess.run([sys.executable, "-m", "wam_cli.main", "view", given.bag, "--save", file], check=True)
         serve = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--serve-web"]
         serve += ["--web-viewer-port", str(WEB), "--port", str(GRPC), str(file)]
         address = f"http://127.0.0.1:{WEB}/?url={quote(f'rerun+http://127.0.0.1:{GRPC}/proxy', safe='')}&renderer=webgl"
-        look = [browser, *FLAGS, f"--user-data-dir={folder}/profile", f"--window-size={SIZE[0]},{SIZE[1]}", address]
+        look = [browser(), *FLAGS, f"--user-data-dir={folder}/profile", f"--window-size={SIZE[0]},{SIZE[1]}", address]
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         with subprocess.Popen(serve, start_new_session=True, **quiet) as server:
             time.sleep(3.0)

@@ -42,6 +42,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.xdist_group("ros"))
 
 
+@pytest.fixture
+def checked_fields(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What ROS_PYTHON_CHECK_FIELDS=1 does: a field of a wrong type fails."""
+    for name, module in list(sys.modules.items()):
+        if ".msg._" in name and hasattr(module, "ros_python_check_fields"):
+            monkeypatch.setattr(module, "ros_python_check_fields", "1")
+
+
 def soon() -> float:
     """Seconds that count as prompt: 2, or on a busy machine as long as a few starts of Python with numpy."""
     begin = time.monotonic()

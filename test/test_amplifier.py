@@ -171,7 +171,7 @@ def test_noise_does_not_go_beyond_the_peak() -> None:
     assert np.abs(flowing[:, 0]).min() < PEAK
 
 
-@pytest.mark.parametrize("name", ["deadband", "torque_ripple", "ripple_cycles", "current_noise"])
+@pytest.mark.parametrize("name", ["deadband", "torque_ripple", "ripple_cycles", "current_noise", "torque_offset"])
 def test_wrong_number_of_values_is_refused_by_name(name: str) -> None:
     with pytest.raises(ParameterError, match=rf"'amplifier\.{name}' has 3 values; 4 names need 4"):
         amplifier(**{name: getattr(PERFECT, name)[:3]})

@@ -54,7 +54,7 @@ MOVING = [
         "name": "back and be pushed",
         "seconds": 1.4,
         "posture": [0.0, -0.6, -0.1, 0.4],
-        "push": {"cover": "outer_link", "place": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.3, "end": 0.9},
+        "push": {"cover": "outer_link", "contact_position": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.3, "end": 0.9},
     },
     {"name": "brake", "seconds": 0.1, "request": "disable"},
 ]

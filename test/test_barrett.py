@@ -195,7 +195,7 @@ def test_a_contact_is_found_on_every_link_that_shows_its_position(arm: Arm, writ
             torques = turning.T @ np.concatenate((force, np.cross(lever, force)))
             best = inference.infer(q.tolist(), torques.tolist(), precision)[0]
             assert best.cover == name
-            assert best.place == pytest.approx(place, abs=2.0 * best.position_sd + 2e-3)
+            assert best.position == pytest.approx(place, abs=2.0 * best.position_sd + 2e-3)
             assert best.position_sd < 0.025
             assert best.force == pytest.approx((0.0, 6.0, 5.0), abs=2.0 * best.force_sd)
             assert best.force_sd < 1.3

@@ -189,7 +189,7 @@ class Broken:
             super()._publish()
 
     def _run(self) -> None:
-        self._watchdog = 1e9 if self.defect in ("watchdog", "answers") else 0.045
+        self._watchdog = 1e9 if self.defect in ("watchdog", "answers", "end") else 0.045  # a busy machine trips it
         super()._run()
 
     def _enable(self) -> Answer:

@@ -328,10 +328,10 @@ def test_contacts_of_every_kind_truly_happen_where_they_are_planned(kind: str) -
     assert first.cover == meant.cover
     middle = played.records[first.first + 20].load
     length = LENGTHS[meant.cover]
-    assert middle.place == pytest.approx(
+    assert middle.position == pytest.approx(
         meant.position, abs=0.05 if kind == "foam" else 0.03 if kind == "flat" else 0.015
     )
-    assert -0.03 < middle.place < length + 0.03
+    assert -0.03 < middle.position < length + 0.03
     across = math.hypot(middle.force[1], middle.force[2])
     if kind != "foam":
         assert across == pytest.approx(meant.force, rel=0.2 + meant.friction)

@@ -50,8 +50,8 @@ def test_in_plane_force_agrees_with_the_closed_form() -> None:
     by_hand = (tau2 - tau4) / (L3 * math.sin(0.5))
     assert found.cover == "outer_link"
     assert found.force == pytest.approx((0.0, by_hand, 0.0), abs=1e-4)
-    assert found.place == pytest.approx(tau4 / by_hand, abs=1e-4)
-    assert found.place == pytest.approx(x, abs=1e-4)
+    assert found.position == pytest.approx(tau4 / by_hand, abs=1e-4)
+    assert found.position == pytest.approx(x, abs=1e-4)
 
 
 def test_out_of_plane_force_agrees_with_the_closed_form() -> None:
@@ -66,7 +66,7 @@ def test_out_of_plane_force_agrees_with_the_closed_form() -> None:
     found = EXACT.infer(POSE, [tau1, 0.0, tau3, 0.0], NOISELESS)[0]
     assert found.cover == "outer_link"
     assert found.force == pytest.approx((0.0, 0.0, m_u / (L3 * c4)), abs=1e-4)
-    assert found.place == pytest.approx(-m_n1 / found.force[2] - L3 * s4, abs=1e-4)
+    assert found.position == pytest.approx(-m_n1 / found.force[2] - L3 * s4, abs=1e-4)
 
 
 def test_any_direction_and_pose_on_the_outer_link() -> None:
@@ -84,8 +84,8 @@ def test_any_direction_and_pose_on_the_outer_link() -> None:
         found = EXACT.infer(q, torques(q, "outer_link", (x, 0, 0), force).tolist(), W)
         wrong += found[0].cover != "outer_link"
         outer = of(found, "outer_link")
-        if not math.isnan(outer.place):
-            errors.append((abs(outer.place - x), outer.position_sd))
+        if not math.isnan(outer.position):
+            errors.append((abs(outer.position - x), outer.position_sd))
             forces.append(np.linalg.norm(np.subtract(outer.force, force)) / size)
             assert outer.direction == pytest.approx(phi, abs=0.1)
     assert len(errors) > 195
@@ -104,8 +104,8 @@ def test_reported_spread_is_the_spread_of_the_errors() -> None:
         x, phi, size = rng.uniform(0.1, 0.3), rng.uniform(-math.pi, math.pi), rng.uniform(5, 20)
         tau = torques(q, "outer_link", (x, 0, 0), (0.0, size * math.cos(phi), size * math.sin(phi)))
         outer = of(EXACT.infer(q, (tau + SD * rng.standard_normal(4)).tolist(), W), "outer_link")
-        if not math.isnan(outer.place):
-            scores.append(abs(outer.place - x) / outer.position_sd)
+        if not math.isnan(outer.position):
+            scores.append(abs(outer.position - x) / outer.position_sd)
     assert 0.5 < np.median(scores) < 0.85
     assert np.quantile(scores, 0.9) < 2.0
 
@@ -115,7 +115,7 @@ def test_reported_spread_is_the_spread_of_the_errors() -> None:
 def test_inner_link_shows_moment_and_bound_but_no_place(x: float, phi: float) -> None:
     force = (0.0, 8 * math.cos(math.radians(phi)), 8 * math.sin(math.radians(phi)))
     found = of(infer(POSE, "inner_link", (x, 0, 0), force), "inner_link")
-    assert math.isnan(found.place)
+    assert math.isnan(found.position)
     assert math.isnan(found.position_sd)
     assert "the shoulder measures only the moment" in found.reason
     assert found.reasons & 1 << contact_inference.REASONS.index(contact_inference.MOMENT_ONLY)
@@ -167,12 +167,12 @@ def test_unknown_places_always_have_a_reason_and_the_least_force() -> None:
         q = tuple(rng.uniform(ARM.joints.lower, ARM.joints.upper))
         tau = rng.normal(0.0, 2.0, 4)
         for found in INFERENCE.infer(q, tau.tolist(), W):
-            if math.isnan(found.place):
+            if math.isnan(found.position):
                 seen += 1
                 assert found.reason
                 assert found.is_lower_bound
             else:
-                assert 0.0 <= found.place <= L4
+                assert 0.0 <= found.position <= L4
                 assert 0.0 < found.position_sd < L4 / 2
     assert seen >= 300
 
@@ -236,7 +236,7 @@ def test_spread_is_never_small_where_the_place_cannot_be_observed(size: float) -
     """A pseudo-inverse of the Fisher matrix reports 2 cm exactly here."""
     for q, cover, point, direction, _ in (AMBIGUOUS[0], AMBIGUOUS[1], AMBIGUOUS[2], AMBIGUOUS[6]):
         force = tuple(size / 6 * part for part in direction)
-        assert math.isnan(of(infer(q, cover, point, force), cover).place)
+        assert math.isnan(of(infer(q, cover, point, force), cover).position)
 
 
 def test_probabilities_add_up_to_1_and_the_best_comes_first() -> None:
@@ -289,7 +289,7 @@ def test_a_single_joint_reports_what_it_measures() -> None:
     (found,) = inference.infer([0.4], [1.2], np.array([[SD**-2]]))
     assert found.cover == "outer_link"
     assert found.probability == 1.0
-    assert math.isnan(found.place)
+    assert math.isnan(found.position)
     assert "the only joint measures only the moment" in found.reason
     assert found.moment == pytest.approx((0.0, 0.0, 1.2), rel=0.01)
     assert found.force == pytest.approx((0.0, 1.2 / L4, 0.0), rel=0.01)
@@ -368,7 +368,7 @@ def test_a_push_across_the_tube_is_not_taken_for_one_along_it() -> None:
         assert found.cover == "outer_link"
         assert found.probability > 0.95
         assert contact_inference.ALONG not in found.reason
-        assert found.place == pytest.approx(x, abs=0.02)
+        assert found.position == pytest.approx(x, abs=0.02)
 
 
 def along_by_quadrature(q: tuple[float, ...], tau: np.ndarray) -> float:
@@ -427,7 +427,7 @@ def test_certain_torques_of_a_pose_that_is_nearly_singular_are_explained() -> No
     tau = torques(q, "outer_link", (0.376, 0, 0), force).tolist()
     best = INFERENCE.infer(q, tau, np.diag([1e12, 50.0, 1e12, 1e12]))[0]
     assert best.cover == "outer_link"
-    assert best.place == pytest.approx(0.376, abs=0.01)
+    assert best.position == pytest.approx(0.376, abs=0.01)
 
 
 def test_evidence_is_finite_where_rounding_would_make_a_determinant_negative() -> None:
@@ -442,5 +442,23 @@ def test_a_place_is_not_between_those_of_a_push_from_the_side_and_of_one_on_the_
     found = INFERENCE.infer(q, tau.tolist(), np.diag(np.array([0.02, 0.14, 0.02, 0.025]) ** -2.0))[0]
     assert found.cover == "outer_link"
     assert found.high == pytest.approx(L4, abs=1e-6)
-    assert found.place == pytest.approx(x, abs=0.01)
+    assert found.position == pytest.approx(x, abs=0.01)
     assert found.position_sd > 0.02, "the end counts in the spread"
+
+
+def test_a_payload_that_is_picked_up_is_no_certain_contact() -> None:
+    """Its weight acts as a force at the tool, downwards: what the links lack to 1 is its probability."""
+    loaded = dataclasses.replace(ARM, payload=ARM.payload + 1.0)
+    load = np.subtract(RigidBody(ARM).gravity_torque(POSE), RigidBody(loaded).gravity_torque(POSE))
+    for mass, picked in ((0.5, True), (1.5, True), (-1.0, False)):
+        found = INFERENCE.infer(POSE, (mass * load).tolist(), W, load)
+        assert (sum(each.probability for each in found) < 0.5) == picked
+        assert (contact_inference.PAYLOAD in found[0].reason) == picked
+        alone = INFERENCE.infer(POSE, (mass * load).tolist(), W)
+        assert sum(each.probability for each in alone) == pytest.approx(1.0)
+        for with_it, without in zip(found, alone, strict=True):  # of a contact everything else is as it was
+            assert (with_it.cover, with_it.position, with_it.low) == (without.cover, without.position, without.low)
+    push = torques(POSE, "outer_link", (0.2, 0.0, 0.0), (0.0, 6.0, 4.0))
+    found = INFERENCE.infer(POSE, push.tolist(), W, load)
+    assert sum(each.probability for each in found) > 0.999
+    assert contact_inference.PAYLOAD not in found[0].reason

@@ -26,6 +26,8 @@ from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, Tabl
 from wam_cli.commands.demo import _report
 from wam_cli.main import main
 from wam_control.contact_inference import REASONS
+from wam_control.force_axis import ForceAxes
+from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.scenario import load as load_steps
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
@@ -558,3 +560,33 @@ def test_broken_opengl_falls_back_to_a_drawing(tmp_path):
     assert arm_picture.render(recorded.arm, POSE, recorded.obstacles, view, ("no_such_gl",)) is None
     save(tmp_path / "demo.png", recording.summary(), recorded, gl=("no_such_gl",))
     assert (tmp_path / "demo.png").stat().st_size > 50_000
+
+
+def test_what_the_estimated_position_gains_is_the_force_of_the_same_torques_at_each_position():
+    """A force of 8.4 N at 0.25 m, measured at the configured 0.28 m: less there, 8.4 N at the true position."""
+    sample = read(Path(__file__).parents[1] / "bags" / "sample" / "wam-touch", ["status"], may_lack=True)
+    configuration = Configuration.load(packaged("wam"))
+    arm = configuration.shared.arm
+    body = RigidBody(arm)
+    axes = ForceAxes(arm, body, configuration.node("force_loop", ForceLoopParameters).sensing)
+    recording, direction = Recording(), body.cover_pose(POSE, "outer_link").rotation @ (0.0, -1.0, 0.0)
+    torque = -8.4 * axes.lever(POSE, "outer_link", 0.25, direction)
+    measured = -float(axes.axis(POSE, "outer_link", 0.28, 0.05, direction, 8.0).sense @ torque)
+    recording.set(recording.measured, 5.0, 7.0, "outer_link", (0.0, -measured, 0.0))
+    bag = recording.bag()
+    every = joints()._replace(effort=np.tile(torque, (len(STAMPS), 1)))
+    columns = {"position": np.full(len(STAMPS), 0.28), "position_sd": np.full(len(STAMPS), 0.05)}
+    axis = TableColumns(STAMPS, STAMPS, ("outer_link",) * len(STAMPS), np.arange(len(STAMPS)), columns)
+    topics = bag.topics | {"/wam/external_joint_torques": every, "/wam/force_axis": axis}
+    summary = summarize(bag._replace(topics=topics, attachments=sample.attachments))
+    found = summary.presses[0].positions
+    assert [one.position for one in found.forces] == pytest.approx([0.28, 0.27, 0.25])
+    assert found.true.force == pytest.approx(8.4, rel=1e-6)
+    assert found.configured.force < found.estimated.force < found.true.force - 0.1
+    lines = text(summary).splitlines()
+    table = next(i for i, line in enumerate(lines) if line.startswith("What the estimated contact position gains"))
+    (row,) = [line for line in lines[table : table + 8] if line.strip().startswith("press 8 N")]
+    assert "25.0  8.40" in row
+    assert "  used by the force loop [cm]: 28.0 +- 5.0, 28.0 +- 5.0" in lines
+    assert all(len(line) <= 100 for line in lines)
+    assert not any("position gains" in line for line in text(Recording().summary()).splitlines()), "nothing is invented"

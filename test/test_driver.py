@@ -391,7 +391,7 @@ def test_true_contact_is_the_greatest_load() -> None:
     hardware.plant.push("outer_link", np.array([0.0, 3.0, 0.0]), np.array([0.0, 0.0, 0.6]))
     hardware.advance(0.0)
     assert hardware.true_contact.cover == "outer_link"
-    assert hardware.true_contact.place == pytest.approx(0.2)
+    assert hardware.true_contact.position == pytest.approx(0.2)
     assert hardware.true_contact.force == (0.0, 3.0, 0.0)
 
 

@@ -89,7 +89,7 @@ def test_the_surface_is_two_millimetres_from_the_link_along_the_force() -> None:
     for task in DRAWN[:12]:
         configuration = configured(CONFIGURATION, task)
         surface = task.surface
-        point = (surface.place, *WAM.covers.aside(surface.cover, surface.place))
+        point = (surface.position, *WAM.covers.aside(surface.cover, surface.position))
         lever = np.array(surface.direction) @ body.point_jacobian(task.q, surface.cover, point)
         for distance, touches in ((0.001, False), (0.003, True)):
             q = np.array(task.q) + lever * distance / float(lever @ lever)
@@ -145,7 +145,7 @@ def test_motors_with_dither_have_no_joint_sensors() -> None:
 
 def test_an_estimated_position_is_not_given_away() -> None:
     conditions = NOMINAL._replace(is_pinned=False)
-    for surface in (ACROSS, ACROSS._replace(cover="inner_link", place=0.2)):
+    for surface in (ACROSS, ACROSS._replace(cover="inner_link", position=0.2)):
         configuration = configured(CONFIGURATION, TASK._replace(surface=surface, conditions=conditions))
         own = configuration.node("force_loop", ForceLoopParameters)
         given = CONFIGURATION.node("force_loop", ForceLoopParameters)

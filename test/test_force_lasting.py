@@ -61,8 +61,14 @@ def press(newtons: float, seconds: float, as_task: bool = False, **more: Any) ->
 
 
 def test_a_small_force_from_the_motors_does_not_creep_while_it_is_held() -> None:
-    """Below what ends a contact it was taken for an error of the model: 1 N became 8 N in 14 s, measured as 1.4 N."""
-    forces, _ = pressed(1500.0, press(1.0, 8.0), **MOTORS)
+    """Below what ends a contact it was taken for an error of the model: 1 N became 8 N in 14 s, measured as 1.4 N.
+
+    It is known to 26 %, so that it is refused where nobody allows that.
+    """
+    forces, reactions = pressed(1500.0, press(1.0, 1.0), **MOTORS)
+    assert reactions[-1] is ForceReaction.NOT_SENSED
+    assert not forces.any()
+    forces, _ = pressed(1500.0, press(1.0, 8.0), **{**MOTORS, "force_loop:sensing.stated_fraction": 0.3})
     assert abs(forces[-480:].mean() - 1.0) < 0.1
     assert forces.max() < 3.0
 
@@ -91,4 +97,20 @@ def test_a_second_push_on_the_same_link_is_reported(place: float, newtons: float
     forces, reactions = pressed(4000.0, *steps, **{"force_loop:contact_source": source})
     assert reactions[1799] is ForceReaction.NONE
     assert abs(forces[-100:].mean() - 8.0) > 2.0
-    assert reactions[-1] is ForceReaction.NOT_EXPLAINED
+    assert reactions[-1] in (ForceReaction.NOT_EXPLAINED, ForceReaction.CONTACT_FORCE)
+
+
+@pytest.mark.parametrize(("degrees", "friction", "as_task"), [(73.0, 0.3, False), (73.0, 0.3, True), (0.0, 0.8, False)])
+def test_the_force_in_all_stays_below_a_multiple_of_the_commanded_one(
+    degrees: float, friction: float, as_task: bool
+) -> None:
+    """Far off the normal of the surface: 45 N were true of 20.  Across the normal, friction alone is no reason."""
+    aside, angle = BODY.cover_pose(POSE, OUTER).rotation[:, 2], np.radians(degrees)
+    direction = triple(np.cos(angle) * np.array(DIRECTION) + np.sin(angle) * aside)
+    step = ScenarioStep("press", 1.5, force=ForceCommand("base", triple(20.0 * np.array(direction))))
+    if as_task:
+        axis = TaskAxis(AxisKind.FORCE, -1, OUTER, PLACE, direction, 20.0)
+        step = ScenarioStep("press", 1.5, task=TaskCommand("base", (axis,)))
+    forces, reactions = pressed(4000.0, step, **{"driver:world.obstacles.friction": [friction]})
+    assert forces.max() < 1.6 * 20.0
+    assert (ForceReaction.CONTACT_FORCE in reactions) is (degrees > 0.0)

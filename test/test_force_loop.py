@@ -292,7 +292,7 @@ def test_a_stale_force_command_is_dropped_and_the_arm_holds_its_position() -> No
     assert out.velocity == pytest.approx([0.0] * 4, abs=1e-9)  # holds here, not at the posture of old
     assert world.q == pressed
     again = ask(loop, world, down(6.0), posture=[0.5, 0.0, 0.0, 0.0])
-    assert max(map(abs, again.velocity)) > 0.1
+    assert max(map(abs, again.velocity)) > 0.03
 
 
 def test_after_a_stale_command_the_arm_is_pulled_back_to_where_the_command_ended() -> None:

@@ -430,7 +430,7 @@ def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
         assert shown.q == pytest.approx(truth.position[at], abs=0.02)  # type: ignore[union-attr]
     pushed = source.snapshot(400_000_000)
     assert pushed.true.cover == "outer_link"
-    assert pushed.true.place == pytest.approx(0.3, abs=1e-6)
+    assert pushed.true.position == pytest.approx(0.3, abs=1e-6)
     assert pushed.estimated.position_sd > 0.0
     assert source.snapshot(300_000_000).statuses["driver"].mode == "enabled"
     assert len(list(source.past(400_000_000))) == POINTS

@@ -28,7 +28,7 @@ STEPS = [
         "name": "move and be pushed",
         "seconds": 0.5,
         "posture": [0.1, -0.7, 0.05, 0.4],
-        "push": {"cover": "outer_link", "place": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.1, "end": 0.4},
+        "push": {"cover": "outer_link", "contact_position": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.1, "end": 0.4},
     },
     {"name": "press on nothing", "seconds": 0.1, "force": {"frame": "outer_link", "newtons": [0.0, -3.0, 0.0]}},
     {"name": "brake", "seconds": 0.1, "request": "disable"},

@@ -2,7 +2,6 @@
 
 import math
 import struct
-import sys
 from array import array
 from typing import Any
 
@@ -34,14 +33,7 @@ FRAMES = ("base", "inner_link", "outer_link")
 ALL = "position velocity effort"
 STATE = State([1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0], [-1.0, -2.0, -3.0, -4.0])
 STAMP = 1_234_567_890_123
-
-
-@pytest.fixture(autouse=True)
-def checked_fields(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What ROS_PYTHON_CHECK_FIELDS=1 does: a field of a wrong type fails."""
-    for name, module in list(sys.modules.items()):
-        if ".msg._" in name and hasattr(module, "ros_python_check_fields"):
-            monkeypatch.setattr(module, "ros_python_check_fields", "1")
+pytestmark = pytest.mark.usefixtures("checked_fields")
 
 
 def test_fields_are_checked_in_these_tests() -> None:
@@ -161,7 +153,7 @@ def test_a_position_may_be_unknown_but_not_infinite() -> None:
         read_point(point_stamped(STAMP, Point("outer_link", (math.inf, 0.0, 0.0))), FRAMES)
 
 
-COLUMNS = ("link", "probability", "place")
+COLUMNS = ("link", "probability", "position")
 ROWS = Table("outer_link", ((1.0, 0.75, 0.1 + 0.2), (0.0, 0.25, math.inf - math.inf)))
 
 
@@ -175,7 +167,7 @@ def test_a_table_is_the_same_to_the_bit_after_a_round_trip() -> None:
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"fields": []}, "fields are none; send little-endian float64 fields link, probability, place"),
+        ({"fields": []}, "fields are none; send little-endian float64 fields link, probability, position"),
         ({"is_bigendian": True}, "send little-endian float64 fields"),
         ({"width": 3}, "48 bytes of data; 3 rows need 24 bytes each"),
         ({"point_step": 8}, "48 bytes of data"),

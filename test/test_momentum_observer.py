@@ -115,6 +115,29 @@ def test_motion_alone_gives_no_external_torque(sensors: bool) -> None:
 
 
 @pytest.mark.slow
+def test_torques_that_come_late_are_no_external_ones() -> None:
+    """By 2 ms, which the observer finds out in free motion, and is uncertain about before."""
+    worst, sds = {}, {}
+    for name, sd in (("with", 1e-3), ("without", 0.0)):
+        own = dataclasses.replace(KNOWN, friction_scale=0.0, torque_delay_uncertainty=sd)
+        observer, plant = MomentumObserver(ARM, own, use_joint_sensors=False), RigidArm(ARM, POSE, friction=0.0)
+        late, rows = [], []
+        for k in range(3000):
+            motor = np.linalg.solve(DRIVE, wave(k * DT) + plant.gravity())
+            plant.step(motor, NONE)
+            late.append(motor)
+            assert observer.observe(State(*plant.motors(late[max(0, k - 2)])), DT)
+            rows.append(observer.torques()[0])
+            if k == 300:
+                sds[name] = np.sqrt(observer.torques()[1].diagonal())
+            observer.follow(0.0, False)
+        worst[name] = np.abs(rows[2000:]).max(axis=0)
+        if sd:
+            assert observer.model_errors["delay of the torques"] == pytest.approx(2e-3, rel=0.2)
+    assert np.all(worst["with"] < 0.5 * worst["without"])
+    assert np.all(sds["with"][:2] > sds["without"][:2])
+
+
 def test_rotor_inertia_is_part_of_the_momentum() -> None:
     without = dataclasses.replace(ARM, motors=dataclasses.replace(ARM.motors, inertia=(1e-9,) * 4))
     worst = {}

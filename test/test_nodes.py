@@ -1,7 +1,6 @@
 """The nodes over real ROS: what is refused, what stops the arm, what the graph looks like."""
 
 import math
-import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -38,14 +37,7 @@ WAM = Configuration.load(packaged("wam"))
 ARM = WAM.shared.arm
 MOTORS = list(ARM.motors.names)
 MS = 1_000_000
-
-
-@pytest.fixture(autouse=True)
-def checked_fields(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What ROS_PYTHON_CHECK_FIELDS=1 does: a field of a wrong type fails."""
-    for name, module in list(sys.modules.items()):
-        if ".msg._" in name and hasattr(module, "ros_python_check_fields"):
-            monkeypatch.setattr(module, "ros_python_check_fields", "1")
+pytestmark = pytest.mark.usefixtures("checked_fields")
 
 
 def start(ros: Any, folder: Path, nodes: list[str], namespace: str = "/wam", **values: Any) -> dict[str, Any]:
@@ -400,7 +392,7 @@ def test_a_push_on_the_base_or_without_numbers_is_refused(hand: Hand) -> None:
     publisher.publish(wrench_stamped(hand.driver.stamp, Wrench("outer_link", (0.0, 2.0, 0.0), (0.0, 0.0, 0.6))))
     hand.ros.wait(hand.driver.plant.loads)
     (load,) = hand.driver.plant.loads()
-    assert (load.cover, load.place) == ("outer_link", pytest.approx(0.3))
+    assert (load.cover, load.position) == ("outer_link", pytest.approx(0.3))
     publisher.publish(wrench_stamped(hand.driver.stamp, Wrench("base", zero, zero)))
     hand.ros.wait(lambda: not hand.driver.plant.loads())
 

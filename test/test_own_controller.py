@@ -31,7 +31,13 @@ STEPS = {
         {
             "name": "push",
             "seconds": 0.3,
-            "push": {"cover": "outer_link", "place": 0.4, "newtons": [0.0, 20.0, 0.0], "begin": 0.05, "end": 0.25},
+            "push": {
+                "cover": "outer_link",
+                "contact_position": 0.4,
+                "newtons": [0.0, 20.0, 0.0],
+                "begin": 0.05,
+                "end": 0.25,
+            },
         },
     ]
 }

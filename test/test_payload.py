@@ -7,7 +7,7 @@ import re
 import mujoco
 import numpy as np
 import pytest
-from arms import CONFIGURATION, NOWHERE, WAM, ideal_mjcf
+from arms import CONFIGURATION, NOWHERE, WAM, ideal_mjcf, ideal_plant
 
 from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.momentum_observer import MomentumObserver
@@ -114,3 +114,55 @@ def test_one_newton_is_pressed_with_half_a_kilogram_at_the_tool() -> None:
     unknown = perform(CONFIGURATION, task, 1.0, {**PINNED, "driver:mismatch.payload": MASS})
     assert unknown.outcome is TaskEnd.REFUSED
     assert "as with 0.48 kg at the tool" in unknown.reason
+
+
+def test_a_mass_picked_up_in_motion_is_carried_as_if_the_arm_had_it_and_reset_sets_it_down() -> None:
+    """The same state with the same mass moves alike from then on; picking it up changes no velocity."""
+    plants = [ideal_plant(arm, NOWHERE, STEP) for arm in (WAM, LOADED)]
+    bare, loaded = plants
+    for plant in plants:
+        plant.brake(False)
+    bare.step([0.02, -0.1, 0.05, 0.1], 100)
+    before = bare.qd
+    bare.carry(MASS)
+    assert bare.qd == before
+    for kept in ("qpos", "qvel", "act", "plastic", "qacc_warmstart", "time"):
+        if hasattr(bare.data, kept):
+            setattr(loaded.data, kept, getattr(bare.data, kept))
+    for plant in plants:
+        plant.step([0.02, -0.1, 0.05, 0.1], 50)
+    assert bare.qd == pytest.approx(loaded.qd, abs=1e-9)
+    light = ideal_plant(WAM, NOWHERE, STEP)
+    light.brake(False)
+    light.step([0.02, -0.1, 0.05, 0.1], 150)
+    assert np.abs(np.subtract(bare.qd, light.qd)).max() > 1e-2
+    bare.reset()
+    assert bare.model.body("link4").mass[0] == pytest.approx(WAM.links.mass[3])
+
+
+@pytest.mark.parametrize(("mass", "expected"), [(0.0, ""), (0.1, "as with 0.1 kg at the tool")])
+def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at_rest(
+    mass: float, expected: str
+) -> None:
+    """At 1.6 rad/s the payload was taken for an error of the motion, and 11.1 N were true of 10."""
+    given = {
+        **PINNED,
+        "arm.joints.start": [-0.9, *DEMO[1:]],
+        "force_loop:guard.posture": list(DEMO),
+        "driver:world.obstacles.positions": [3.0, 3.0, 3.0],
+        "driver:mismatch.payload": mass,
+    }
+    down = triple(-10.0 * RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
+    steps = [
+        ScenarioStep("release", RELEASE, request="enable"),
+        ScenarioStep("move", 0.4, posture=DEMO),
+        ScenarioStep("press", 1.1, posture=DEMO, force=ForceCommand("base", down)),
+    ]
+    run = Simulation(with_accepted_gain(CONFIGURATION.with_values(given)), steps)
+    loop, reasons = run.nodes["force_loop"], [""]
+    while not run.step():
+        if loop.reason != reasons[-1]:
+            reasons.append(loop.reason)
+    assert "it comes to rest first" in reasons[1]
+    assert expected in reasons[2]
+    assert bool(reasons[2]) is bool(expected)

@@ -342,7 +342,7 @@ def test_one_contact_pushes_with_stiffness_times_depth_along_the_normal(stiffnes
     load = next(load for load in plant.loads() if load.cover == "outer_link")
     np.testing.assert_allclose(load.force, pose[:3, :3].T @ [0.0, 0.0, stiffness * depth], rtol=1e-4, atol=1e-6)
     touching = tip[:3] + np.array([0.0, 0.0, depth / 2 - RADIUS])
-    assert load.place == pytest.approx(float(pose[:3, 0] @ (touching - pose[:3, 3])), abs=1e-6)
+    assert load.position == pytest.approx(float(pose[:3, 0] @ (touching - pose[:3, 3])), abs=1e-6)
 
 
 @pytest.mark.slow
@@ -362,7 +362,7 @@ def test_two_contacts_share_the_stiffness_of_their_surface(stiffness: float) -> 
     assert force[2] == pytest.approx(stiffness * max(depths), rel=0.03)  # k_c, whatever touches
     np.testing.assert_allclose(force[:2], 0.0, atol=5e-3 * force[2])  # an edge pushes at right angles to the tube
     middle = float(np.average([near, far], weights=shares * depths)) - pose[0, 3]
-    assert load.place == pytest.approx(middle / pose[0, 0], abs=2e-3)
+    assert load.position == pytest.approx(middle / pose[0, 0], abs=2e-3)
 
 
 @pytest.mark.slow
@@ -522,13 +522,13 @@ def test_place_of_a_push_is_where_its_line_crosses_the_axis(force: tuple[float, 
     plant.push("inner_link", np.array(force), np.cross([0.31, 0.0, 0.0], force))
     (load,) = plant.loads()
     assert (load.cover, load.force) == ("inner_link", force)
-    assert load.place == pytest.approx(0.31, abs=1e-12)
+    assert load.position == pytest.approx(0.31, abs=1e-12)
 
 
 def test_push_along_the_link_has_no_place() -> None:
     plant = released(WAM)
     plant.push("inner_link", np.array([3.0, 0.0, 0.0]), NONE)
-    assert math.isnan(plant.loads()[0].place)
+    assert math.isnan(plant.loads()[0].position)
 
 
 def test_push_is_the_callers_to_change_afterwards() -> None:
@@ -738,7 +738,7 @@ def story(plant: Plant) -> list[float]:
         if k % 5 == 0:
             values += [*plant.theta, *plant.thetad, *plant.q, *plant.qd, *plant.strain_torque, *plant.cable_torque]
             for load in plant.loads():
-                values += [load.place, *load.force]
+                values += [load.position, *load.force]
     return values
 
 

@@ -53,10 +53,10 @@ def test_a_hand_presses_with_its_force_at_its_place(shape: str, sizes: tuple[flo
     force = 8.0 * np.array((0.0, math.cos(angle), math.sin(angle)))
     assert load.cover == "outer_link"
     # a flat side that lies along the tube may carry at its edge
-    assert load.place == pytest.approx(0.25, abs=1e-3 if shape == "sphere" else 0.0201)
+    assert load.position == pytest.approx(0.25, abs=1e-3 if shape == "sphere" else 0.0201)
     assert np.abs(np.subtract(load.force, force)).max() < 0.05
     # the line of the force meets the tube's axis there
-    assert np.abs(np.subtract(load.moment, np.cross((load.place, 0.0, 0.0), force))).max() < 0.02
+    assert np.abs(np.subtract(load.moment, np.cross((load.position, 0.0, 0.0), force))).max() < 0.02
     run(plant, 0.25)
     assert plant.loads() == []
 
@@ -97,7 +97,7 @@ def test_a_hand_that_slides_rubs_along_the_link_with_its_friction(way: float) ->
     run(resting, 0.2)
     (load,) = resting.loads()
     assert abs(load.force[0]) < 0.05 * 8.0
-    assert load.place == pytest.approx(0.25, abs=1e-3)
+    assert load.position == pytest.approx(0.25, abs=1e-3)
 
 
 def test_a_hand_that_turns_round_the_link_twists_it() -> None:

@@ -24,14 +24,14 @@ STEPS = """
   seconds: 0.6
   task:
     axes:
-      - {force: 8.0, along: [0, 0, -1], cover: outer_link, place: 0.28}
-      - {force: 8.0, along: [0, 0, -1], cover: outer_link, place: 0.27}
+      - {force: 8.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}
+      - {force: 8.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.27}
 - {name: to the box, seconds: 2.0, posture: [0.0, -1.9, 0.0, 1.45]}
 - {name: lower, seconds: 4.0, posture: [0.0, -2.1, 0.0, 1.45], until_force: 1.5}
 - {name: press across, seconds: 1.2, force: {frame: outer_link, newtons: [0.0, -8.0, 0.0]}}
 - name: press across by a task
   seconds: 1.2
-  task: {frame: outer_link, axes: [{force: 8.0, along: [0, -1, 0], cover: outer_link, place: 0.26}]}
+  task: {frame: outer_link, axes: [{force: 8.0, along: [0, -1, 0], cover: outer_link, contact_position: 0.26}]}
 - {name: brake, seconds: 0.2, request: disable}
 """
 REFUSED = {

@@ -156,7 +156,7 @@ def test_a_push_is_the_wrench_about_the_origin_of_the_cover() -> None:
 
 def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_path: Path) -> None:
     """The inner tube is 1.6 in aside at the elbow: a push on the cover's axis would hardly touch it."""
-    push = {"cover": "inner_link", "place": 0.5588, "newtons": [0.0, 10.0, 0.0], "begin": 0.0, "end": 0.1}
+    push = {"cover": "inner_link", "contact_position": 0.5588, "newtons": [0.0, 10.0, 0.0], "begin": 0.0, "end": 0.1}
     steps = load(write(tmp_path, {"steps": [{"name": "a", "seconds": 0.2, "push": push}]}), ARM)
     out = play(Scenario(steps), 1)[0]
     np.testing.assert_allclose(out.push_torque, [-0.4064, 0.0, 5.588], rtol=1e-9)
@@ -215,7 +215,7 @@ WHOLE: dict[str, Any] = {
     "posture": [0.1, -0.7, 0.05, 0.4],
     "until_force": 1.5,
     "force": {"frame": "outer_link", "newtons": [0, -3, 1]},
-    "push": {"cover": "inner_link", "place": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.1, "end": 0.4},
+    "push": {"cover": "inner_link", "contact_position": 0.3, "newtons": [0.0, 9.0, 2.0], "begin": 0.1, "end": 0.4},
 }
 
 
@@ -226,7 +226,7 @@ def write(directory: Path, tree: Any) -> Path:
 
 
 def placed(place: float, frame: str = "outer_link", newtons: Sequence[float] = (0, -3, 1)) -> dict[str, Any]:
-    return {**WHOLE, "force": {"frame": frame, "newtons": list(newtons), "place": place}}
+    return {**WHOLE, "force": {"frame": frame, "newtons": list(newtons), "contact_position": place}}
 
 
 def without(body: dict[str, Any], key: str) -> dict[str, Any]:
@@ -259,14 +259,20 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
         ({**WHOLE, "force": {"frame": "hand", "newtons": [0, 0, 1]}}, "frame is 'hand'; allowed: base, inner_link"),
         ({**WHOLE, "force": {"frame": "base", "newtons": [0, 1]}}, r"newtons is \[0, 1\]; it must be a list of 3"),
         ({**WHOLE, "force": {"frame": "base", "newtons": [0, 0, math.nan]}}, "newtons is nan; it must be a finite"),
-        (placed(0.28, "base"), "place is given; it needs the frame of a link and a force across it"),
-        (placed(0.28, newtons=[1, 0, 0]), "place is given; it needs the frame of a link and a force across it"),
-        (placed(0.0), "place is 0 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
-        (placed(0.9), "place is 0.9 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
-        ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, place"),
+        (placed(0.28, "base"), "contact_position is given; it needs the frame of a link and a force across it"),
+        (
+            placed(0.28, newtons=[1, 0, 0]),
+            "contact_position is given; it needs the frame of a link and a force across it",
+        ),
+        (placed(0.0), "contact_position is 0 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
+        (placed(0.9), "contact_position is 0.9 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
+        ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, contact_position"),
         ({**WHOLE, "push": without(WHOLE["push"], "end")}, "push: 'end' is missing"),
         ({**WHOLE, "push": {**WHOLE["push"], "cover": "base"}}, "cover is 'base'; allowed: inner_link, outer_link"),
-        ({**WHOLE, "push": {**WHOLE["push"], "place": 0.6}}, "place is 0.6 m; inner_link reaches from 0 to 0.5588 m"),
+        (
+            {**WHOLE, "push": {**WHOLE["push"], "contact_position": 0.6}},
+            "contact_position is 0.6 m; inner_link reaches from 0 to 0.5588 m",
+        ),
         ({**WHOLE, "push": {**WHOLE["push"], "end": 0.1}}, "begin is 0.1 s, end 0.1 s; end must be later"),
     ],
 )

@@ -30,7 +30,7 @@ TOUCH = """steps:
   - name: push while moving
     seconds: 1.2
     posture: [0.0, -1.2, 0.0, 1.0]
-    push: {cover: outer_link, place: 0.28, newtons: [0.0, 12.0, 0.0], begin: 0.4, end: 1.0}
+    push: {cover: outer_link, contact_position: 0.28, newtons: [0.0, 12.0, 0.0], begin: 0.4, end: 1.0}
   - {name: brake, seconds: 0.1, request: disable}
 """
 

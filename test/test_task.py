@@ -322,6 +322,15 @@ def test_a_force_that_cannot_be_measured_is_refused_with_its_standard_deviation(
     assert "lever" in reason or "standard deviation" in reason
 
 
+@pytest.mark.parametrize(("friction", "is_refused"), [(0.0, True), (0.1, False)])
+def test_two_forces_without_friction_are_refused(friction: float, is_refused: bool) -> None:
+    """On a friction of 0.3 one of them was 3.8 N of 8, known to 0.1 N as it was stated."""
+    world = Springs(springs={DOWN: 4000.0})
+    world.loop.tune(replace(OWN, sensing=replace(OWN.sensing, friction=friction)))
+    world.step(base(force(10.0, DOWN, 0.1), force(10.0, Y, 0.39)))
+    assert ("sensing.friction is 0; allowed: 0.01 and above" in world.loop.reason) is is_refused
+
+
 def test_a_task_that_ends_leaves_the_arm_where_it_is() -> None:
     world = Springs()
     world.step(base(TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, Y, 0.1)), 100)
@@ -389,7 +398,7 @@ def test_a_task_is_the_same_after_it_was_a_table() -> None:
         (0, 9.0, "kind is 9; allowed: 1 force"),
         (1, 0.0, "joint is 0 and link 1"),
         (2, 7.0, "link is 7; allowed: 0 to 1"),
-        (3, 2.0, "place is 2.0 m; allowed: 0 to 0.4064"),
+        (3, 2.0, "contact_position is 2.0 m; allowed: 0 to 0.4064"),
         (6, 0.0, "direction is zero"),
         (7, math.nan, "value is not a number"),
         (8, 0.1, "rate is 0.1; it belongs to a position"),

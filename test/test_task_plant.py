@@ -22,7 +22,7 @@ OUTER = "outer_link"
 
 
 def force(surface: Surface, newtons: float) -> TaskAxis:
-    return TaskAxis(AxisKind.FORCE, -1, surface.cover, surface.place, surface.direction, newtons)
+    return TaskAxis(AxisKind.FORCE, -1, surface.cover, surface.position, surface.direction, newtons)
 
 
 class Played:
@@ -101,3 +101,20 @@ def test_two_forces_that_are_stable_alone_do_not_swing_together(mode: str) -> No
     else:
         assert swing.max() < 0.5, "N"
         assert played.forces[-500:].mean(axis=0) == pytest.approx((8.65, 16.8), rel=0.03)
+
+
+@pytest.mark.parametrize(("place", "newtons"), [(0.35, 6.5), (0.2, 20.0)])
+def test_a_posture_pulls_the_link_back_no_faster_than_its_force_follows(place: float, newtons: float) -> None:
+    """After a motion along the link, by 6 cm: it went back at its full speed, and pressed with up to 25 N of 6.5."""
+    q = (0.0, -1.0, 0.0, 0.6)
+    rotation = BODY.cover_pose(q, OUTER).rotation
+    surface = Surface(OUTER, place, triple(rotation[:, 1]), 4000.0, 0.3, is_plane=False)
+    slide = TaskAxis(AxisKind.VELOCITY, -1, OUTER, place, triple(rotation[:, 0]), -0.03)
+    alone = (force(surface, newtons),)
+    later = [
+        ScenarioStep(name, s, task=TaskCommand("base", axes))
+        for name, s, axes in (("slide", 2.0, (*alone, slide)), ("back", 1.5, alone))
+    ]
+    played = Played(Task(q, surface, newtons), alone, 1.0, *later)
+    assert played.forces[3000:, 0].max() < 1.2 * newtons
+    assert played.forces[3000:, 0].min() > 0.8 * newtons

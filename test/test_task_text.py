@@ -23,7 +23,7 @@ ARM = SHARED.arm
 NAMES = list(ARM.joints.names)
 START = [0.0, -1.2, 0.2, 0.3]
 EXAMPLE = Path(__file__).parents[1] / "examples" / "tasks.yaml"
-AT = {"along": [0, 0, -1], "cover": "outer_link", "place": 0.28}
+AT = {"along": [0, 0, -1], "cover": "outer_link", "contact_position": 0.28}
 
 
 def step_of(tmp_path: Path, **keys: Any) -> ScenarioStep:
@@ -43,7 +43,7 @@ def test_axes_are_read_in_the_order_of_their_priority(tmp_path: Path) -> None:
     assert [axis.kind for axis in read.axes] == [AxisKind.FORCE, AxisKind.POSITION, AxisKind.IMPEDANCE]
     assert (read.axes[0].value, read.axes[1].joint, read.axes[1].value) == (10.0, 2, None)
     assert (read.axes[2].stiffness, read.axes[2].damping) == (0.0, 90.0)
-    assert task(tmp_path, {"force": 10, **AT, "place": "estimated"}).axes[0].place is None
+    assert task(tmp_path, {"force": 10, **AT, "contact_position": "estimated"}).axes[0].position is None
 
 
 def test_a_frame_of_ones_own_turns_the_axes(tmp_path: Path) -> None:
@@ -53,7 +53,7 @@ def test_a_frame_of_ones_own_turns_the_axes(tmp_path: Path) -> None:
 
 def test_a_line_is_four_positions_of_which_some_may_be_held(tmp_path: Path) -> None:
     line = {"line": "outer_link", "point": [0.4, 0.0, -0.2], "along": [0, 1, 0]}
-    assert [axis.place for axis in task(tmp_path, line).axes] == [0.0, 0.0, 0.4064, 0.4064]
+    assert [axis.position for axis in task(tmp_path, line).axes] == [0.0, 0.0, 0.4064, 0.4064]
     level = task(tmp_path, {**line, "hold": ["start_up", "end_up"]}).axes
     assert [abs(axis.direction[2]) for axis in level] == [1.0, 1.0]
     assert [axis.value * axis.direction[2] for axis in level] == pytest.approx([-0.2, -0.2])  # type: ignore[operator]
@@ -72,10 +72,16 @@ def test_a_torque_is_a_force_of_each_joint(tmp_path: Path) -> None:
         ({"task": {"axes": [{"push": 3}]}}, "axis 1 has no kind; give one of force, velocity"),
         ({"task": {"axes": [{"force": 3, "free": 3, **AT}]}}, "has force, free; give one"),
         ({"task": {"axes": [{"force": 3, **AT, "cover": "hand"}]}}, "cover is 'hand'; allowed: inner_link, outer_link"),
-        ({"task": {"axes": [{"force": 3, **AT, "place": 3.0}]}}, "place is 3.0 m; allowed: 0 to 0.4064 m"),
+        (
+            {"task": {"axes": [{"force": 3, **AT, "contact_position": 3.0}]}},
+            "contact_position is 3.0 m; allowed: 0 to 0.4064 m",
+        ),
         ({"task": {"axes": [{"force": 3, "joint": "joint9"}]}}, "joint is 'joint9'"),
         ({"task": {"axes": [{"position": 0, **AT}], "frame": "outer_link"}}, "turns with it"),
-        ({"task": {"axes": [{"velocity": 0.1, **AT, "place": "estimated"}]}}, "only that of a force is estimated"),
+        (
+            {"task": {"axes": [{"velocity": 0.1, **AT, "contact_position": "estimated"}]}},
+            "only that of a force is estimated",
+        ),
         ({"torque": [1.0]}, "must be a list of 4 numbers"),
         ({"torque": [0.0] * 4, "task": {"axes": [{"force": 3, **AT}]}}, "task and torque are given"),
         ({"posture": START, "tip": [0.5, 0.0, 0.0]}, "posture and tip are given"),
@@ -183,7 +189,7 @@ def test_a_scenario_keeps_the_outer_link_on_a_line_while_it_slides(tmp_path: Pat
     along = body.cover_pose(level, "outer_link").rotation[:, 0]
     line = {"line": "outer_link", "point": start.tolist(), "along": along.tolist()}
     line["hold"] = ["start_up", "end_side", "end_up"]
-    slide = {"velocity": 0.04, "along": along.tolist(), "cover": "outer_link", "place": 0.2}
+    slide = {"velocity": 0.04, "along": along.tolist(), "cover": "outer_link", "contact_position": 0.2}
     release = ScenarioStep("release", 0.3, request="enable")
     configuration = CONFIGURATION.with_values(
         {

@@ -20,7 +20,7 @@ STEPS = [
         "name": "disturb",
         "seconds": 0.5,
         "force": {"frame": "base", "newtons": [0.0, 0.0, -10.0 * POUND]},
-        "push": {"cover": "link", "place": 0.6, "newtons": [0.0, -5.0, 0.0], "begin": 0.1, "end": 0.3},
+        "push": {"cover": "link", "contact_position": 0.6, "newtons": [0.0, -5.0, 0.0], "begin": 0.1, "end": 0.3},
     },
     {"name": "brake", "seconds": 0.1, "request": "disable"},
 ]

@@ -240,5 +240,5 @@ def test_a_folded_elbow_is_stopped_by_the_links_that_touch(stiffness: float) -> 
         size = float(np.linalg.norm(on["outer_link"]))
         assert size > 20.0, "N"
         torques = run.estimate.external_torques
-        assert abs(torques[3]) == pytest.approx(size * loads["outer_link"].place, rel=0.05)
+        assert abs(torques[3]) == pytest.approx(size * loads["outer_link"].position, rel=0.05)
         assert np.abs(torques[:3]).max() < 0.3, "N m: nothing else holds the arm"

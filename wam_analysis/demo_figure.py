@@ -114,7 +114,7 @@ def _contact_forces(summary: DemoSummary, arm: Arm, q: Sequence[float]) -> list[
     traces, found = summary.traces, []
     for signal, colour, label in ((traces.true, TRUE, "true"), (traces.estimated, ESTIMATED, "estimated")):
         contact = _contact(signal, summary.moment.row)
-        if contact.cover in arm.covers.names and math.isfinite(contact.place):
+        if contact.cover in arm.covers.names and math.isfinite(contact.position):
             point, force = arm_picture.contact_on_surface(arm, q, contact)
             found.append((point, force, colour, f"{label} {np.linalg.norm(force):.1f} N"))
     return found

@@ -81,7 +81,14 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
     lines += _wrapped(f"Demonstration of {summary.namespace or '/'}: {_played(summary)}")
     worst = "Result, worst case in brackets" + (", for what is left of the recording" if summary.lost else "")
     lines += ["", worst, *(f"  {answer}" for answer in verdict(summary))]
-    lines += ["", *_presses(summary.presses), *_reactions(summary), "", *_touches(summary.touches, summary.period)]
+    lines += [
+        "",
+        *_presses(summary.presses),
+        *_positions(summary.presses),
+        *_reactions(summary),
+        "",
+        *_touches(summary.touches, summary.period),
+    ]
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
     lines += [line for note in (*summary.notes, *notes) for line in _wrapped(f"Note     {note}")]
@@ -171,6 +178,31 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
             : any(p.is_refused for p in presses)
         ],
     ]
+
+
+def _positions(presses: Sequence[SteadyPress]) -> list[str]:
+    """What the estimated contact position is worth: the force that the same torques are at each position."""
+    rows: list[list[str]] = []
+    used: list[str] = []
+    for press in presses:
+        if press.is_refused or not press.true:  # nothing was measured, or nothing touched
+            continue
+        cells: list[str] = []
+        for one in press.positions.forces:
+            off = 100.0 * (one.force - press.true) / press.true
+            cells += [_number(100.0 * one.position, 1), _number(one.force, 2)]
+            cells.append("-" if math.isnan(off) else f"{off:+.1f} %")
+        if any(not math.isnan(one.force) for one in press.positions.forces):
+            used.append(f"{100.0 * press.positions.used:.1f} +- {100.0 * press.positions.used_sd:.1f}")
+            rows.append([press.step, _number(press.true, 2), *cells])
+    if not rows:
+        return []
+    first = ["", "", "configured", "[cm]", "", "estimated", "[cm]", "", "true", "[cm]", ""]
+    head = ["step", "true", "at", "[N]", "error", "at", "[N]", "error", "at", "[N]", "error"]
+    title = "What the estimated contact position gains: the same torques, measured as a force there"
+    error = "  error: to the true force; at the true position, the error of the torques alone"
+    places = _wrapped(f"  used by the force loop [cm]: {', '.join(used)}", "    ")
+    return ["", title, *_table(rows, first, head), error, *places]
 
 
 def _reactions(summary: DemoSummary) -> list[str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from wam_analysis.demo_traces import NAN, RECORDED, Mask, Names, Numbers, Traces, traces_of
 from wam_analysis.measures.runs import runs
+from wam_analysis.press_positions import NOWHERE, PressPositions, press_positions
 from wam_analysis.reactions import RecordedReaction, reactions_of, within
 from wam_analysis.task_forces import TaskForce, measured_force, task_forces
 from wam_bag.bag import Bag, TableColumns
@@ -30,6 +31,7 @@ class SteadyPress(NamedTuple):
     Attributes
     ----------
     ripple : half of the range of the true force.
+    positions : what the same torques are at the configured, at the estimated and at the true position.
     reactions : what the force loop did meanwhile instead of what was commanded, in the whole step.
     """
 
@@ -41,6 +43,7 @@ class SteadyPress(NamedTuple):
     ripple: float
     measured: float
     estimated: float
+    positions: PressPositions = NOWHERE
     reactions: tuple[RecordedReaction, ...] = ()
 
     @property
@@ -216,7 +219,7 @@ def _presses(
     """The forces of a step: the commanded one, or each one of a task that commands several."""
     during = within(reactions, step.begin, step.end)
     begin = max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
-    presses = [_press(traces, step, begin)]
+    presses = [_press(run, traces, step, begin)]
     for task in tasks:
         if not task.is_only and task.begin < step.end and task.end > begin:
             name, size = f"{step.name}, axis {task.number + 1}", float(np.linalg.norm(task.force))
@@ -225,7 +228,7 @@ def _presses(
     return [press._replace(reactions=during) for press in presses if press]
 
 
-def _press(traces: Traces, step: RecordedStep, begin: int) -> SteadyPress | None:
+def _press(run: RecordedRun, traces: Traces, step: RecordedStep, begin: int) -> SteadyPress | None:
     whole = traces.during(step.begin, step.end) & traces.commanded.acts
     if not np.any(whole):
         return None
@@ -233,6 +236,7 @@ def _press(traces: Traces, step: RecordedStep, begin: int) -> SteadyPress | None
     if not np.any(steady):
         steady = whole
     true = traces.along(traces.true, -1.0)[steady]
+    measured = _mean(traces.along(traces.measured)[steady])
     return SteadyPress(
         step=step.name,
         begin=begin,
@@ -240,8 +244,9 @@ def _press(traces: Traces, step: RecordedStep, begin: int) -> SteadyPress | None
         commanded=_mean(traces.commanded.size[steady]),
         true=_mean(true),
         ripple=float(np.ptp(true)) / 2.0,
-        measured=_mean(traces.along(traces.measured)[steady]),
+        measured=measured,
         estimated=_mean(traces.along(traces.estimated, -1.0)[steady]),
+        positions=press_positions(run, traces, steady, measured),
     )
 
 

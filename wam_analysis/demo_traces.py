@@ -25,8 +25,8 @@ RECORDED = (
     "sim/disturbance", "sim/joint_states",
 )  # fmt: skip
 TOPICS_READ = (
-    *RECORDED, "joint_states", "contact/hypotheses", "force_axis", "task_command", "task_axes", "status",
-    "/diagnostics",
+    *RECORDED, "joint_states", "external_joint_torques", "contact/hypotheses", "force_axis", "task_command",
+    "task_axes", "status", "/diagnostics",
 )  # fmt: skip
 
 

@@ -35,7 +35,7 @@ from wam_bag.errors import BagError, Damage
 from wam_bag.mcap_file import McapFile
 from wam_bag.message_groups import Times
 from wam_bag.message_search import NEVER, log_times, messages
-from wam_bag.series import Series, series
+from wam_bag.series import Series
 
 __all__ = [
     "Bag", "BagError", "BoolColumns", "ClockColumns", "Columns", "JointColumns", "Messages", "PointColumns", "Raw",
@@ -63,7 +63,7 @@ class Bag(NamedTuple):
         return f"Bag({str(self.path)!r}, {len(self.topics)} topics, {messages} messages)"
 
     def series(self, topic: str) -> Series:
-        """A topic as named series of equal length, see `wam_bag.series.series`.
+        """A topic as named series of equal length, see `wam_bag.columns.Columns`.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class Bag(NamedTuple):
         if len(found) != 1:
             listed = ", ".join(found or sorted(self.topics)) or "none"
             raise BagError(f"{self.path}: {len(found) or 'no'} topics are named '{topic}'; choose one of {listed}")
-        return series(self.topics[found[0]])
+        return self.topics[found[0]].series()
 
     def to_pandas(self, topic: str) -> Any:
         """A topic as a DataFrame with the time, s, as its index; arguments and errors as those of `series`.

@@ -17,8 +17,10 @@ from wam_bag.mcap_records import Bytes
 from wam_bag.message_groups import Decoded, Group, Grouping, Index, Numbers, Times
 from wam_bag.message_search import DATA, Found, log_times, messages
 from wam_bag.point_clouds import table_columns, tables
+from wam_bag.series import Series, split, stamped
 
 Texts = NDArray[np.object_]
+AXES = ("x", "y", "z")
 
 
 def _listed(frames: Texts) -> str:
@@ -43,6 +45,11 @@ class JointColumns(NamedTuple):
     def __repr__(self) -> str:
         return f"JointColumns({len(self.log_time_ns)} messages: {', '.join(self.names)})"
 
+    def series(self) -> Series:
+        """The stamp and 'position.joint1' and so on; see `Columns`."""
+        fields = {"position": self.position, "velocity": self.velocity, "effort": self.effort}
+        return stamped(self.stamp_ns) | split(fields, self.names)
+
 
 class WrenchColumns(NamedTuple):
     """geometry_msgs/WrenchStamped, k messages: force (k, 3) N, torque (k, 3) N m."""
@@ -56,6 +63,12 @@ class WrenchColumns(NamedTuple):
     def __repr__(self) -> str:
         return f"WrenchColumns({len(self.log_time_ns)} messages: {_listed(self.frames)})"
 
+    def series(self) -> Series:
+        """The stamp, 'frame', 'force.x' to 'torque.z'; see `Columns`."""
+        return (
+            stamped(self.stamp_ns) | {"frame": self.frames} | split({"force": self.force, "torque": self.torque}, AXES)
+        )
+
 
 class PointColumns(NamedTuple):
     """geometry_msgs/PointStamped, k messages: point (k, 3) m."""
@@ -67,6 +80,10 @@ class PointColumns(NamedTuple):
 
     def __repr__(self) -> str:
         return f"PointColumns({len(self.log_time_ns)} messages: {_listed(self.frames)})"
+
+    def series(self) -> Series:
+        """The stamp, 'frame', 'point.x' to 'point.z'; see `Columns`."""
+        return stamped(self.stamp_ns) | {"frame": self.frames} | split({"point": self.point}, AXES)
 
 
 class TableColumns(NamedTuple):
@@ -90,6 +107,13 @@ class TableColumns(NamedTuple):
         """Stamp of the message of each row, ns, (p,)."""
         return self.stamp_ns[self.message]
 
+    def series(self) -> Series:
+        """The stamp and 'message' of each row, its numbers by name; see `Columns`."""
+        found = stamped(self.row_stamp_ns) | {"message": self.message}
+        for name, values in self.columns.items():
+            found |= split({name: values}, range(values.shape[-1])) if values.ndim > 1 else {name: values}
+        return found
+
 
 class BoolColumns(NamedTuple):
     """std_msgs/Bool, k messages."""
@@ -99,6 +123,10 @@ class BoolColumns(NamedTuple):
 
     def __repr__(self) -> str:
         return f"BoolColumns({len(self.log_time_ns)} messages)"
+
+    def series(self) -> Series:
+        """The log time and 'data'; see `Columns`."""
+        return stamped(self.log_time_ns) | {"data": self.data}
 
 
 class ClockColumns(NamedTuple):
@@ -110,6 +138,10 @@ class ClockColumns(NamedTuple):
     def __repr__(self) -> str:
         return f"ClockColumns({len(self.log_time_ns)} messages)"
 
+    def series(self) -> Series:
+        """The stamp alone; see `Columns`."""
+        return stamped(self.stamp_ns)
+
 
 class Messages(NamedTuple):
     """Messages of any other type; fields are attributes, arrays of numbers numpy arrays."""
@@ -120,12 +152,17 @@ class Messages(NamedTuple):
     def __repr__(self) -> str:
         return f"Messages({len(self.log_time_ns)} messages)"
 
+    def series(self) -> Series:
+        """The log time and 'message'; see `Columns`."""
+        return stamped(self.log_time_ns) | {"message": np.fromiter(self.messages, object, len(self.messages))}
+
     def column(self, path: str) -> NDArray[Any]:
         """One field of every message, for example 'header.stamp.sec'; shape (k,), or (k, n) of equal arrays."""
         values = list(map(attrgetter(path), self.messages))
         return np.array(values, object if values and isinstance(values[0], str) else None)
 
 
+# of all: `series`, named series of equal length (k,) as data frames and spreadsheets take them, with 'time', s
 Columns = JointColumns | WrenchColumns | PointColumns | TableColumns | BoolColumns | ClockColumns | Messages
 
 

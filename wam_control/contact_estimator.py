@@ -11,10 +11,10 @@ from wam_control.contact_inference import (
     SECOND,
     ContactInference,
     Hypothesis,
-    InferenceParameters,
     detection_statistic,
     with_second,
 )
+from wam_control.inference_parameters import InferenceParameters
 from wam_control.momentum_observer import MomentumObserver
 from wam_control.observer_parameters import ObserverParameters
 from wam_control.pressed_pose import has_left
@@ -34,7 +34,7 @@ class ContactEstimatorParameters:
     inference: InferenceParameters
     use_joint_sensors: bool = parameter("observe the joint sensors instead of the motors alone")
     detect: float = parameter(
-        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or 1.3 times it in one",
+        "r^T S^-1 r of the external torques above which a contact is detected: in two periods, or twice it in one",
         low=0.0,
         high=1e6,
     )
@@ -65,7 +65,7 @@ class ContactEstimate(NamedTuple):
     in_contact : whether a contact is detected.
     contacts : number of contacts: 2 where a second one is suspected, which one contact then only seems to explain.
     link : name of the cover in contact, '' without contact.
-    place : contact position, m along the cover's x axis, NaN where it cannot be observed.
+    position : contact position, m along the cover's x axis, NaN where it cannot be observed.
     position_sd : m, NaN where the position is.
     probability : that this link is in contact, NaN without contact.
     direction_sd : rad, of the angle of the force about the link, NaN without contact.
@@ -83,7 +83,7 @@ class ContactEstimate(NamedTuple):
     in_contact: bool
     contacts: int
     link: str
-    place: float
+    position: float
     position_sd: float
     probability: float
     direction_sd: float
@@ -97,7 +97,8 @@ class ContactEstimate(NamedTuple):
 NOTHING = (0.0, 0.0, 0.0)
 SUDDEN = 1.75  # times the threshold of the faster estimate: the cables' vibration passes its filter
 SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faster estimate is not used
-ALONE = 1.3  # times the threshold: detected in one period; below that in two, because noise exceeds it now and then
+SHAKEN = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
+ALONE = 2.0  # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
 TOO_EARLY = "too few samples yet"
 
 
@@ -204,14 +205,15 @@ class ContactEstimator:
         if fast is not None:
             quick = detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64))
             statistic = max(statistic, quick / SUDDEN)
-        was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic)
+        was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic, is_calm)
         if was_in_contact and not self._in_contact:
             self._ended = observer.age
         observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
             self._second.reset()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
-        hypotheses = self._inference.infer(observer.pose, torques, precision / observer.size)
+        load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
+        hypotheses = self._inference.infer(observer.pose, torques, precision, load)
         self._second.step(observer.age, hypotheses, observer, self._inference)
         if self._second.is_suspected:
             why = CERTAIN_SECOND if self._second.is_certain else SECOND
@@ -224,7 +226,7 @@ class ContactEstimator:
             in_contact=True,
             contacts=1 + self._second.is_suspected,
             link=best.cover,
-            place=best.place,
+            position=best.position,
             position_sd=best.position_sd,
             probability=best.probability,
             direction_sd=best.direction_sd,
@@ -244,12 +246,12 @@ class ContactEstimator:
             self._pressed_at = []
         return self._in_contact or bool(self._pressed_at)
 
-    def _is_detected(self, statistic: float) -> bool:
+    def _is_detected(self, statistic: float, is_calm: bool) -> bool:
         detect, was_above = self._parameters.detect, self._is_above
-        self._is_above = statistic > detect
+        self._is_above = statistic > (detect if is_calm else SHAKEN * detect)
         if self._in_contact:
             return statistic > self._parameters.release
-        return statistic > ALONE * detect or (self._is_above and was_above)
+        return (is_calm and statistic > ALONE * detect) or (self._is_above and was_above)
 
     @property
     def model_errors(self) -> dict[str, float]:
@@ -267,7 +269,7 @@ def _nothing(
         in_contact=False,
         contacts=0,
         link="",
-        place=math.nan,
+        position=math.nan,
         position_sd=math.nan,
         probability=math.nan,
         direction_sd=math.nan,

@@ -71,7 +71,7 @@ class ContactEstimatorNode:
             "external_joint_torques": State([], [], list(estimate.external_torques)),
             "external_joint_torques_sd": State([], [], list(estimate.torque_sd)),
             "contact/wrench": Wrench(frame, estimate.force, estimate.moment),
-            "contact/point": Point(frame, (estimate.place, 0.0, 0.0)),
+            "contact/point": Point(frame, (estimate.position, 0.0, 0.0)),
             "contact/hypotheses": hypothesis_table(estimate.hypotheses, self._covers),
         }
         if self._timing.is_display(inputs.stamp):
@@ -121,5 +121,5 @@ def _is_pressing(inputs: Inputs) -> bool:
 
 def _view(estimate: ContactEstimate) -> ContactView:
     likely = tuple(LikelyRange(h.cover, h.low, h.high) for h in estimate.hypotheses if h.low < h.high)
-    contact = Contact(estimate.link, estimate.place, estimate.force) if estimate.link else NO_CONTACT
+    contact = Contact(estimate.link, estimate.position, estimate.force) if estimate.link else NO_CONTACT
     return ContactView(contact, likely)

@@ -28,7 +28,9 @@ PARTS = 12  # pieces of a refined peak, two thirds of a standard deviation each
 WEAK_PRIOR = 1e-9  # of the force prior: avoids a division by zero in directions that no joint measures
 END = 0.01  # m, length of the end of a link
 LEANS = (0.05, 0.5)  # force across the tube per force along it, on its end
-SET = 0.9  # probability of the set that is reported
+SET = 0.9  # probability of the set that is reported, of contacts
+LARGEST_EXPONENT = 500.0
+LEAST_CHANCE = 1e-300  # avoids the logarithm of 0
 
 
 class Fit(NamedTuple):
@@ -36,10 +38,10 @@ class Fit(NamedTuple):
 
     Attributes
     ----------
-    place : m, mean contact position, of the likelier ones of forces from the side and along the tube: a mean of both
+    position : m, mean contact position, of the likelier ones of forces from the side and along the tube: a mean of both
         would be where neither is.
     position_sd : m, root mean square distance of the contact from there, by both.
-    force : (2,), N, most likely components across the link at `place`.
+    force : (2,), N, most likely components across the link at `position`.
     force_sd : N, standard deviation of the size of the force, the position unknown.
     direction_sd : rad, standard deviation of its direction about the link, the position unknown.
     torque_position_sd : m, standard deviation of the position by the torques alone, without priors of position
@@ -51,7 +53,7 @@ class Fit(NamedTuple):
     along : probability that the force is along the tube, of a contact on this link.
     """
 
-    place: float
+    position: float
     position_sd: float
     force: Pair
     force_sd: float
@@ -117,12 +119,13 @@ class ContactFit:
         self._row = row.tolist()
         self._powers = np.stack([row**k for k in range(5)], axis=1)
 
-    def __call__(self, gram: Array) -> list[Fit]:
+    def __call__(self, gram: Array, other: float = -math.inf) -> list[Fit]:
         """Fit a contact to each link.
 
         Parameters
         ----------
         gram : (links, 7, 7), Z^T S^-1 Z for each link.
+        other : log of the probability of the torques, with its weight, if no contact but something else explains them.
         """
         full = gram.tolist()
         links = [
@@ -135,7 +138,7 @@ class ContactFit:
         for i, link in enumerate(links):
             cells += self._cells(i, link, log_density[i], top)
             cells += self._at_ends(i, link, top - REACH) + self._along(i, full[i], top - REACH)
-        parts = self._parts(sorted(cells, reverse=True))
+        parts = self._parts(sorted(cells, reverse=True), other)
         return [self._fit(i, link, *part) for i, (link, part) in enumerate(zip(links, parts, strict=True))]
 
     def _log_density(self, links: "list[_Link]") -> list[list[float]]:
@@ -189,7 +192,7 @@ class ContactFit:
     def _three(link: "_Link", x: float, near: float) -> tuple[float, float, float]:
         return link.log_density(x - near), link.log_density(x), link.log_density(x + near)
 
-    def _parts(self, cells: list[Cell]) -> list[tuple[float, float, float, float, float, float]]:
+    def _parts(self, cells: list[Cell], other: float) -> list[tuple[float, float, float, float, float, float]]:
         """Of each link: probability, place and variance, ends of the 90 % set, fraction of forces along; see `Fit`.
 
         The set takes the most probable positions first: `cells` are in this order.
@@ -209,6 +212,7 @@ class ContactFit:
                 mine[4] += weight * x
         total, passed = sum(weights), 0.0
         enough = SET * total
+        total += math.exp(min(other - top, LARGEST_EXPONENT))
         inside = [[math.inf, -math.inf] for _ in self._ends]
         for weight, (_, x, width, i, _) in zip(weights, cells, strict=True):
             if passed >= enough:
@@ -295,7 +299,7 @@ class ContactFit:
         along = u1 * (u1 * s11 + 2.0 * u2 * s12) + u2 * u2 * s22 + (u1 * d1 + u2 * d2) ** 2 * variance
         about = u2 * (u2 * s11 - 2.0 * u1 * s12) + u1 * u1 * s22 + (u1 * d2 - u2 * d1) ** 2 * variance
         return Fit(
-            place=place,
+            position=place,
             position_sd=math.sqrt(variance),
             force=force,
             force_sd=math.sqrt(along),
@@ -346,6 +350,25 @@ class _Link:
         known = (v1 * v1 * n22 - 2.0 * v1 * v2 * n12 + v2 * v2 * n11) / (n11 * n22 - n12 * n12)
         information = f1 * f1 * b11 + 2.0 * f1 * f2 * b12 + f2 * f2 * b22 - known
         return 1.0 / math.sqrt(information) if information > 0.0 else math.inf
+
+
+def log_evidence_of_weight(torques: Array, unit: Array, precision: Array, least: float) -> float:
+    """Log of the probability of external torques, (n,), N m, if a force of one direction and sign explains them.
+
+    As that of contacts in `ContactFit`: -1/2 (r^T S'^-1 r + log abs(S')/abs(S)), S' = S + a a^T / least, and twice the
+    probability that the force is positive.
+
+    Parameters
+    ----------
+    unit : (n,), a, torques of the force 1.
+    precision : (n, n), S^-1.
+    least : inverse of the prior variance of the force.
+    """
+    weighted = precision.dot(unit)
+    aa, ra = float(weighted.dot(unit)) + least, float(weighted.dot(torques))
+    rr = float(precision.dot(torques).dot(torques))
+    positive = 0.5 * math.erfc(-ra / math.sqrt(2.0 * aa))
+    return -0.5 * (rr - ra * ra / aa + math.log(aa / least)) + math.log(2.0 * max(positive, LEAST_CHANCE))
 
 
 def _log_evidence(

@@ -7,16 +7,17 @@ moment only.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.contact_fit import ContactFit, Fit
+from wam_control.contact_fit import ContactFit, Fit, log_evidence_of_weight
+from wam_control.inference_parameters import InferenceParameters
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, parameter, require
+from wam_description.parameters import lengths, require
 from wam_description.rigid_body import RigidBody
+from wam_description.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -38,37 +39,11 @@ MORE = "one contact does not explain the torques"
 ALONG = "a force along the tube and one at its start cannot be distinguished"
 SECOND = "a second contact is suspected: position and force are those of both together"
 CERTAIN_SECOND = "a second contact is nearly certain: position and force are those of both together"
+PAYLOAD = "a payload that was picked up may explain the torques; its probability is what those of the links lack to 1"
 REASONS = (  # as bits
     MOMENT_ONLY, BENT, STRAIGHT, SHOULDER, WEAK, ELBOW, STRAIGHT_LINK, LINKS, MORE, ALONG, SECOND, CERTAIN_SECOND,
+    PAYLOAD,
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class InferenceParameters:
-    """Prior probabilities of a contact, before it is detected."""
-
-    weights: tuple[float, ...] = parameter(
-        "relative frequency of contacts on each cover; the outer one sweeps more", low=1e-3, high=1e3
-    )
-    force_scale: float = parameter("prior sd of each component of a contact's force", "N", low=0.1, high=1e4)
-    moment_arm_offset: float = parameter(
-        "sd of the distance between the line of the force and the tube's axis, per radius", low=0.0, high=2.0
-    )
-    friction: float = parameter("sd of the friction force along a cover, per force", low=0.0, high=2.0)
-    end_weight: float = parameter(
-        "relative frequency of contacts where two links meet, on each", low=0.0, high=1e3, before=0.0
-    )
-    along_weight: float = parameter(
-        "relative frequency of forces along the last link: on its surface, and on its end",
-        low=0.0,
-        high=1e3,
-        before=0.0,
-    )
-    positions: int = parameter("contact positions tried along a link", low=9, high=200)
-    identification_threshold: float = parameter(
-        "probability from which the link in contact is identified", low=0.5, high=1.0
-    )
-    largest_residual: float = parameter("chi^2 above which one contact does not explain the torques", low=0.0, high=1e6)
 
 
 class Hypothesis(NamedTuple):
@@ -78,7 +53,7 @@ class Hypothesis(NamedTuple):
     ----------
     cover : name of the cover.
     probability : of this hypothesis among all, 0..1.
-    place : contact position, m along the cover's x axis, NaN where it cannot be observed.
+    position : contact position, m along the cover's x axis, NaN where it cannot be observed.
     position_sd : m, NaN where the position is.
     low, high : m, ends of the part of the cover that is in the 90 % set of positions on all covers; NaN
         where no part is.
@@ -96,7 +71,7 @@ class Hypothesis(NamedTuple):
 
     cover: str
     probability: float
-    place: float
+    position: float
     position_sd: float
     low: float
     high: float
@@ -184,7 +159,9 @@ class ContactInference:
         self._wrenches = np.array([cover.wrenches for cover in covers])
         self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
 
-    def infer(self, q: Sequence[float], torques: Sequence[float], precision: Array) -> tuple[Hypothesis, ...]:
+    def infer(
+        self, q: Sequence[float], torques: Sequence[float], precision: Array, load: Array | None = None
+    ) -> tuple[Hypothesis, ...]:
         """Explain external torques by one contact.
 
         Parameters
@@ -192,11 +169,12 @@ class ContactInference:
         q : (n,), joint angles, rad.
         torques : (n,), external torques, N m.
         precision : (n, n), the inverse of their covariance, 1/(N^2 m^2); of smaller ones than `SMALLEST_SD` that.
+        load : (n,), torques of a mass of 1 kg at the tool, N m; None if none may have been picked up.
 
         Returns
         -------
         tuple of Hypothesis
-            one per cover, the most probable first; probabilities add up to 1.
+            one per cover, the most probable first; what their probabilities lack to 1 is that of a payload.
         """
         if precision.trace() > SMALLEST_SD**-2:
             precision = np.asarray(
@@ -207,13 +185,19 @@ class ContactInference:
         rows = np.empty((len(self._covers), 7, len(torques)))
         rows[:, 0] = torques
         np.matmul(self._wrenches, self.jacobians, out=rows[:, 1:])
-        fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1))
+        picked, weight = -math.inf, self._parameters.payload_weight
+        if load is not None and weight:
+            least = (STANDARD_GRAVITY / self._parameters.force_scale) ** 2
+            picked = math.log(weight) + log_evidence_of_weight(rows[0, 0], load, precision, least)
+        fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1), picked)
+        is_payload = 1.0 - sum(fit.probability for fit in fits) > NOTED
         ambiguity = (
             self._ambiguity(q, fits)
             if max(fit.probability for fit in fits) < self._parameters.identification_threshold
             else ""
         )
-        found = [self._hypothesis(q, cover, fit, ambiguity) for cover, fit in zip(self._covers, fits, strict=True)]
+        each = zip(self._covers, fits, strict=True)
+        found = [self._hypothesis(q, cover, fit, ambiguity, is_payload) for cover, fit in each]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
 
     def slide(self, hypothesis: Hypothesis, force: Array) -> Array:
@@ -225,14 +209,14 @@ class ContactInference:
         """Joint torques, (hypotheses, 3, n), m, of a force where each has it or at the far end, in a pose."""
         index = [self._index[h.cover] for h in hypotheses]
         ends = [self._covers[i].end[0] for i in index]
-        places = [end if math.isnan(h.place) else h.place for end, h in zip(ends, hypotheses, strict=True)]
+        places = [end if math.isnan(h.position) else h.position for end, h in zip(ends, hypotheses, strict=True)]
         place, chosen = np.array(places)[:, None], jacobians[index]
         sides = chosen[:, :3]
         sides[:, 1] += place * chosen[:, 5]
         sides[:, 2] -= place * chosen[:, 4]
         return sides
 
-    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str) -> Hypothesis:
+    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str, is_payload: bool) -> Hypothesis:
         start, end = cover.start, cover.end
         length = end[0] - start[0]
         is_unknown = cover.is_moment_only or fit.torque_position_sd > length
@@ -243,7 +227,9 @@ class ContactInference:
             reasons.append(ALONG)
         if fit.residual > self._parameters.largest_residual:
             reasons.append(MORE)
-        place = end[0] if is_unknown else fit.place
+        if is_payload:
+            reasons.append(PAYLOAD)
+        place = end[0] if is_unknown else fit.position
         f1, f2 = fit.force_at_end if is_unknown else fit.force
         force = _triple([f1 * e1 + f2 * e2 for e1, e2 in cover.directions])
         share = (place - start[0]) / length
@@ -251,7 +237,7 @@ class ContactInference:
         return Hypothesis(
             cover=cover.name,
             probability=fit.probability,
-            place=math.nan if is_unknown else place,
+            position=math.nan if is_unknown else place,
             position_sd=math.nan if is_unknown else fit.position_sd,
             low=fit.low,
             high=fit.high,
@@ -295,7 +281,7 @@ class ContactInference:
         in_plane, straight, _ = self._at_elbow(q, self._elbow, fit)
         if straight > NEAR and in_plane < math.sqrt(1.0 - NEAR**2):
             return STRAIGHT_LINK
-        if fit.place - outer.start[0] < 2.0 * fit.position_sd:
+        if fit.position - outer.start[0] < 2.0 * fit.position_sd:
             return ELBOW
         return LINKS
 

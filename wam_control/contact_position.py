@@ -90,7 +90,7 @@ class ContactPosition:
             self._last = None
         elif not problem:
             sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
-            self._last = contact.cover, contact.place, sd
+            self._last = contact.cover, contact.position, sd
         assumed = parameters.contact_cover, parameters.contact_position
         cover, position, sd = self._last or (*assumed, anywhere_sd(self._covers, *assumed))
         if problem:
@@ -145,7 +145,7 @@ def _problem(contact: Contact, lean: float, parameters: ForceLoopParameters) -> 
             f"position is estimated well up to {math.degrees(STEEPEST):.0f} deg, and not on the end of a link; "
             "pin the position (contact_source, or the torque of the command)"
         )
-    known = position_is_certain(contact.place, contact.position_sd, parameters.position_uncertainty_limit)
+    known = position_is_certain(contact.position, contact.position_sd, parameters.position_uncertainty_limit)
     if known and not contact.probability < parameters.link_probability_limit:
         return ""
     return (

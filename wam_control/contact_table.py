@@ -7,7 +7,7 @@ from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Tabl
 from wam_description.topics import HYPOTHESIS_COLUMNS
 
 _COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
-_LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "place", "position_sd"))
+_LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "position", "position_sd"))
 _FORCE, _DIRECTION_SD, _REASONS = (_COLUMN[name] for name in ("force_x", "direction_sd", "reasons"))
 _LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
 
@@ -18,7 +18,7 @@ def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) ->
         (
             float(covers.index(h.cover)),
             h.probability,
-            h.place,
+            h.position,
             h.position_sd,
             h.low,
             h.high,
@@ -73,7 +73,7 @@ def _hypothesis(row: Sequence[float], covers: Sequence[str]) -> Hypothesis:
     return Hypothesis(
         cover=covers[int(value["link"])],
         probability=value["probability"],
-        place=value["place"],
+        position=value["position"],
         position_sd=value["position_sd"],
         low=value["low"],
         high=value["high"],

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 REACH = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
 ALONG = np.array([1.0, 0.0, 0.0])  # a metre along a cover
 STEEPEST = 0.5  # cosine of the lean of a force from the normal of the side of a link
+CERTAIN = 2.0  # standard deviations
 SMALLEST_FORCE = 1.0  # N, for the size of tangential forces
 
 
@@ -79,6 +80,14 @@ class SensingParameters:
         high=1.0,
         live=True,
         before=0.0,
+    )
+    stated_fraction: float = parameter(
+        "standard deviation of the measured force with what the contact estimator states of its torques, per commanded "
+        "force, up to which a force is begun with feedback contact_estimate",
+        low=0.0,
+        high=1e9,
+        live=True,
+        before=1e9,
     )
     reported_fraction: float = parameter(
         "standard deviation of the measured force, per commanded force, above which it is reported",
@@ -179,6 +188,16 @@ class ForceAxis(NamedTuple):
         return float(change @ weighted) - force * force / float(self.press @ precision @ self.press)
 
 
+class PressedForce(NamedTuple):
+    """A force, N, that is commanded along a direction (3,), base frame, at a known position of a cover, m."""
+
+    cover: str
+    position: float
+    position_sd: float
+    direction: Array
+    force: float
+
+
 class ForceAxes:
     """Makes the axes of one arm.
 
@@ -225,6 +244,23 @@ class ForceAxes:
         point = (position, *self._covers.aside(cover, position))
         along = self._body.cover_pose(q, cover).rotation[:, 0]
         return float(along @ self._body.point_jacobian(q, cover, point) @ moved)
+
+    def whole(self, q: Sequence[float], pressed: PressedForce, torques: Array) -> float:
+        """Size of the force in all, N, less its uncertainty, by torques of the world on the joints (n,), N m.
+
+        It is taken to be as large as the commanded one: what the joints do not see of it is not counted.
+        """
+        own, (cover, position, position_sd, direction, force) = self._parameters, pressed
+        jacobian, surface = self._jacobian(q, cover, position, direction)
+        slide = self._body.point_jacobian(q, cover, surface + ALONG) - jacobian
+        shift = position_sd * force * direction @ slide
+        spread = np.diag(own.torque_sd**2 + (own.torque_fraction * torques) ** 2) + np.outer(shift, shift)
+        weighted = np.linalg.solve(spread, jacobian.T)
+        precision = jacobian @ weighted + np.eye(3) / max(force, SMALLEST_FORCE) ** 2
+        found = np.linalg.solve(precision, torques @ weighted)
+        size = float(np.linalg.norm(found))
+        sd = math.sqrt(float(found @ np.linalg.solve(precision, found))) / max(size, SMALLEST_FORCE)
+        return size - CERTAIN * sd
 
     def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
         """Jacobian (3, n) of the point of the surface, one radius off the axis of the tube, and the point (3,)."""

@@ -25,7 +25,10 @@ LATE = 0.1  # s, the same as IDENTIFIED where the position is known: the measure
 BY_MOTORS = 0.2  # s, the same with the estimate from the motors, which detect most of a small force at once, and late
 FED = 0.3  # s, in which the torque of the force is fed forward after the touch
 CREPT, LITTLE = 1.5, 9e-3  # settling times in which the arm has moved less, m, and touched nothing
+SLOPE = 0.01  # of a surface that moves across the force, or of the link on it, against the direction of its motion
+TURNING = 0.3  # s, in which the friction of the arm turns round on a surface that moves
 SETTLED = 3.0  # time constants within the settling time
+LIKELY = 0.6  # of the errors that are stated of torques; those of friction on a surface are as large as stated
 CREEP = 3e-3  # m, least way towards a surface within the settling time: slower, friction moves the arm in jerks
 FADING = 0.2  # of the time without it, by which that with it is reduced: a link that bounces is touched
 FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of friction are larger than its error
@@ -79,6 +82,7 @@ class ForceHold:
     Attributes
     ----------
     is_touching : whether the measured force shows that something is touched.
+    has_touched : whether it was, since the force is commanded.
     share : of the speed along the force: less where the late force of the motors was seen to swing.
     fed : fraction of the torque of the commanded force that is fed forward.
     """
@@ -92,7 +96,7 @@ class ForceHold:
         self._shake.reset()
         self.share, self.fed = 1.0, 0.0
         self._way = self._watched = self._shaking = self._blocked = 0.0
-        self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self._has_touched = (
+        self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
             self._has_settled
         ) = self._has_begun = False
         self._is_slow, self._other = False, ""
@@ -105,7 +109,7 @@ class ForceHold:
     def _forget_swings(self) -> None:
         """What the force was before something was touched shows nothing of how it is held."""
         self._strayed = self._within = 0.0
-        self._report = ""
+        self._report, self._returns = "", LEFT
         self._turns.reset()
 
     def approach_speed(
@@ -130,7 +134,8 @@ class ForceHold:
             return max(desired * yielding / axis.speed_fraction / rise, slowest)
         fastest = parameters.limits.impact * desired / math.sqrt(axis.impact_mass * stiffness)
         if not is_known:  # no slower: the estimator would take a force that grows for seconds for an error of its model
-            fastest = min(fastest, max(desired * yielding / DETECTED, slowest))
+            detected = BY_MOTORS if parameters.is_estimated else DETECTED
+            fastest = min(fastest, max(desired * yielding / detected, slowest))
         return fastest / axis.speed_fraction
 
     def feed(self, point: ForcePoint, parameters: ForceLoopParameters, dt: float) -> float:
@@ -234,14 +239,13 @@ class ForceHold:
         unknown : force, N, of torques at rest before, which no touched surface gives, and what they mean.
         """
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
-        limit = parameters.sensing.sd_limit(desired, point.is_pinned)
-        self._is_sensed = axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
+        blind = self._not_sensed(axis, point, desired, torque_error, parameters)
         is_loaded = not self._has_begun and abs(unknown[0]) > TOLERANCE * desired
         pushed = measured if pushed is None else pushed
         self.is_touching = pushed >= TOUCH * desired and not is_loaded
         self._has_begun = self._has_begun or self.is_touching
-        if self.is_touching and not self._has_touched:
-            self._has_touched = True
+        if self.is_touching and not self.has_touched:
+            self.has_touched = True
             self._forget_swings()
         if self.is_touching and self._travel <= parameters.limits.free_travel:
             self._travel = 0.0
@@ -255,7 +259,7 @@ class ForceHold:
         weak = self._too_weak(point, desired, signal, elsewhere, parameters)
         if is_loaded:
             return ForceReaction.NOT_SENSED, _loaded(*unknown, desired)
-        held = self._held(axis, point, desired, limit, weak, parameters)
+        held = self._held(axis, point, desired, blind or weak, parameters)
         if held[0].holds:
             return held
         is_double = not point.is_single and (is_strange or not point.is_pinned)
@@ -271,7 +275,7 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        force_sd = math.hypot(axis.force_sd, torque_error, unknown[0])
+        force_sd = math.hypot(_likely_sd(axis, torque_error, parameters), unknown[0])
         is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
@@ -290,6 +294,40 @@ class ForceHold:
             return ForceReaction.NOT_EXPLAINED, turned
         return self._doubted(axis, point, force_sd, desired, unexplained, parameters)
 
+    def _not_sensed(
+        self,
+        axis: ForceAxis,
+        point: ForcePoint,
+        desired: float,
+        torque_error: float,
+        parameters: ForceLoopParameters,
+    ) -> str:
+        """Why the force is not measured well enough, '' where it is.
+
+        What the estimator states of its torques counts until the force is controlled: it states more while the arm
+        moves and presses, which is reported.
+        """
+        sensing = parameters.sensing
+        limit, stated = sensing.sd_limit(desired, point.is_pinned), math.hypot(axis.force_sd, torque_error)
+        is_known = self._is_sensed or not torque_error or stated <= sensing.stated_fraction * desired
+        self._is_sensed = is_known and axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
+        if self._is_sensed:
+            return ""
+        if not is_known:
+            return (
+                f"the force is known to +-{stated:.3g} N from the motors at {point.position:.3g} m of {point.cover}; "
+                f"allowed to begin: {sensing.stated_fraction * desired:.3g} N, {sensing.stated_fraction:.0%} of the "
+                "commanded (sensing.stated_fraction); the arm holds its position: command more force, another "
+                "direction or position, use joint sensors, or allow more where less accuracy will do"
+            )
+        return (
+            f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
+            f"of {point.cover}; allowed: {limit:.3g} N, and {RESUME:g} of it to begin (sensing.force_sd_limit, "
+            "force_sd_fraction); the arm holds its position: bend the arm, or command more force, another "
+            "direction or position"
+            f"{'' if point.is_pinned else ', or pin the position'}"
+        )
+
     def _too_weak(
         self, point: ForcePoint, desired: float, signal: float, elsewhere: float, parameters: ForceLoopParameters
     ) -> str:
@@ -300,7 +338,7 @@ class ForceHold:
             name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
         begins = RESUME if self._is_detectable else 1.0
         is_weak, is_unseen = signal < begins * least, elsewhere < begins * sensing.least_signal
-        self._is_detectable = self._has_touched or not (is_weak or is_unseen)
+        self._is_detectable = self.has_touched or not (is_weak or is_unseen)
         if self._is_detectable:
             return ""
         if is_weak:
@@ -330,32 +368,23 @@ class ForceHold:
         axis: ForceAxis,
         point: ForcePoint,
         desired: float,
-        limit: float,
-        weak: str,
+        blind: str,
         parameters: ForceLoopParameters,
     ) -> tuple[ForceReaction, str]:
-        """Why the arm is held instead; `limit` of the standard deviation, N; `weak`: why the force is not detected."""
+        """Why the arm is held instead; `blind`: why the force is not sensed, or not detected."""
         if self._other:
             return ForceReaction.OTHER_LINK, self._other
-        if not self._is_sensed:
-            return ForceReaction.NOT_SENSED, (
-                f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
-                f"of {point.cover}; allowed: {limit:.3g} N, and {RESUME:g} of it to begin (sensing.force_sd_limit, "
-                "force_sd_fraction); the arm holds its position: bend the arm, or command more force, another "
-                "direction or position"
-                f"{'' if point.is_pinned else ', or pin the position'}"
-            )
-        if weak:
-            return ForceReaction.NOT_SENSED, weak
+        if blind:
+            return ForceReaction.NOT_SENSED, blind
         if self._travel > parameters.limits.free_travel:
             return ForceReaction.NOTHING_TOUCHED, (
-                f"the arm has moved {self._travel:.3g} m along the force and nothing is touched; allowed: "
+                f"the arm has moved {self._travel:.3g} m along the force and nothing was touched; allowed: "
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
-        if not self._has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
+        if not self.has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
             return ForceReaction.NOTHING_TOUCHED, (
-                f"nothing is touched {self._missed:.2g} s after the command: the arm creeps, and has moved "
+                f"nothing was touched {self._missed:.2g} s after the command: the arm creeps, and has moved "
                 f"{1e3 * self._travel:.2g} mm; it holds its position: go nearer, declare a softer surface "
                 "(guard.contact_stiffness), or pin the position; command no force, then again"
             )
@@ -380,14 +409,8 @@ class ForceHold:
                 "least, as the velocity loops wind up through friction for longer than limits.settling_time; the arm "
                 "holds its position: pin the position, command more force, or use joint sensors"
             )
-        lag = parameters.limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
-        most = parameters.sensing.reported_fraction * desired
-        if lag > most:
-            return ForceReaction.TOO_SLOW, (
-                f"a surface that moves with {parameters.limits.surface_speed:g} m/s (limits.surface_speed) would keep "
-                f"the force {lag:.2g} N off; allowed: {most:.2g} N (sensing.reported_fraction); the arm holds its "
-                "position: command more force, a larger force_gain, or let the surface move more slowly"
-            )
+        if moves := _left_behind(axis, desired, parameters):
+            return ForceReaction.TOO_SLOW, moves
         speed = self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < CREEP:
             return ForceReaction.TOO_SLOW, (
@@ -461,8 +484,13 @@ class ForceHold:
         )
 
     def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
-        """A reason, or the last one until the force has been within the tolerance for as long as it may be off."""
-        if missed or self._within >= LEFT * parameters.limits.settling_time:
+        """A reason, or the last one until the force has been within the tolerance for as long as it may be off.
+
+        A force that had been right before has to be right for the whole settling time: what takes it away comes again.
+        """
+        if missed:
+            self._returns = 1.0 if self._has_settled else LEFT
+        if missed or self._within >= self._returns * parameters.limits.settling_time:
             self._report = missed
         return self._report
 
@@ -475,14 +503,14 @@ class ForceHold:
         self._within = 0.0 if is_off else self._within + dt
         if self._has_settled and desired - self._reached > tolerance(desired, parameters):
             self._has_settled, self._missed = False, 0.0  # more is commanded: that takes its time again
-        if self._has_touched and not is_off:
+        if self.has_touched and not is_off:
             self._has_settled, self._reached = True, desired
         if not is_off or error * self._missed < 0.0:
             self._missed = 0.0
         self._missed += math.copysign(dt, error)
         has_rested = not self._has_settled or self._within >= LEFT * lasting
         self._strayed = 0.0 if has_rested else self._strayed + dt * is_off
-        if not self._has_touched and abs(self._missed) > lasting:
+        if not self.has_touched and abs(self._missed) > lasting:
             return (
                 f"nothing is touched yet, {abs(self._missed):.2g} s after the command: the arm has moved "
                 f"{1e3 * self._travel:.2g} mm towards it; go nearer, declare a softer surface "
@@ -516,6 +544,51 @@ def _slowed(axis: ForceAxis) -> str:
         f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
         "apparent mass is large in this pose (sensing.apparent_mass_limit)"
     )
+
+
+def _likely_sd(axis: ForceAxis, torque_error: float, parameters: ForceLoopParameters) -> float:
+    """Standard deviation of the measured force, N, with `LIKELY` of what is stated of the torques themselves."""
+    sensing = parameters.sensing
+    each = sensing.estimated_torque_sd if parameters.is_estimated else sensing.torque_sd
+    stated = math.hypot(each * float(np.linalg.norm(axis.sense)), torque_error)
+    whole = math.hypot(axis.force_sd, torque_error)
+    return math.sqrt(max(whole * whole - (1.0 - LIKELY * LIKELY) * stated * stated, 0.0))
+
+
+def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> str:
+    """Why a surface that moves would keep the force off, '' where it would not.
+
+    Along the force the integral law is v/G_I behind, and the force rises in no less than `LATE`.  A surface that moves
+    across it comes nearer by a slope that nobody knows, if it is stiff by more than the force allows before the
+    friction of the arm has turned round.
+    """
+    limits, yielding = parameters.limits, 1.0 / parameters.guard.contact_stiffness + axis.compliance
+    lag = limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
+    most = parameters.sensing.reported_fraction * desired
+    if lag > most:
+        return (
+            f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) would keep the force "
+            f"{lag:.2g} N off; allowed: {most:.2g} N (sensing.reported_fraction); the arm holds its position: command "
+            "more force, a larger force_gain, or let the surface move more slowly"
+        )
+    fastest = desired * yielding / (BY_MOTORS if parameters.is_estimated else LATE)
+    if limits.impact and limits.surface_speed > fastest:
+        return (
+            f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) goes faster than the arm "
+            f"follows for {desired:.3g} N on {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness), "
+            f"{fastest:.2g} m/s; the arm holds its position: command more force, or let the surface move more slowly"
+        )
+    nearer = TURNING * SLOPE * limits.slide_speed
+    off = nearer / yielding
+    if off > tolerance(desired, parameters):
+        return (
+            f"a surface that moves across the force with {limits.slide_speed:g} m/s (limits.slide_speed) comes nearer "
+            f"by {1e6 * nearer:.2g} um while the friction of the arm turns round, which is {off:.2g} N on "
+            f"{parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness); allowed: "
+            f"{tolerance(desired, parameters):.2g} N; the arm holds its position: command more force, or let the "
+            "surface move more slowly"
+        )
+    return ""
 
 
 def _loaded(force: float, meaning: str, desired: float) -> str:

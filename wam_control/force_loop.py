@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.feed_forward import FeedForward
-from wam_control.force_axis import ForceAxes, ForceAxis
+from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force_command import CommandAdmission
 from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
@@ -25,8 +25,9 @@ from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
 from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
-from wam_control.hybrid_velocity import hybrid_velocity, posture_velocity
-from wam_control.motion_limits import MotionLimits
+from wam_control.held_arm import HeldArm, HeldPush, RetreatForce
+from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
+from wam_control.motion_limits import MotionLimits, WholeForce
 from wam_control.pressed_pose import has_left
 from wam_control.stability_guard import GuardAssessment
 from wam_control.task import AxisKind, TaskCommand
@@ -40,6 +41,8 @@ __all__ = ["ForceCommand", "ForceLoop", "ForceLoopParameters", "ForceOutput"]
 Array = NDArray[np.float64]
 TASK = "task"  # in place of a frame of the force
 REST = 0.05  # rad/s, mean speed of a joint below which the arm is at rest
+FAST = 0.3  # rad/s, above which a payload is not known from the torques of the motion
+RESTED = 3.0 * STEADY  # s at rest, after which it is
 SHORTEST = 1e-12  # m^2, square of a lever
 SMALL = 0.2  # rad/s, velocity towards a posture below which it waits while a force on a stiff surface is kept
 BACK = 3e-3  # m, way back from another link than commanded
@@ -66,6 +69,7 @@ class ForceOutput(NamedTuple):
     point: ForcePoint | None = None  # where it acts
     sd_limit: float = math.inf  # N, of its standard deviation
     rows: tuple[AxisRow, ...] = ()  # of the axes of a task
+    pressed: PressedForce | None = None  # where all of the commanded force acts at one known place
 
 
 class ForceLoop:
@@ -103,9 +107,8 @@ class ForceLoop:
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._position = ContactPosition(arm.covers)
         self._contact_rejected = False
-        self._held_at: list[float] | None = None
+        self._held = HeldArm(self._body)
         self._goes_back = False
-        self._way_back = 0.0  # m, that an arm which holds may still go back from what it presses too hard
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
         self._filter, self._motion, self._delay = LowPass(), LowPass(), DelayLine()
@@ -117,7 +120,8 @@ class ForceLoop:
         self._is_free = False
         self._external = np.zeros(self._n), np.zeros(self._n)
         self._resting: Array | None = None
-        self._is_moving = False
+        self._is_moving = self._is_fast = False
+        self._rested = 0.0  # s
         self._unknown: tuple[Array, str] = np.zeros(self._n), ""  # torques at rest that no surface gives
         self._external_sd: Sequence[float] | None = None
         self._transfer = BumplessTransfer(self._n)
@@ -189,9 +193,19 @@ class ForceLoop:
         return ""
 
     @property
+    def is_pushed(self) -> bool:
+        """Whether something has pushed the arm since it holds."""
+        return bool(self._held.push or self._tasks.is_pushed)
+
+    @property
     def _is_at_rest(self) -> bool:
+        return self._speed < REST
+
+    @property
+    def _speed(self) -> float:
+        """Mean speed of the fastest joint, rad/s; infinite where it is not known yet."""
         speed = self._motion.value
-        return speed is not None and float(np.abs(speed).max()) < REST
+        return math.inf if speed is None else float(np.abs(speed).max())
 
     @property
     def _has_left(self) -> bool:
@@ -243,6 +257,7 @@ class ForceLoop:
                 command = torque = None  # a force that is not measured would grow without bounds
         self._is_free = contact is not None and not contact.cover
         self._motion.step(np.array(joints.velocity), STEADY, dt)
+        self._rested = self._rested + dt if self._is_at_rest else 0.0
         contact = contact or NO_CONTACT
         if task is None and self._axes == TASK:
             self._reset(joints.position)
@@ -263,12 +278,19 @@ class ForceLoop:
         else:
             out = self._force(joints.position, contact, commands.force, commands.posture, dt)
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        limited = self._limits.step(velocity, joints.position, self._external[0], _known_place(out.point, task))
+        place = _known_place(out.point, task)
+        limited = self._limits.step(velocity, joints.position, self._external[0], place, self._whole(out.pressed))
         if not self.reaction.holds and limited.contact_force:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
         elif not self.reaction.holds and limited.joint_end:
             self._react(ForceReaction.JOINT_END, limited.joint_end)
         return out._replace(velocity=limited.velocity)
+
+    def _whole(self, pressed: PressedForce | None) -> WholeForce | None:
+        """How the force in all is known at the place of a commanded one; None where it is not."""
+        if pressed is None:
+            return None
+        return WholeForce(pressed.force, lambda: self._force_axes.whole(self._joints, pressed, self._external[0]))
 
     def _react(self, reaction: ForceReaction, reason: str) -> None:
         self.reaction, self.reason = reaction, reason
@@ -294,12 +316,13 @@ class ForceLoop:
         self._resting = None
         self._axes = axes
         self._approached = [0.0] * self._n  # along the force: as its lever turns, the posture would pull this back
-        self._held_at = None
+        self._held.release()
         self._transfer.restart()
         limit = self.parameters.sensing.zero_limit
-        self._is_moving = not self._is_at_rest
+        self._is_moving, self._is_fast = not self._is_at_rest, False
         if not (axes and limit and self._has_left):
             return
+        self._is_fast = self._speed > FAST and axes != TASK
         if self._is_moving:
             self._resting = self._external[0]
             if self.parameters.feedback == "joint_sensors":
@@ -318,7 +341,7 @@ class ForceLoop:
         is_open = own.mode == "open_loop"
         desired = math.hypot(*command.force) if command is not None else 0.0
         axes = command.frame if command is not None and desired else ""
-        if axes != self._axes:
+        if axes != self._axes or (self._is_fast and self._rested > RESTED):
             self._begin(axes)
         goal = [a + b for a, b in zip(posture, self._approached, strict=True)]
         held = posture_velocity(goal, q, own.posture_gain, own.joint_speed_limit, self._rate)
@@ -331,7 +354,7 @@ class ForceLoop:
         force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
         measured, before, free = self._measured(force_axis)
         scalar = law.along(axis)
-        error = desired - measured
+        error, is_pressed = desired - measured, point.is_certain and self._hold.is_touching
         out = ForceOutput(
             [],
             [0.0] * self._n,
@@ -342,6 +365,7 @@ class ForceLoop:
             force_axis,
             point,
             own.sensing.sd_limit(desired, point.is_pinned),
+            pressed=PressedForce(*point[:3], direction, desired) if is_pressed else None,
         )
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
@@ -350,15 +374,16 @@ class ForceLoop:
         self._react(reaction, reason)
         self._remember(q, moved, contact, point, force_axis)
         if reaction.holds:
-            self.refusals["force_command"] = reason
-            speed, excess = 0.0, self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
-            if excess:
-                factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
-                speed = factor * scalar.velocity(0, -excess, -excess, dt)
-            velocity, effort = self._held(q, force_axis, speed, dt)
+            measured -= -float(force_axis.sense @ self._unknown[0])
+            excess = self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
+            factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
+            force = RetreatForce(force_axis, factor * scalar.velocity(0, -excess, -excess, dt) if excess else 0.0)
+            velocity, effort = self._hold_still(q, contact, point, force, desired, factor, dt)
+            self._react(reaction, reason + self._held.push)
+            self.refusals["force_command"] = self.reason
             return out._replace(velocity=[] if is_open else velocity, effort=effort)
-        if self._held_at is not None:
-            self._held_at = None
+        if self._held.is_holding:
+            self._held.release()
             self._transfer.restart()
         if is_open:
             return out._replace(effort=(force_axis.lever * desired).tolist())
@@ -370,10 +395,21 @@ class ForceLoop:
         speed = speeds[0] * self._gain_factor(point, _triple(direction.tolist()), desired, dt)
         speed *= self._hold.share
         speed = min(speed, 0.0 if is_watching else self._hold.approach_speed(force_axis, point, desired, own))
+        if self._hold.has_touched and self._rate is None:
+            held = self._followed(q, point, force_axis, held, desired, scalar.gain[0])
         velocity = hybrid_velocity(held, force_axis, speed, own.joint_speed_limit)
         self._hold.travel(float(force_axis.lever @ velocity) * dt)
         fed = force_axis.lever * (self._hold.feed(point, own, dt) * desired)
         return out._replace(velocity=velocity, effort=self._feed_forward.step(fed, velocity, own, dt))
+
+    def _followed(
+        self, q: Sequence[float], point: ForcePoint, axis: ForceAxis, held: list[float], desired: float, gain: float
+    ) -> list[float]:
+        """Velocities of the posture (n,), rad/s, slower where the link would slide fast on what it presses."""
+        place = (point.position, *self._arm.covers.aside(point.cover, point.position))
+        across = np.array(hybrid_velocity(held, axis, 0.0, self.parameters.joint_speed_limit))
+        slow: list[float] = followed(across, self._body.point_jacobian(q, point.cover, place), desired, gain).tolist()
+        return slow
 
     def _measured(self, axis: ForceAxis) -> tuple[float, float, float]:
         """Force along an axis, N, now and one period before, and now without the inertia of the arm itself.
@@ -399,6 +435,11 @@ class ForceLoop:
         dt: float,
     ) -> tuple[ForceReaction, str]:
         """What the loop does instead of the command, and why; forces in N, the measured one without inertia, too."""
+        if self._is_fast:
+            return ForceReaction.NOT_SENSED, (
+                f"the arm moved faster than {FAST:g} rad/s as the force began, and it is not known what it carries: it "
+                "comes to rest first"
+            )
         if self._resting is not None:
             self._judge(q, point, direction, self._resting)
         return self._hold.step(
@@ -440,20 +481,40 @@ class ForceLoop:
         mass, left = self._measurement.payload(q, resting, sd)
         return f"as with {mass:.2g} kg at the tool" if mass > 0.0 and left <= UNEXPLAINED else ""
 
-    def _held(self, q: Sequence[float], axis: ForceAxis, speed: float, dt: float) -> tuple[list[float], list[float]]:
-        """Velocities and torques of an arm that holds: to where it does, or back along the force at a speed, m/s."""
+    def _hold_still(
+        self,
+        q: Sequence[float],
+        contact: Contact,
+        point: ForcePoint,
+        force: RetreatForce,
+        desired: float,
+        factor: float,
+        dt: float,
+    ) -> tuple[list[float], list[float]]:
+        """Velocities and torques of an arm that holds: to where it does, or away from what pushes too hard."""
         own, still = self.parameters, [0.0] * self._n
         self._hold.fed = 0.0
         goes_back = self.reaction is ForceReaction.OTHER_LINK
-        if self._held_at is None or goes_back != self._goes_back:
-            self._held_at, self._goes_back = self._free_of(axis) if goes_back else list(q), goes_back
-            self._way_back = 0.0 if goes_back or self._has_left else own.limits.free_travel
+        if not self._held.is_holding or goes_back != self._goes_back:
+            self._goes_back = goes_back
+            self._held.hold(self._free_of(force.axis) if goes_back else q, own.limits.free_travel)
             self._transfer.restart()
-        if not speed or self._way_back <= 0.0:
-            return posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit), still
-        self._way_back, self._held_at = self._way_back + speed * dt, list(q)
-        velocity = hybrid_velocity(still, axis, speed, own.joint_speed_limit)
-        return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt)
+        push = self._push(q, contact, _known_place(point, None))
+        push = push._replace(allowed=min(push.allowed, desired), gain=factor * push.gain)
+        velocity, is_yielding = self._held.step(q, [force], push, own.posture_gain, own.joint_speed_limit, dt)
+        return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt) if is_yielding else still
+
+    def _push(self, q: Sequence[float], contact: Contact, place: tuple[str, float] | None) -> HeldPush:
+        """What pushes an arm that holds: where it is estimated, if on another cover than that of the known place."""
+        own = self.parameters
+        torques = self._external[0] - self._unknown[0]
+        if own.feedback == "joint_sensors":
+            torques = torques + self._force_axes.inertia(q) @ self._acceleration
+        sd = np.array(self._external_sd or [sensing_of(own).torque_sd] * self._n)
+        if contact.cover and (place is None or place[0] != contact.cover):
+            middle = MIDDLE * self._arm.covers.length_of(contact.cover)
+            place = contact.cover, middle if math.isnan(contact.position) else contact.position
+        return HeldPush(torques, sd, place, own.limits.contact_force, max(own.force_gain))
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
@@ -530,7 +591,8 @@ class ForceLoop:
             # what no mass at the tool explains may be several surfaces that are touched already
             carried = self._carried(q, resting)
             self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
-        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown)
+        push = self._push(q, contact, _known_place(None, task))
+        found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown, push)
         self._react(found.reaction, found.reason)
         if found.reaction.holds:
             self.refusals["task_command"] = found.reason
@@ -539,7 +601,8 @@ class ForceLoop:
         if found.has_changed:
             self._transfer.restart()
         measured, error = _triple(found.measured.tolist()), _triple(found.error.tolist())
-        return ForceOutput(found.velocity, found.effort, measured, error, error, task.frame, rows=found.rows)
+        out = ForceOutput(found.velocity, found.effort, measured, error, error, task.frame)
+        return out._replace(rows=found.rows, pressed=found.pressed)
 
     def _joint_torque(self, contact: Contact, torque: Sequence[float] | None, dt: float) -> ForceOutput:
         """Torque of each joint; without a command the arm holds still."""
@@ -585,7 +648,7 @@ def _known_place(point: ForcePoint | None, task: TaskCommand | None) -> tuple[st
     if point is not None:
         return (point.cover, point.position) if point.is_pinned or point.is_certain else None
     forces = [axis for axis in task.axes if axis.kind is AxisKind.FORCE] if task is not None else []
-    places = [(axis.cover, axis.place) for axis in forces if axis.cover and axis.place is not None]
+    places = [(axis.cover, axis.position) for axis in forces if axis.cover and axis.position is not None]
     return places[0] if len(forces) == len(places) == 1 else None
 
 

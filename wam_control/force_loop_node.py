@@ -35,7 +35,7 @@ class ForceLoopNode:
         self._refusal = ""
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
-        self._reported: tuple[Report, ForceReaction, tuple[str, ...], str] | None = None
+        self._reported: tuple[Report, ForceReaction, bool, tuple[str, ...], str] | None = None
         self._reaction = ForceReaction.NONE
 
     @reaction(
@@ -136,7 +136,7 @@ class ForceLoopNode:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
         report, reaction = self._loop.report, self._loop.reaction
         refused = {topic: why for topic, why in self.refusals.items() if topic != "contact/hypotheses"}
-        present = report, reaction, tuple(refused), self._refusal or self._player.refusal
+        present = report, reaction, self._loop.is_pushed, tuple(refused), self._refusal or self._player.refusal
         if present == self._reported:
             return {}
         self._reported = present

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from wam_control.force_axis import ForceAxis
 
 Array = NDArray[np.float64]
+SLOPE = 0.3  # of a surface to the force: as fast as this times the link slides on it, it comes towards the link
+ALLOWED = 0.1  # of the commanded force, error while it does
 
 
 def posture_velocity(
@@ -39,3 +41,17 @@ def hybrid_velocity(posture: Sequence[float], axis: ForceAxis, speed: float, lim
         force *= limit / fastest
     result: list[float] = (force + held - lever * (float(lever @ held) / float(lever @ lever))).tolist()
     return result
+
+
+def followed(posture: Array, jacobian: Array, force: float, gain: float) -> Array:
+    """Velocities towards a posture (n,), rad/s, at which the force stays right: slower where the link slides fast.
+
+    Parameters
+    ----------
+    posture : velocities (n,), rad/s, without motion along the force.
+    jacobian : (3, n), m/rad, of where the link presses.
+    force, gain : commanded, N, and speed along it per error, m/s/N.
+    """
+    slide = SLOPE * float(np.linalg.norm(jacobian @ posture))
+    most = gain * ALLOWED * force
+    return posture * (most / slide) if slide > most else posture

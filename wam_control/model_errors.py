@@ -6,8 +6,8 @@ r - H x with the covariance S = H P H^T + R; while a contact lasts, x is frozen 
 is, with a dither, too, however many samples there are: they show more and more of that pose, which x and P then take
 in, but of others no more than one sample of R. The rest is forgotten where the arm is away from there without contact.
 
-How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, positions are
-less certain.  Never more: on a better arm, links that are wrong by friction of the contact would seem certain.
+How large the errors are in free motion, over S, is followed, too: on an arm that is worse than stated, S is so much
+larger.  Never smaller: on a better arm, links that are wrong by friction of the contact would seem certain.
 """
 
 from collections import deque
@@ -79,7 +79,7 @@ class ModelErrors:
         self.errors, self.covariance = prior.errors.copy(), prior.covariance.copy()
         self.noise, self.size = noise.copy(), 1.0
         self.beyond = self._beyond()
-        self._waiting: deque[tuple[Observation, float]] = deque()
+        self._waiting: deque[Observation] = deque()
         self._at, self._of_pose, self._rested = np.full(len(through), np.inf), 0, 0.0
         self._elsewhere: tuple[Array, Array] | None = None  # errors and covariance as they are for other poses
         self._since = self._contact = self._hold = 0.0
@@ -129,13 +129,13 @@ class ModelErrors:
             self._leave(seen.pose)
         if not in_contact and self._hold <= 0.0:
             self._contact = 0.0
-            self._waiting.append((seen, statistic))
+            self._waiting.append(seen)
             if len(self._waiting) > HINDSIGHT / LEARN_EVERY and statistic < GATE:
-                before, its = self._waiting.popleft()
+                before = self._waiting.popleft()
                 self._of_pose += 1
                 if self._of_pose > CORRELATED and self._elsewhere is None:
                     self._elsewhere, self._rested = (self.errors.copy(), self.covariance.copy()), 0.0
-                self._learn(before, its, self._since)
+                self._learn(before, self._since)
         self._since = 0.0
 
     def _leave(self, pose: Array) -> None:
@@ -154,17 +154,18 @@ class ModelErrors:
         covariance *= scale
         covariance *= scale[:, None]
 
-    def _learn(self, seen: Observation, statistic: float, span: float) -> None:
+    def _learn(self, seen: Observation, span: float) -> None:
+        innovation, covariance = self.corrected(seen)
         # of a shaft at rest stiction hides the errors
         rate = span / TRUST_TIME * float(seen.moving.min())
-        size = self.size + rate * (MARGIN * statistic / len(seen.residual) - self.size)
-        self.size = min(max(size, 1.0), LARGEST)
-        innovation, covariance = self.corrected(seen)
+        squared = float(innovation.dot(np.linalg.solve(covariance, innovation))) / len(innovation)
+        self.size = min(max(self.size + rate * (MARGIN * squared - self.size), 1.0), LARGEST)
         rate = span / NOISE_TIME
         at_motors = self._to_motors @ innovation
         known = np.einsum("ij,jk,ik->i", self._to_motors, covariance, self._to_motors) - self.noise * seen.moving
-        found = np.maximum(0.0, at_motors * at_motors - known)
-        self.noise += rate * seen.moving * (found - self.noise)
+        # what is below the rest counts, too: of positive parts alone the mean is above 0 without any noise
+        self.noise += rate * seen.moving * (at_motors * at_motors - known - self.noise)
+        self.noise = np.maximum(0.0, self.noise)
         gain_torques = self.covariance @ seen.effects.T
         coloured = covariance + (CORRELATED - 1.0) * (covariance - seen.effects @ gain_torques)
         gain = np.linalg.solve(coloured, gain_torques.T).T

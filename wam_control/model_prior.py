@@ -12,21 +12,21 @@ from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 WAYS = ("positive", "negative")
-# friction, masses, load friction and torque constants per torque; payload, kg: beyond, a warning
-TOLERABLE = (0.2, 0.04, 0.05, 0.05, 0.05)
+# friction, masses, load friction and torque constants per torque; delay, s; payload, kg: beyond, a warning
+TOLERABLE = (0.2, 0.04, 0.05, 0.05, 3e-3, 0.05)
 INFLATED = 2.0  # of identified standard deviations: those stated are too small by up to that (docs/identify.md)
 LEAST = 0.02  # sd of an identified friction, per friction
 
 
 class ModelPrior(NamedTuple):
-    """Errors of the model: friction in positive, then in negative motion; masses; load; torque constants; payload.
+    """Errors of the model: friction in positive, then in negative motion; masses; load; constants; delay; payload.
 
     Friction and its share of the load are those of motors, then joints.
 
     Attributes
     ----------
     names : of the k errors.
-    errors : (k,), friction per dynamic friction, payload in kg, the others per torque.
+    errors : (k,), friction per dynamic friction, delay in s, payload in kg, the others per torque.
     covariance : (k, k).
     limit : (k,), largest variances.
     tolerable : (k,), errors above which the model is off.
@@ -53,6 +53,7 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
                 *[given.load_uncertainty] * n,
                 *np.where(driven_by > 1, given.load_uncertainty, 0.0),
                 *[given.torque_scale_uncertainty] * n,
+                given.torque_delay_uncertainty,
                 payload_sd,
             ]
         )
@@ -68,9 +69,10 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
         *(f"masses at {name}" for name in joints),
         *(f"load friction of {name}" for name in shafts),
         *(f"torque constant of {name}" for name in motors),
+        "delay of the torques",
         "payload",
     )
-    return ModelPrior(names, errors, covariance, limit, np.repeat(TOLERABLE, [4 * n, n, 2 * n, n, 1]))
+    return ModelPrior(names, errors, covariance, limit, np.repeat(TOLERABLE, [4 * n, n, 2 * n, n, 1, 1]))
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:

@@ -104,6 +104,7 @@ class MomentumObserver:
         # the same of the errors of the model, and their sizes
         self._through_errors = np.hstack((-self._through, self._through, np.eye(n), -self._through, inverse.T))
         self._sizes = np.concatenate((half_levels, half_levels, np.ones(4 * n)))
+        self._to_joints = inverse.T
         payload_sd = 0.0
         if self._load is not None:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
@@ -118,14 +119,16 @@ class MomentumObserver:
         n = self._n
         self.q: list[float] = [0.0] * n
         # of each filter the residual and the torque of the model, (2 n,), N m, the pose, (n,), rad, then the signals of
-        # the shafts, (10 n,); strain gauges lie behind the friction: no signals
-        self._filtered = np.zeros((len(self._times), 3 * n if self._link_side else 13 * n))
+        # the shafts, (10 n,), and the rate of the motors' torques, (n,), N m/s; strain gauges lie behind the friction:
+        # no signals
+        self._filtered = np.zeros((len(self._times), 3 * n if self._link_side else 14 * n))
         self._decay = _Decay.over(math.inf, self._times, self._filtered.shape[1])
-        self._ring = np.zeros((max(1, self._cycle), 12 * n))
+        self._ring = np.zeros((max(1, self._cycle), 13 * n))
         self._filled = 0
         if self._load is not None:
             self._load.reset()
         self._momentum: list[float] | None = None
+        self._torque: Sequence[float] = ()
         self._inertia = self._carried
         self._motors.reset()
         self._joints.reset()
@@ -190,7 +193,9 @@ class MomentumObserver:
             *motor.shape,
             *joint.shape,
             *loaded,
+            *((torque - before) / dt for torque, before in zip(tau_motor, self._torque or tau_motor, strict=True)),
         ]
+        self._torque = tau_motor
         return self._update(q, qd, tau, friction, signals, dt)
 
     def _update(
@@ -251,7 +256,7 @@ class MomentumObserver:
             self._expect()
             self.seen = self._observation()
             torques, covariance = self._errors.corrected(self.seen)
-            return torques.tolist(), covariance
+            return torques.tolist(), self._errors.size * covariance
         uncertainty, load = self._parameters.mass_uncertainty, self._load
         residual, model = self._filtered[0, : 2 * self._n].reshape(2, -1).tolist()
         sizes = [uncertainty * torque for torque in model]
@@ -273,7 +278,8 @@ class MomentumObserver:
         if self.seen is None:
             raise RuntimeError("nothing has been observed")
         if not self._link_side:
-            return self._errors.change(self.seen, then)
+            torques, covariance = self._errors.change(self.seen, then)
+            return torques, self._errors.size * covariance
         effects = self.seen.effects - then.effects
         return self.seen.residual - then.residual, effects.dot(effects.T) + ALIKE * (self.seen.rest + then.rest)
 
@@ -286,7 +292,7 @@ class MomentumObserver:
         if len(self._times) == 1:
             return None
         torques, covariance = self._errors.corrected(self._observation(1))
-        return torques.tolist(), covariance
+        return torques.tolist(), self._errors.size * covariance
 
     def follow(self, statistic: float, in_contact: bool) -> None:
         """Track the errors of the model by the torques last given; `statistic` is theirs, for the detection."""
@@ -300,9 +306,9 @@ class MomentumObserver:
         return self.q if self.seen is None else self.seen.pose.tolist()
 
     @property
-    def size(self) -> float:
-        """How much larger the variances of the torques are in free motion than stated; of joint sensors not known."""
-        return 1.0 if self._link_side else self._errors.size
+    def load_torques(self) -> Array | None:
+        """External torques of a mass of 1 kg at the tool, (n,), N m, through the filter; None where not followed."""
+        return None if self._load is None else np.array(self._load.torque)
 
     @property
     def model_errors(self) -> dict[str, float]:
@@ -334,12 +340,15 @@ class MomentumObserver:
             # a shaft that slips in both directions within a cycle stops at both limits of its stiction
             resting, shape = resting * resting, np.minimum(shape, np.abs(sliding))
         load = self._load
-        effects = np.zeros((n, 8 * n + 1))
+        effects = np.zeros((n, 8 * n + 2))
         modelled = self._map.motor_torques(model)
         pairs = zip(modelled, self._map.motor_torques(residual.tolist()), strict=True)
         driving = [torque - external for torque, external in pairs]
-        sizes = self._sizes * np.concatenate((moving + sliding, moving - sliding, model, signals[8 * n :], driving))
-        np.multiply(self._through_errors, sizes, out=effects[:, :-1])
+        sizes = self._sizes * np.concatenate(
+            (moving + sliding, moving - sliding, model, signals[8 * n : 10 * n], driving)
+        )
+        np.multiply(self._through_errors, sizes, out=effects[:, :-2])
+        effects[:, -2] = self._to_joints.dot(signals[10 * n :])
         if load is not None:
             effects[:, -1] = load.torque
             residual -= load.mass * effects[:, -1]

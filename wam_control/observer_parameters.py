@@ -37,6 +37,13 @@ class ObserverParameters:
     torque_scale_uncertainty: float = parameter(
         "sd of a motor's torque constant, per constant", low=0.0, high=1.0, before=0.02
     )
+    torque_delay_uncertainty: float = parameter(
+        "sd of the time by which the motors' torques are older than their angles, of all together",
+        "s",
+        low=0.0,
+        high=0.1,
+        before=0.0,
+    )
     shape_uncertainty: float = parameter(
         "sd of the friction of a shaft that has just reversed or is slow, per static friction",
         low=0.0,

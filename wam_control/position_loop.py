@@ -7,10 +7,11 @@ loop.  The gains are `wam_description.arm.Servo`: integral_gain is the stiffness
 from collections.abc import Sequence
 
 from wam_control.servo_guard import DEAD, ServoGuard, ServoGuardParameters
+from wam_control.velocity_loop_node import SERVO_REACTION
 from wam_description.arm import Motors, Servo, Shared
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
-from wam_description.wiring import Input, Outputs, reaction
+from wam_description.wiring import Outputs
 
 
 class PositionLoop:
@@ -64,12 +65,7 @@ class PositionLoopNode:
         self._loop = PositionLoop(shared.arm.motors, shared.servo)
         self._zero = [0.0] * len(shared.arm.motors.names)
 
-    @reaction(
-        Input("motor_states"),
-        Input("motor_velocity_command", "velocity?", delayed=True, absent="brake"),
-        Input("motor_effort_command", "effort", delayed=True, absent="brake"),
-        outputs=("motor_current_command",),
-    )
+    @SERVO_REACTION
     def step(self, inputs: Inputs) -> Outputs:
         """Currents that answer a motor state, A."""
         velocity, effort = inputs["motor_velocity_command"], inputs["motor_effort_command"]

@@ -44,7 +44,7 @@ class Push(NamedTuple):
     """
 
     cover: str
-    place: float  # m along the cover
+    position: float  # m along the cover
     force: tuple[float, float, float]  # N, in the cover's frame
     begin: float  # s
     end: float  # s
@@ -151,7 +151,7 @@ class Scenario:
         push = step.push
         pushing = push is not None and push.begin <= self._elapsed + ROUNDING < push.end and not self.done
         force = fx, fy, fz = push.force if push and pushing else (0.0, 0.0, 0.0)
-        x, y, z = (push.place, *push.aside) if push and pushing else (0.0, 0.0, 0.0)
+        x, y, z = (push.position, *push.aside) if push and pushing else (0.0, 0.0, 0.0)
         request = "disable" if self.failure else step.request
         return ScenarioOutput(
             posture=list(self._posture),
@@ -341,19 +341,23 @@ def _posture(where: str, body: Any, arm: Arm) -> tuple[float, ...]:
 
 
 def _force(where: str, body: Any, arm: Arm) -> ForceCommand:
-    known(where + ", force", body, ("frame", "newtons", "place"), ("frame", "newtons"))
+    known(where + ", force", body, ("frame", "newtons", "contact_position"), ("frame", "newtons"))
     frames = ("base", *arm.covers.names)
     frame = body["frame"]
     require(frame in frames, f"{where}: frame is {frame!r}; allowed: {', '.join(frames)}")
     x, y, z = numbers(where, "newtons", body["newtons"], 3)
-    if "place" not in body:
+    if "contact_position" not in body:
         return ForceCommand(frame, (x, y, z))
-    place = number(where, "place", body["place"])
+    place = number(where, "contact_position", body["contact_position"])
     require(
-        frame != BASE and any((y, z)), f"{where}: place is given; it needs the frame of a link and a force across it"
+        frame != BASE and any((y, z)),
+        f"{where}: contact_position is given; it needs the frame of a link and a force across it",
     )
     length = arm.covers.length_of(frame)
-    require(0.0 < place <= length, f"{where}: place is {place:g} m; allowed: above 0, up to {length:g} m of {frame}")
+    require(
+        0.0 < place <= length,
+        f"{where}: contact_position is {place:g} m; allowed: above 0, up to {length:g} m of {frame}",
+    )
     return ForceCommand(frame, (x, y, z), torque_of_position((x, y, z), place))
 
 
@@ -374,15 +378,18 @@ def _settings(where: str, body: Any) -> Iterator[Setting]:
 
 
 def _push(where: str, body: Any, arm: Arm) -> Push:
-    names = ("cover", "place", "newtons", "begin", "end")
+    names = ("cover", "contact_position", "newtons", "begin", "end")
     known(where + ", push", body, names, names)
     require(
         body["cover"] in arm.covers.names,
         f"{where}: cover is {body['cover']!r}; allowed: {', '.join(arm.covers.names)}",
     )
     x, y, z = numbers(where, "newtons", body["newtons"], 3)
-    place, begin, end = (number(where, key, body[key]) for key in ("place", "begin", "end"))
+    place, begin, end = (number(where, key, body[key]) for key in ("contact_position", "begin", "end"))
     length = arm.covers.length_of(body["cover"])
-    require(0.0 <= place <= length, f"{where}: place is {place:g} m; {body['cover']} reaches from 0 to {length:g} m")
+    require(
+        0.0 <= place <= length,
+        f"{where}: contact_position is {place:g} m; {body['cover']} reaches from 0 to {length:g} m",
+    )
     require(0.0 <= begin < end, f"{where}: begin is {begin:g} s, end {end:g} s; end must be later, begin 0 or later")
     return Push(body["cover"], place, (x, y, z), begin, end, arm.covers.aside(body["cover"], place))

@@ -31,7 +31,7 @@ class TaskAxis(NamedTuple):
     ----------
     kind : what is commanded.
     joint : index of the joint; -1 for a point of a link.
-    cover, place : link and position along it, m, of the point; '' and 0 for a joint; None for the estimated one.
+    cover, position : link and position along it, m, of the point; '' and 0 for a joint; None for the estimated one.
     direction : unit vector in the frame of the task (3,); zeros for a joint.
     value : N, m/s or m; of a joint N m, rad/s or rad; None for the position where the axis is when it begins.
     rate : at which a commanded position moves, m/s or rad/s.
@@ -41,7 +41,7 @@ class TaskAxis(NamedTuple):
     kind: AxisKind
     joint: int = -1
     cover: str = ""
-    place: float | None = 0.0
+    position: float | None = 0.0
     direction: Triple = ZERO
     value: float | None = 0.0
     rate: float = 0.0
@@ -60,7 +60,7 @@ class TaskAxis(NamedTuple):
         if self.joint >= 0:
             return f"{kind} of joint {self.joint + 1}"
         x, y, z = self.direction
-        place = "the estimated position" if self.place is None else f"{self.place:.3g} m"
+        place = "the estimated position" if self.position is None else f"{self.position:.3g} m"
         return f"{kind} along ({x:.3g}, {y:.3g}, {z:.3g}) at {place} of {self.cover}"
 
 
@@ -115,7 +115,7 @@ def table_of(task: TaskCommand | None, covers: Sequence[str]) -> Table:
 def _row(axis: TaskAxis, covers: Sequence[str]) -> tuple[float, ...]:
     link = float(covers.index(axis.cover)) if axis.cover else -1.0
     value = math.nan if axis.value is None else axis.value
-    place = (math.nan if axis.place is None else axis.place, *axis.direction)
+    place = (math.nan if axis.position is None else axis.position, *axis.direction)
     motion = (value, axis.rate, axis.stiffness, axis.damping)
     return (float(axis.kind), float(axis.joint), link, *place, *motion)
 
@@ -194,10 +194,12 @@ def checked(where: str, axis: TaskAxis, arm: Arm) -> TaskAxis:
         )
         return axis
     length = arm.covers.length_of(axis.cover)
-    require(axis.place is not None or axis.is_sensed, f"{where}: no position given; only that of a force is estimated")
     require(
-        axis.place is None or 0.0 <= axis.place <= length,
-        f"{where}: place is {axis.place} m; allowed: 0 to {length:g} m, on {axis.cover}",
+        axis.position is not None or axis.is_sensed, f"{where}: no position given; only that of a force is estimated"
+    )
+    require(
+        axis.position is None or 0.0 <= axis.position <= length,
+        f"{where}: contact_position is {axis.position} m; allowed: 0 to {length:g} m, on {axis.cover}",
     )
     return axis
 

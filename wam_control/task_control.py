@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from wam_control.contact_position import ForcePoint, position_is_certain, slid_position
 from wam_control.feed_forward import FeedForward
-from wam_control.force_axis import ForceAxes
+from wam_control.force_axis import ForceAxes, PressedForce
 from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
-from wam_control.hybrid_velocity import posture_velocity
+from wam_control.held_arm import HeldArm, HeldPush, RetreatForce
+from wam_control.hybrid_velocity import followed, posture_velocity
 from wam_control.stability_guard import GuardedContact, GuardedForces
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_frame import HAND, AxisState, TaskFrame, force_speed
@@ -36,6 +37,7 @@ class TaskOutput(NamedTuple):
     rows : of each axis, as the topic task_axes has them.
     reaction, reason : what is done instead of what is commanded, and why.
     has_changed : whether the law has changed since the period before.
+    pressed : the commanded force, where the task is nothing but forces at one known place.
     """
 
     velocity: list[float]
@@ -46,6 +48,7 @@ class TaskOutput(NamedTuple):
     reaction: ForceReaction
     reason: str
     has_changed: bool
+    pressed: PressedForce | None
 
 
 class TaskControl:
@@ -67,7 +70,7 @@ class TaskControl:
         self, arm: Arm, body: RigidBody, axes: ForceAxes, parameters: ForceLoopParameters, supervision: Supervision
     ) -> None:
         self._frame = TaskFrame(arm, body, axes, parameters.task, parameters.sensing)
-        self._force_axes = axes
+        self._body, self._force_axes, self._held = body, axes, HeldArm(body)
         self._covers, self._parameters, self._supervision = arm.covers, parameters, supervision
         self._feed_forward = FeedForward(arm)
         self.restart()
@@ -80,8 +83,7 @@ class TaskControl:
         # by cover and place: m since something is touched there, s since it is no more
         self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
-        self._held_at: list[float] | None = None
-        self._has_pressed, self._way_back = False, 0.0  # m, that an arm which holds may still go back
+        self._held.release()
         self._feed_forward.reset()
         self._refusal = ""
         self._places: dict[str, tuple[float, float]] = {}  # m, of the last certain estimate, and its sd, by cover
@@ -96,6 +98,7 @@ class TaskControl:
         rate: Sequence[float] | None,
         dt: float,
         unknown: tuple[Array, str],
+        push: HeldPush,
     ) -> TaskOutput:
         """One outer period.
 
@@ -108,6 +111,7 @@ class TaskControl:
         posture, rate : joint angles to hold in what the task leaves (n,), rad, and their velocity, rad/s.
         dt : outer period, s.
         unknown : torques at rest before that no touched surface gives (n,), N m, and what they mean.
+        push : what pushes an arm that holds, as far as it is allowed without a task.
         """
         own = self._parameters
         self._slide(q, dt)
@@ -121,10 +125,12 @@ class TaskControl:
             if self._refusal
             else self._watch(states, forces, torques[0], dt, unknown)
         )
-        if reaction.holds != (self._held_at is not None):
-            self._held_at, has_changed = (list(q) if reaction.holds else None), True
-            self._way_back = own.limits.free_travel if self._has_pressed else 0.0
-        self._has_pressed = self._has_pressed or (not reaction.holds and self.is_touching)
+        if reaction.holds != self._held.is_holding:
+            has_changed = True
+            if reaction.holds:
+                self._held.hold(q, own.limits.free_travel)
+            else:
+                self._held.release()
         factor, is_other = self._supervision.factor(lambda: self._guarded(states, q), dt)
         speeds = [
             self._speed(state, force, anchor, torques[1], hold, factor, dt)
@@ -132,22 +138,24 @@ class TaskControl:
         ]
         held = posture_velocity(posture, q, own.posture_gain, own.joint_speed_limit, rate)
         resolved = self._frame.resolve(states, speeds, held, q)
-        velocity = _limited(resolved.velocity, own.joint_speed_limit)
+        held_slowly = resolved.posture if rate else self._followed(states, resolved.posture, q)
+        velocity = _limited(resolved.velocity + held_slowly, own.joint_speed_limit)
         fed = np.sum([self._fed(*pair, dt) for pair in zip(states, self._holds, strict=True)], axis=0)
-        if self._held_at is not None:  # never pressing harder than commanded
-            velocity = self._back(states, forces, factor, dt)
-            if any(velocity):
-                self._held_at = list(q)
-            else:
-                velocity = posture_velocity(self._held_at, q, own.posture_gain, own.joint_speed_limit)
-            effort = [0.0] * len(q)
-        else:
-            effort = self._feed_forward.step(fed, velocity, own, dt)
+        if self._held.is_holding:
+            allowed = math.fsum(map(_desired, states)) or push.allowed
+            push = push._replace(allowed=min(push.allowed, allowed), gain=factor * push.gain)
+            back = [self._back(*one, factor, dt) for one in zip(states, forces, self._holds, strict=True)]
+            gain, limit = own.posture_gain, own.joint_speed_limit
+            velocity, is_yielding = self._held.step(q, [one for one in back if one], push, gain, limit, dt)
+            reason += self._held.push
+            fed = np.zeros(len(q)) if is_yielding else None
+        effort = [0.0] * len(q) if fed is None else self._feed_forward.step(fed, velocity, own, dt)
         for state, hold in zip(states, self._holds, strict=True):
             hold.travel(float(state.row @ velocity) * dt)
         rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
         measured, error = _vectors(states, forces)
-        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed or is_other)
+        pressed, has_changed = self._pressed(states), has_changed or is_other
+        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed, pressed)
 
     def _begin(self, task: TaskCommand) -> bool:
         """Take a task; whether it has other axes than the one before."""
@@ -169,9 +177,9 @@ class TaskControl:
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
         for axis, hold in zip(self._task.axes if self._task else (), self._holds, strict=True):
-            if axis.kind is not AxisKind.FORCE or not axis.cover or axis.place is None:
+            if axis.kind is not AxisKind.FORCE or not axis.cover or axis.position is None:
                 continue
-            at = axis.cover, axis.place
+            at = axis.cover, axis.position
             slid, lost = self._slid.get(at, (0.0, math.inf))
             lost = 0.0 if hold.is_touching else lost + dt
             slid += self._force_axes.slide(q, *at, moved)
@@ -181,6 +189,11 @@ class TaskControl:
     def is_touching(self) -> bool:
         """Whether one of the forces shows that something is touched."""
         return any(hold.is_touching for hold in self._holds)
+
+    @property
+    def is_pushed(self) -> bool:
+        """Whether something has pushed the arm since it holds."""
+        return bool(self._held.push)
 
     def _find_anchors(self, states: Sequence[AxisState]) -> list[float]:
         """Commanded position of each axis; where none is, the position at which it has begun."""
@@ -239,16 +252,16 @@ class TaskControl:
         limit = own.position_uncertainty_limit
         if (
             is_single
-            and position_is_certain(contact.place, contact.position_sd, limit)
+            and position_is_certain(contact.position, contact.position_sd, limit)
             and not (contact.probability < own.link_probability_limit)
         ):
             sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
-            self._places[contact.cover] = contact.place, sd
+            self._places[contact.cover] = contact.position, sd
         found = []
         for axis in task.axes:
-            if axis.place is not None:
-                slid, _ = self._slid.get((axis.cover, axis.place), (0.0, 0.0))
-                place = slid_position(self._covers, axis.cover, axis.place, slid) if slid else axis.place
+            if axis.position is not None:
+                slid, _ = self._slid.get((axis.cover, axis.position), (0.0, 0.0))
+                place = slid_position(self._covers, axis.cover, axis.position, slid) if slid else axis.position
                 sd = own.contact_position_sd
                 found.append(ForcePoint(axis.cover, place, sd, True, True, True, False, "", conflict, is_single))
                 continue
@@ -291,18 +304,35 @@ class TaskControl:
         fastest = self._parameters.task.speed_limit if state.sensed else self._parameters.task.joint_speed_limit
         return min(max(speed, -fastest), fastest)
 
-    def _back(self, states: Sequence[AxisState], forces: Sequence[float], factor: float, dt: float) -> list[float]:
-        """Velocities (n,), rad/s, of an arm that holds, away from what it presses harder than commanded."""
-        velocity, law = np.zeros(len(self._q_before)), self._supervision.force_law
-        for state, force, hold in zip(states, forces, self._holds, strict=True):
-            desired = _desired(state)
-            if not (state.sensed and state.point and desired and self._way_back > 0.0):
-                continue
-            if excess := hold.excess(state.sensed, force, desired):
-                speed = factor * law.along(state.axis.direction).velocity(0, -excess, -excess, dt)
-                velocity += state.sensed.move * speed
-                self._way_back += speed * dt
-        return _limited(velocity, self._parameters.joint_speed_limit)
+    def _followed(self, states: Sequence[AxisState], posture: Array, q: Sequence[float]) -> Array:
+        """Velocities towards the posture (n,), rad/s, slower where a link would slide fast on what it presses."""
+        law = self._supervision.force_law
+        for state, hold in zip(states, self._holds, strict=True):
+            if hold.has_touched and state.point and state.axis.kind is AxisKind.FORCE:
+                gain = law.along(state.axis.direction).gain[0]
+                place = (state.point.position, *self._covers.aside(state.point.cover, state.point.position))
+                jacobian = self._body.point_jacobian(q, state.point.cover, place)
+                posture = followed(posture, jacobian, _desired(state), gain)
+        return posture
+
+    def _back(self, state: AxisState, force: float, hold: ForceHold, factor: float, dt: float) -> RetreatForce | None:
+        """How an arm that holds goes back along a force, N; None along other axes."""
+        desired = _desired(state)
+        if not (state.sensed and state.point and desired):
+            return None
+        excess = hold.excess(state.sensed, force, desired)
+        law = self._supervision.force_law.along(state.axis.direction)
+        return RetreatForce(state.sensed, factor * law.velocity(0, -excess, -excess, dt) if excess else 0.0)
+
+    def _pressed(self, states: Sequence[AxisState]) -> PressedForce | None:
+        """The commanded force, where all axes are forces at one position that is given, and it presses."""
+        points = [state.point for state in states if state.point and state.point.is_pinned]
+        is_one = len(points) == len(states) and len({point[:2] for point in points}) == 1
+        if not (is_one and self.is_touching and all(state.axis.kind is AxisKind.FORCE for state in states)):
+            return None
+        whole = np.sum([_desired(state) * state.direction for state in states], axis=0)
+        size = float(np.linalg.norm(whole))
+        return PressedForce(*points[0][:3], whole / size, size) if size else None
 
     def _fed(self, state: AxisState, hold: ForceHold, dt: float) -> Array:
         """Torque of a commanded force that is fed forward (n,), N m."""
@@ -313,7 +343,7 @@ class TaskControl:
 
 def _axes(task: TaskCommand) -> list[object]:
     """What makes an axis the same as before, whatever is commanded along it."""
-    return [(task.frame, axis.kind, axis.joint, axis.cover, axis.place, axis.direction) for axis in task.axes]
+    return [(task.frame, axis.kind, axis.joint, axis.cover, axis.position, axis.direction) for axis in task.axes]
 
 
 def _desired(state: AxisState) -> float:

@@ -26,6 +26,7 @@ from wam_description.signals import BASE
 Array = NDArray[np.float64]
 SHORT = 0.05  # m or 1, lever below which a motion along an axis is slowed down
 LOST = 1e-3  # part of an axis that the others have to leave it
+LEAST_FRICTION = 0.01  # of surfaces that two forces press on
 HAND = 10.0  # N, of a hand that leads the arm, as an unknown of the other forces
 
 
@@ -59,9 +60,10 @@ class AxisState(NamedTuple):
 
 
 class Resolved(NamedTuple):
-    """Joint velocities (n,), rad/s, and for each axis what was left of it, and its speed per commanded one."""
+    """Joint velocities (n,), rad/s, of the axes and the posture; of each axis what is left, and its speed fraction."""
 
     velocity: Array
+    posture: Array
     independence: tuple[float, ...]
     speed_fraction: tuple[float, ...]
 
@@ -117,7 +119,7 @@ class TaskFrame:
             others = []
             for k, other in enumerate(torques):
                 # two axes at one place are parts of one force, whose friction is that of `sensed` already
-                is_same = (task.axes[k].cover, task.axes[k].place) == (axis.cover, axis.place)
+                is_same = (task.axes[k].cover, task.axes[k].position) == (axis.cover, axis.position)
                 others += [] if k == i else other[:1] if is_same else other
             sensed = self._axes.axis(q, axis.cover, place, place_sd, u, _size(axis), others)
             found.append(AxisState(axis, sensed.lever, u, coordinate, sensed, points[i]))
@@ -139,6 +141,13 @@ class TaskFrame:
                     f"{state.axis.name}: its lever on the joints is {lever:.2g} m; allowed: {SHORT:g} m and above; "
                     "bend the arm, or command another axis"
                 )
+        forces = [state.axis for state in states if state.sensed and state.axis.kind is AxisKind.FORCE]
+        places = {(axis.cover, axis.position) for axis in forces}
+        if len(places) > 1 and self._sensing.friction < LEAST_FRICTION:
+            return (
+                f"{len(places)} forces at once: the friction of each is measured as a part of the others, and "
+                f"sensing.friction is {self._sensing.friction:g}; allowed: {LEAST_FRICTION:g} and above; declare it"
+            )
         limit = own.condition_limit
         rank, condition = rank_and_condition([state.row for state in states], limit)
         if rank < len(states):
@@ -148,7 +157,7 @@ class TaskFrame:
                 "go to another posture"
             )
         for state in states:
-            most = self._sensing.sd_limit(_size(state.axis), is_pinned=state.axis.place is not None)
+            most = self._sensing.sd_limit(_size(state.axis), is_pinned=state.axis.position is not None)
             if state.sensed and state.force_sd > most:
                 return (
                     f"{state.axis.name}: the force is measured with a standard deviation of {state.force_sd:.3g} N; "
@@ -219,7 +228,7 @@ class TaskFrame:
             velocity += a * ((speed - float(state.row @ velocity)) / damped)
             left -= np.outer(a, a) / square
             fractions.append(square / damped)
-        return Resolved(velocity + left @ np.array(posture), tuple(independence), tuple(fractions))
+        return Resolved(velocity, left @ np.array(posture), tuple(independence), tuple(fractions))
 
     def linear(
         self,
@@ -239,7 +248,7 @@ class TaskFrame:
         n, count = len(q), len(states)
         no_speed, no_posture = [0.0] * count, [0.0] * n
         move = np.array([self.resolve(states, unit, no_posture, q).velocity for unit in np.eye(count).tolist()]).T
-        left = np.array([self.resolve(states, no_speed, unit, q).velocity for unit in np.eye(n).tolist()]).T
+        left = np.array([self.resolve(states, no_speed, unit, q).posture for unit in np.eye(n).tolist()]).T
         hold, sense, gain = posture_gain * left, np.zeros((count, n)), np.zeros((2, count))
         for i, state in enumerate(states):
             axis = state.axis

@@ -5,11 +5,11 @@ One task as an example::
     task:
       frame: base                      # or a cover, or {of: base, rpy: [0, 0, 0.3]}: axes of a frame of your own
       axes:                            # in the order of their priority
-        - {force: 10.0, along: [0, 0, -1], cover: outer_link, place: 0.28}       # or place: estimated
-        - {velocity: 0.04, along: [0, 1, 0], cover: outer_link, place: 0.28}
-        - {position: here, along: [1, 0, 0], cover: outer_link, place: 0.4}
-        - {impedance: here, stiffness: 400, damping: 100, along: [1, 0, 0], cover: outer_link, place: 0.4}
-        - {free: 100, along: [1, 0, 0], cover: outer_link, place: 0.4}           # led by hand, with this damping
+        - {force: 10.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}   # or estimated
+        - {velocity: 0.04, along: [0, 1, 0], cover: outer_link, contact_position: 0.28}
+        - {position: here, along: [1, 0, 0], cover: outer_link, contact_position: 0.4}
+        - {impedance: here, stiffness: 400, damping: 100, along: [1, 0, 0], cover: outer_link, contact_position: 0.4}
+        - {free: 100, along: [1, 0, 0], cover: outer_link, contact_position: 0.4}   # led by hand, with this damping
         - {position: 0.3, joint: joint3}
         - {line: outer_link, point: [0.4, 0, -0.2], along: [0, 1, 0], hold: [start_up, end_up]}
 """
@@ -86,7 +86,7 @@ def _axis(where: str, body: Mapping[str, Any], rotation: Any, arm: Arm) -> TaskA
     require(len(kinds) == 1, f"{where} has {', '.join(kinds) or 'no kind'}; give one of {', '.join((*KINDS, 'line'))}")
     name = kinds[0]
     is_joint = "joint" in body
-    given = ("joint",) if is_joint else ("along", "cover", "place")
+    given = ("joint",) if is_joint else ("along", "cover", "contact_position")
     extra = ("stiffness", "damping") if name == "impedance" else ("rate",) if name == "position" else ()
     known(where, body, (name, *given, *extra), (name, *given))
     kind = AxisKind.IMPEDANCE if name == "free" else AxisKind[name.upper()]
@@ -99,7 +99,9 @@ def _axis(where: str, body: Mapping[str, Any], rotation: Any, arm: Arm) -> TaskA
         require(body["joint"] in names, f"{where}: joint is {body['joint']!r}; allowed: {', '.join(names)}")
         return checked(where, TaskAxis(kind, names.index(body["joint"]), "", 0.0, (0.0, 0.0, 0.0), *motion), arm)
     cover = _cover(where, body["cover"], arm)
-    place = None if body["place"] == ESTIMATED else number(where, "place", body["place"])
+    place = (
+        None if body["contact_position"] == ESTIMATED else number(where, "contact_position", body["contact_position"])
+    )
     x, y, z = (rotation @ _direction(where, body["along"])).tolist()
     return checked(where, TaskAxis(kind, -1, cover, place, (x, y, z), *motion), arm)
 

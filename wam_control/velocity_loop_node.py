@@ -1,6 +1,7 @@
 """Node `velocity_loop`: the inner loop, motor states in, motor currents out."""
 
 from operator import gt
+from typing import Final
 
 from wam_control.dither import Dither
 from wam_control.servo_guard import ServoGuard
@@ -10,6 +11,13 @@ from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
 from wam_description.wiring import Input, Outputs, reaction
+
+SERVO_REACTION: Final = reaction(
+    Input("motor_states"),
+    Input("motor_velocity_command", "velocity?", delayed=True, absent="brake"),
+    Input("motor_effort_command", "effort", delayed=True, absent="brake"),
+    outputs=("motor_current_command",),
+)  # of every node that closes the inner loop
 
 
 class VelocityLoopNode:
@@ -32,12 +40,7 @@ class VelocityLoopNode:
         self.refusals: dict[str, str] = {}
         self._at_rest, self._no_effort = State([], zero, []), State([], [], zero)
 
-    @reaction(
-        Input("motor_states"),
-        Input("motor_velocity_command", "velocity?", delayed=True, absent="brake"),
-        Input("motor_effort_command", "effort", delayed=True, absent="brake"),
-        outputs=("motor_current_command",),
-    )
+    @SERVO_REACTION
     def step(self, inputs: Inputs) -> Outputs:
         """Currents that answer a motor state, A."""
         motors = inputs["motor_states"]

@@ -46,9 +46,7 @@ class Motors:
     viscous_friction: tuple[float, ...] = parameter("viscous friction", "N m s/rad", low=0.0, high=10.0)
 
     def __post_init__(self) -> None:
-        _distinct("arm.motors", self.names)
-        lengths("arm.motors", self.names, {k: v for k, v in vars(self).items() if k != "names"})
-        _friction("arm.motors", self.names, self.static_friction, self.dynamic_friction)
+        _check_shafts("arm.motors", self)
         for name, peak, continuous in zip(self.names, self.peak_torque, self.continuous_torque, strict=True):
             require(
                 continuous <= peak,
@@ -80,9 +78,7 @@ class Joints:
     speed_limit: tuple[float, ...] = parameter("speed above which there is a fault", "rad/s", low=0.0, high=100.0)
 
     def __post_init__(self) -> None:
-        _distinct("arm.joints", self.names)
-        lengths("arm.joints", self.names, {k: v for k, v in vars(self).items() if k != "names"})
-        _friction("arm.joints", self.names, self.static_friction, self.dynamic_friction)
+        _check_shafts("arm.joints", self)
         for name, low, start, high in zip(self.names, self.lower, self.start, self.upper, strict=True):
             require(low < high, f"{name}: arm.joints.lower {low:g} rad is not below upper {high:g} rad")
             require(low <= start <= high, f"{name}: arm.joints.start {start:g} rad is outside {low:g} to {high:g} rad")
@@ -98,8 +94,11 @@ class Joints:
         return ""
 
 
-def _friction(group: str, names: tuple[str, ...], static: tuple[float, ...], dynamic: tuple[float, ...]) -> None:
-    for name, f_static, f_dynamic in zip(names, static, dynamic, strict=True):
+def _check_shafts(group: str, shafts: Motors | Joints) -> None:
+    """Refuse a name twice, a list that has not one value each, and friction that grows with the motion."""
+    _distinct(group, shafts.names)
+    lengths(group, shafts.names, {key: value for key, value in vars(shafts).items() if key != "names"})
+    for name, f_static, f_dynamic in zip(shafts.names, shafts.static_friction, shafts.dynamic_friction, strict=True):
         require(
             f_dynamic <= f_static,
             f"{name}: {group}.dynamic_friction {f_dynamic:g} N m is above static_friction {f_static:g} N m",

@@ -73,7 +73,7 @@ class Contact(NamedTuple):
     """A force of the world on one cover."""
 
     cover: str  # '' where nothing touches
-    place: float  # m along the cover, NaN where it is not known
+    position: float  # m along the cover, NaN where it is not known
     force: Triple  # N, in the cover's frame
     position_sd: float = float("nan")  # m, standard deviation of the position, NaN where it is not known
     probability: float = float("nan")  # that this cover is touched and no other, NaN where it is not known
@@ -88,7 +88,7 @@ class Load(NamedTuple):
     """The true load of the world on one cover, known to the simulator only."""
 
     cover: str  # '' where nothing touches
-    place: float  # m along the cover, NaN where there is none
+    position: float  # m along the cover, NaN where there is none
     force: Triple  # N, in the cover's frame
     moment: Triple  # N m, about the origin of the cover's frame, in that frame
 

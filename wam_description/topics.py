@@ -24,7 +24,7 @@ LINK: Final = "link"  # column with the index of a cover in arm.covers.names
 HYPOTHESIS_COLUMNS: Final = (
     LINK,  # index of the cover in arm.covers.names
     "probability",  # of this hypothesis among all
-    "place",  # m along the cover, NaN where it cannot be observed
+    "position",  # m along the cover, NaN where it cannot be observed
     "position_sd",  # m, NaN where the position is
     "low",  # m, ends of the part of the cover that is in the 90 % set, NaN where no part is
     "high",
@@ -49,7 +49,7 @@ FORCE_AXIS_COLUMNS: Final = (
     "lever",  # m, size of the joint torques per force
     "apparent_mass",  # kg, measured force per acceleration along the force
     "speed_fraction",  # velocity along the force per commanded one, 0 to 1
-    "place",  # m along the cover where the force acts
+    "position",  # m along the cover where the force acts
     "position_sd",  # m
 )
 
@@ -57,7 +57,7 @@ TASK_COLUMNS: Final = (
     "kind",  # number of `wam_control.task.AxisKind`: 1 force, 2 velocity, 3 position, 4 impedance
     "joint",  # index of the joint, -1 for a point of a link
     "link",  # index of the cover in arm.covers.names, -1 for a joint
-    "place",  # m along the cover; NaN of a force: the estimated position
+    "position",  # m along the cover; NaN of a force: the estimated position
     "x",  # direction of the axis in the frame of the table; its length does not count
     "y",
     "z",
@@ -102,7 +102,7 @@ class Column(NamedTuple):
 def columns_of(names: tuple[str, ...]) -> tuple[Column, ...]:
     """The columns of a table by their names."""
     if names == TASK_COLUMNS:
-        return tuple(Column(name, LARGEST_ESTIMATE, name in ("value", "place")) for name in names)
+        return tuple(Column(name, LARGEST_ESTIMATE, name in ("value", "position")) for name in names)
     known = HYPOTHESIS_COLUMNS
     return tuple(
         Column(name, LARGEST_ESTIMATE if name in known else LARGEST_ELSEWHERE, name not in _KNOWN) for name in names
@@ -242,7 +242,7 @@ TOPICS: Final = (
         TABLE,
         "outer",
         "one row per hypothesis, the most probable first, none without contact; float64 columns: "
-        "link, probability, place (m) and so on, see docs/estimator.md",
+        "link, probability, position (m) and so on, see docs/estimator.md",
         columns=HYPOTHESIS_COLUMNS,
     ),
     Topic("contact/in_contact", "std_msgs/msg/Bool", "latched", "whether something touches the arm"),

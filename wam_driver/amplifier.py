@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from math import sin
-from operator import mul
+from operator import add, mul
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class Amplifier:
     Parameters
     ----------
     motors : torque constants and limits, as configured.
-    parameters : deadband, ripple, noise, thermal time constant.
+    parameters : deadband, ripple, noise, offset, thermal time constant.
     random : source of the noise.
     true_constant : torque of each true motor per current (n,), N m/A; None where it is as configured.
 
@@ -36,7 +36,7 @@ class Amplifier:
         random: np.random.Generator,
         true_constant: Sequence[float] | None = None,
     ) -> None:
-        keys = ("deadband", "torque_ripple", "ripple_cycles", "current_noise")
+        keys = ("deadband", "torque_ripple", "ripple_cycles", "current_noise", "torque_offset")
         lengths("amplifier", motors.names, {key: getattr(parameters, key) for key in keys})
         self.torque_constant = list(motors.torque_constant)
         self._true_constant = list(true_constant or motors.torque_constant)
@@ -47,6 +47,7 @@ class Amplifier:
         self._is_noisy = any(parameters.current_noise)
         ripples = zip(parameters.torque_ripple, parameters.ripple_cycles, strict=True)
         self._ripples = [(i, ripple, cycles) for i, (ripple, cycles) in enumerate(ripples) if ripple]
+        self._offset = list(parameters.torque_offset) if any(parameters.torque_offset) else []
         self._random = random
 
     def reset(self) -> None:
@@ -76,8 +77,10 @@ class Amplifier:
         return list(map(mul, self.torque_constant, currents))
 
     def torque(self, currents: Sequence[float], theta: Sequence[float]) -> list[float]:
-        """Torque on the rotors at the angles theta, rad, with the ripple of the commutation, N m, (n,)."""
+        """Torque on the rotors at the angles theta, rad, with offset and ripple of the commutation, N m, (n,)."""
         torque = list(map(mul, self._true_constant, currents))
+        if self._offset:
+            torque = list(map(add, torque, self._offset))
         for i, ripple, cycles in self._ripples:
             torque[i] *= 1.0 + ripple * sin(cycles * theta[i])
         return torque

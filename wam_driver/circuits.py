@@ -22,6 +22,8 @@ class CableCircuits:
     ----------
     depends_on_torque : True if `follow` has anything to do.
     is_slack : True if a strand is slack and friction depends on the tension.
+    each : of each circuit the first slack end between its strands, creep in a step per speed and torque, and the
+        torque, N m, above which friction depends on the tension.
     """
 
     def __init__(self, data: Any, arm: Arm, effects: Effects, step: float) -> None:
@@ -45,10 +47,10 @@ class CableCircuits:
         self._prepare()
 
     def _prepare(self) -> None:
-        self._each = [
+        self.each = [
             (4 * i + 1, loss, 2.0 * circuit.pretension * circuit.radius if self._friction_counts else math.inf)
             for i, (loss, circuit) in enumerate(zip(self._losses, self._circuits, strict=True))
-        ]  # first slack end between the strands, creep of a step per speed and torque, torque that makes a strand slack
+        ]
 
     def reset(self) -> None:
         """Return to power-up; the first step finds out whether a strand is slack."""
@@ -88,7 +90,7 @@ class CableCircuits:
         ends = self._slack_ends
         self.is_slack = False
         for (i, rate, most), way, speed, pull in zip(  # noqa: B905 - costs 1 % of a step
-            self._each, direction, self._speed.tolist(), self._pull.tolist()
+            self.each, direction, self._speed.tolist(), self._pull.tolist()
         ):
             if way:
                 crept = rate * abs(speed) * pull

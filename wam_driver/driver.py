@@ -159,7 +159,7 @@ class Driver:
                 enabled = False
         self.plant.brake(not enabled)
         self.currents = self.amplifier.step(self._command if enabled else self._zero, self._timing.period)
-        torque = self.amplifier.torque(self.currents, self.plant.theta)
+        torque = self.amplifier.torque(self.currents, self.plant.theta) if enabled else self._zero
         self.plant.step(torque, self._timing.substeps)
         if trouble := self.plant.trouble():
             self.plant.recover()

@@ -204,7 +204,7 @@ class DriverNode(TolerantNode):
             ports.publish("motor_currents", stamp, State([], [], driver.currents))
             ports.publish("sim/joint_states", stamp, driver.true_joint_state)
             ports.publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
-            ports.publish("sim/contact/point", stamp, Point(frame, (load.place, 0.0, 0.0)))
+            ports.publish("sim/contact/point", stamp, Point(frame, (load.position, 0.0, 0.0)))
             if objects := driver.true_objects:
                 ports.publish("sim/objects", stamp, objects)
         if ports.report_due(stamp):

@@ -81,6 +81,11 @@ class DryFriction:
             presliding.torque = 0.0
         self.elastic = [0.0] * len(self._shafts) if self._presliding else []
 
+    @property
+    def bounds(self) -> tuple[list[float], list[float]]:
+        """Velocities of each shaft, rad/s, above and below which `follow` has anything to do."""
+        return self._low, self._high
+
     def set_circuits(self, circuits: Sequence[Circuit]) -> None:
         """Take the pretension of each circuit, (n,), for the friction by tension (6.5)."""
         self._circuits = [

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from wam_description.parameters import parameter
+from wam_description.parameters import one_each, parameter
 
 
 @dataclass(frozen=True)
@@ -15,6 +15,13 @@ class AmplifierParameters:
     ripple_cycles: tuple[int, ...] = parameter("cycles of the torque ripple per turn of the motor", low=1, high=1e4)
     current_noise: tuple[float, ...] = parameter(
         "standard deviation of the actual current, while it is not zero", "A", low=0.0, high=100.0
+    )
+    torque_offset: tuple[float, ...] = parameter(
+        "torque of each motor at a commanded and reported current of zero, from the zero of its current sensor",
+        "N m",
+        low=-100.0,
+        high=100.0,
+        before=one_each("arm.motors.names", 0.0),
     )
 
 

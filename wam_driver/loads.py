@@ -127,9 +127,10 @@ class CoverLoads:
 def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
     """All forces on a cover as one load, at their mean position weighted by force; None if there is no force."""
     weights = [float(np.linalg.norm(part.force)) for part in parts]
-    if not sum(weights) > 0.0:
+    whole = sum(weights, 0.0)
+    if not whole > 0.0:
         return None
-    place = sum(w * part.position for w, part in zip(weights, parts, strict=True)) / sum(weights)
+    place = sum((w * part.position for w, part in zip(weights, parts, strict=True)), 0.0) / whole
     force = np.sum([part.force for part in parts], axis=0)
     moment = np.sum([part.moment for part in parts], axis=0)
     return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))

@@ -6,6 +6,7 @@ at the rotor and, through the same row, at the joints, until its loose strand is
 friction is MuJoCo's friction constraint, made stiff, its level set before every step by `DryFriction`.
 """
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from functools import partial
@@ -22,6 +23,7 @@ from wam_description.mjcf import mjcf
 from wam_description.signals import Load, ObjectState
 from wam_description.world import World
 from wam_driver.circuits import CableCircuits
+from wam_driver.compiled_steps import compiled_steps
 from wam_driver.dry_friction import DryFriction
 from wam_driver.friction import COULOMB_STICTION, FrictionParameters
 from wam_driver.loads import CoverLoads
@@ -40,6 +42,16 @@ WARNINGS = {
     "badctrl": "a torque is not finite",
 }  # what MuJoCo's warnings mean for the arm
 RIGID = 1e3  # N m of a brake, far above any cable
+OF_MASS = (
+    "body_mass",
+    "body_subtreemass",
+    "body_ipos",
+    "body_iquat",
+    "body_inertia",
+    "body_invweight0",
+    "dof_invweight0",
+    "dof_M0",
+)  # what MuJoCo's model keeps of the masses
 
 
 class Plant:
@@ -69,7 +81,8 @@ class Plant:
         friction: FrictionParameters = COULOMB_STICTION,
         brake_torque: float = RIGID,
     ) -> None:
-        self.model = mujoco.MjModel.from_xml_string(mjcf(arm, step, world, effects))
+        self._xml_of = partial(mjcf, step=step, world=world, effects=effects)
+        self.model = mujoco.MjModel.from_xml_string(self._xml_of(arm))
         self.data = mujoco.MjData(self.model)
         mujoco.set_mju_user_warning(_unheard)
         n = len(arm.motors.names)
@@ -77,7 +90,7 @@ class Plant:
         self._brakes = [brake_torque] * n
         self._start = arm.joints.start
         self._slack, self._play = effects.slack, [effects.play(i) for i in range(n)]
-        self._arm = arm
+        self._arm, self._carried = arm, 0.0
         self._motor_from_joint = np.linalg.inv(np.array(arm.joint_from_motor).reshape(n, n))
         self._circuits = CableCircuits(self.data, arm, effects, step)
         self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0[: 2 * n].tolist())
@@ -102,6 +115,8 @@ class Plant:
         self._write_torque = partial(Struct(f"{n}d").pack_into, memoryview(self.data.ctrl))
         self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
+        is_plain = self._friction.is_steady and not self._movers  # what the steps in C do
+        self._advance = compiled_steps(model, data) if is_plain else None
         self._rest()
         self._kept = self._position.tolist(), self._plastic.tolist()
         if set(effects.pretension_share) != {1.0}:
@@ -142,6 +157,7 @@ class Plant:
     def reset(self) -> None:
         """Return to power-up: start pose, at rest, brakes on, no pushes."""
         self.release()
+        self.carry(0.0)
         self._rest()
 
     def trouble(self) -> str:
@@ -190,6 +206,15 @@ class Plant:
         """End every push."""
         self._loads.release()
 
+    def carry(self, mass: float) -> None:
+        """Carry a mass at the tool, kg, from now on, besides `arm.payload`: a point that already moves with it."""
+        if mass != self._carried:
+            self._carried = mass
+            loaded = dataclasses.replace(self._arm, payload=self._arm.payload + mass)
+            heavier = mujoco.MjModel.from_xml_string(self._xml_of(loaded))
+            for name in OF_MASS:
+                getattr(self.model, name)[:] = getattr(heavier, name)
+
     def set_added_friction(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of each joint, (n,), N m, static and dynamic alike."""
         self._friction.set_added(friction)
@@ -213,6 +238,19 @@ class Plant:
         """
         model, data, pushes, circuits = self.model, self.data, self._loads.pushes, self._circuits
         self._write_torque(0, *torque)
+        if self._advance is not None:
+            self._velocity = self._advance(
+                count,
+                self._is_set,
+                *self._friction.bounds,
+                self._friction.direction,
+                circuits,
+                circuits.each if circuits.depends_on_torque else [],
+                self._set_friction,
+                self._loads.apply_pushes if pushes else None,
+                self._surfaces.apply,
+            )
+            return
         for _ in range(count):
             self._set_friction()
             for mover in self._movers:

@@ -263,14 +263,14 @@ def sample(snapshot: Snapshot) -> tuple[float, ...]:
         snapshot.measured,
         math.nan if is_bound else newtons if estimated.cover else 0.0,
         newtons if is_bound else math.nan,
-        true.place,
-        estimated.place,
+        true.position,
+        estimated.position,
     )
 
 
 def is_lower_bound(estimated: Contact) -> bool:
     """Whether the force is the least one that explains the torques, as it is where the position is not known."""
-    return bool(estimated.cover) and not math.isfinite(estimated.place)
+    return bool(estimated.cover) and not math.isfinite(estimated.position)
 
 
 def legend(parts: Sequence[tuple[str, str, str]]) -> str:
@@ -359,7 +359,7 @@ def contact_text(contact: Contact) -> str:
     if not contact.cover:
         return "nothing touches the arm"
     bound, place = "at least ", "somewhere on"
-    if math.isfinite(contact.place):
+    if math.isfinite(contact.position):
         spread = f" ± {contact.position_sd * 100:.0f}" if math.isfinite(contact.position_sd) else ""
-        bound, place = "", f"{contact.place * 100:.0f}{spread} cm along"
+        bound, place = "", f"{contact.position * 100:.0f}{spread} cm along"
     return f"<b>{bound}{size(contact.force):.1f} N</b> {place} the {html.escape(contact.cover.replace('_', ' '))}"

@@ -176,10 +176,10 @@ class Scene:
         """An arrow from where the world pushes, in the direction in which it pushes the arm."""
         arrow = self._arrows[name]
         length = METRES_PER_NEWTON * size(contact.force)
-        known = contact.cover in self.links and math.isfinite(contact.place) and length > 1e-3
+        known = contact.cover in self.links and math.isfinite(contact.position) and length > 1e-3
         if known:
             pose = self._body.cover_pose(self._q, contact.cover)
-            start = self.point(contact.cover, contact.place)
+            start = self.point(contact.cover, contact.position)
             scale = min(length, LONGEST_ARROW) / length * METRES_PER_NEWTON
             end = start + scale * pose.rotation @ np.array(contact.force)
             arrow.points = np.array([[start, end]], dtype=np.float32)

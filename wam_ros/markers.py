@@ -28,7 +28,7 @@ def contact_markers(stamp: int, view: ContactView) -> MarkerArray:
     stamp : time, ns.
     view : what to draw.
     """
-    cover, place, force = view.contact.cover, view.contact.place, view.contact.force
+    cover, place, force = view.contact.cover, view.contact.position, view.contact.force
     gone = Marker(header=header(stamp, BASE), action=Marker.DELETEALL)
     if not cover:
         return MarkerArray(markers=[gone])

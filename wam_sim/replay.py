@@ -16,17 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_bag.bag import (
-    Bag,
-    BagError,
-    Columns,
-    JointColumns,
-    Messages,
-    PointColumns,
-    TableColumns,
-    WrenchColumns,
-    read,
-)  # fmt: skip
+from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_bag.losses import losses
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration

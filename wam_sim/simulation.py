@@ -163,7 +163,7 @@ class Simulation:
         self._publish("motor_currents", stamp, State([], [], list(self.driver.currents)))
         self._publish("sim/joint_states", stamp, self.driver.true_joint_state)
         self._publish("sim/contact/wrench", stamp, Wrench(frame, load.force, load.moment))
-        self._publish("sim/contact/point", stamp, Point(frame, (load.place, 0.0, 0.0)))
+        self._publish("sim/contact/point", stamp, Point(frame, (load.position, 0.0, 0.0)))
         if objects := self.driver.true_objects:
             self._publish("sim/objects", stamp, objects)
 

@@ -8,24 +8,15 @@ from wam_theory.regimes import psi
 from wam_theory.stiction import stiction_cycle_period
 
 
-def gain_for_cycle_frequency(
-    frequency: ArrayLike,
-    transmission_stiffness: ArrayLike,
-    contact_stiffness: ArrayLike,
-    static_friction: ArrayLike,
-    dynamic_friction: ArrayLike,
-    zeta: ArrayLike,
-) -> Array:
+def gain_for_cycle_frequency(frequency: ArrayLike, *node: ArrayLike) -> Array:
     """G_I at which the stiction cycle has this frequency, away from a resonance: the inverse of (5.9) corrected.
 
     Parameters
     ----------
     frequency : of the cycle, Hz, above zero.
-    transmission_stiffness, contact_stiffness, static_friction, dynamic_friction, zeta : as in
-        `stiction.stiction_cycle_period`.
+    *node : k_tr, k_c, F_static, F_dynamic, zeta, the arguments of `stiction.stiction_cycle_period` after the gain.
     """
     (f,) = above_zero(frequency=frequency)
-    node = (transmission_stiffness, contact_stiffness, static_friction, dynamic_friction, zeta)
     return np.asarray(f * stiction_cycle_period(1.0, *node))
 
 

@@ -7,15 +7,7 @@ from wam_theory.arguments import Array, above_zero
 from wam_theory.describing_function import friction_to_velocity
 
 
-def harmonic_share(
-    order: ArrayLike,
-    frequency: ArrayLike,
-    gain: ArrayLike,
-    inertia: ArrayLike,
-    damping: ArrayLike,
-    transmission_stiffness: ArrayLike,
-    contact_stiffness: ArrayLike,
-) -> Array:
+def harmonic_share(order: ArrayLike, frequency: ArrayLike, *loop: ArrayLike) -> Array:
     """Harmonic of the velocity over its fundamental, |G(j n omega)|/(n |G(j omega)|), with a square wave of friction.
 
     The describing function neglects it.  G falls only as 1/s: far above the resonances the share is 1/n^2 times
@@ -25,14 +17,13 @@ def harmonic_share(
     ----------
     order : n, odd; a square wave has no even harmonics.
     frequency : omega of the fundamental, rad/s, above zero.
-    gain, inertia, damping, transmission_stiffness, contact_stiffness : as in `linear_loop.routh_gain`.
+    *loop : G_I, J_l, b, k_tr, k_c, the arguments of `describing_function.friction_to_velocity` after s.
     """
     n, omega = above_zero(order=order, frequency=frequency)
     if not np.all(n % 2.0 == 1.0):
         raise ValueError(f"order is {order!r}; a square wave has odd harmonics only")
-    node = (gain, inertia, damping, transmission_stiffness, contact_stiffness)
 
     def magnitude(w: NDArray[np.float64]) -> Array:
-        return np.abs(friction_to_velocity(1j * w, *node))
+        return np.abs(friction_to_velocity(1j * w, *loop))
 
     return np.asarray(magnitude(n * omega) / (n * magnitude(omega)))

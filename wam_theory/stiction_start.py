@@ -10,18 +10,11 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wam_theory.arguments import Array, above_zero
-from wam_theory.linear_loop import damping_ratio
-from wam_theory.stiction import inertia_number, slip_overshoot
+from wam_theory.arguments import Array, above_zero, below_one
+from wam_theory.stiction import slip_overshoot
 
 
-def asymmetry_decay(
-    gain: ArrayLike,
-    inertia: ArrayLike,
-    damping: ArrayLike,
-    transmission_stiffness: ArrayLike,
-    contact_stiffness: ArrayLike,
-) -> Array:
+def asymmetry_decay(number: ArrayLike, zeta: ArrayLike) -> Array:
     """Part of the asymmetry that one slip takes away, kappa: lambda (pi/sqrt(1 - zeta^2) - 2 zeta Omega).
 
     lambda is the left side of (5.4).  The motor runs on at G_I e during the slip, on average at G_I u; the node
@@ -30,14 +23,11 @@ def asymmetry_decay(
 
     Parameters
     ----------
-    gain, inertia, transmission_stiffness, contact_stiffness : as in `stiction.inertia_number`.
-    damping : b, N m s/rad, above zero, below critical.
+    number : lambda, `stiction.inertia_number`, above zero.
+    zeta : (5.12), above zero, below one: only then does a slip overshoot.
     """
-    number = inertia_number(gain, inertia, transmission_stiffness, contact_stiffness)
-    zeta = damping_ratio(inertia, damping, transmission_stiffness, contact_stiffness)
-    if not np.all(zeta < 1.0):
-        raise ValueError(f"damping is {damping!r}: zeta is {zeta!r}; a slip overshoots below 1 only")
-    return np.asarray(number * (math.pi / np.sqrt(1.0 - zeta**2) - 2.0 * zeta * slip_overshoot(zeta)))
+    (lam,), (z,) = above_zero(number=number), below_one(zeta=zeta)
+    return lam * (math.pi / np.sqrt(1.0 - z**2) - 2.0 * z * slip_overshoot(z))
 
 
 def asymmetric_period_ratio(error: ArrayLike, jump: ArrayLike) -> Array:

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.identification.motion import MotionSamples
-from wam_analysis.identification.parameters import Unknowns, unknowns
+from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, shared_joints, unknowns
 from wam_analysis.identification.regressor import Equations, Regressor
 from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_velocities
 from wam_description.arm import Shared
+from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 
@@ -60,6 +61,17 @@ class Identification(NamedTuple):
     condition: float
     rank: int
     both_directions: Array
+
+    @property
+    def offset_if_alike(self) -> tuple[Array, Array]:
+        """Torque offset of each motor if its friction were alike in both directions, and its standard error.
+
+        (n,) each, N m, true less reported torque.  No recording shows which of both a difference of the directions is.
+        """
+        positive, negative = (self.unknowns.places(f"motors.coulomb_{way}") for way in DIRECTIONS)
+        variance = self.covariance.diagonal()
+        both = variance[positive] + variance[negative] - 2.0 * self.covariance[positive, negative]
+        return 0.5 * (self.values[negative] - self.values[positive]), 0.5 * np.sqrt(np.maximum(both, 0.0))
 
     @property
     def is_identified(self) -> NDArray[np.bool_]:
@@ -116,7 +128,15 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     for i, name in enumerate(shared.arm.motors.names):
         own = [k for k, each in enumerate(sought.names) if each.endswith(f".{name}")]
         best.without[:, own] += np.outer(off[:, i], slope[i, own])
-    return _result(sought, best, chosen.velocity)
+    return _result(sought, best, chosen.velocity, _through(shared))
+
+
+def _through(shared: Shared) -> Array:
+    """Friction of a joint with a motor of its own at that motor, (n,), N m, as far as the present arm has it."""
+    matrix = TransmissionMap.of(shared.arm).joint_from_motor
+    own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(len(matrix))]
+    found: Array = own.T @ shared.arm.joints.dynamic_friction
+    return found
 
 
 def _estimate(regressor: Regressor, sought: Unknowns, start: Array | None = None) -> _Estimate:
@@ -182,15 +202,18 @@ def _rms(left: Array, is_used: NDArray[np.bool_]) -> Array:
     return found
 
 
-def _result(sought: Unknowns, best: _Estimate, velocity: Array) -> Identification:
+def _result(sought: Unknowns, best: _Estimate, velocity: Array, through: Array) -> Identification:
     equations, information = best.equations, best.normal.information.sum(0)
     before = equations.torque - equations.columns @ sought.present
     left = equations.torque - equations.columns @ best.values
     posterior = np.linalg.inv(information + np.diag(sought.prior_sd**-2))
     jackknife = best.without - best.without.mean(0)
     sd = np.sqrt(np.maximum((PARTS - 1) / PARTS * (jackknife**2).sum(0), posterior.diagonal()))
-    coulomb = [i for i, name in enumerate(sought.names) if name.startswith("motors.coulomb")]
-    sd[coulomb] = np.hypot(sd[coulomb], LAW * best.values[coulomb])
+    for way in DIRECTIONS:
+        coulomb, load = (sought.places(f"motors.{what}_{way}") for what in ("coulomb", "load"))
+        # the friction of a joint adds to the load of its motor's friction or takes from it, by the way of the load
+        by_joint = best.values[load] * through / np.sqrt(3.0)
+        sd[coulomb] = np.sqrt(sd[coulomb] ** 2 + (LAW * best.values[coulomb]) ** 2 + by_joint**2)
     # standard deviations of the jackknife, which 20 parts give well; correlations, which they do not, of the posterior
     unit = sd / np.sqrt(posterior.diagonal())
     scaled = information * np.outer(sought.prior_sd, sought.prior_sd)

@@ -20,8 +20,10 @@ UNEXPLAINED = 1.5  # rms of held-out motion per rms of the estimate's own
 LEFT = 0.1  # rms that stays unexplained, per Coulomb friction
 NOTES = """{rank} combinations of {count} parameters are identified, condition {condition:.3g}.
 'In combination': only together with others.
-Friction of a joint with a motor of its own is part of that motor's friction; a torque offset is part of the difference
-between its directions."""
+Friction of a joint with a motor of its own is part of that motor's friction.
+A torque offset is not identifiable from this recording: in motion, at rest and with a dither it gives the torques of a
+difference between the directions of friction. Shown is the offset if friction were alike in both directions; used is
+the sum of both, in coulomb_positive and coulomb_negative."""
 
 
 def report(shared: Shared, found: Identification, label: str) -> str:
@@ -38,6 +40,10 @@ def report(shared: Shared, found: Identification, label: str) -> str:
         state = "yes" if found.is_identified[i] else "in combination" if found.is_combined[i] else "no"
         cells = [f"{value:.4g}" for value in (result.values[i], result.sd[i], result.present[i])]
         rows.append([name, *cells, unit, state])
+    offset, offset_sd = found.offset_if_alike
+    for i, name in enumerate(shared.arm.motors.names):
+        numbers = [f"{offset[i]:.4g}", f"{offset_sd[i]:.4g}", "0"]
+        rows.append([f"motors.torque_offset.{name}", *numbers, "N m", "not from this recording"])
     head = [["parameter", "value", "standard error", "previous", "unit", "identifiable"]]
     lines = [f"{label}: model of the controllers from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
     parts = (found.before, found.residual, found.held_out)

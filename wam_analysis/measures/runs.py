@@ -1,4 +1,4 @@
-"""Intervals in which a condition holds, and the noise of a signal."""
+"""Intervals in which a condition holds, the noise of a signal, and what signal can be evaluated."""
 
 import heapq
 
@@ -8,6 +8,21 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.int64]
+
+
+def require_usable(what: str, signal: Numbers, **threshold: float) -> None:
+    """Refuse a threshold that cannot be above the noise, and a signal that has gaps.
+
+    Raises
+    ------
+    ValueError
+        if the threshold is not above zero or the signal is not finite; names both as they are given.
+    """
+    for name, value in threshold.items():
+        if not value > 0.0:
+            raise ValueError(f"{name} is {value!r}; it must be above zero, above the noise of the {what}")
+    if not np.all(np.isfinite(signal)):
+        raise ValueError(f"the {what} has values that are not finite; leave them out")
 
 
 def runs(mask: Mask) -> Rows:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.measures.runs import require_usable
+
 Numbers = NDArray[np.float64]
 
 TRANSIENT = 2  # first peaks, which are not conclusive: gamma 1.5 gives 4.00, 2.70, 2.94, 3.06, 3.24 ... and diverges
@@ -58,10 +60,7 @@ def stability(error: Numbers, tolerance: float) -> Stability:
     ValueError
         if `tolerance` is not above zero or the error is not finite.
     """
-    if not tolerance > 0.0:
-        raise ValueError(f"tolerance is {tolerance!r}; it must be above zero, above the noise of the error")
-    if not np.all(np.isfinite(error)):
-        raise ValueError("the error has values that are not finite; leave them out")
+    require_usable("error", error, tolerance=tolerance)
     peaks = half_cycle_peaks(error, tolerance)
     quiet = len(error) > 4 and bool(np.all(np.abs(error[-max(len(error) // 5, 2) :]) <= tolerance))
     if quiet:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.measures.runs import runs, without_short
+from wam_analysis.measures.runs import require_usable, runs, without_short
 
 Numbers = NDArray[np.float64]
 PASSING = 0.25  # of the speed of rest; a shaft whose median speed in a rest is above it passes through zero
@@ -44,10 +44,7 @@ def stick_slip_phases(velocity: Numbers, rest: float, shortest: int) -> Phases:
     ValueError
         if `rest` is not above zero or the velocity is not finite.
     """
-    if not rest > 0.0:
-        raise ValueError(f"rest is {rest!r}; it must be above zero, above the noise of the velocity")
-    if not np.all(np.isfinite(velocity)):
-        raise ValueError("the velocity has values that are not finite; leave them out")
+    require_usable("velocity", velocity, rest=rest)
     still = without_short(np.abs(velocity) <= rest, shortest)
     sticks, slips = runs(still), runs(~still)
     directions = np.array([np.sign(np.mean(velocity[a:b])) for a, b in slips], dtype=np.float64)

@@ -4,7 +4,10 @@ import argparse
 from pathlib import Path
 
 from wam_cli.commands import at_least, batch_of, configuration_of, require_evaluation, take_evaluation
+from wam_experiments.contact_benchmark.evaluation import evaluate_scenario
+from wam_experiments.contact_benchmark.timing import reference_time
 from wam_experiments.contact_robustness import degradations
+from wam_experiments.contact_robustness.comparison import first_tasks
 from wam_experiments.contact_robustness.evaluation import (
     SHORTEST,
     RobustnessResult,
@@ -27,7 +30,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     take_evaluation(parser, SEEDS, "arms and contacts", "docs/contact-robustness.md")
     parser.add_argument("--seconds", type=float, default=110.0, help="length of a recording, default 110")
     parser.add_argument(
-        "--only", nargs="+", default=list(degradations.NAMES), metavar="DEGRADATION", help="default: all"
+        "--only",
+        nargs="+",
+        default=list(degradations.NAMES),
+        metavar="DEGRADATION",
+        help="default: all, and the first benchmark on the same seeds",
     )
     parser.add_argument(
         "--recordings", type=Path, metavar="DIRECTORY", help="keep the recordings here, and use those that are here"
@@ -44,15 +51,20 @@ def run(given: argparse.Namespace) -> int:
     chosen = drives(configuration, given.seed, given.only, given.seconds)
     with batch_of(given) as batch:
         groups = [evaluate(each, *batch, recordings=given.recordings) for each in chosen]
+        whole = given.only == list(degradations.NAMES)
+        first = results(evaluate_scenario, first_tasks(configuration, given.seed), *batch) if whole else []
         identifications = results(run_trial, friction_trials(configuration, given.seed), *batch)
-    wide, second, level, identified = groups
+    wide, second, masses, level, identified = groups
     average, bounds = average_update(configuration, given.seed[0]), bounds_of(configuration, given.seed[0], identified)
-    text = report_text(RobustnessResult(wide, second, level, identified, identifications, average, bounds))
+    result = RobustnessResult(
+        wide, second, masses, level, identified, identifications, average, bounds, reference_time(), first
+    )
+    text = report_text(result, configuration.shared.arm)
     print(text)
     if given.write:
         seeds = " ".join(map(str, given.seed))
         command = f"wam evaluate robustness --seed {seeds} --seconds {given.seconds:g}"
-        if given.only != list(degradations.NAMES):
+        if not whole:
             command += " --only " + " ".join(f"'{name}'" for name in given.only)
         command += f" --write {given.write}"
         given.write.write_text(page(text, command, before), encoding="utf-8")

@@ -96,7 +96,7 @@ def lost_in(found: Contents) -> list[str]:
 def _steps(arm: Arm, seconds: float) -> list[dict[str, Any]]:
     drawn = MoveGenerator(arm).moves(np.random.default_rng(SEED), arm.joints.start, POSTURES)
     postures = [list(move.posture) for move in drawn]
-    push = {"cover": arm.covers.names[-1], "place": ALONG * arm.covers.length[-1], **PUSH}
+    push = {"cover": arm.covers.names[-1], "contact_position": ALONG * arm.covers.length[-1], **PUSH}
     moves = [
         {"name": f"move {i}", "seconds": STEP, "posture": postures[i % POSTURES], "push": push}
         for i in range(max(1, int(seconds / STEP)))

@@ -128,16 +128,16 @@ def _evaluate(
     right = named is not None and named.cover == span.cover
     position_sd = named.position_sd if right and named is not None else math.nan
     has_position = right and named is not None and not math.isnan(named.position)
-    error = named.position - truth.place if has_position and named is not None else math.inf
+    error = named.position - truth.position if has_position and named is not None else math.inf
     own = [hypothesis for hypothesis in now.hypotheses if hypothesis.cover == span.cover][:1]
-    level = credibility(now.hypotheses, span.cover, truth.place, lengths)
+    level = credibility(now.hypotheses, span.cover, truth.position, lengths)
     moment_error = math.dist(own[0].moment, truth.moment) if right else math.nan
     return EvaluatedContact(
         group=played.scenario.group,
         kind=planned.kind if planned else "",
         friction=planned.friction if planned else math.nan,
         cover=span.cover,
-        position=truth.place,
+        position=truth.position,
         force=force_of(truth),
         moving=is_moving(now),
         began_moving=is_moving(records[span.first]),
@@ -149,7 +149,7 @@ def _evaluate(
         error=error,
         position_sd=position_sd,
         credibility=level,
-        in_set=_in_set(now.hypotheses, span.cover, truth.place, level),
+        in_set=_in_set(now.hypotheses, span.cover, truth.position, level),
         moment_error=moment_error,
         moment=math.hypot(*truth.moment),
         least_force=math.hypot(*own[0].force) if own else math.nan,

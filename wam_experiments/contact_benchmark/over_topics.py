@@ -40,7 +40,7 @@ def _step(step: ScenarioStep) -> dict[str, Any]:
         push = step.push
         body["push"] = {
             "cover": push.cover,
-            "place": push.place,
+            "contact_position": push.position,
             "newtons": list(push.force),
             "begin": push.begin,
             "end": push.end,

@@ -72,14 +72,14 @@ def draw(axes: Axes, arm: Arm, q: Sequence[float], estimate: ContactEstimate, tr
             ends = [body.point(q, hypothesis.cover, begin + fraction * (end - begin)) for fraction in fractions]
             axes.plot(*view.project(np.array(ends)).T, color=LIKELY, linewidth=9.0, alpha=0.75, zorder=18)
     _arrow(axes, arm, q, view, true, TRUE, 4.2)
-    if estimate.link and math.isfinite(estimate.place):
-        _arrow(axes, arm, q, view, Contact(estimate.link, estimate.place, estimate.force), ESTIMATED, 1.6)
+    if estimate.link and math.isfinite(estimate.position):
+        _arrow(axes, arm, q, view, Contact(estimate.link, estimate.position, estimate.force), ESTIMATED, 1.6)
     axes.text(0.03, 0.9, _numbers(estimate), va="top", transform=axes.transAxes, fontsize=9, color=ESTIMATED)
     size = math.hypot(*true.force)
     axes.text(
         0.03,
         0.84,
-        f"true: {true.cover}, {true.place:.2f} m, {size:.1f} N",
+        f"true: {true.cover}, {true.position:.2f} m, {size:.1f} N",
         va="top",
         transform=axes.transAxes,
         fontsize=9,
@@ -100,9 +100,9 @@ def _numbers(estimate: ContactEstimate) -> str:
     if not estimate.in_contact:
         return f"estimated: {estimate.reason}"
     force = math.hypot(*estimate.force)
-    if math.isnan(estimate.place):
+    if math.isnan(estimate.position):
         return f"estimated: {estimate.link}, position unknown, at least {force:.1f} N"
-    position = f"{estimate.place:.2f} m (sd {100.0 * estimate.position_sd:.1f} cm)"
+    position = f"{estimate.position:.2f} m (sd {100.0 * estimate.position_sd:.1f} cm)"
     return f"estimated: {estimate.link} ({estimate.probability:.2f}), {position}, {force:.1f} N"
 
 

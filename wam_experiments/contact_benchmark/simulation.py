@@ -100,7 +100,7 @@ def hypothesis(cover: str, facts: Mapping[str, Any]) -> EstimatedHypothesis:
     return EstimatedHypothesis(
         cover=cover,
         probability=facts["probability"],
-        position=facts["place"],
+        position=facts["position"],
         position_sd=facts["position_sd"],
         low=facts.get("low", math.nan),
         high=facts.get("high", math.nan),

@@ -6,6 +6,8 @@ recording      play one drawn arm without ROS; keep the motors' signals and the 
 replay         the estimator on a recording
 bounds         what exact torques, and torques with the errors of the identified arms, leave open
 requirements   what is required, and what was measured
+reasons        why a row is missed, as counted, and the bound that physics sets
+comparison     the first benchmark on the same seeds
 rows           the tables, by degradation and by kind of contact
 evaluation     all degradations of some seeds on an executor, and the page
 """

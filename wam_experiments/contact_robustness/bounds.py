@@ -48,7 +48,7 @@ class BoundRow(NamedTuple):
         small, held, count, detected = 0, 0, 0, []
         for touch in touches(arm, random, [float(i) for i in range(COUNT)], LEVEL_KINDS):
             q, wrong = np.array(moves.pose(random)), self.constant * random.uniform(-1.0, 1.0, len(matrix))
-            wrench = np.concatenate(touch.wrench(touch.begin + 0.1, axis_of(arm, touch.cover, touch.place)))
+            wrench = np.concatenate(touch.wrench(touch.begin + 0.1, axis_of(arm, touch.cover, touch.position)))
             true = wrench @ body.cover_jacobian(q, touch.cover)
             at_motors = matrix.T @ true
             torques = to_joints @ (at_motors * (1.0 + wrong)) + self.sd * random.standard_normal(len(matrix))
@@ -62,11 +62,11 @@ class BoundRow(NamedTuple):
                 continue
             found = inference.infer(q.tolist(), torques.tolist(), precision)
             best, right = found[0], [each for each in found if each.cover == touch.cover]
-            known = best.cover == touch.cover and not np.isnan(best.place)
+            known = best.cover == touch.cover and not np.isnan(best.position)
             count, small = count + 1, small + (known and best.position_sd < SMALL_SD)
-            held += any(each.low <= touch.place <= each.high for each in right)
+            held += any(each.low <= touch.position <= each.high for each in right)
             if level is not None:
-                errors[level].append(abs(best.place - touch.place) if known else np.inf)
+                errors[level].append(abs(best.position - touch.position) if known else np.inf)
         middle, most = (
             " / ".join(f"{100.0 * quantile(errors[force], part).value:.1f}" for force in LEVELS) for part in (0.5, 0.95)
         )

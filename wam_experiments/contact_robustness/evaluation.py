@@ -12,24 +12,26 @@ import numpy as np
 
 from wam_analysis.table import markdown
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
-from wam_description.arm import seconds
+from wam_description.arm import Arm, seconds
 from wam_description.configuration import Configuration
 from wam_description.signals import State
 from wam_experiments.contact_benchmark.scenarios import base_values
+from wam_experiments.contact_benchmark.score import ScenarioScore
 from wam_experiments.contact_robustness import degradations
 from wam_experiments.contact_robustness.bounds import BOUNDS, bounds
+from wam_experiments.contact_robustness.comparison import EXTENT, comparison_table
+from wam_experiments.contact_robustness.reasons import Evidence, missed_table
 from wam_experiments.contact_robustness.recording import Drive, DriveRecording, record
 from wam_experiments.contact_robustness.replay import ReplayScore, SignalFaults, replay
 from wam_experiments.contact_robustness.requirements import (
     MIX,
     alone_table,
     contacts_needed,
-    missed_table,
     required_rows,
     required_table,
     seconds_needed,
 )
-from wam_experiments.contact_robustness.rows import DETECTION, POSITION, SECOND, kinds_table, table
+from wam_experiments.contact_robustness.rows import DETECTION, POSITION, SECOND, kinds_table, masses_table, table
 from wam_experiments.identification import plants
 from wam_experiments.identification.evaluation import IdentificationResult, IdentificationTrial
 from wam_sim import pieces
@@ -37,7 +39,7 @@ from wam_sim.batch import Report, results
 
 Groups = dict[str, list[ReplayScore]]  # scores by degradation
 ARMS = 3  # of each seed, that are identified
-SECOND_SHARE = 0.4  # of the length of a recording, with second contacts
+SECOND_SHARE = 0.4  # of the length of a recording, with second contacts or with masses
 SHORTEST = 10.0  # s, with one contact
 RUNS = 4  # of which the fastest counts
 EXCITATION = 40.0  # s of motion of the plants that are identified for their friction
@@ -46,26 +48,41 @@ EXCITATION = 40.0  # s of motion of the plants that are identified for their fri
 class DrivePlan(NamedTuple):
     """What is recorded.
 
-    A drive for each degradation and seed; the same arms with many second contacts; arms of some degradations with
-    contacts of three forces, whose models are not identified; the same, identified before.
+    A drive for each degradation and seed; the same arms with many second contacts; the same arms picking up masses;
+    arms of some degradations with contacts of three forces, whose models are not identified; the same, identified
+    before.
     """
 
     wide: list[Drive]
     second: list[Drive]
+    masses: list[Drive]
     level: list[Drive]
     identified: list[Drive]
 
 
 class RobustnessResult(NamedTuple):
-    """The scores of a plan, of identifications, the time of an update, average over the periods, s, and the bounds."""
+    """What was measured.
+
+    Attributes
+    ----------
+    wide, second, masses, level, identified : scores of a plan.
+    identifications : of plants with every error of friction.
+    average : time of an update, average over the periods, s.
+    bounds : rows of `bounds.bounds`.
+    reference : time of the reference workload on this computer, s.
+    first : scores of the first benchmark on the same seeds, none if it was not run.
+    """
 
     wide: Groups
     second: Groups
+    masses: Groups
     level: Groups
     identified: Groups
     identifications: list[IdentificationResult]
     average: float
-    bounds: list[list[str]] = []  # noqa: RUF012 - none is added
+    bounds: Sequence[Sequence[str]] = ()
+    reference: float = math.nan
+    first: Sequence[ScenarioScore] = ()
 
 
 class DriveTrial(NamedTuple):
@@ -88,13 +105,14 @@ def drives(configuration: Configuration, seeds: Sequence[int], names: Sequence[s
             raise ValueError(f"no degradation is named '{name}'; degradations: {', '.join(degradations.NAMES)}")
     wide = [Drive(configuration, name, seed, seconds) for seed in seeds for name in names]
     second = [drive._replace(contacts="second", seconds=max(SHORTEST, SECOND_SHARE * seconds)) for drive in wide]
+    masses = [drive._replace(contacts="masses") for drive in second]
     level = [
         drive._replace(contacts="level", seed=ARMS * drive.seed + arm)
         for drive in wide
         if drive.degradation in degradations.IDENTIFIED
         for arm in range(ARMS)
     ]
-    return DrivePlan(wide, second, level, [drive._replace(is_identified=True) for drive in level])
+    return DrivePlan(wide, second, masses, level, [drive._replace(is_identified=True) for drive in level])
 
 
 def evaluate_trial(trial: DriveTrial) -> ReplayScore:
@@ -175,12 +193,16 @@ def bounds_of(configuration: Configuration, seed: int, identified: Groups) -> li
     return bounds(configuration, seed, np.sqrt(np.mean(np.square(errors), axis=0))) if errors else []
 
 
-def report_text(result: RobustnessResult) -> str:
+def report_text(result: RobustnessResult, arm: Arm) -> str:
     """The tables as text."""
     every = [score for own in result.wide.values() for score in own]
     after = result.identified.get(MIX, [])
     failures = sorted({f"{score.degradation}: {score.failure}" for score in every if score.failure})
-    rows = required_rows(result.wide, result.second, after, result.identifications, result.average)
+    masses = [score for own in result.masses.values() for score in own]
+    rows = required_rows(result.wide, result.second, result.masses, after, result.identifications, result.average)
+    evidence = Evidence(
+        result.wide, result.second, result.masses, after, result.identifications, result.bounds, result.reference
+    )
     named = {
         f"{name}, {how}": own
         for name in result.level
@@ -190,11 +212,17 @@ def report_text(result: RobustnessResult) -> str:
     size = SIZE.format(needed=contacts_needed(), quiet=seconds_needed())
     parts = [
         ("Required", required_table(rows)),
-        ("What is missed, and why", missed_table(rows, result.bounds)),
+        ("What is missed, and why", missed_table(rows, evidence)),
+        *(
+            [("Next to the first benchmark", FIRST + "\n\n" + comparison_table(result.first, arm, rows))]
+            if result.first
+            else []
+        ),
         ("Each degradation", f"{size}\n\n{alone_table(result.wide)}"),
         ("Detection", table(DETECTION, result.wide)),
         ("Position on the outer link, and the link", table(POSITION, result.wide)),
-        ("By kind of contact and by force, all degradations", kinds_table(every)),
+        ("By kind of contact and by force, all degradations", kinds_table([*every, *masses])),
+        ("Picking up", masses_table(masses)),
         ("Second contact", table(SECOND, seconds)),
         ("After an identification", table(DETECTION, named) + "\n" + table(POSITION, named)),
         ("What torques leave open", OPEN + "\n\n" + markdown(BOUNDS, result.bounds)),
@@ -221,14 +249,18 @@ Written by `{command}`; nothing here is written by hand.
 
 What the estimator states is in the section `contact_estimator` of the configuration; what is drawn is in
 `wam_experiments/contact_robustness/degradations.py` (the arm and its signals) and `touches.py` (the contacts: 1 to
-60 N, friction to 0.8, tip, end cap, elbow, two at once, sliding, impacts). Neither is read by the other. Every row
-adds one degradation to friction within 10 % and masses within 2 %; contacts are drawn for each row. Numbers in
-brackets are counts."""
+60 N, friction to 0.8, tip, end cap, elbow, two at once, sliding, impacts, masses that are picked up). Neither is read
+by the other. Every row adds one degradation to friction within 10 % and masses within 2 %; contacts are drawn for each
+row. Numbers in brackets are counts."""
 
 SIZE = """With {needed} contacts or more the 95 % interval (Wilson) of a share of 91 % lies within 85 to 97 %; with
 fewer a row can only be marginal. Contacts of one arm share its errors, so these intervals are rather too narrow. No
 false alarm in {quiet:.0f} s or more shows less than 1 a minute (Poisson). Of the rows with a fitting share one of
 twenty is outside its interval by chance: the worst of many rows is no measure of all."""
+
+FIRST = f"""The benchmark of [contact.md](contact.md) on the seeds of this page, {EXTENT.contacts} contacts in motion,
+{EXTENT.resting} at rest and {EXTENT.free:g} s of free motion of each: there the arm is as the estimator states
+it, and the contacts are those of its prior. Quantities that both have; arms and contacts are others."""
 
 OPEN = """The inference alone, in poses and on contacts drawn as after an identification, with torques that have these
 errors and no others, and with just their covariance. The rows of the requirement lie between the last two: the last
@@ -250,6 +282,10 @@ METHOD = """## Method
 * Second contact: other recordings of the same arms, two of five contacts with a second one 0.5 s later, on the same
   link or on the other, of 4 to 60 N; the others are single for 1 s, constant, sliding at 0.2 m/s, or growing to 1.5 to
   3 times their force within 50 to 400 ms. False: reported while there is one, from 0.1 s after its start.
+* Picking up: other recordings of the same arms, whose tool carries a mass for 3 of every 6 s of its motion, a point of
+  0.1 to 1 kg in the plant's inertia. While it is carried: whether a payload is reported, as hypothesis or warning;
+  whether a link that the tool is not on ever has a probability above 0.95; what is reported at the end. By kind above:
+  0.2 s after the start, as for contacts; the payload and the tool's link are right.
 * After an identification: three more arms of each seed, with contacts of 5, 10 and 20 N on both links. Their models
   come from `wam identify` on 20 s of exciting motion; torque constant, delay and noise of the mix are not in that
   motion.

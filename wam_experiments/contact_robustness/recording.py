@@ -15,16 +15,24 @@ from wam_driver.safety import Mode
 from wam_experiments.contact_benchmark.moves import MoveGenerator
 from wam_experiments.contact_benchmark.scenarios import RELEASE, SETTLE, base_values
 from wam_experiments.contact_robustness.degradations import Degradation, Values, drawn
-from wam_experiments.contact_robustness.touches import KINDS, LEVEL_KINDS, SECOND_KINDS, Touch, axis_of, touches
+from wam_experiments.contact_robustness.touches import (
+    KINDS,
+    LEVEL_KINDS,
+    MASS_KINDS,
+    SECOND_KINDS,
+    Touch,
+    axis_of,
+    touches,
+)
 from wam_experiments.identification.evaluation import play
 from wam_sim.simulation import Simulation
 
 Array = NDArray[np.float64]
 WARM_UP = 6.0  # s of free motion before the first contact
-SPACING = 1.9  # s from one contact to the next
+SPACING, SPACING_OF_MASSES = 1.9, 6.0  # s from one contact to the next
 EXCITATION = 20.0  # s of motion for an identification
 DRIFT_STEPS = 20  # of friction, over a recording
-CONTACTS = {"wide": KINDS, "second": SECOND_KINDS, "level": LEVEL_KINDS}
+CONTACTS = {"wide": KINDS, "second": SECOND_KINDS, "level": LEVEL_KINDS, "masses": MASS_KINDS}
 
 
 class Drive(NamedTuple):
@@ -86,7 +94,8 @@ def draw(drive: Drive) -> tuple[Degradation, list[Touch], list[ScenarioStep], li
             steps.append(ScenarioStep("stop", stop))
         left -= move.seconds + stop
         here = move.posture
-    times = np.arange(WARM_UP, drive.seconds - SPACING, SPACING) + random.uniform(0.0, 0.4)
+    spacing = SPACING_OF_MASSES if drive.contacts == "masses" else SPACING
+    times = np.arange(WARM_UP, drive.seconds - spacing, spacing) + random.uniform(0.0, 0.4)
     return (
         degradation,
         touches(arm, random, times.tolist(), CONTACTS[drive.contacts]),
@@ -137,8 +146,9 @@ def _identified(configured: Configuration, seed: int) -> Values:
 
 
 def _push(run: Simulation, arm: Any, contacts: Sequence[Touch], time: float) -> None:
-    """Apply the contacts that act now; those that have just ended with no force."""
-    near = [touch for touch in contacts if touch.begin - 0.01 <= time <= touch.end + 0.01]
+    """Apply the contacts that act now, those that have just ended with no force; carry the masses."""
+    run.driver.plant.carry(sum(touch.mass for touch in contacts if touch.begin <= time < touch.end))
+    near = [touch for touch in contacts if not touch.mass and touch.begin - 0.01 <= time <= touch.end + 0.01]
     for cover in {touch.cover for touch in near}:
         force, moment = np.zeros(3), np.zeros(3)
         for touch in near:

@@ -10,8 +10,8 @@ from wam_analysis.table import markdown
 from wam_experiments.contact_benchmark.page import MET, bound_text, mark, number
 from wam_experiments.contact_benchmark.score import ANY, Bound
 from wam_experiments.contact_benchmark.statistics import NONE, Interval, counted, events, quantile, rms, share
-from wam_experiments.contact_robustness.replay import SECOND_WITHIN, ReplayScore, TouchOutcome
-from wam_experiments.contact_robustness.rows import SMALL_SD, SURE, Scores, near, outcomes
+from wam_experiments.contact_robustness.replay import SECOND_WITHIN, SURE, ReplayScore, TouchOutcome
+from wam_experiments.contact_robustness.rows import SMALL_SD, Scores, near, outcomes
 from wam_experiments.identification.evaluation import IdentificationResult
 
 STATED, MIX = "as stated", "realistic mix"
@@ -61,7 +61,7 @@ class RequiredRow(NamedTuple):
 
 def false_alarms(scores: Scores) -> Interval:
     """Detections without contact per second; observed: seconds without contact."""
-    return _per_second(sum(score.alarms for score in scores), sum(score.free_seconds for score in scores))
+    return _per_second(sum(len(score.alarms) for score in scores), sum(score.free_seconds for score in scores))
 
 
 def false_changes(scores: Scores) -> Interval:
@@ -88,6 +88,7 @@ def seconds_needed() -> float:
 def required_rows(
     wide: Mapping[str, Scores],
     second: Mapping[str, Scores],
+    masses: Mapping[str, Scores],
     identified: Scores,
     identifications: Sequence[IdentificationResult],
     average: float,
@@ -96,7 +97,8 @@ def required_rows(
 
     Parameters
     ----------
-    wide, second : scores by degradation, of the contacts of every kind and of those for second contacts.
+    wide, second, masses : scores by degradation, of the contacts of every kind, of those for second contacts, of
+        masses that are picked up.
     identified : scores of the realistic mix after an identification.
     identifications : of plants with every error of friction.
     average : s, of a whole update over the periods.
@@ -106,6 +108,7 @@ def required_rows(
     alone = {name: own for name, own in wide.items() if name not in (STATED, MIX)}
     realistic = f"{MIX}, identified"
     outer, moving = outcomes(identified, "outer"), outcomes(both)
+    masses_moving = outcomes([score for own in masses.values() for score in own])
     return [
         _worst("false alarms per minute, any degradation alone", "1/min", 60.0, "up to 687", _to(1 / 60),
                _to(0.1 / 60), alone, false_alarms),
@@ -122,8 +125,9 @@ def required_rows(
         _percent("90 % set at 20 N, mu 0.8", "78", 0.85, 0.88,
                  [one.in_set for one in moving
                   if one.detected and one.friction == ROUGH and abs(one.force - STRONG) <= WITHIN], "all"),
-        RequiredRow("wrong link where p > 0.95, tip and elbow included", "%", 100.0, "26 of 26", _to(0.01), _to(0.003),
-                    _share([not one.right_link for one in moving if one.detected and one.probability > SURE]), "all"),
+        RequiredRow("wrong link where p > 0.95, tip, elbow, masses included", "%", 100.0, "26 of 26", _to(0.01),
+                    _to(0.003), _share([not one.right_link for one in [*moving, *masses_moving]
+                                        if one.detected and one.probability > SURE]), "all"),
         _percent("inner link, 10 N moving, detected in 200 ms", "89", 0.95, 0.99,
                  _within(near(outcomes(both, "inner"), 10.0), 0.2, True), "all"),
         _percent("second contact detected within 250 ms", "12 to 38", 0.5, 0.8,
@@ -156,46 +160,6 @@ def required_table(rows: Sequence[RequiredRow]) -> str:
     """Markdown table of the requirement."""
     head = ("quantity", "unit", "at first", "required", "target", "measured", "95 %", "n", "", "of")
     return markdown(head, [row.cells for row in rows])
-
-
-LATE = "it begins while a motor is at rest or turns round, whose stiction holds the push: with all sliding, no bound"
-FRICTION = "friction of motors is known to some per cent, that of the contact not at all: four torques leave that open"
-CAREFUL = "the same, and an arm that errs more in free motion than stated has up to twice the standard deviation"
-UNEXPECTED = "an error that the estimator does not expect is not in its sets; one row of twenty is outside by chance"
-ROUGHEST = "a set that is right on average of all coefficients of friction holds less often where it is the largest"
-LEVER = "near the shoulder 10 N have a small lever, and the torques are below what is detected without false alarms"
-COMPUTER = "it is the speed of this computer, at the time of the run"
-REASONS = (  # how the name of a row begins; the column of its bound, or none, and which part of it; why it is missed
-    ("5 N detected", (0, 0), LATE),
-    *(
-        (f"position on the outer link, moving, {force:g} N, {title}", (column, part), FRICTION)
-        for column, (_, title, limits) in enumerate(POSITIONS, 1)
-        for part, (force, *_) in enumerate(limits)
-    ),
-    ("share with sd", (3, 0), CAREFUL),
-    ("90 % set holds the truth, any", (0, 0), UNEXPECTED),
-    ("90 % set at 20 N", (0, 0), ROUGHEST),
-    ("inner link", (5, 0), LEVER),
-    ("whole update", (0, 0), COMPUTER),
-)
-
-
-def missed_table(rows: Sequence[RequiredRow], bounds: Sequence[Sequence[str]]) -> str:
-    """Markdown table of the rows that are missed: why, and the bound that physics sets.
-
-    Parameters
-    ----------
-    rows : of the requirement.
-    bounds : of `bounds.bounds`, the last two for errors in free motion; none where there are none.
-    """
-    missed = []
-    for row in filter(lambda row: row.is_missed, rows):
-        found = ((place, why) for name, place, why in REASONS if row.name.startswith(name))
-        (column, part), why = next(found, ((0, 0), "not known"))
-        span = " to ".join(own[column].split(" / ")[part] for own in bounds[-2:]) if column else ""
-        missed.append([row.name, row.unit, bound_text(row.must, row.scale), row.measured[0], span or "none", why])
-    head = ("quantity", "unit", "required", "measured", "bound of physics", "why")
-    return markdown(head, missed) if missed else "Nothing."
 
 
 def alone_table(groups: Mapping[str, Sequence[ReplayScore]]) -> str:

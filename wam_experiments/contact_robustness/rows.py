@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 from wam_analysis.table import markdown
 from wam_experiments.contact_benchmark.statistics import quantile
-from wam_experiments.contact_robustness.replay import SECOND_WITHIN, ReplayScore, TouchOutcome
+from wam_experiments.contact_robustness.replay import SECOND_WITHIN, SURE, MassOutcome, ReplayScore, TouchOutcome
 
 NEAR = 0.2  # of a force: 5 N are 4 to 6 N
-SURE, SMALL_SD = 0.95, 0.02
+SMALL_SD = 0.02
 FORCES = (0.0, 7.5, 15.0, 30.0, 80.0)  # N, between the rows by force
+MASSES = (0.1, 0.2, 0.5, 1.0)  # kg, between the rows by mass
 Scores = Sequence[ReplayScore]
 
 
@@ -36,7 +37,7 @@ def percent(hits: int, count: int) -> str:
 def alarms(scores: Scores) -> str:
     """False alarms per minute without contact."""
     seconds = sum(score.free_seconds for score in scores)
-    return f"{60.0 * sum(score.alarms for score in scores) / seconds:.1f}" if seconds else "none"
+    return f"{60.0 * sum(len(score.alarms) for score in scores) / seconds:.1f}" if seconds else "none"
 
 
 def near(found: Sequence[TouchOutcome], force: float) -> list[TouchOutcome]:
@@ -188,6 +189,23 @@ def kinds_table(scores: Scores) -> str:
         (name, _wrong(found, 0.0), _wrong(found, SURE), _covered(found), _detected(found)) for name, found in groups
     ]
     return markdown(("contact", "wrong link, %", "wrong, p > .95, %", "90 % set holds, %", "detected, %"), rows)
+
+
+def masses_table(scores: Scores) -> str:
+    """Markdown table of what is reported while the tool carries a mass, by mass."""
+    every = [one for score in scores for one in score.masses]
+    groups = [
+        *((f"{low:g} to {high:g} kg", [m for m in every if low <= m.mass < high]) for low, high in pairwise(MASSES)),
+        ("all", every),
+    ]
+    columns: tuple[tuple[str, Callable[[MassOutcome], bool]], ...] = (
+        ("reported at all, %", lambda one: one.detected),
+        ("as a payload, %", lambda one: one.named),
+        ("a wrong link, p > .95, %", lambda one: one.wrong),
+        ("a contact at the end, %", lambda one: one.lasting),
+    )
+    rows = [[name, *(percent(sum(map(of, own)), len(own)) for _, of in columns)] for name, own in groups]
+    return markdown(("picked up", *(head for head, _ in columns)), rows)
 
 
 def _covered(found: Sequence[TouchOutcome]) -> str:

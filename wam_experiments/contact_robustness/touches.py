@@ -1,4 +1,4 @@
-"""Contacts drawn wider than the estimator's prior: strong, rough, on the ends, sliding, two at once, impacts."""
+"""Contacts drawn wider than the estimator's prior: strong, rough, at ends, sliding, two at once, impacts; masses."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -43,31 +43,36 @@ SECOND_KINDS = {
 }
 # how often in the recordings of an arm that was identified, whose forces are all of `LEVELS`
 LEVEL_KINDS = {"outer": 0.75, "inner": 0.25}
+PICKING_UP = "picking up"
+MASS_KINDS = {PICKING_UP: 1.0}  # in the recordings in which the tool picks up a mass, carries it and sets it down
+LIGHTEST, HEAVIEST = 0.1, 1.0  # kg, uniform in the logarithm
+HOLD_OF_MASS = 3.0  # s
 HOLD, HOLD_OF_FIRST, IMPACT = 0.5, 1.0, 0.03  # s
 HARDER, HARDER_AFTER, HARDER_WITHIN = (1.5, 3.0), 0.4, (0.05, 0.4)  # times the force, s after the start, s
 SECOND_AFTER, SECOND_HOLD = 0.5, 0.4  # s, of the second contact after the first
 
 
 class Touch(NamedTuple):
-    """One contact, an exact force.
+    """One contact, an exact force; or a mass at the tool, which is in the plant while it is carried.
 
     Attributes
     ----------
     kind : of `KINDS`; 'second' for the second of two.
     cover : name of the cover.
-    place : m along the cover at the start.
+    position : m along the cover at the start.
     force : (3,), N, of the world on the cover, in its frame.
-    arm : (3,), m, from the axis at `place` to the point of the force.
+    arm : (3,), m, from the axis at `position` to the point of the force.
     twist : N m about the cover's x axis.
     speed : m/s, of the position.
     begin, end : s.
     friction : coefficient; tangential over normal force.
     harder, within : factor by which the force grows, `HARDER_AFTER` the start, and s that this takes.
+    mass : kg, picked up by the tool; its force is 0.
     """
 
     kind: str
     cover: str
-    place: float
+    position: float
     force: tuple[float, float, float]
     arm: tuple[float, float, float]
     twist: float
@@ -77,6 +82,7 @@ class Touch(NamedTuple):
     friction: float
     harder: float = 1.0
     within: float = 0.1
+    mass: float = 0.0
 
     def share(self, time: float) -> float:
         """Fraction of the force that acts at a time, s."""
@@ -87,7 +93,7 @@ class Touch(NamedTuple):
 
     def place_at(self, time: float) -> float:
         """Contact position, m."""
-        return self.place + self.speed * max(0.0, time - self.begin)
+        return self.position + self.speed * max(0.0, time - self.begin)
 
     def wrench(self, time: float, axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Force, N, and moment about the origin of the cover, N m; `axis` is the tube's axis at the contact, m."""
@@ -127,6 +133,10 @@ def _neighbours(arm: Arm, random: np.random.Generator) -> tuple[str, str]:
 def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_levels: float) -> list[Touch]:
     inner, outer = _neighbours(arm, random)
     size = _size(random, of_levels)
+    if kind == PICKING_UP:
+        mass = float(np.exp(random.uniform(math.log(LIGHTEST), math.log(HEAVIEST))))
+        none, end = (0.0, 0.0, 0.0), begin + HOLD_OF_MASS
+        return [Touch(kind, outer, _length(arm, outer), none, none, 0.0, 0.0, begin, end, 0.0, mass=mass)]
     if kind.startswith("second"):
         first_cover = str(random.choice((inner, outer)))
         same = kind.endswith("same link")
@@ -148,7 +158,7 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_le
         cover = str(random.choice((inner, outer)))
         touch = _side(arm, random, cover, size, begin, HOLD)
         place = float(random.uniform(0.0, NEAR_ELBOW))
-        return [touch._replace(kind=kind, place=place if cover == outer else _length(arm, inner) - place)]
+        return [touch._replace(kind=kind, position=place if cover == outer else _length(arm, inner) - place)]
     if kind == "drag along the tube":
         touch = _side(arm, random, outer, size, begin, HOLD)
         along = float(random.choice((-1.0, 1.0))) * size
@@ -158,7 +168,7 @@ def _drawn(arm: Arm, random: np.random.Generator, kind: str, begin: float, of_le
         touch = touch._replace(twist=float(random.choice((-0.5, 0.5))))
     if kind == "sliding":
         middle = 0.5 * _length(arm, outer)
-        touch = touch._replace(speed=SLIDE if touch.place < middle else -SLIDE)
+        touch = touch._replace(speed=SLIDE if touch.position < middle else -SLIDE)
     if kind == "harder":
         low, high = HARDER_WITHIN
         factor, within = float(random.uniform(*HARDER)), float(random.uniform(low, high))
@@ -192,7 +202,7 @@ def _side(arm: Arm, random: np.random.Generator, cover: str, size: float, begin:
     return Touch(
         kind="outer" if i else "inner",
         cover=cover,
-        place=float(random.uniform(MARGIN, arm.covers.length[i] - MARGIN)),
+        position=float(random.uniform(MARGIN, arm.covers.length[i] - MARGIN)),
         force=(float(force[0]), float(force[1]), float(force[2])),
         arm=(float(lever[0]), float(lever[1]), float(lever[2])),
         twist=0.0,

@@ -53,7 +53,7 @@ def asymmetric_start(number: float = 0.002, slips: int = 800) -> AsymmetricStart
         node, gain = node_of(zeta, STATIC), 2.0 * number
         jump = 0.5 * (STATIC - 1.0) * float(slip_overshoot(zeta))
         times, errors = standstills(node, gain, 0.9 * jump, slips)
-        keep = 1.0 - float(asymmetry_decay(gain, 1.0, node.damping, STIFFNESS, STIFFNESS))
+        keep = 1.0 - float(asymmetry_decay(number, zeta))
         measured = np.abs(errors[1:] + errors[:-1]) / 2.0 / jump
         n = np.arange(float(len(measured)))
         asymmetry.append(Series(n, measured[0] * keep**n, n[::25], measured[::25]))

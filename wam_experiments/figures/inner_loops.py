@@ -13,11 +13,10 @@ import numpy as np
 
 from wam_description.arm import Arm, Servo
 from wam_description.configuration import Configuration, packaged
-from wam_description.world import Springs, World
 from wam_driver.plant import Plant
 from wam_experiments.figures.panels import Panels, ThesisPanel
 from wam_experiments.figures.series import Numbers, Series
-from wam_experiments.plant.ideal_testbed import NOTHING, RATIO, ideal_testbed, link_inertia, released_plant
+from wam_experiments.plant.ideal_testbed import RATIO, against_spring, ideal_testbed, link_inertia, released_plant
 from wam_theory.velocity_servo import is_stable, largest_scale
 from wam_theory.zero_order_hold import zero_order_hold
 
@@ -85,8 +84,7 @@ def period_map(arm: Arm, contact: float = CONTACT) -> tuple[Numbers, Numbers]:
 
 def plant_period_map(arm: Arm) -> tuple[Numbers, Numbers]:
     """The same by stepping the plant from each unit state and under a unit torque."""
-    world = World(NOTHING, Springs(("joint1",), (CONTACT,), (1.0,), (0.0,), (True,)))
-    plant = released_plant(arm, world, PERIOD / SUBSTEPS)
+    plant = released_plant(arm, against_spring(CONTACT), PERIOD / SUBSTEPS)
     small, torque = 1e-6 * np.eye(4), 1e-3
     columns = [_after(plant, state, 0.0) / 1e-6 for state in small]
     return np.array(columns).T, _after(plant, np.zeros(4), torque)[:, None] / torque

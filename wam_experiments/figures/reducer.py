@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from wam_description.arm import Arm
-from wam_description.world import Springs, World
 from wam_experiments.figures.panels import Panels, ThesisPanel
 from wam_experiments.figures.series import Numbers, Series
+from wam_experiments.plant.force_response import loop_plant
 from wam_experiments.plant.ideal_testbed import (
     IMMOVABLE,
-    NOTHING,
     RATIO,
     STEP,
     ideal_testbed,
@@ -73,7 +72,7 @@ def link_frequency(arm: Arm) -> float:
 
 def force_amplitude(arm: Arm, frequencies: Numbers) -> Numbers:
     """Amplitude of F_c over that of the motor's torque, from the plant's steps out of rest; frequencies in rad/s."""
-    plant = released_plant(arm, World(NOTHING, Springs(("joint1",), (CONTACT,), (1.0,), (0.0,), (True,))))
+    plant = loop_plant(arm, CONTACT)
     state = one_step_map(plant)
     plant.data.qpos[:], plant.data.qvel[:] = 0.0, 0.0
     plant.step([1e-3])

@@ -12,13 +12,13 @@ from wam_analysis.table import markdown
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import Effects, no_effects
-from wam_description.world import Springs, World
+from wam_description.world import World
 from wam_driver.driver import DriverParameters
 from wam_driver.friction import FrictionParameters
 from wam_driver.plant import Plant
 from wam_experiments.figures.panels import Panels, ThesisPanel
 from wam_experiments.figures.series import Series
-from wam_experiments.plant.ideal_testbed import EMPTY, IMMOVABLE, NOTHING, link_inertia, one_step_map
+from wam_experiments.plant.ideal_testbed import EMPTY, IMMOVABLE, against_spring, link_inertia, one_step_map
 from wam_theory.cable import efficiency, stage_loss
 from wam_theory.resonance import force_resonances
 
@@ -188,9 +188,8 @@ def _deflection(it: Driven, torque: float) -> float:
 
 def bandwidth(it: Driven, contact: float) -> float:
     """Lower frequency of the plant without play, rad/s, on a spring at the joint, N m/rad."""
-    spring = World(NOTHING, Springs(("joint1",), (float(contact),), (1.0,), (0.0,), (True,)))
     smooth = it._replace(friction=driven("cables").friction)
-    angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(smooth.plant(world=spring, play=False)))))
+    angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(smooth.plant(world=against_spring(contact), play=False)))))
     return float(np.sort(angles)[0]) / it.step
 
 

@@ -234,7 +234,7 @@ def details(seed: int, trial: ForceTrial) -> str:
     """One task and its result in full."""
     task, result = trial.task, trial.result
     surface, conditions = task.surface, task.conditions
-    place = f"{surface.place:.3f} m of {surface.cover}, along ({', '.join(f'{x:.3f}' for x in surface.direction)})"
+    place = f"{surface.position:.3f} m of {surface.cover}, along ({', '.join(f'{x:.3f}' for x in surface.direction)})"
     lines = [
         f"task {trial.number} of seed {seed}: {result.outcome.value}; {_numbers(trial)}",
         f"  pose ({', '.join(f'{angle:.3f}' for angle in task.q)}) rad, {task.pose}; {_contact(task)}: {place}",
@@ -329,9 +329,9 @@ RULES = f"""## Method
   counts as reported if the loop gives a reason, or the guard predicts at least half of its size.
 * {MOVING:.0%} of the surfaces move, as a sine after {AT_REST:g} s of the whole force, half of them along it: with
   {1e3 * SPEEDS[0]:g} to {1e3 * SPEEDS[1]:g} mm/s, at {FREQUENCIES[0]:g} to {FREQUENCIES[1]:g} Hz, by
-  {1e3 * FARTHEST:g} mm at most. The user declares the speed along the force (`limits.surface_speed`), a friction of
-  {FULL_FRICTION:g}, which is there in full (`sensing.friction`), and how far a pinned position moves along the link
-  (`contact_position_sd`).
+  {1e3 * FARTHEST:g} mm at most. The user declares the speed along the force (`limits.surface_speed`) and across it
+  (`limits.slide_speed`), a friction of {FULL_FRICTION:g}, which is there in full (`sensing.friction`), and how far a
+  pinned position moves along the link (`contact_position_sd`).
 * {DOUBLED:.0%} of the tasks have a second force elsewhere, commanded at the same time by a task frame of two axes at
   known positions. Such a task has ended as the force with the greater failure.
 * Of the other tasks {STEPPED:.0%} command another force first, for {FIRST_HELD:g} s: {CHANGES[0]:g} to {CHANGES[1]:g}

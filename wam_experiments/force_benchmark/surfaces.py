@@ -25,7 +25,7 @@ class Surface(NamedTuple):
 
     Attributes
     ----------
-    cover, place : where the link touches, m along the cover.
+    cover, position : where the link touches, m along the cover.
     direction : of the force of the arm on the surface (3,), base frame.
     stiffness : N/m.
     friction : coefficient.
@@ -36,7 +36,7 @@ class Surface(NamedTuple):
     """
 
     cover: str
-    place: float
+    position: float
     direction: Triple
     stiffness: float
     friction: float
@@ -50,6 +50,12 @@ class Surface(NamedTuple):
         """Largest speed along the force, m/s."""
         along = sum(a * b for a, b in zip(self.direction, self.motion, strict=True))
         return 2.0 * math.pi * self.frequency * abs(along)
+
+    @property
+    def slide_speed(self) -> float:
+        """Largest speed across the force, m/s."""
+        whole = 2.0 * math.pi * self.frequency * math.hypot(*self.motion)
+        return math.sqrt(max(whole * whole - self.speed * self.speed, 0.0))
 
     def slide(self, link: Array) -> float:
         """Standard deviation of the motion along a link, whose direction is given (3,), m."""
@@ -77,7 +83,7 @@ def position(body: RigidBody, q: Sequence[float], surface: Surface) -> Array:
     """A point of the plane, or the centre of the rod, (3,), m, base frame."""
     covers = body.arm.covers
     radius = covers.radius_of(surface.cover)
-    point = body.point(q, surface.cover, (surface.place, *covers.aside(surface.cover, surface.place)))
+    point = body.point(q, surface.cover, (surface.position, *covers.aside(surface.cover, surface.position)))
     return point + (radius + GAP + (0.0 if surface.is_plane else ROD[0])) * np.array(surface.direction)
 
 

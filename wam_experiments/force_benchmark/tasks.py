@@ -244,7 +244,7 @@ def _doubled(body: RigidBody, task: Task, random: np.random.Generator) -> Task:
     conditions = task.conditions._replace(is_pinned=True)
     for _ in range(TRIES):
         found = _surface(body, task.q, random)._replace(stiffness=task.surface.stiffness)
-        is_apart = found.cover != task.surface.cover or abs(found.place - task.surface.place) > APART
+        is_apart = found.cover != task.surface.cover or abs(found.position - task.surface.position) > APART
         if is_apart and is_clear(body, task.q, found):
             return task._replace(second=(found, _log_uniform(random, *FORCES)), conditions=conditions)
     return task
@@ -274,12 +274,13 @@ def configured(base: Configuration, task: Task) -> Configuration:
         values |= {f"driver:friction.{one}_asymmetry": [conditions.asymmetry] for one in ("motor", "joint")}
         values["driver:friction.law"] = "stribeck"
     if conditions.is_pinned:
-        values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": surface.place}
+        values |= {"force_loop:contact_cover": surface.cover, "force_loop:contact_position": surface.position}
     if surface.frequency:
         along = RigidBody(base.shared.arm).cover_pose(task.q, surface.cover).rotation[:, 0]
         values |= {
             "force_loop:sensing.friction": FULL_FRICTION,
             "force_loop:limits.surface_speed": surface.speed,
+            "force_loop:limits.slide_speed": surface.slide_speed,
             "force_loop:contact_position_sd": surface.slide(along),
         }
     if conditions.is_dithered:
@@ -321,7 +322,7 @@ def _command(task: Task, fraction: float) -> dict[str, Any]:
     if not task.second:
         return {"force": ForceCommand("base", triple(fraction * task.force * np.array(task.surface.direction)))}
     axes = [
-        TaskAxis(AxisKind.FORCE, -1, surface.cover, surface.place, surface.direction, fraction * force)
+        TaskAxis(AxisKind.FORCE, -1, surface.cover, surface.position, surface.direction, fraction * force)
         for surface, force in task.forces
     ]
     return {"task": TaskCommand("base", tuple(axes))}

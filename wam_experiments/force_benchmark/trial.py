@@ -139,7 +139,7 @@ class TaskWatch:
         """Position of each touched point along its force, m."""
         found = []
         for (surface, _), direction in zip(self._task.forces, self._directions, strict=True):
-            point = (surface.place, *self._arm.covers.aside(surface.cover, surface.place))
+            point = (surface.position, *self._arm.covers.aside(surface.cover, surface.position))
             found.append(float(direction @ self._body.point(q, surface.cover, point)))
         return np.array(found)
 

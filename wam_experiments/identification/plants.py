@@ -13,20 +13,22 @@ from wam_driver.driver import DriverParameters
 
 Array = NDArray[np.float64]
 
-KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, real sensors")
+KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, presliding", "all, real sensors")
 FACTOR = (0.8, 1.3)  # of the friction of each motor and joint
 STRIBECK = (0.5, 3.0)  # rad/s, v_s of the motors
 ASYMMETRY = 0.15
 LOAD = 0.06
 MASS = 0.03
+PRESLIDING = (4.0, 500.0)  # N m/rad, of motors and joints: a shape that the regression does not have
 COUNTS = 16384  # of the encoder per turn
 CURRENT_NOISE = 0.02  # A
+OFFSET = 0.004  # N m, largest of a motor's torque
 
 
 class TrueFriction(NamedTuple):
     """Friction of the motors, with that of joints with a motor of their own, (n,) each; by direction (2, n)."""
 
-    coulomb: Array  # without link load, N m
+    coulomb: Array  # without link load; less the torque offset of the motor in positive motion, N m
     at_joint: Array  # friction of the joints among it, which the cables transmit, N m
     drop: Array  # F_s - F_c, N m
     load: Array
@@ -71,14 +73,18 @@ def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
         values["driver:friction.joint_load_factor"] = random.uniform(0.0, LOAD, n).tolist()
     if every:
         values["driver:mismatch.mass"] = random.uniform(1.0 - MASS, 1.0 + MASS, n).tolist()
+    if kind == "all, presliding":
+        stiffness = zip(("motor", "joint"), PRESLIDING, strict=True)
+        values |= {f"driver:friction.{shaft}_presliding_stiffness": [each] for shaft, each in stiffness}
     if kind == "all, real sensors":
         values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / COUNTS] * n
         values["driver:amplifier.current_noise"] = [CURRENT_NOISE] * n
+        values["driver:amplifier.torque_offset"] = random.uniform(-OFFSET, OFFSET, n).tolist()
     return configuration.with_values(values)
 
 
 def true_friction(configuration: Configuration) -> TrueFriction:
-    """What the motors of a plant resist with."""
+    """What the motors of a plant resist with, as far as their reported torques show it."""
     driver = configuration.node("driver", DriverParameters)
     shared, law = configuration.shared, driver.friction
     arm = true_arm(shared.arm, driver.mismatch)
@@ -87,7 +93,7 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     own = np.abs(matrix) * [[j not in shared_joints(matrix)] for j in range(n)]
     lean, joint_lean = _each(law.motor_asymmetry, n), _each(law.joint_asymmetry, n)
     load, joint_load = _each(law.motor_load_factor, n), _each(law.joint_load_factor, n)
-    motors = driver.effects.dry(arm)
+    motors, offset = driver.effects.dry(arm), np.array(driver.amplifier.torque_offset)
     coulomb, joint_coulomb = np.array(motors.dynamic_friction), np.array(arm.joints.dynamic_friction)
     drop = np.subtract(motors.static_friction, coulomb) * (law.law == "stribeck")
     # alike in both directions; ripples average out in motion
@@ -100,7 +106,11 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     factor += signs * (np.sign(own.T * matrix.T) @ (joint_lean * joint_load))
     return TrueFriction(
         # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
-        coulomb * (1.0 + signs * lean) + by_tension + own.T @ joint_coulomb + signs * constant + factor * at_joint,
+        coulomb * (1.0 + signs * lean)
+        + by_tension
+        + own.T @ joint_coulomb
+        + signs * (constant - offset)
+        + factor * at_joint,
         at_joint,
         drop * (1.0 + signs * lean),
         factor,

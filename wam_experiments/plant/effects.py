@@ -22,6 +22,7 @@ from wam_experiments.plant.ideal_testbed import (
     LEVER,
     NOTHING,
     STEP,
+    against_spring,
     ideal_testbed,
     link_inertia,
     one_step_map,
@@ -212,8 +213,7 @@ def resonances(ratio: float, stiffness: Numbers) -> Resonance:
     (circuit,) = arm.circuits
     found = []
     for k in stiffness:
-        world = World(NOTHING, Springs(("joint1",), (float(k),), (1.0,), (0.0,), (True,)))
-        angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(released_plant(arm, world)))))
+        angles = np.abs(np.angle(np.linalg.eigvals(one_step_map(released_plant(arm, against_spring(k))))))
         found.append(np.sort(angles)[[0, 2]] / STEP)
     inertia = float(arm.motors.inertia[0]), link_inertia(arm)
     theory = force_resonances(*inertia, circuit.stiffness, stiffness, ratio)

@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
-from wam_description.world import Springs, World
 from wam_driver.plant import Plant
 from wam_experiments.plant.ideal_testbed import (
     IMMOVABLE,
-    NOTHING,
     RATIO,
     STEP,
+    against_spring,
     ideal_testbed,
     link_inertia,
     released_plant,
@@ -47,8 +46,7 @@ def loop_plant(
     arm: Arm, stiffness: float, unilateral: bool = False, step: float = STEP, backlash: float = 0.0
 ) -> Plant:
     """Its plant against a spring, N m/rad; a unilateral one pushes at angles below zero; backlash at the joint, rad."""
-    spring = Springs(("joint1",), (stiffness,), (1.0,), (0.0,), (not unilateral,))
-    return released_plant(arm, World(NOTHING, spring), step, backlash=(RATIO * backlash,))
+    return released_plant(arm, against_spring(stiffness, unilateral), step, backlash=(RATIO * backlash,))
 
 
 def loop_node(arm: Arm, stiffness: float, unilateral: bool = False) -> FrictionNode:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
-from wam_description.world import NO_SPRINGS, Obstacles, World
+from wam_description.world import NO_SPRINGS, Obstacles, Springs, World
 from wam_driver.plant import Plant
 
 Numbers = NDArray[np.float64]
@@ -61,6 +61,11 @@ def released_plant(arm: Arm, world: World = EMPTY, step: float = STEP, **effects
     plant = Plant(arm, world, replace(no_effects(arm), **effects), step)
     plant.brake(False)
     return plant
+
+
+def against_spring(stiffness: float, unilateral: bool = False) -> World:
+    """A spring at the joint, N m/rad; a unilateral one pushes at angles below zero."""
+    return World(NOTHING, Springs(("joint1",), (float(stiffness),), (1.0,), (0.0,), (not unilateral,)))
 
 
 def link_inertia(arm: Arm) -> float:

@@ -1,0 +1,125 @@
+"""Steps of the plant in C, as WAM_COMPILE builds them, against the plain way: the same bits and the same failures."""
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from wam_description.configuration import Configuration, packaged
+from wam_driver.driver import DriverParameters
+from wam_driver.plant import Plant
+
+NAME = "wam_driver.fast_steps"
+SOURCE = Path(__file__).parents[1] / "wam_driver" / "fast_steps.c"
+COMPILER = str(sysconfig.get_config_var("CC")).split()[0]
+INCLUDES = (sysconfig.get_path("include"), str(Path(mujoco.__file__).parent / "include"))
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which(COMPILER) and Path(INCLUDES[0], "Python.h").exists()), reason="needs a C compiler and Python.h"
+)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The module, built from its source."""
+    library = tmp_path_factory.mktemp("built") / f"fast_steps{sysconfig.get_config_var('EXT_SUFFIX')}"
+    given = [f"-I{folder}" for folder in INCLUDES]
+    flags = ["-shared", "-fPIC", "-O2", "-Wall", "-Werror", "-ffp-contract=off"]
+    subprocess.run([COMPILER, *flags, *given, str(SOURCE), "-o", str(library)], check=True)
+    spec = importlib.util.spec_from_file_location(NAME, library)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def with_c(built: Any, monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Plants are advanced in C until the fixture's patches are undone."""
+    monkeypatch.setitem(sys.modules, NAME, built)
+    return monkeypatch
+
+
+def plant(name: str = "wam", **values: Any) -> Plant:
+    """The plant of a configuration with these parameters of the driver."""
+    changed = {f"driver:{key}": value for key, value in values.items()}
+    configuration = Configuration.load(packaged(name)).with_values(changed)
+    own = configuration.node("driver", DriverParameters)
+    shared = configuration.shared
+    return Plant(shared.arm, own.world, own.effects, shared.timing.substep, own.friction, own.brake_torque)
+
+
+def history(made: Plant) -> bytes:
+    """Every number of a run with motion both ways, rest, a push, a change of friction and brakes."""
+    n = len(made.theta)
+    rows = []
+    made.brake(False)
+    for k in range(900):
+        if k == 300:
+            made.push("outer_link" if n > 1 else "link", np.array([0.0, 12.0, 3.0]), np.array([0.0, 0.0, 3.0]))
+        if k == 500:
+            made.release()
+        if k == 600:
+            made.set_added_friction([0.05] * n)
+        made.brake(k > 800)
+        made.step([0.4 * (1.0 if k % 200 < 90 else -1.0) * (k % 150 < 120)] * n, 1 + k % 3)
+        rows += [made.theta, made.thetad, made.q, made.qd, made.strain_torque, made.cable_pull]
+        rows.append(made.data.plastic.tolist())
+    return repr(rows).encode()
+
+
+CASES: dict[str, dict[str, Any]] = {
+    "as configured": {},
+    "no friction by tension": {"effects.tension_friction": (0.0,) * 4},
+    "strands that go slack": {"effects.tension_friction": (1e-5,) * 4, "effects.pretension_share": (0.02,)},
+    "no creep": {"effects.creep": False, "effects.tension_friction": (0.0,) * 4},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_steps_have_the_bits_of_plain_python(case: str, with_c: pytest.MonkeyPatch) -> None:
+    fast = plant(**CASES[case])
+    with_c.undo()
+    with_c.setitem(sys.modules, NAME, None)
+    plain = plant(**CASES[case])
+    assert fast._advance is not None
+    assert plain._advance is None
+    assert history(fast) == history(plain)
+
+
+@pytest.mark.parametrize("values", [{"friction.law": "stribeck"}])
+def test_a_law_that_changes_in_every_step_is_left_to_python(values: dict[str, Any], with_c: pytest.MonkeyPatch) -> None:
+    assert plant(**values)._advance is None
+
+
+def test_an_error_of_mujoco_is_an_exception_and_the_next_step_works(with_c: pytest.MonkeyPatch) -> None:
+    made = plant()
+    made.brake(False)
+    solver = made.model.opt.solver
+    made.model.opt.solver = 99
+    with pytest.raises(mujoco.FatalError, match="solver"):
+        made.step([0.0] * 4)
+    made.model.opt.solver = solver
+    made.step([0.1] * 4)
+    assert not made.trouble()
+
+
+def test_a_failure_in_python_comes_through(with_c: pytest.MonkeyPatch) -> None:
+    made = plant()
+    made.push("outer_link", np.array([0.0, 1.0, 0.0]), np.zeros(3))
+    made._loads.pushes["nowhere"] = made._loads.pushes["outer_link"]
+    with pytest.raises(KeyError, match="nowhere"):
+        made.step([0.0] * 4, 2)
+
+
+def test_it_is_not_used_with_another_mujoco(built: Any, with_c: pytest.MonkeyPatch) -> None:
+    with_c.setattr(built, "MUJOCO", built.MUJOCO + 1)
+    assert plant()._advance is None

@@ -1,0 +1,137 @@
+/* Plant.step of wam_driver/plant.py in C, for a build with WAM_COMPILE; same order, same bits.  What is rare stays in
+ * Python: a shaft that begins or ends to stick, a slack strand, pushes, contacts.  MuJoCo is that of its Python package, already loaded;
+ * its functions come as addresses, and its errors become exceptions as in its own binding. */
+
+#include <Python.h>
+#include <math.h>
+#include <mujoco/mujoco.h>
+#include <setjmp.h>
+#include <string.h>
+
+typedef void (*Step)(const mjModel *, mjData *);
+typedef mjfLogHandler (*SetHandler)(mjfLogHandler);
+
+static jmp_buf before_error;  /* one is enough: a step holds the interpreter's lock */
+static char error_text[1024];
+
+/* Warnings are counted in mjData, where Plant.trouble finds them. */
+static void handle(const mjLogMessage *message) {
+  if (message->level < mjLOG_ERROR) return;
+  memcpy(error_text, message->subject, sizeof error_text);
+  longjmp(before_error, 1);
+}
+
+/* One half of a step; -1 with an exception where MuJoCo fails. */
+static int half_step(Step step, SetHandler set, PyObject *error, const mjModel *model, mjData *data) {
+  if (setjmp(before_error)) {
+    set(NULL);
+    PyErr_SetString(error, error_text);
+    return -1;
+  }
+  set(handle);
+  step(model, data);
+  set(NULL);
+  return 0;
+}
+
+static int call(PyObject *work) {
+  PyObject *none = PyObject_CallNoArgs(work);
+  Py_XDECREF(none);
+  return none ? 0 : -1;
+}
+
+static int may_leave(PyObject *low, PyObject *high, const mjtNum *velocity, Py_ssize_t shafts) {
+  for (Py_ssize_t i = 0; i < shafts; i++)
+    if (!(PyFloat_AS_DOUBLE(PyList_GET_ITEM(low, i)) < velocity[i] &&
+          velocity[i] < PyFloat_AS_DOUBLE(PyList_GET_ITEM(high, i))))
+      return 1;
+  return 0;
+}
+
+PyDoc_STRVAR(advance_doc,
+             "advance(fixed, count, is_set, low, high, direction, circuits, each, set_friction, apply_pushes,\n"
+             "    apply_surfaces)\n\n"
+             "Advance by `count` steps; the velocities of rotors and joints at the start of the last one, rad/s.\n"
+             "`fixed`: addresses of model, data, mj_step1, mj_step2 and of what sets a handler of messages; the class of\n"
+             "the exception.  `is_set`: whether MuJoCo has the levels of friction.  `low`, `high`, `direction`: of\n"
+             "DryFriction.  `each`: of CableCircuits, empty where nothing follows the torque.  `apply_pushes`: None\n"
+             "without pushes.");
+
+static PyObject *number(PyObject *circuit, int place) { return PyTuple_GET_ITEM(circuit, place); }
+
+/* CableCircuits.follow; -1 with an exception where the flag cannot be set. */
+static int follow(PyObject *circuits, PyObject *each, PyObject *direction, mjData *data, int *slack) {
+  int found = 0;
+  for (Py_ssize_t i = 0; i < PyList_GET_SIZE(each); i++) {
+    PyObject *circuit = PyList_GET_ITEM(each, i);
+    const double pull = data->qfrc_spring[i];
+    if (PyObject_IsTrue(PyList_GET_ITEM(direction, i))) {
+      const double crept = PyFloat_AS_DOUBLE(number(circuit, 1)) * fabs(data->qvel[i]) * pull;
+      mjtNum *ends = data->plastic + PyLong_AsLong(number(circuit, 0));
+      ends[0] -= crept;
+      ends[1] -= crept;
+    }
+    found |= fabs(pull) > PyFloat_AS_DOUBLE(number(circuit, 2));
+  }
+  const int same = found == *slack;
+  *slack = found;
+  return same ? 0 : PyObject_SetAttrString(circuits, "is_slack", found ? Py_True : Py_False);
+}
+
+static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ssize_t given) {
+  Py_ssize_t a_model, a_data, a_first, a_second, a_set;
+  PyObject *error;
+  if (given != 11 || !PyTuple_Check(args[0]) || !PyList_Check(args[3]) || !PyList_Check(args[4]) ||
+      !PyList_Check(args[5]) || !PyList_Check(args[7])) {
+    PyErr_SetString(PyExc_TypeError, "advance does not take these arguments; see its docstring");
+    return NULL;
+  }
+  if (!PyArg_ParseTuple(args[0], "nnnnnO", &a_model, &a_data, &a_first, &a_second, &a_set, &error)) return NULL;
+  const mjModel *model = (const mjModel *)a_model;
+  mjData *data = (mjData *)a_data;
+  const Step first = (Step)a_first, second = (Step)a_second;
+  const SetHandler set = (SetHandler)a_set;
+  PyObject *low = args[3], *high = args[4], *direction = args[5], *circuits = args[6], *each = args[7];
+  PyObject *set_friction = args[8], *pushes = args[9] == Py_None ? NULL : args[9], *surfaces = args[10];
+  const long count = PyLong_AsLong(args[1]);
+  const Py_ssize_t shafts = PyList_GET_SIZE(low);
+  if (PyList_GET_SIZE(high) != shafts || PyList_GET_SIZE(direction) != shafts || PyList_GET_SIZE(each) > shafts ||
+      model->nv < shafts) {
+    PyErr_SetString(PyExc_ValueError, "advance needs one value for each rotor and joint");
+    return NULL;
+  }
+  PyObject *was_slack = PyObject_GetAttrString(circuits, "is_slack");
+  if (!was_slack) return NULL;
+  int is_set = PyObject_IsTrue(args[2]), slack = PyObject_IsTrue(was_slack);
+  Py_DECREF(was_slack);
+  PyObject *velocity = PyList_New(shafts);
+  if (!velocity) return NULL;
+  for (Py_ssize_t i = 0; i < shafts; i++) PyList_SET_ITEM(velocity, i, PyFloat_FromDouble(0.0));
+  for (long k = 0; k < count; k++) {
+    if (k == count - 1)
+      for (Py_ssize_t i = 0; i < shafts; i++) PyList_SetItem(velocity, i, PyFloat_FromDouble(data->qvel[i]));
+    if (!is_set || slack || may_leave(low, high, data->qvel, shafts)) {
+      if (call(set_friction)) goto failed;
+      is_set = !slack;
+    }
+    if (half_step(first, set, error, model, data)) goto failed;
+    if (pushes && call(pushes)) goto failed;
+    if (data->ncon && call(surfaces)) goto failed;
+    if (half_step(second, set, error, model, data)) goto failed;
+    if (pushes) memset(data->qfrc_applied, 0, model->nv * sizeof(mjtNum));
+    if (PyList_GET_SIZE(each) && follow(circuits, each, direction, data, &slack)) goto failed;
+  }
+  return velocity;
+failed:
+  Py_DECREF(velocity);
+  return NULL;
+}
+
+static PyMethodDef methods[] = {{"advance", (PyCFunction)(void (*)(void))advance, METH_FASTCALL, advance_doc}, {NULL}};
+static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "fast_steps", "Steps of the plant in C.", -1, methods};
+
+PyMODINIT_FUNC PyInit_fast_steps(void) {
+  PyObject *made = PyModule_Create(&module);
+  if (made && PyModule_AddIntConstant(made, "MUJOCO", mjVERSION_HEADER)) Py_CLEAR(made);
+  return made;
+}
