@@ -9,6 +9,7 @@ demo_traces     forces and contacts of a run on one time base
 task_forces     forces that tasks command, and what was measured of each
 reactions       what the force loop did instead of what was commanded, when and why
 demo_summary    the demonstration in numbers
+press_positions the force of a press at the configured, the estimated and the true position
 demo_report     its report, as text
 demo_figure     its picture
 drawing         colours and sizes that all pictures share

@@ -8,6 +8,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``velocity_loop``                 inner loop: PI control of each motor's velocity, torque feed-forward
 ``torque_loop``                   - in its place, on torque: law and node, 2.1.2
 ``position_loop``                 - in its place, on position: law and node, 2.1.2
+``servo_reaction``                - inputs and output of both
 ``servo_guard``                   which gains of the velocity loop are stable on the arm
 ``dither``                        alternating motor torque against stiction, for contact detection at rest
 ``force_loop``                    outer loop: force along a direction, posture elsewhere, or joint torques
@@ -46,6 +47,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``model_prior``                   - what is known of them before: stated, or identified
 ``tool_load``                     - torques of a mass at the tool
 ``contact_inference``             - which link is touched, where and how hard
+``inference_parameters``          - its parameters
 ``contact_fit``                   - the probability of contact positions along straight links
 ``second_contact``                - whether a second contact has joined a steady first one
 ``contact_table``                 hypotheses as rows of numbers, as the topic carries them, and back

@@ -7,7 +7,7 @@ loop.  The gains are `wam_description.arm.Servo`: integral_gain is the stiffness
 from collections.abc import Sequence
 
 from wam_control.servo_guard import DEAD, ServoGuard, ServoGuardParameters
-from wam_control.velocity_loop_node import SERVO_REACTION
+from wam_control.servo_reaction import SERVO_REACTION
 from wam_description.arm import Motors, Servo, Shared
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs

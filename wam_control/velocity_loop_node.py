@@ -1,23 +1,16 @@
 """Node `velocity_loop`: the inner loop, motor states in, motor currents out."""
 
 from operator import gt
-from typing import Final
 
 from wam_control.dither import Dither
 from wam_control.servo_guard import ServoGuard
+from wam_control.servo_reaction import SERVO_REACTION
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
 from wam_description.arm import Servo, Shared
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
-from wam_description.wiring import Input, Outputs, reaction
-
-SERVO_REACTION: Final = reaction(
-    Input("motor_states"),
-    Input("motor_velocity_command", "velocity?", delayed=True, absent="brake"),
-    Input("motor_effort_command", "effort", delayed=True, absent="brake"),
-    outputs=("motor_current_command",),
-)  # of every node that closes the inner loop
+from wam_description.wiring import Outputs
 
 
 class VelocityLoopNode:

@@ -12,6 +12,7 @@
 - sensors: resolution and noise of encoders and strain gauges
 - imperfections: parameters of amplifiers and sensors
 - plant: the arm in MuJoCo, stepped with motor torques
+- compiled_steps: its steps in C, where the package is built with WAM_COMPILE
 - step_size: which step fits the plant's stiffest mode
 - friction: laws of dry friction and their parameters
 - dry_friction: dry friction of all motors and joints, by these laws
