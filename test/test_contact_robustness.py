@@ -101,7 +101,7 @@ def test_a_row_that_is_missed_has_its_reason_as_counted_and_its_bound() -> None:
         RequiredRow(name, "cm", 100.0, "", (0.0, 0.012), (0.0, 0.005), Interval(value, value, value, 30), "")
         for value in (0.013, 0.012)
     )
-    bounds = [["", "1 / 2 / 3", "4 / 5 / 6", "7", "8", "9"], ["", "10 / 20 / 30", "40 / 50 / 60", "70", "80", "90"]]
+    bounds = [["", "1 / 2 / 3", "4 / 5 / 6", "7", "8", "9"], [], ["", "10 / 20 / 30", "40 / 50 / 60", "70", "80", "90"]]
     far = TOUCH._replace(force=10.0, error=0.03)
     score = scored(TOUCH._replace(force=10.0), far, far._replace(error=np.inf, right_link=False, in_set=False))
     shown = missed_table([missed, met], evidence(identified=[score], bounds=bounds))
@@ -135,7 +135,7 @@ def test_every_account_counts_and_has_a_bound_or_says_why_there_is_none() -> Non
         "all", 1, *(np.array([0.1, 0.2]), np.array([0.01, 0.02])) * 2, np.zeros(2), 0.0, 0.0, ""
     )
     groups = {"delay 2 ms": [score], "realistic mix": [score]}
-    bounds = [["", "1 / 2 / 3", "4 / 5 / 6", "7", "8", "9"]] * 2
+    bounds = [["", "1 / 2 / 3", "4 / 5 / 6", "7", "8", "9"]] * 3
     known = evidence(wide=groups, second=groups, identified=[score], identifications=[found], bounds=bounds)
     rows = required_rows(groups, groups, {}, [score], [found], 90e-6)
     missed = [row for row in rows if row.is_missed]

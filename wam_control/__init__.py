@@ -49,6 +49,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``contact_inference``             - which link is touched, where and how hard
 ``inference_parameters``          - its parameters
 ``contact_fit``                   - the probability of contact positions along straight links
+``contact_fusion``                - several moments of one contact that explain it together
 ``second_contact``                - whether a second contact has joined a steady first one
 ``contact_table``                 hypotheses as rows of numbers, as the topic carries them, and back
 ``motion``                        trajectories of the joints and straight lines, limited in speed, acceleration and jerk

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_control.contact_fusion import ContactFusion
 from wam_control.contact_inference import (
     CERTAIN_SECOND,
     SECOND,
@@ -136,6 +137,7 @@ class ContactEstimator:
         )
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
+        self._fusion = ContactFusion(parameters.inference.fusion_time)
         self._second = SecondContact(parameters.second)
         self._in_contact = self._is_above = self._is_blind = False
         self._ended = -math.inf  # by the age of the observer, s
@@ -153,6 +155,7 @@ class ContactEstimator:
     def reset(self) -> None:
         """Forget all samples."""
         self._observer.reset()
+        self._fusion.reset()
         self._second.reset()
         self._in_contact = self._is_above = False
         self._ended = -math.inf
@@ -196,6 +199,7 @@ class ContactEstimator:
         if not observer.is_ready:
             self._in_contact = self._is_above = False
             self._ended = -math.inf
+            self._fusion.reset()
             self._second.reset()
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
         precision = np.asarray(np.linalg.inv(covariance), np.float64)
@@ -210,12 +214,14 @@ class ContactEstimator:
             self._ended = observer.age
         observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
+            self._fusion.reset()
             self._second.reset()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
-        hypotheses = self._inference.infer(observer.pose, torques, precision, load)
+        hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, observer.moment())
         self._second.step(observer.age, hypotheses, observer, self._inference)
         if self._second.is_suspected:
+            self._fusion.reset()
             why = CERTAIN_SECOND if self._second.is_certain else SECOND
             hypotheses = tuple(with_second(hypothesis, why) for hypothesis in hypotheses)
         best = hypotheses[0]

@@ -352,21 +352,18 @@ class _Link:
         return 1.0 / math.sqrt(information) if information > 0.0 else math.inf
 
 
-def log_evidence_of_weight(torques: Array, unit: Array, precision: Array, least: float) -> float:
-    """Log of the probability of external torques, (n,), N m, if a force of one direction and sign explains them.
+def log_evidence_of_weight(gram: Array, least: float) -> float:
+    """Log of the probability of external torques, if a force of one direction and sign explains them.
 
     As that of contacts in `ContactFit`: -1/2 (r^T S'^-1 r + log abs(S')/abs(S)), S' = S + a a^T / least, and twice the
     probability that the force is positive.
 
     Parameters
     ----------
-    unit : (n,), a, torques of the force 1.
-    precision : (n, n), S^-1.
+    gram : (7, 7), of the torques r and, first of the others, the torques a of the force 1.
     least : inverse of the prior variance of the force.
     """
-    weighted = precision.dot(unit)
-    aa, ra = float(weighted.dot(unit)) + least, float(weighted.dot(torques))
-    rr = float(precision.dot(torques).dot(torques))
+    rr, ra, aa = float(gram[0, 0]), float(gram[0, 1]), float(gram[1, 1]) + least
     positive = 0.5 * math.erfc(-ra / math.sqrt(2.0 * aa))
     return -0.5 * (rr - ra * ra / aa + math.log(aa / least)) + math.log(2.0 * max(positive, LEAST_CHANCE))
 

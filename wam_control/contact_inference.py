@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact_fit import ContactFit, Fit, log_evidence_of_weight
+from wam_control.contact_fusion import ContactFusion, Guess, Torques
 from wam_control.inference_parameters import InferenceParameters
 from wam_description.arm import Arm
 from wam_description.parameters import lengths, require
@@ -64,7 +65,7 @@ class Hypothesis(NamedTuple):
     direction : rad, angle of the force about the link, from the cover's y to its z axis.
     direction_sd : rad.
     moment : (3,), N m, of the force about the origin of the cover's frame, in that frame.
-    residual : chi^2 that the contact does not explain.
+    residual : chi^2 that the contact does not explain, per moment that counts.
     reason : why the position is unknown or the estimate not reliable, in words, '' where neither.
     reasons : the same as bits, in the order of `REASONS`.
     """
@@ -160,7 +161,13 @@ class ContactInference:
         self.jacobians = np.zeros((len(covers), 6, len(arm.joints.names)))  # at the last pose
 
     def infer(
-        self, q: Sequence[float], torques: Sequence[float], precision: Array, load: Array | None = None
+        self,
+        q: Sequence[float],
+        torques: Sequence[float],
+        precision: Array,
+        load: Array | None = None,
+        fusion: ContactFusion | None = None,
+        now: Torques | None = None,
     ) -> tuple[Hypothesis, ...]:
         """Explain external torques by one contact.
 
@@ -170,6 +177,8 @@ class ContactInference:
         torques : (n,), external torques, N m.
         precision : (n, n), the inverse of their covariance, 1/(N^2 m^2); of smaller ones than `SMALLEST_SD` that.
         load : (n,), torques of a mass of 1 kg at the tool, N m; None if none may have been picked up.
+        fusion : earlier moments of the same contact, to which this one is added; None for this one alone.
+        now : the same torques with what is known of their errors, for `fusion`.
 
         Returns
         -------
@@ -180,16 +189,29 @@ class ContactInference:
             precision = np.asarray(
                 np.linalg.inv(np.linalg.inv(precision) + SMALLEST_SD**2 * np.eye(len(torques))), np.float64
             )
-        at = np.array(q)
+        if precision.trace() > (10.0 * SMALLEST_SD) ** -2:
+            fusion = None  # together they would be as exact
+        at, links = np.array(q), len(self._covers)
         self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
-        rows = np.empty((len(self._covers), 7, len(torques)))
+        rows = np.zeros((links + 1, 7, len(torques)))  # the last are those of a payload
         rows[:, 0] = torques
-        np.matmul(self._wrenches, self.jacobians, out=rows[:, 1:])
-        picked, weight = -math.inf, self._parameters.payload_weight
-        if load is not None and weight:
+        np.matmul(self._wrenches, self.jacobians, out=rows[:links, 1:])
+        weight = self._parameters.payload_weight if load is not None else 0.0
+        if load is not None:
+            rows[links, 1] = load
+        gram = fusion.gram(rows, now) if fusion is not None and now is not None else None
+        if gram is None:
+            gram = rows @ precision @ rows.transpose(0, 2, 1)
+        picked = -math.inf
+        if weight:
             least = (STANDARD_GRAVITY / self._parameters.force_scale) ** 2
-            picked = math.log(weight) + log_evidence_of_weight(rows[0, 0], load, precision, least)
-        fits = self._fit(rows @ precision @ rows.transpose(0, 2, 1), picked)
+            picked = math.log(weight) + log_evidence_of_weight(gram[links], least)
+        fits = self._fit(gram[:links], picked)
+        moments = 1
+        if fusion is not None and now is not None:
+            moments = fusion.count
+            best = max(fits, key=lambda fit: fit.probability)
+            fusion.remember(rows, now, [Guess(fit.position, fit.probability) for fit in fits], best.residual)
         is_payload = 1.0 - sum(fit.probability for fit in fits) > NOTED
         ambiguity = (
             self._ambiguity(q, fits)
@@ -197,7 +219,7 @@ class ContactInference:
             else ""
         )
         each = zip(self._covers, fits, strict=True)
-        found = [self._hypothesis(q, cover, fit, ambiguity, is_payload) for cover, fit in each]
+        found = [self._hypothesis(q, cover, fit, ambiguity, is_payload, moments) for cover, fit in each]
         return tuple(sorted(found, key=lambda hypothesis: -hypothesis.probability))
 
     def slide(self, hypothesis: Hypothesis, force: Array) -> Array:
@@ -216,7 +238,9 @@ class ContactInference:
         sides[:, 2] -= place * chosen[:, 4]
         return sides
 
-    def _hypothesis(self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str, is_payload: bool) -> Hypothesis:
+    def _hypothesis(
+        self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str, is_payload: bool, moments: int
+    ) -> Hypothesis:
         start, end = cover.start, cover.end
         length = end[0] - start[0]
         is_unknown = cover.is_moment_only or fit.torque_position_sd > length
@@ -225,7 +249,7 @@ class ContactInference:
             reasons.append(ambiguity)
         if fit.along > (NOTED if ambiguity else 0.5):
             reasons.append(ALONG)
-        if fit.residual > self._parameters.largest_residual:
+        if fit.residual > moments * self._parameters.largest_residual:
             reasons.append(MORE)
         if is_payload:
             reasons.append(PAYLOAD)
@@ -247,7 +271,7 @@ class ContactInference:
             direction=math.atan2(f2, f1),
             direction_sd=fit.direction_sd,
             moment=_cross(point, force),
-            residual=fit.residual,
+            residual=fit.residual / moments,
             reason="; ".join(self._in_words(reason, cover) for reason in reasons),
             reasons=sum(2 ** REASONS.index(reason) for reason in reasons),
         )

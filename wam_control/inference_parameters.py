@@ -29,6 +29,13 @@ class InferenceParameters:
     payload_weight: float = parameter(
         "relative frequency of a mass that is picked up at the tool", low=0.0, high=1e3, before=0.0
     )
+    fusion_time: float = parameter(
+        "for how long the torques of a contact explain it together; 0: those of the present moment alone",
+        "s",
+        low=0.0,
+        high=10.0,
+        before=0.0,
+    )
     positions: int = parameter("contact positions tried along a link", low=9, high=200)
     identification_threshold: float = parameter(
         "probability from which the link in contact is identified", low=0.5, high=1.0

@@ -46,6 +46,7 @@ class Observation(NamedTuple):
     rest : (n, n), N^2 m^2, R without the noise of the motors that is followed here.
     moving : (n,), fraction to which each motor moves; more for a filter that averages less of the noise.
     pose : (n,), joint angles, rad, as late as the residual.
+    lasting : (n, m), N m, torques of those errors of the rest, of one sd, that may stay as they are in a pose.
     """
 
     residual: Array
@@ -53,6 +54,7 @@ class Observation(NamedTuple):
     rest: Array
     moving: Array
     pose: Array
+    lasting: Array
 
 
 class ModelErrors:
@@ -101,6 +103,15 @@ class ModelErrors:
         noise = (self._through * (self.noise * seen.moving)).dot(self._through.T)
         covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest + noise
         return seen.residual - effects.dot(self.errors), covariance
+
+    def parts(self, seen: Observation) -> tuple[Array, Array, Array]:
+        """Effects, (n, k), N m, of the errors that stay, their covariance, (k, k), and that of the others, (n, n)."""
+        noise = (self._through * (self.noise * seen.moving)).dot(self._through.T)
+        effects = np.concatenate((seen.effects, seen.lasting), axis=1)
+        k = len(self.errors)
+        covariance = np.eye(effects.shape[1])
+        covariance[:k, :k] = self.covariance
+        return effects, self.size * covariance, self.size * (seen.rest + noise)
 
     def change(self, now: Observation, then: Observation) -> tuple[Array, Array]:
         """Change of the external torques, (n,), N m, and its covariance, (n, n): errors that stay drop out.

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.contact_fusion import Torques
 from wam_control.model_errors import ALIKE, ModelErrors, Observation
 from wam_control.model_prior import model_prior
 from wam_control.observer_parameters import ObserverParameters
@@ -269,9 +270,25 @@ class MomentumObserver:
             covariance = covariance + np.outer(sized, sized)
             effects = np.column_stack((effects, sized))
         self.seen = Observation(
-            np.array(residual), effects, self._sensors, self._at_rest, self._filtered[0, 2 * self._n :].copy()
+            np.array(residual),
+            effects,
+            self._sensors,
+            self._at_rest,
+            self._filtered[0, 2 * self._n :].copy(),
+            np.sqrt(self._sensors),
         )
         return residual, covariance
+
+    def moment(self) -> Torques:
+        """The external torques last given, with what is known of their errors."""
+        seen = self.seen
+        if seen is None:
+            raise RuntimeError("nothing has been observed")
+        if not self._link_side:
+            residual = seen.residual - seen.effects.dot(self._errors.errors)
+            return Torques(self.age, residual, *self._errors.parts(seen), seen.pose)
+        effects = np.concatenate((seen.effects, seen.lasting), axis=1)
+        return Torques(self.age, seen.residual, effects, np.eye(effects.shape[1]), seen.rest, seen.pose)
 
     def change(self, then: Observation) -> tuple[Array, Array]:
         """Change of the external torques, (n,), N m, since a mean of what was `seen`, and its covariance, (n, n)."""
@@ -357,10 +374,11 @@ class MomentumObserver:
         less, least = self._times[0] / self._times[which], given.motor_torque_sd**2
         sds = [given.motor_torque_fraction * torque for torque in modelled]
         variance[:n] += [less * (least + sd * sd) for sd in sds]
+        lasting = self._through * np.sqrt(np.square(self._rest_sd * resting) + np.square(self._shape_sd * shape))
         rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
         momentum = self._inertia.dot(speed)
-        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n], pose)
+        return Observation(residual, effects, rest + momentum.dot(momentum.T), less * moving[:n], pose, lasting)
 
     def identify_payload(self) -> str:
         """Identify the payload from the torques of joint sensors; '' or why that is not possible."""

@@ -263,12 +263,13 @@ FIRST = f"""The benchmark of [contact.md](contact.md) on the seeds of this page,
 it, and the contacts are those of its prior. Quantities that both have; arms and contacts are others."""
 
 OPEN = """The inference alone, in poses and on contacts drawn as after an identification, with torques that have these
-errors and no others, and with just their covariance. The rows of the requirement lie between the last two: the last
-takes errors at rest, where stiction hides a force, as frequent as any. Friction of the contact is in all of them:
-four torques do not distinguish it from position and force. The first row is that friction alone: it makes the 95 %
-error, the medians are those of the torques' errors. So is the inner link near the shoulder, where 10 N have hardly a
-moment: the last column is what a threshold finds on torques with these errors. They are those of friction and stay
-longer than the time in which a contact is to be found, so that a longer window does not average them."""
+errors and no others, and with just their covariance. The rows of the requirement lie between the last three: what errs
+in motion changes within some 50 ms, so that the moments of 0.2 s are worth about four (with `inference.fusion_time` 0
+one); the last row takes errors at rest, where stiction hides a force, as frequent as any, and these stay. Friction of
+the contact is in all of them: four torques do not distinguish it from position and force, however long it lasts. The
+first row is that friction alone: it makes the 95 % error, the medians are those of the torques' errors. So is the inner
+link near the shoulder, where 10 N have hardly a moment: the last column is what a threshold finds on torques with these
+errors."""
 
 METHOD = """## Method
 

@@ -39,7 +39,7 @@ class Evidence(NamedTuple):
     wide, second, masses : scores by degradation.
     identified : scores of the realistic mix after an identification.
     identifications : of plants with every error of friction.
-    bounds : rows of `bounds.bounds`, the last two for errors in free motion; none where there are none.
+    bounds : rows of `bounds.bounds`, the last three for errors in free motion; none where there are none.
     reference : time of the reference workload on this computer, s.
     """
 
@@ -62,8 +62,8 @@ class Evidence(NamedTuple):
         return outcomes([*(score for own in self.wide.values() for score in own), *self.identified])
 
     def bound(self, column: int, part: int = 0) -> str:
-        """A value of the last two rows of the bounds."""
-        return " to ".join(own[column].split(" / ")[part] for own in self.bounds[-2:]) or "not computed"
+        """A value of the rows of the bounds for the smallest and the largest errors in free motion."""
+        return " to ".join(own[column].split(" / ")[part] for own in self.bounds[-3::2]) or "not computed"
 
 
 Account = Callable[[RequiredRow, Evidence], tuple[str, str]]  # the bound and why

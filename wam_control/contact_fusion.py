@@ -1,0 +1,211 @@
+"""Several moments of one contact that explain it together.
+
+While a contact lasts, part of the errors of its torques changes from moment to moment (cogging, noise, friction of a
+motor that has moved on), and part stays (a wrong friction level, a shaft at rest).  The torques of some moments, each
+4 numbers of an arm of 4 joints, are taken as one measurement of 4 numbers per moment, with the covariance of both:
+
+    C_jk = H_j P H_k^T + L_j L_k^T + delta_jk R_j,
+
+H the effects of the model's errors and P their covariance, which are the same in all moments; L the errors of shafts at
+rest or just reversed.  These may stay or change: they count as both, in L and in R.  One contact position explains all
+moments, by a force that grows and shrinks with the torques; how else it may change is in the covariance, too, by the
+links' probabilities: its direction by a fraction of its size, its position by the way that the arm has moved since.
+How large all errors of this contact are, over what is stated, follows from what the fit leaves unexplained, and from
+`BELIEF` degrees of freedom of the statement itself.
+
+The inner products of `ContactFit` are all that a fit needs, of any number of rows.  Those of the past moments are
+computed when one joins them; with the present one, of covariance C_nn, they are those of (Rasmussen & Williams,
+2006, A.6) Z_n - C_np C_pp^-1 Z_p with C_nn - C_np C_pp^-1 C_pn, added to those of the past.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+EVERY = 0.0299  # s, between moments: one and a half time constants of the observer, within which errors are alike
+MOST = 6  # past moments
+MOVED = 2e-3  # rad, of any joint: in one pose the errors stay, and more moments show nothing
+TURNED = 0.15  # of the size of the force: sd of the change of its components from moment to moment
+SLIPS = 0.03  # m/rad: sd of the way of a contact along its link, per way of the joints
+DRIFTS = 0.02  # m/s: the same, of what touches an arm that does not move
+UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a lever is as likely as errors of 0.14 N m
+LIKE, GROWN = 0.25, 4.0  # least and largest torques of the same contact, of those of its last moment
+BELIEF = 10.0  # degrees of freedom
+UNKNOWN = 3  # of a contact: its position and the force across the link
+DIFFERENT = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
+
+
+class Torques(NamedTuple):
+    """External torques of one moment, with what is known of their errors.
+
+    Attributes
+    ----------
+    time : s.
+    residual : (n,), N m.
+    effects : (n, k), N m, of errors that stay, of the covariance `covariance`.
+    covariance : (k, k).
+    own : (n, n), N^2 m^2, covariance of the errors of this moment alone.
+    pose : (n,), rad.
+    """
+
+    time: float
+    residual: Array
+    effects: Array
+    covariance: Array
+    own: Array
+    pose: Array
+
+
+class Guess(NamedTuple):
+    """Position of a contact on a link, m, and its probability."""
+
+    position: float
+    probability: float
+
+
+class _Seen(NamedTuple):
+    torques: Torques
+    rows: Array
+
+
+class _Past(NamedTuple):
+    """What past moments contribute; their forces in units of that of the last one.
+
+    `gram` (links, 7, 7) of them alone; `predicts` (links, k, 7) and `explains` (k, k): C_np C_pp^-1 Z_p and
+    C_np C_pp^-1 C_pn without the effects of the present moment at their outer sides.
+    """
+
+    gram: Array
+    predicts: Array
+    explains: Array
+    expected: float  # chi^2 of the errors alone, without what the force may have changed
+    last: Array  # (n,), torques of the last moment
+    moments: int
+
+
+class ContactFusion:
+    """Keeps the moments of a contact, and their inner products.
+
+    Parameters
+    ----------
+    duration : s, for which a moment counts; 0 for the present one alone.
+
+    Attributes
+    ----------
+    count : number of moments that explain the present contact together.
+    """
+
+    def __init__(self, duration: float) -> None:
+        self._duration = duration
+        self.reset()
+
+    def reset(self) -> None:
+        """The contact has ended, or is another one."""
+        self._last: _Seen | None = None  # its errors are still those of the present one
+        self._moments: deque[_Seen] = deque()
+        self._past: _Past | None = None
+        self._widening = 1.0
+        self.count = 1
+
+    def gram(self, rows: Array, now: Torques) -> Array | None:
+        """Inner products of all moments, (links, 7, 7); None for no past, or another contact.
+
+        Parameters
+        ----------
+        rows : (links, 7, n), those of `ContactFit` of the present moment; the last link may be a payload.
+        now : its torques.
+        """
+        past = self._past
+        self.count = 1
+        if past is None:
+            return None
+        effects = now.effects
+        covariance = effects.dot(now.covariance).dot(effects.T) + now.own
+        weighted = np.linalg.solve(covariance, past.last)
+        grown = float(now.residual.dot(weighted)) / float(past.last.dot(weighted))
+        if not LIKE < grown < GROWN:
+            self.reset()
+            return None
+        scale = np.full(7, 1.0 / grown)
+        scale[0] = 1.0
+        rest = rows - (effects @ (past.predicts * scale)).transpose(0, 2, 1)
+        precision = np.linalg.inv(covariance - effects.dot(past.explains).dot(effects.T))
+        self.count = 1 + past.moments
+        return (past.gram * np.outer(scale, scale) + rest @ precision @ rest.transpose(0, 2, 1)) / self._widening
+
+    def remember(self, rows: Array, now: Torques, guess: Sequence[Guess], residual: float) -> None:
+        """Take the present moment, with what was fitted to it.
+
+        Parameters
+        ----------
+        guess : of each link.
+        residual : chi^2 of all moments that the fit does not explain.
+        """
+        if self._past is not None and self.count > 1:
+            freedom = max(0.0, self._past.expected + len(now.residual) - UNKNOWN)
+            self._widening = (BELIEF + self._widening * residual) / (BELIEF + freedom)
+            if self._widening > DIFFERENT:
+                self.reset()
+        moments, last = self._moments, self._last
+        if not self._duration or (last and now.time - last.torques.time < EVERY):
+            return
+        has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > MOVED
+        if has_moved:
+            moments.extend([] if last is None else [last])
+            self._last = _Seen(now, rows)
+        count = len(moments)
+        while moments and (len(moments) > MOST or now.time - moments[0].torques.time > self._duration):
+            moments.popleft()
+        if has_moved or len(moments) < count:
+            self._past = self._of(list(moments), now, guess) if moments else None
+
+    def _of(self, moments: list[_Seen], now: Torques, guess: Sequence[Guess]) -> _Past:
+        n, last = len(now.residual), moments[-1].torques
+        effects = np.concatenate([moment.torques.effects for moment in moments])
+        shared = effects @ last.covariance
+        common = shared @ effects.T
+        weighted = np.linalg.solve(common[-n:, -n:] + last.own, last.residual)
+        size = float(last.residual.dot(weighted))
+        sizes = np.array([float(moment.torques.residual.dot(weighted)) / size for moment in moments])
+        # (links, 7, moments, n)
+        rows = np.stack([moment.rows for moment in moments], axis=2)
+        rows = rows * np.concatenate((np.ones((1, len(moments))), np.tile(sizes, (6, 1))))[None, :, :, None]
+        for j, moment in enumerate(moments):
+            common[n * j : n * j + n, n * j : n * j + n] += moment.torques.own
+        covariance = common.copy()
+        found, count = len(guess), len(moments)
+        places = np.array([each.position for each in guess])[:, None, None, None]
+        sides = rows[:found, [1, 2, 6]]  # of forces across the link and along it, at the contact position
+        sides[:, :2] += places * rows[:found, 3:5]
+        present = sides[:, :, -1]
+        levers = present @ present.transpose(0, 2, 1) + UNMEASURED
+        forces = np.linalg.solve(levers, present @ last.residual[:, None])  # (links, 3, 1), N
+        weights = np.sqrt([each.probability for each in guess])
+        slopes = (forces[:, :2, :, None] * rows[:found, 3:5]).sum(axis=1)  # (links, moments, n), N m per m
+        ways = [
+            SLIPS * np.abs(moment.torques.pose - now.pose).max() + DRIFTS * (now.time - moment.torques.time)
+            for moment in moments
+        ]
+        slips = (slopes * np.multiply.outer(weights, ways)[:, :, None]).reshape(found, -1)
+        covariance += slips.T @ slips
+        sides *= (weights * TURNED * np.sqrt((forces**2).sum(axis=(1, 2))))[:, None, None, None]
+        for j in range(count):
+            of = slice(n * j, n * j + n)
+            side = sides[:, :, j].reshape(-1, n)
+            covariance[of, of] += side.T @ side
+        rows = rows.reshape(len(rows), 7, count * n)
+        inverse = np.linalg.inv(covariance)
+        weighted_rows = inverse @ rows.transpose(0, 2, 1)
+        return _Past(
+            gram=rows @ weighted_rows,
+            predicts=shared.T @ weighted_rows,
+            explains=shared.T @ inverse @ shared,
+            expected=float((inverse * common).sum()),
+            last=last.residual,
+            moments=count,
+        )
