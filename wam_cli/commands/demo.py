@@ -21,9 +21,10 @@ from wam_cli.commands.demo_nodes import play
 from wam_control.scenario import ScenarioStep, script_file
 from wam_control.scenario import load as steps_of
 from wam_description.configuration import Configuration
+from wam_description.status import DONE
 from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
 from wam_ros.program import end_at_once_on_signals
-from wam_sim.recording import DONE, recorded_run
+from wam_sim.recording import recorded_run
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

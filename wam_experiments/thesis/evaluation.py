@@ -7,11 +7,11 @@ from pathlib import Path
 from wam_bag.bag import BagError
 from wam_bag.cut import CUT
 from wam_description.parameters import ParameterError
+from wam_description.status import DONE
 from wam_experiments.thesis.definition import Experiment, Run
 from wam_experiments.thesis.recording import Recording, recording
 from wam_experiments.thesis.rows import Comparison, Result, plain
 
-DONE = "done"  # status of the scenario at its end
 Evaluation = Callable[[Mapping[str, Recording]], Result]
 
 
