@@ -14,7 +14,7 @@ from wam_bag.bag import BagError, raw, read
 from wam_bag.bag_writer import BagWriter
 from wam_bag.metadata import INFINITE
 from wam_cli import main as cli
-from wam_cli.commands.replay import reasons, told
+from wam_cli.commands.replay import reasons, stated
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.status import CHANGES
@@ -264,7 +264,7 @@ def test_of_a_realtime_recording_the_share_that_differs_is_told() -> None:
     """25 of 101 messages differ, the largest by 0.97 N m."""
     different = Compared("gravity_effort", 101, 0, 0, 25, None, 0.97, "N m", None)
     done = Replay("gravity", "realtime", (different,), (), ())
-    assert told(different) == "gravity_effort: 101 messages, 25 differ (24.8 %), at most by 0.97 N m"
+    assert stated(different) == "gravity_effort: 101 messages, 25 differ (24.8 %), at most by 0.97 N m"
     (why,) = reasons(done)
     assert why.startswith("recorded in realtime: 25 of 101 messages (24.8 %) differ: gravity took what was newest")
     assert reasons(done._replace(mode="lockstep")) == []

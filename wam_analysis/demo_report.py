@@ -208,11 +208,11 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
 
 def _reactions(summary: DemoSummary) -> list[str]:
     """Commands that were not simply obeyed, by step."""
-    told = [
+    stated = [
         line for step in summary.steps for line in sentences(step.name, within(summary.reactions, step.begin, step.end))
     ]
-    lines = ["Commands that were refused, held or doubted"] if told else []
-    return ["", *lines, *(line for one in told for line in _wrapped(f"  {one}", "    "))] if told else []
+    lines = ["Commands that were refused, held or doubted"] if stated else []
+    return ["", *lines, *(line for one in stated for line in _wrapped(f"  {one}", "    "))] if stated else []
 
 
 def _touches(touches: Sequence[StepContact], period: float) -> list[str]:

@@ -176,7 +176,7 @@ class Processes:
         if process is None:
             return
         begin = now = moved = time.monotonic()
-        state, said = _work_of(process.pid), begin
+        state, printed = _work_of(process.pid), begin
         while process.poll() is None:
             time.sleep(0.02)
             now = time.monotonic()
@@ -184,8 +184,8 @@ class Processes:
                 state, moved = work, now
             if now - moved > RECORDER_PATIENCE:
                 self._kill(LAST, f"has done nothing for {RECORDER_PATIENCE:.0f} s; 'wam bag repair' closes its bag")
-            elif now - said > TOLD:
-                said = now
+            elif now - printed > TOLD:
+                printed = now
                 LOGGER.warning(f"waiting for the recorder to write the bag, {now - begin:.0f} s")
 
     def _kill(self, name: str, reason: str) -> None:

@@ -127,9 +127,9 @@ def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
 
 def _verdict(sections: tuple[Section, ...]) -> Section:
     """The most important findings of all sections, in a few sentences."""
-    said = [sentence for section in sections for sentence in section.verdict]
+    stated = [sentence for section in sections for sentence in section.verdict]
     silent = "No force, contact, cycle or fault was recorded that could be evaluated."
-    return Section("verdict", "Verdict", tuple(said) or (silent,), ())
+    return Section("verdict", "Verdict", tuple(stated) or (silent,), ())
 
 
 def _happened(recording: AnalysedRun, duration: float) -> Section:

@@ -95,18 +95,18 @@ def play(experiment: Experiment, each: Run, directory: Path, label: str, stop: S
             now = time.monotonic()
             if now >= shown[0]:
                 shown[0] = now + SHOWN_EVERY
-                _say(f"{label}: {driver.driver.stamp / 1e9:5.1f} of {each.seconds:.1f} s")
+                _show(f"{label}: {driver.driver.stamp / 1e9:5.1f} of {each.seconds:.1f} s")
             return stop.is_set or bool(scenario.done)
 
         composition.spin(is_over)
         failure, fault, is_done = scenario.failure, driver.driver.safety.fault, bool(scenario.done)
     ended = f"stopped by the driver: {fault}" if fault else "done" if is_done else "stopped"
-    _say(f"{label}: {ended}", end="\n")
+    _show(f"{label}: {ended}", end="\n")
     if failure and not fault:
         raise ValueError(f"{label}: {failure}")
 
 
-def _say(words: str, end: str = "") -> None:
+def _show(words: str, end: str = "") -> None:
     """Show the progress: in one line on a terminal, otherwise only the end."""
     if sys.stderr.isatty():
         print(f"\r\033[K{words}", end=end, file=sys.stderr, flush=True)
