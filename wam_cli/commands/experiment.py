@@ -58,9 +58,12 @@ def run(given: argparse.Namespace) -> int:
             if not _record(experiment, directory, f"{number}/{len(chosen)} " if given.all else ""):
                 return 130
         result = evaluate(experiment, directory)
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        draw(experiment, result, picture)
-        print(f"{text(experiment, result)}\nbags     {directory}\npicture  {picture}\n", flush=True)
+        drawn = ""
+        if result.panels:
+            picture.parent.mkdir(parents=True, exist_ok=True)
+            draw(experiment, result, picture)
+            drawn = f"picture  {picture}\n"
+        print(f"{text(experiment, result)}\nbags     {directory}\n{drawn}", flush=True)
         results[experiment.name] = (experiment, result, picture)
     if given.write:
         write(Path(given.write), list(results.values()))

@@ -93,11 +93,6 @@ def _stop(run: Run, recorded: Recording) -> Comparison:
     return Comparison(f"{run.name.replace('_', ' ')}, driver", predicted, measured)
 
 
-def evaluation_of(experiment: Experiment) -> Evaluation:
-    """The function that evaluates an experiment."""
-    return function_of(experiment.evaluation)
-
-
 def function_of(evaluation: str) -> Evaluation:
     """The function of a name: ``cables.creeping``, or ``my_package.my_module:function`` outside of this package.
 
