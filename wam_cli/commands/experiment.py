@@ -4,7 +4,6 @@ import argparse
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 from wam_cli.commands import writable_directory, writable_file
 from wam_experiments.thesis.definition import Experiment, Run, configured, load, names
@@ -90,23 +89,20 @@ def play(experiment: Experiment, each: Run, directory: Path, label: str, stop: S
         where the scenario failed for another reason than that the driver protected the arm.
     """
     shown = [0.0]
+
+    def is_stopped(seconds: float) -> bool:
+        now = time.monotonic()
+        if now >= shown[0]:
+            shown[0] = now + SHOWN_EVERY
+            _show(f"{label}: {seconds:5.1f} of {each.seconds:.1f} s")
+        return stop.is_set
+
     with Composition(configured(experiment, each, directory)) as composition:
-        scenario: Any = composition.nodes["scenario"]
-        driver: Any = composition.nodes["driver"]
-
-        def is_over() -> bool:
-            now = time.monotonic()
-            if now >= shown[0]:
-                shown[0] = now + SHOWN_EVERY
-                _show(f"{label}: {driver.driver.stamp / 1e9:5.1f} of {each.seconds:.1f} s")
-            return stop.is_set or bool(scenario.done)
-
-        composition.spin(is_over)
-        failure, fault, is_done = scenario.failure, driver.driver.safety.fault, bool(scenario.done)
-    ended = f"stopped by the driver: {fault}" if fault else "done" if is_done else "stopped"
+        played = composition.play(is_stopped)
+    ended = f"stopped by the driver: {played.fault}" if played.fault else "done" if played.is_done else "stopped"
     _show(f"{label}: {ended}", end="\n")
-    if failure and not fault:
-        raise ValueError(f"{label}: {failure}")
+    if played.failure and not played.fault:
+        raise ValueError(f"{label}: {played.failure}")
 
 
 def _show(words: str, end: str = "") -> None:
