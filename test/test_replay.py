@@ -229,6 +229,15 @@ def test_a_missing_input_is_named(bag: Path, tmp_path: Path) -> None:
         replay(tmp_path / "part", "velocity_loop")
 
 
+@pytest.mark.parametrize("topic", ["motor_states", "motor_effort_command", "motor_current_command"])
+def test_a_topic_that_had_another_type_is_named_and_not_left_out(tmp_path: Path, topic: str) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        bag.add_topic(f"/wam/{topic}", "std_msgs/msg/Bool", QOS)
+        bag.write(f"/wam/{topic}", b"\0\1\0\0\1", 1, 1, 1)
+    with pytest.raises(BagError, match=rf"/wam/{topic} was recorded as std_msgs/msg/Bool; this version has it as sen"):
+        replay(tmp_path / "bag", "velocity_loop")
+
+
 def test_a_comparison_of_nothing_is_no_success() -> None:
     with pytest.raises(BagError, match="velocity_loop publishes nothing from what is recorded"):
         replay(Path(__file__).parents[1] / "bags/sample/active-pretension", "velocity_loop")
