@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import yaml
-from comparing import arguments, machine, ratios, save, spread, table
+from comparing import arguments, machine, quartiles, ratios, save, table
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -91,7 +91,7 @@ def main() -> None:
             measured[f"{mine}, {other}"] = ratio
             rows.append(
                 [f"{mine} against {other}"]
-                + [f"{spread(costs[name]).median:.2f}" for name in (mine, other)]
+                + [f"{quartiles(costs[name]).median:.2f}" for name in (mine, other)]
                 + [f"{ratio:.2f}"]
             )
     print(machine())

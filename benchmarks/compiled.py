@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from comparing import Spread, machine, mark, options, ratios, save, spread, table
+from comparing import Quartiles, machine, mark, options, quartiles, ratios, save, table
 from plant import FREE, Case, pose_in_contact
 from speed import ROWS, scenario
 
@@ -133,10 +133,10 @@ def main() -> None:
     fast, plain = ([speed for speed, _ in each] for each in direct)
     rows, measured = [], dict[str, Any]()
 
-    def add(name: str, ours: list[float], theirs: list[float], gain: Spread, limits: tuple[float, float]) -> None:
-        middle, usual = spread(ours).median, spread(theirs).median
+    def add(name: str, ours: list[float], theirs: list[float], gain: Quartiles, limits: tuple[float, float]) -> None:
+        middle, usual = quartiles(ours).median, quartiles(theirs).median
         rows.append([name, f"{middle:.2f}", f"{usual:.2f}", f"{gain:.2f}", mark(middle, *limits)])
-        measured[name] = {"compiled": spread(ours), "plain": spread(theirs), "gain": gain}
+        measured[name] = {"compiled": quartiles(ours), "plain": quartiles(theirs), "gain": gain}
 
     add(f"{DIRECT}, times real time", fast, plain, ratios(fast, plain), ROWS[DIRECT])
     for name, (ours, theirs) in substeps.items():

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from comparing import Spread, arguments, machine, ratios, save, spread, table
+from comparing import Quartiles, arguments, machine, quartiles, ratios, save, table
 
 from wam_control.contact_estimator import ContactEstimator, ContactEstimatorParameters
 from wam_control.contact_inference import ContactInference
@@ -88,7 +88,7 @@ def main() -> None:
         times["update"].append(times["observe"][-1] + times["estimate"][-1])
     rows, measured = [], dict[str, Any]()
     for name in ("observe", "infer", "estimate", "update"):
-        microseconds: Spread = spread([1e6 * value for value in times[name]])
+        microseconds: Quartiles = quartiles([1e6 * value for value in times[name]])
         ratio = ratios(times[name], times["reference"])
         rows.append([name, f"{microseconds:.1f}", f"{ratio:.2f}"])
         measured[name] = {"microseconds": microseconds, "reference_ratio": ratio}

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
-from comparing import arguments, machine, save, spread, table
+from comparing import arguments, machine, quartiles, save, table
 
 from wam_analysis.demo_summary import summarize
 from wam_bag.bag import raw, read
@@ -115,7 +115,7 @@ def main() -> None:
             equal = {digest(run.bag) for run in runs if run.passed}
             digests |= equal
             failed += given.rounds - passed
-            factor = spread([run.factor for run in runs])
+            factor = quartiles([run.factor for run in runs])
             rows.append([f"{count} busy loops", f"{passed} of {given.rounds}", f"{factor:.2f}", str(len(equal))])
             measured[f"{count} loops"] = {"passed": passed, "real_time_ratio": factor, "results": len(equal)}
     print(machine())

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
-from comparing import RESULTS, machine, mark, options, ratios, spread, table
+from comparing import RESULTS, machine, mark, options, quartiles, ratios, table
 from long_bag import repeated
 from plant import FREE, Case
 
@@ -163,7 +163,7 @@ def draw(costs: Costs) -> None:
         figure, axes = plt.subplots(1, len(costs), figsize=(9.0, 2.4), layout="constrained")
         for panel, (name, found) in zip(axes, costs.items(), strict=True):
             sizes = np.array(list(found)) / min(found)
-            growth = np.array([spread(values).median for values in found.values()])
+            growth = np.array([quartiles(values).median for values in found.values()])
             panel.loglog(sizes, growth / growth[0], "o-", color=TRUE)
             panel.loglog(sizes, sizes ** (-1.0 if name == "workers" else 1.0), "--", color="0.6", linewidth=1.0)
             panel.set_title(name)
@@ -210,7 +210,7 @@ def main() -> None:
             growth = ratios(values[:count], found[smallest][:count])
             each = f"{growth.median * (size / smallest if name == 'workers' else smallest / size):.2f}"
             reached = mark(1.0 / growth.median, *FASTER) if (name, size) == ("workers", 2) else ""
-            rows.append([f"{name}: {size}", f"{1e3 * spread(values).median:.3g}", f"{growth:.2f}", each, reached])
+            rows.append([f"{name}: {size}", f"{1e3 * quartiles(values).median:.3g}", f"{growth:.2f}", each, reached])
     print(machine())
     print(table(["work", "cost [ms]", "relative to the smallest", "the same, in proportion", "[must, aim]"], rows))
     if not given.quick:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from comparing import machine, ratios, save, spread, table
+from comparing import machine, quartiles, ratios, save, table
 
 from wam_cli.commands.live import PageProcess
 from wam_description.configuration import Configuration, packaged
@@ -97,9 +97,9 @@ def main() -> None:
                         factor(stack, 0.8 * 60.0 * given.minutes / 20)
                         memory.append(resident(pid))
         costs[name] = ratios(watched, alone)
-        row = [f"{spread(alone):.2f}", f"{spread(watched):.2f}", f"{costs[name]:.3f}"]
+        row = [f"{quartiles(alone):.2f}", f"{quartiles(watched):.2f}", f"{costs[name]:.3f}"]
         rows.append([f"real-time factor with the page, {name}", *row])
-    growth = spread(np.array(memory) / memory[0])
+    growth = quartiles(np.array(memory) / memory[0])
     print(machine())
     memories = [f"{memory[0]:.0f}", f"{memory[-1]:.0f}", f"{growth:.3f}"]
     rows.append([f"memory of the page over {given.minutes:g} min [MB]", *memories])

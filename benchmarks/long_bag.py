@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import yaml
-from comparing import arguments, machine, save, spread, table
+from comparing import arguments, machine, quartiles, save, table
 from speed import lockstep, scenario
 
 from wam_analysis.findings.analysis import TOPICS_READ, analyse_bag
@@ -37,7 +37,7 @@ def repeated(source: Path, target: Path, seconds: float) -> None:
         (int(at), name, i) for name, found in topics.items() for i, at in enumerate(found.log_time_ns.tolist())
     )
     stamped = {name: stamp_reader(found.type) for name, found in topics.items()}
-    said = read(source)
+    recorded = read(source)
     count = 0
     with BagWriter(target) as bag:
         for name, found in topics.items():
@@ -53,9 +53,9 @@ def repeated(source: Path, target: Path, seconds: float) -> None:
                     data = data[:4] + struct.pack("<iI", *later) + data[12:]
                 bag.write(name, data, at + turn * length, at + turn * length, count)
                 count += 1
-        for name, attached in said.attachments.items():
+        for name, attached in recorded.attachments.items():
             bag.attach(name, "application/yaml", attached)
-        bag.metadata("recording", said.metadata.get("recording", {}))
+        bag.metadata("recording", recorded.metadata.get("recording", {}))
 
 
 def timed(path: Path) -> tuple[float, float, float]:
@@ -89,7 +89,7 @@ def main() -> None:
         long = Path(folder) / "long"
         repeated(Path(folder) / "short", long, 60.0 * minutes)
         rounds = [timed(long) for _ in range(given.rounds)]
-    found = {row: spread([60.0 * minutes / times[i] for times in rounds]) for i, row in enumerate(ROWS)}
+    found = {row: quartiles([60.0 * minutes / times[i] for times in rounds]) for i, row in enumerate(ROWS)}
     print(machine())
     head = [f"{minutes:g} minutes", "times real time (middle half)", "seconds"]
     lines = [[row, f"{found[row]:.2f}", f"{60.0 * minutes / found[row].median:.1f}"] for row in ROWS]

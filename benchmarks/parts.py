@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from comparing import arguments, machine, save, spread, table
+from comparing import arguments, machine, quartiles, save, table
 from speed import scenario
 
 from wam_control.scenario import load
@@ -97,9 +97,9 @@ def main() -> None:
             for part, value in {**whole, **nodes, **within}.items():
                 found.setdefault(part, []).append(value)
     print(machine())
-    rows = [[part, f"{spread(found[part]):.1f}"] for part in PARTS]
+    rows = [[part, f"{quartiles(found[part]):.1f}"] for part in PARTS]
     print(table(["part", "us of a period (middle half)"], rows))
-    save("parts", given, {part: spread(values) for part, values in found.items()})
+    save("parts", given, {part: quartiles(values) for part, values in found.items()})
 
 
 if __name__ == "__main__":

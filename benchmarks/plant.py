@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from comparing import Spread, arguments, machine, mark, ratios, save, spread, table
+from comparing import Quartiles, arguments, machine, mark, quartiles, ratios, save, table
 
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
@@ -129,7 +129,7 @@ def main() -> None:
     rows, measured = [], dict[str, Any]()
     for name, (plant, bare) in seconds.items():
         ratio = ratios(plant, bare)
-        micro = [Spread(*(1e6 * value for value in spread(part))) for part in (plant, bare)]
+        micro = [Quartiles(*(1e6 * value for value in quartiles(part))) for part in (plant, bare)]
         best = min(plant) / min(bare)
         contacts = cases[name].plant.data.ncon
         times = f"{SUBSTEP / min(plant):.0f}"

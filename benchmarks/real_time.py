@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from comparing import arguments, machine, mark, save, spread, table
+from comparing import arguments, machine, mark, quartiles, save, table
 from comparing.clock import watched_clock
 from demo_under_load import Run, busy_loops, demonstration, short_form
 
@@ -60,8 +60,8 @@ def main() -> None:
             found["wam demo to first motion [s]"].append(first_motion(folder, f"start_{i}", short))
     rows, measured = [], dict[str, Any]()
     for name, values in found.items():
-        measured[name] = spread(values)
-        rows.append([name, f"{spread(values):.2f}", mark(spread(values).median, *ROWS[name])])
+        measured[name] = quartiles(values)
+        rows.append([name, f"{quartiles(values):.2f}", mark(quartiles(values).median, *ROWS[name])])
     print(machine())
     print(table(["in real time", "(middle half)", "[must, aim]"], rows))
     save("real_time", given, measured)

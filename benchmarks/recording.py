@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from comparing import arguments, machine, ratios, save, spread, table
+from comparing import arguments, machine, quartiles, ratios, save, table
 from mcap.writer import Writer
 from rclpy.publisher import Publisher
 
@@ -109,10 +109,10 @@ def main() -> None:
             }
         )
         sent = published(configuration)
-        said = contents(Path(folder) / "bag")
-        found = {name: topic.messages for name, topic in said.topics.items()}
+        recorded = contents(Path(folder) / "bag")
+        found = {name: topic.messages for name, topic in recorded.topics.items()}
         early = Counter[str]()  # published before the recorder was there
-        for key, value in said.metadata.get("recording", {}).items():
+        for key, value in recorded.metadata.get("recording", {}).items():
             if key.endswith(" missed"):
                 early[key.split(" ")[0]] += int(value)
         states = raw(Path(folder) / "bag", ["motor_states"])["/wam/motor_states"]
@@ -135,8 +135,8 @@ def main() -> None:
         ],
         [
             "writing a message [us]",
-            f"{spread(costs['ours']).median:.2f}",
-            f"{spread(costs['library']).median:.2f} by mcap's writer",
+            f"{quartiles(costs['ours']).median:.2f}",
+            f"{quartiles(costs['library']).median:.2f} by mcap's writer",
             f"{cheaper:.2f}",
         ],
     ]

@@ -11,7 +11,7 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
-from comparing import Spread, arguments, machine, mark, ratios, save, spread, table
+from comparing import Quartiles, arguments, machine, mark, quartiles, ratios, save, table
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -137,7 +137,7 @@ def measure_stack(way: str, seconds: float) -> Any:
         listener.create_subscription(DiagnosticArray, "/diagnostics", take, qos(BY_NAME["/diagnostics"]))
         executor.add_node(listener)
         spin(executor, lambda: len(reports) >= max(1, round(seconds)))
-    return tuple(1e-6 * spread([report[i] for report in reports]).median for i in (0, 1))
+    return tuple(1e-6 * quartiles([report[i] for report in reports]).median for i in (0, 1))
 
 
 def main() -> None:
@@ -155,7 +155,7 @@ def main() -> None:
             ours, bare = [one[i] for one in stack], [one[i] for one in relay]
             ratio = ratios(ours, bare)
             reached = mark(ratio.median, *WAYS[way]) if name == "p50" else ""
-            micro = [Spread(*(1e6 * value for value in spread(part))) for part in (ours, bare)]
+            micro = [Quartiles(*(1e6 * value for value in quartiles(part))) for part in (ours, bare)]
             rows.append([f"{way}, {name}", *(f"{part.median:.0f}" for part in micro), f"{ratio:#.3g}", reached])
             measured[f"{way}, {name}"] = {"ratio": ratio, "stack_us": micro[0], "relay_us": micro[1]}
     print(machine())

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from comparing import arguments, machine, mark, ratios, save, spread, table
+from comparing import arguments, machine, mark, quartiles, ratios, save, table
 from comparing.clock import Readings, watched_clock
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -127,7 +127,7 @@ def main() -> None:
                 speeds[f"{row}, recorded"].append(processes(named, how))
     rows, measured = [], dict[str, Any]()
     for name, values in speeds.items():
-        real, least = spread(values), ratios(speeds["direct run"], values)
+        real, least = quartiles(values), ratios(speeds["direct run"], values)
         rows.append([name, f"{real:.2f}", f"{least:.2f}", mark(real.median, *ROWS[name])])
         measured[name] = {"real_time_ratio": real, "direct_ratio": least}
     print(machine())

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from comparing import arguments, machine, ratios, save, spread, table
+from comparing import arguments, machine, quartiles, ratios, save, table
 from comparing.solve_ivp import BEST, Node
 from comparing.solve_ivp import largest_stable_step as by_solve_ivp
 
@@ -61,7 +61,7 @@ def main() -> None:
         ("map, against the scalar bisection", "map", "scalar"),
     ):
         ratio = ratios(times[slow], times[fast])
-        micro = [1e6 * spread(times[name]).median for name in (fast, slow)]
+        micro = [1e6 * quartiles(times[name]).median for name in (fast, slow)]
         rows.append([title, f"{micro[0]:.1f}", f"{micro[1]:.0f}", f"{ratio:.2f}", f"{100.0 * worst[slow]:.2f} %"])
         measured[title] = {"ratio": ratio, "us": micro, "worst": worst[slow]}
     print(f"{machine()}; {BEST}")

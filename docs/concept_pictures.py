@@ -134,8 +134,8 @@ def lockstep(file: Path) -> None:
                     arrow(axes, (answer, 0.0), (answer + 0.3, 1.0), colour=OUTER)
             axes.plot([2.3, 4.5], [-0.08, -0.08], color=OUTER, linewidth=5, solid_capstyle="butt")
             axes.text(3.4, -0.35, "this node is late", ha="center", fontsize=8, color=OUTER)
-            said = "the arm's time waits" if waits else "t4 to t6: the last command is held"
-            axes.text(3.6 if waits else 4.0, 1.36, said, ha="center", fontsize=8, color=INK)
+            caption = "the arm's time waits" if waits else "t4 to t6: the last command is held"
+            axes.text(3.6 if waits else 4.0, 1.36, caption, ha="center", fontsize=8, color=INK)
 
 
 def main() -> None:

@@ -30,6 +30,7 @@ from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, fields
 from wam_description.topics import TOPICS
 from wam_description.transmission_map import TransmissionMap
+from wam_description.wiring import Input
 from wam_experiments import design_choices
 from wam_experiments.contact_benchmark import resting_push
 from wam_experiments.figures import backdrivability, open_loop, transmissions
@@ -101,6 +102,24 @@ def topics(configuration: Configuration) -> str:
         for topic in TOPICS
     ]
     return markdown(["topic", "type", "from", "to", "rate", "content"], rows)
+
+
+def steps(configuration: Configuration) -> str:
+    """What each step of each node waits for in lockstep, and what it takes the newest of."""
+    interface = Interface(configuration.with_values({"nodes": [name for name in NODES if name != "recorder"]}).shared)
+
+    def named(item: Input) -> str:
+        late = " of t - d" if item.delayed else " of t - 1" if item.answers else ""
+        return f"`{item.topic}`{late}"
+
+    rows = []
+    for name, one in interface.declarations.items():
+        for reaction in one.reactions:
+            waited = [named(item) for item in reaction.inputs if interface.is_streamed(item.topic)]
+            newest = [named(item) for item in reaction.inputs if not interface.is_streamed(item.topic)]
+            trigger = f"`{reaction.trigger.topic}`{' of an outer period' if reaction.thinned else ''}"
+            rows.append([name, trigger, ", ".join(waited) or "nothing", ", ".join(newest) or "–"])
+    return markdown(["node", "trigger, at time t", "waits for", "takes the newest of"], rows)
 
 
 # parameters
@@ -260,6 +279,7 @@ def blocks() -> dict[str, Callable[[], str]]:
     return {
         "topics": lambda: topics(configuration),
         "parameters": lambda: parameters(configuration),
+        "steps": lambda: steps(configuration),
         "driver contract": driver_contract,
         "constants of the arm, printed": lambda: constants(ARM_PRINTED),
         "constants of the arm, assumed": lambda: constants(ARM_ASSUMED),

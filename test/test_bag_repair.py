@@ -28,7 +28,7 @@ from wam_bag.contents import contents
 from wam_bag.losses import losses
 from wam_bag.metadata import INFINITE
 from wam_bag.repair import repair
-from wam_cli.commands.bag import described, told
+from wam_cli.commands.bag import described, stated
 
 ROOT = Path(__file__).parents[1]
 JOINTS = "sensor_msgs/msg/JointState"
@@ -93,7 +93,7 @@ def test_a_killed_recording_is_whole_again_up_to_the_last_chunk(tmp_path: Path, 
     killed(tmp_path / "bag", samples, split)
     with pytest.raises(BagError, match=r"was not closed.*wam bag repair"):
         read(tmp_path / "bag")
-    lines = [told(result) for result in repair(tmp_path / "bag")]
+    lines = [stated(result) for result in repair(tmp_path / "bag")]
     assert "was repaired" in lines[-1]
     assert serialized(tmp_path / "bag") == written(samples[:100])
     assert_others_read_it(tmp_path / "bag", 100)
@@ -210,7 +210,7 @@ def test_what_a_repair_could_not_save_is_told_first_wherever_one_looks(tmp_path:
     samples = [sample._replace(time=10**7 * k) for k, sample in enumerate(samples_of(100))]
     first, last = damaged(tmp_path / "bag", samples, 5)
     gone = Counter(sample.topic for sample in samples if first <= sample.time <= last)
-    lines = told(repair(tmp_path / "bag")[0]).splitlines()
+    lines = stated(repair(tmp_path / "bag")[0]).splitlines()
     assert "lost are 10 messages (5 of /jointstate, 5 of /wrenchstamped)" in lines[1]
     assert lines[2] == f"A gap from {first / 1e9:.3f} s to {last / 1e9:.3f} s."
     info = described(contents(tmp_path / "bag"))

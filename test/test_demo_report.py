@@ -169,6 +169,17 @@ def test_steps_run_from_one_status_to_the_next():
     assert summary.notes == ()
 
 
+def test_a_step_may_have_the_name_with_which_a_scenario_ends():
+    bag = Recording().bag()
+    names = ("press", "done", "brake")
+    steps = [status("scenario", name, stamp=str(START + i), step=name) for i, name in enumerate(names)]
+    bag.topics["/wam/status"] = messages([*steps, said("done", START + 3, 0)])
+    run = recorded_run(bag)
+    assert [step.name for step in run.steps] == list(names)
+    assert run.unfinished is None
+    assert run.outcome == "done"
+
+
 def test_press_is_judged_in_its_steady_last_second_along_the_force_asked_for():
     first, second = Recording().summary().presses
     assert (first.step, second.step) == ("press 8 N", "press 4 N")

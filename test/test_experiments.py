@@ -30,11 +30,11 @@ from wam_experiments.thesis import (
     transmission,
 )
 from wam_experiments.thesis.definition import configured, load, names
-from wam_experiments.thesis.evaluation import evaluation_of
+from wam_experiments.thesis.evaluation import function_of
 from wam_experiments.thesis.one_link import growth, one_link
 from wam_experiments.thesis.page import write
 from wam_experiments.thesis.recording import Step
-from wam_experiments.thesis.rows import Comparison, Result, markdown, plain
+from wam_experiments.thesis.rows import Comparison, Panel, Result, markdown, plain
 from wam_theory.stick_slip import Kind, simulate
 from wam_theory.stiction import play
 
@@ -54,7 +54,7 @@ def pressed(time, force):  # the sensors of a testbed that presses with this for
 @pytest.mark.parametrize("name", names())
 def test_every_experiment_has_parameters_that_exist_and_steps_that_can_be_played(name: str, tmp_path: Path) -> None:
     experiment = load(name)
-    assert callable(evaluation_of(experiment))
+    assert callable(function_of(experiment.evaluation))
     for run in experiment.runs:
         configuration = configured(experiment, run, tmp_path)
         arm = configuration.shared.arm  # refuses what does not fit together
@@ -380,7 +380,8 @@ def test_page_gets_the_table_and_the_picture_of_each_experiment(tmp_path: Path) 
     picture = tmp_path / "result.png"
     picture.write_bytes(b"picture")
     experiment = load("creep")
-    write(page, [(experiment, Result([Comparison("q", 1.0, 1.01, "N", 0.02)], [], ("a \\d remark",)), picture)])
+    panels = [Panel("creep", "x", "y", [])]
+    write(page, [(experiment, Result([Comparison("q", 1.0, 1.01, "N", 0.02)], panels, ("a \\d remark",)), picture)])
     text = page.read_text()
     assert "| q | 1 | 1.01 | N | +1.00 % | 2.00 % |  | ok |" in text
     assert "- a \\d remark" in text
@@ -412,10 +413,31 @@ def test_an_experiment_outside_of_the_package_has_an_evaluation_of_its_own(
         "runs: [{name: a, steps: [{name: rest, seconds: 1.0}]}]}"
     )
     experiment = load(str(tmp_path / "mine.yaml"))
-    assert evaluation_of(experiment)({"b": None, "a": None}) == ["a", "b"]  # type: ignore[dict-item, comparison-overlap]
+    assert function_of(experiment.evaluation)({"b": None, "a": None}) == ["a", "b"]  # type: ignore[dict-item, comparison-overlap]
     for wrong in ("my_laboratory:missing", "nowhere:names", "cables", "cables.missing"):
         with pytest.raises(ParameterError, match=f"evaluation is '{wrong}'.*it must be MODULE.FUNCTION"):
-            evaluation_of(experiment._replace(evaluation=wrong))
+            function_of(wrong)
+
+
+@pytest.mark.slow
+def test_an_experiment_without_curves_has_no_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    root = Path(__file__).resolve().parents[1]
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "my_laboratory.py").write_text(
+        "from wam_experiments.thesis.rows import Comparison, Result\n"
+        "def steps(runs):\n    return Result([Comparison('steps', 9.0, 9.0, '', 0.01)], [])\n"
+    )
+    mine, page = tmp_path / "mine.yaml", tmp_path / "page.md"
+    creep = (root / "config" / "experiments" / "creep.yaml").read_text()
+    mine.write_text(creep.replace("evaluation: cables.creeping", "evaluation: my_laboratory:steps"))
+    page.write_text("# Title\n")
+    bag = str(root / "bags" / "sample" / "creep")
+    assert run_command(str(mine), "--evaluate", bag, "--directory", str(tmp_path), "--write", str(page)) == 0
+    assert "picture" not in capfd.readouterr().out
+    assert "| steps | 9 | 9 |" in page.read_text()
+    assert ".png" not in page.read_text()
 
 
 def test_documentation_shows_every_experiment() -> None:

@@ -45,6 +45,7 @@ def test_a_point_beside_the_line_is_noticed() -> None:
     assert moved.relative_distance == pytest.approx(1.0 / x[21])
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_grasp_by_hand(found: dict[str, Any]) -> None:
     grasp = found["3.1"]
     # mu = 0.4, L/W = 10: L' = 1 - 0.05/0.4, D = 0.8 - 0.1; mu = 0.2, L/W = 2: nothing
@@ -53,6 +54,7 @@ def test_grasp_by_hand(found: dict[str, Any]) -> None:
     assert np.interp(2.0, grasp.aspect_ratio, grasp.length[0]) == 0.0
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_breakpoints_are_those_of_two_masses_on_two_springs(found: dict[str, Any]) -> None:
     numbers_ = found["4.9"]
     rotor = 0.0057 / 16.0 * 0.1129848
@@ -65,6 +67,7 @@ def test_breakpoints_are_those_of_two_masses_on_two_springs(found: dict[str, Any
     assert numbers_.crossover == pytest.approx(8.27e5 * 0.1129848, rel=5e-3)
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_simple_responses_by_hand(found: dict[str, Any]) -> None:
     simple = found["5.3"]
     assert simple.steady_error == pytest.approx(20.0 / 4.0)  # G_P K = 3
@@ -74,6 +77,7 @@ def test_simple_responses_by_hand(found: dict[str, Any]) -> None:
     )
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_stairs_are_as_high_as_5_8_says(found: dict[str, Any]) -> None:
     stairs = found["5.5"]
     zeta = 24.0 / (2.0 * math.sqrt((K_TR + K_C) * INERTIA))
@@ -85,6 +89,7 @@ def test_stairs_are_as_high_as_5_8_says(found: dict[str, Any]) -> None:
     assert len(heights[heights > 0.0]) > 5
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_describing_function_is_the_transfer_of_the_state_equations(found: dict[str, Any]) -> None:
     curves = found["5.7"]
     for gamma, curve in zip((0.6, 1.5), curves.curves, strict=True):
@@ -96,6 +101,7 @@ def test_describing_function_is_the_transfer_of_the_state_equations(found: dict[
     assert curves.crossing == pytest.approx(-2.0)
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_bound_has_the_numbers_of_the_errata(found: dict[str, Any]) -> None:
     map_ = found["5.8"]
     heights = np.interp([1.1, 1.5, 2.0], map_.bound.x, map_.bound.y)
@@ -105,6 +111,7 @@ def test_bound_has_the_numbers_of_the_errata(found: dict[str, Any]) -> None:
     assert map_.with_stiction[0][-1] < map_.gamma_3  # point B moves to the left
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_half_cycles_shrink_by_psi_and_the_motor_goes_on(found: dict[str, Any]) -> None:
     response = found["5.9"]
     force = response.force
@@ -118,6 +125,7 @@ def test_half_cycles_shrink_by_psi_and_the_motor_goes_on(found: dict[str, Any]) 
     assert found["5.11"].gamma == 1.5
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_lost_contact_closes_its_cycle(found: dict[str, Any]) -> None:
     cycle = found["5.10"].cycle
     assert cycle.x[0] == pytest.approx(cycle.x[-1], abs=1e-6 * np.ptp(cycle.x))
@@ -125,6 +133,7 @@ def test_lost_contact_closes_its_cycle(found: dict[str, Any]) -> None:
     assert cycle.x.min() < -20.0 < 20.0 < cycle.x.max()
 
 
+@pytest.mark.slow  # its fixture: of all figures, where a source has changed
 def test_cables_by_hand(found: dict[str, Any]) -> None:
     efficiency, creep = found["6-efficiency"], found["6-creep"]
     # section 6.4.5: 60 in-lb, two stages

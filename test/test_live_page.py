@@ -28,7 +28,7 @@ from wam_analysis.drawing import TRUE, channels
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
 from wam_cli.commands import take_page
-from wam_cli.commands.live import page_beside
+from wam_cli.commands.live import page_next_to
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
@@ -218,7 +218,7 @@ def test_buttons_are_above_all_that_changes_its_height(server: Any) -> None:
     panel = Controls(server, ARM, {})
     stop = next(one for one in server.gui._gui_input_handle_from_uuid.values() if one.label == "Emergency stop")
     assert stop.order < panel._status.order
-    assert stop.order < panel._said.order
+    assert stop.order < panel._shown.order
 
 
 def test_a_slider_that_the_page_moves_asks_for_nothing(server: Any) -> None:
@@ -347,7 +347,7 @@ def test_the_dither_has_a_slider_where_there_is_one(domain_id: int) -> None:
         shown.page.panel.requests.put(SetParameters(DITHER[0], {DITHER[1]: 0.7}))
         shown.wait(lambda: loop._dither.amplitude == pytest.approx([0.5 * each for each in before]), spin)
         shown.page.panel.requests.put(SetParameters(DITHER[0], {DITHER[1]: 4.0}))
-        shown.wait(lambda: "refused" in shown.page.panel._said.content, spin)
+        shown.wait(lambda: "refused" in shown.page.panel._shown.content, spin)
         assert shown.page.panel._sliders[DITHER].value == 0.7
 
 
@@ -369,7 +369,7 @@ def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> No
         scene._push(RELEASE)
         shown.wait(lambda: panel.snapshot.true.cover == "", spin)
         panel.requests.put(SetParameters("force_loop", {"posture_gain": -1.0}))
-        shown.wait(lambda: "posture_gain" in panel._said.content and "refused" in panel._said.content, spin)
+        shown.wait(lambda: "posture_gain" in panel._shown.content and "refused" in panel._shown.content, spin)
         panel.requests.put(Call("driver", "estop"))
         shown.wait(lambda: mode_of(shown) == "fault", spin)
 
@@ -386,10 +386,10 @@ def test_a_scenario_is_played_into_a_running_stack_and_a_wrong_one_is_refused(
     script.write_text(json.dumps({"steps": steps}))
     with ready(domain_id, 0.3) as (_, shown, panel, spin):
         panel.requests.put(Play("nosuch"))
-        shown.wait(lambda: "refused" in panel._said.content and "nosuch" in panel._said.content, spin)
+        shown.wait(lambda: "refused" in panel._shown.content and "nosuch" in panel._shown.content, spin)
         start = panel.snapshot.q
         panel.requests.put(Play(str(script)))
-        shown.wait(lambda: "the scenario has ended" in panel._said.content, spin)
+        shown.wait(lambda: "the scenario has ended" in panel._shown.content, spin)
         assert abs(panel.snapshot.q[0] - start[0]) > 0.02, panel.snapshot
         ended = panel.snapshot.stamp
         shown.wait(lambda: panel.snapshot.stamp > ended + 10**8, spin)  # time goes on
@@ -520,7 +520,7 @@ def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypat
     far = {"force_loop:limits.free_travel": 0.3}  # m; it is 0.15 m to the box
     with ready(domain_id, 1.0, **far) as (_, shown, panel, spin):
         panel.requests.put(Bend())
-        shown.wait(lambda: "enable the arm first" in panel._said.content, spin)
+        shown.wait(lambda: "enable the arm first" in panel._shown.content, spin)
         panel.requests.put(Call("driver", "enable", True))
         shown.wait(lambda: mode_of(shown) == "enabled", spin)
         press = Press(BASE, (0.0, 0.0, -5.0))  # as the page opens
@@ -529,7 +529,7 @@ def test_the_page_bends_the_arm_where_a_press_needs_it(domain_id: int, monkeypat
         shown.wait(lambda: reaction() not in (None, "none"), spin)
         panel.requests.put(NO_PRESS)
         panel.requests.put(Bend())
-        shown.wait(lambda: "the scenario has ended" in panel._said.content, spin)
+        shown.wait(lambda: "the scenario has ended" in panel._shown.content, spin)
         panel.requests.put(press)
         shown.wait(lambda: panel.snapshot.measured == pytest.approx(5.0, abs=0.25), spin)
         shown.wait(lambda: panel.snapshot.true.cover == "outer_link", spin)  # topics come one after the other
@@ -542,7 +542,7 @@ def test_an_arm_goes_on_where_the_page_presses_and_lets_go(domain_id: int) -> No
         node = composition.nodes["driver"]
         press = Press("outer_link", (0.0, -2.0, 0.0))
         panel.requests.put(press)
-        shown.wait(lambda: "enable the arm first" in panel._said.content, spin)
+        shown.wait(lambda: "enable the arm first" in panel._shown.content, spin)
         panel.requests.put(Call("driver", "enable", True))
         shown.wait(lambda: mode_of(shown) == "enabled", spin)
         panel.requests.put(press)
@@ -569,18 +569,18 @@ def test_a_page_that_was_asked_for_is_refused_where_there_can_be_none(capsys: py
         port = str(taken.getsockname()[1])
         with (
             pytest.raises(NoPageError, match=f"port {port} .* --port"),
-            page_beside(options("--live", "--port", port), "wam"),
+            page_next_to(options("--live", "--port", port), "wam"),
         ):
             pass
-        with page_beside(options("--port", port), "wam"):
+        with page_next_to(options("--port", port), "wam"):
             assert f"no live page: port {port}" in capsys.readouterr().out
-        with page_beside(options("--no-live", "--port", port), "wam"):
+        with page_next_to(options("--no-live", "--port", port), "wam"):
             assert capsys.readouterr().out == ""
 
 
 def test_the_page_runs_beside_the_stack_and_ends_with_it(domain_id: int) -> None:
     port = free_port()
-    with page_beside(options("--port", str(port)), "wam"):
+    with page_next_to(options("--port", str(port)), "wam"):
         until(lambda: not port_is_free(port))
     assert port_is_free(port)
 

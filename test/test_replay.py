@@ -14,7 +14,7 @@ from wam_bag.bag import BagError, raw, read
 from wam_bag.bag_writer import BagWriter
 from wam_bag.metadata import INFINITE
 from wam_cli import main as cli
-from wam_cli.commands.replay import reasons, told
+from wam_cli.commands.replay import reasons, stated
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.status import CHANGES
@@ -229,6 +229,15 @@ def test_a_missing_input_is_named(bag: Path, tmp_path: Path) -> None:
         replay(tmp_path / "part", "velocity_loop")
 
 
+@pytest.mark.parametrize("topic", ["motor_states", "motor_effort_command", "motor_current_command"])
+def test_a_topic_that_had_another_type_is_named_and_not_left_out(tmp_path: Path, topic: str) -> None:
+    with BagWriter(tmp_path / "bag") as bag:
+        bag.add_topic(f"/wam/{topic}", "std_msgs/msg/Bool", QOS)
+        bag.write(f"/wam/{topic}", b"\0\1\0\0\1", 1, 1, 1)
+    with pytest.raises(BagError, match=rf"/wam/{topic} was recorded as std_msgs/msg/Bool; this version has it as sen"):
+        replay(tmp_path / "bag", "velocity_loop")
+
+
 def test_a_comparison_of_nothing_is_no_success() -> None:
     with pytest.raises(BagError, match="velocity_loop publishes nothing from what is recorded"):
         replay(Path(__file__).parents[1] / "bags/sample/active-pretension", "velocity_loop")
@@ -264,7 +273,7 @@ def test_of_a_realtime_recording_the_share_that_differs_is_told() -> None:
     """25 of 101 messages differ, the largest by 0.97 N m."""
     different = Compared("gravity_effort", 101, 0, 0, 25, None, 0.97, "N m", None)
     done = Replay("gravity", "realtime", (different,), (), ())
-    assert told(different) == "gravity_effort: 101 messages, 25 differ (24.8 %), at most by 0.97 N m"
+    assert stated(different) == "gravity_effort: 101 messages, 25 differ (24.8 %), at most by 0.97 N m"
     (why,) = reasons(done)
     assert why.startswith("recorded in realtime: 25 of 101 messages (24.8 %) differ: gravity took what was newest")
     assert reasons(done._replace(mode="lockstep")) == []

@@ -32,6 +32,7 @@ OWN = replace(PACKAGED, sensing=replace(PACKAGED.sensing, zero_limit=0.0))
 SERVO = WAM.shared.servo
 Loop = partial(ForceLoop, ARM, SERVO, timing=CLOCK)
 UNSURE = anywhere_sd(ARM.covers, "outer_link", 0.28)
+OUTER = CLOCK.outer_period_ns / 1e9  # s
 POUND_INCH = 0.1129848  # N m
 
 
@@ -430,6 +431,40 @@ def test_a_force_that_turns_is_judged_again_though_the_arm_is_at_rest() -> None:
         follow(loop, STIFF_POSE, force=force)
         assert loop.watch is not None
         assert loop.watch.scale == fresh[force]
+
+
+def assessed_again(before: GuardedContact, after: GuardedContact) -> bool:
+    """Whether the guard of a moving arm assesses the loop again where one contact has become another."""
+    watch = Loop(OWN).watch
+    assert watch is not None
+    found = []
+    for contact in (before, after):
+        for _ in range(200):
+            watch.step(lambda contact=contact: [contact], OUTER)  # type: ignore[misc]
+        found.append(watch.assessed[0])
+    return found[0] is not found[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("little", "much"),
+    [
+        ({"q": (0.0, -1.71, 0.0, 1.45)}, {"q": (0.0, -1.69, 0.0, 1.45)}),
+        ({"direction": (0.09, 0.0, -1.0)}, {"direction": (0.11, 0.0, -1.0)}),
+        ({"position": 0.219}, {"position": 0.221}),
+        ({"position_sd": 0.019}, {"position_sd": 0.021}),
+        ({"force": 7.4}, {"force": 7.6}),
+        ({"force": 3.4}, {"force": 3.3}),
+        ({}, {"cover": "inner_link"}),
+    ],
+    ids=["pose", "direction", "position", "certainty", "more force", "less force", "link"],
+)
+def test_the_loop_is_assessed_again_where_one_thing_about_the_contact_has_changed(
+    little: dict[str, Any], much: dict[str, Any]
+) -> None:
+    contact = GuardedContact((0.0, -1.8, 0.0, 1.45), "outer_link", 0.2, 0.0, (0.0, 0.0, -1.0), 5.0)
+    assert not assessed_again(contact, contact._replace(**little))
+    assert assessed_again(contact, contact._replace(**much))
 
 
 def test_a_judgement_is_distributed_over_periods_and_not_repeated_at_rest() -> None:

@@ -13,7 +13,7 @@ from wam_driver.driver import Driver, DriverParameters
 from wam_experiments.tasks.object_traces import object_states, object_traces, world_of
 from wam_experiments.tasks.pictures import save
 from wam_experiments.thesis.definition import load, tasks, with_run
-from wam_experiments.thesis.evaluation import evaluate, evaluation_of
+from wam_experiments.thesis.evaluation import evaluate, function_of
 from wam_experiments.thesis.recording import recording
 from wam_live.object_meshes import at_rest
 
@@ -28,7 +28,7 @@ def test_the_whole_arm_tasks_of_the_thesis_are_there() -> None:
 @pytest.mark.parametrize("name", tasks())
 def test_every_task_has_a_world_that_can_be_simulated_and_steps_that_can_be_played(name: str, tmp_path: Path) -> None:
     task = load(name)
-    assert callable(evaluation_of(task))
+    assert callable(function_of(task.evaluation))
     (run,) = task.runs
     configuration = with_run(Configuration.load(packaged("wam")), run, tmp_path)
     driver = Driver(configuration.shared, configuration.node("driver", DriverParameters))

@@ -59,6 +59,7 @@ TERMS = {
     r"force leans|leans": "tangential component",
 }
 PATTERNS = {re.compile(rf"\b(?:{words})\b", re.IGNORECASE): instead for words, instead in TERMS.items()}
+NAMES = re.compile(r"(?:^|_)(?:felt|told|tells?|said|says?|asked|judged|anew|beside|stood|stands|leans)(?:_|$)")
 ANY = re.compile(rf"\b(?:{'|'.join(f'(?:{words})' for words in TERMS)})\b", re.IGNORECASE)  # fast where all is well
 PAGES = ("*.md", "docs/*.md", "bags/*.md", "benchmarks/*.md")
 VALUES = ("config/**/*.yaml", "docs/*.yaml", "examples/*.yaml", "pyproject.toml")
@@ -79,6 +80,14 @@ def texts_of_a_module(source: str) -> Iterator[tuple[int, str]]:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
             for number, line in enumerate(CODE.sub("", node.value).splitlines()):
                 yield node.lineno + number, line
+
+
+def names_of_a_module(source: str) -> Iterator[tuple[int, str]]:
+    """Line and words of every name that a module uses; those in f-strings, too."""
+    for node in ast.walk(ast.parse(source)):
+        for field in ("id", "arg", "attr", "name"):
+            if isinstance(name := getattr(node, field, None), str):
+                yield getattr(node, "lineno", 0), name
 
 
 def texts_of_comments(source: str) -> Iterator[tuple[int, str]]:
@@ -110,6 +119,8 @@ def complaints(root: Path) -> list[str]:
         source = path.read_text(encoding="utf-8")
         found += found_in(texts_of_a_module(source), path.relative_to(root))
         found += found_in(texts_of_comments(source), path.relative_to(root))
+        names = names_of_a_module(source)
+        found += [f"{path.relative_to(root)}:{line}: the name {name}" for line, name in names if NAMES.search(name)]
     found += found_in(enumerate((root / "Makefile").read_text(encoding="utf-8").splitlines(), start=1), "Makefile")
     return found
 
@@ -117,6 +128,12 @@ def complaints(root: Path) -> list[str]:
 def test_texts_are_in_the_terms_of_the_field() -> None:
     found = complaints(ROOT)
     assert not found, f"{len(found)} terms:\n" + "\n".join(found)
+
+
+@pytest.mark.parametrize("source", ["told = 1", "def page_beside(): pass", "f(tell=1)", "print(f'{x.said}')"])
+def test_a_wrong_term_is_found_in_a_name(source: str) -> None:
+    assert any(NAMES.search(name) for _, name in names_of_a_module(source))
+    assert not any(NAMES.search(name) for _, name in names_of_a_module("essay = retold.page_next_to(states=1)"))
 
 
 @pytest.mark.parametrize(

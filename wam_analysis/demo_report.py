@@ -21,6 +21,7 @@ from wam_analysis.reactions import sentences, within
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import plain
 from wam_bag.bag import BagError, read
+from wam_description.status import DONE
 from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
@@ -150,7 +151,7 @@ def _played(summary: DemoSummary) -> str:
     if not summary.steps:
         return summary.outcome
     seconds = (summary.steps[-1].end - summary.steps[0].begin) / 1e9
-    ended = "done" if summary.outcome == "done" else f"FAILED: {summary.outcome}"
+    ended = DONE if summary.outcome == DONE else f"FAILED: {summary.outcome}"
     return f"{len(summary.steps)} steps, {seconds:.1f} s, {summary.loop.mode}, {ended}"
 
 
@@ -207,11 +208,11 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
 
 def _reactions(summary: DemoSummary) -> list[str]:
     """Commands that were not simply obeyed, by step."""
-    told = [
+    stated = [
         line for step in summary.steps for line in sentences(step.name, within(summary.reactions, step.begin, step.end))
     ]
-    lines = ["Commands that were refused, held or doubted"] if told else []
-    return ["", *lines, *(line for one in told for line in _wrapped(f"  {one}", "    "))] if told else []
+    lines = ["Commands that were refused, held or doubted"] if stated else []
+    return ["", *lines, *(line for one in stated for line in _wrapped(f"  {one}", "    "))] if stated else []
 
 
 def _touches(touches: Sequence[StepContact], period: float) -> list[str]:

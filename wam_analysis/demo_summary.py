@@ -120,7 +120,7 @@ class DemoSummary(NamedTuple):
     period : time between two instants of the traces, s.
     tasks : forces that tasks command.
     reactions : of the force loop to what was commanded, and faults of the driver.
-    outcome : 'done', why the scenario failed, or that the recording ended before.
+    outcome : DONE, why the scenario failed, or that the recording ended before.
     false_contact, longest_false_contact : time of false detections and the longest of them, s.
     free : time without contact, s.
     received, dropped : messages counted by the recorder, -1 if it wrote no counts.

@@ -41,13 +41,13 @@ def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple
 
 def sentences(name: str, reactions: Sequence[RecordedReaction]) -> list[str]:
     """One for each kind of reaction to a command of this name: when, how often and why."""
-    told = []
+    stated = []
     for kind in dict.fromkeys(one.name for one in reactions):
         first, *others = [one for one in reactions if one.name == kind]
         verb = kind if kind == REFUSAL else f"{'held' if first.holds else 'reported'} ({kind})"
         again = f" and {len(others)} times more" if others else ""
-        told.append(f"{name}: {verb} from {first.begin / 1e9:.2f} to {first.end / 1e9:.2f} s{again}: {first.reason}")
-    return told
+        stated.append(f"{name}: {verb} from {first.begin / 1e9:.2f} to {first.end / 1e9:.2f} s{again}: {first.reason}")
+    return stated
 
 
 def reactions_of(run: RecordedRun, end: int) -> tuple[RecordedReaction, ...]:

@@ -29,13 +29,13 @@ def run_next_to(
     connection = Connection()
     try:
         connection.add(asking := Node("asks_for_parameters", context=connection.context, namespace=namespace))
-        asked = RemoteParameters(asking, ["driver"])
-        while not until() and asked.missing:
-            asked.ask()
+        requested = RemoteParameters(asking, ["driver"])
+        while not until() and requested.missing:
+            requested.ask()
             connection.executor.spin_once(timeout_sec=0.05)
-        if asked.missing:
+        if requested.missing:
             return
-        connection.add(node := make(connection.context, build_part(Shared, asked.found["driver"])))
+        connection.add(node := make(connection.context, build_part(Shared, requested.found["driver"])))
         while not until():
             connection.executor.spin_once(timeout_sec=0.1)
             between(node)

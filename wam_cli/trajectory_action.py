@@ -183,12 +183,12 @@ def _require_joints_alone(goal: Any) -> None:
         raise Refused("joints of several degrees of freedom are named; this arm has none")
 
 
-def serve(namespace: str, until: Callable[[], bool], say: Callable[[str], None]) -> None:
+def serve(namespace: str, until: Callable[[], bool], report: Callable[[str], None]) -> None:
     """Serve the action of the stack in a namespace until a condition holds; a stack that comes later is waited for."""
 
     def make(context: Any, shared: Shared) -> TrajectoryActionNode:
         node = TrajectoryActionNode(context, namespace, shared)
-        say(f"action {node.get_namespace().rstrip('/')}/{ACTION}")
+        report(f"action {node.get_namespace().rstrip('/')}/{ACTION}")
         return node
 
     run_next_to(namespace, make, until, TrajectoryActionNode.watch)

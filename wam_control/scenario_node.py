@@ -7,6 +7,7 @@ from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, S
 from wam_control.task import table_of
 from wam_description.arm import Shared
 from wam_description.signals import BASE, Level, NodeStatus, State, Wrench
+from wam_description.status import DONE
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Call, Input, Outputs, SetParameters, reaction
 
@@ -90,7 +91,7 @@ class ScenarioNode:
     def _end(self, failure: str) -> Outputs:
         self.done, self.failure = True, self.failure or failure
         level = Level.ERROR if self.failure else Level.OK
-        return {"status": NodeStatus(level, self.failure or "done", stamp=self._stamp)}
+        return {"status": NodeStatus(level, self.failure or DONE, stamp=self._stamp)}
 
 
 def _plain(setting: Setting) -> Any:

@@ -262,9 +262,9 @@ class Arm:
                 where = f"{joints.names[link + 1]} is at {_point(joint)} m"
                 beyond = [end - there for end, there in zip(ends, joint, strict=True)]
                 along = sum(a * b for a, b in zip(beyond, x, strict=True))
-                beside = math.sqrt(max(0.0, sum(a * a for a in beyond) - along * along))
-                beside = max(0.0, beside - covers.radius[k])  # the axis of a joint may cross the tube anywhere
-                apart = math.hypot(along, beside)
+                across = math.sqrt(max(0.0, sum(a * a for a in beyond) - along * along))
+                across = max(0.0, across - covers.radius[k])  # the axis of a joint may cross the tube anywhere
+                apart = math.hypot(along, across)
             else:
                 here, where = "arm.tool", f"arm.tool is at {_point(self.tool)} m"
                 beyond = [end - tool for end, tool in zip(ends, self.tool, strict=True)]

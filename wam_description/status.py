@@ -9,6 +9,7 @@ AWAITED = "waits for"  # fact: topics that a node lacks for its next step, separ
 PAUSED = "time"  # fact of the driver while the arm's time is stopped: "paused"
 CHANGES = "parameter changes"  # fact: how often live parameters were taken, with those that were taken last
 REFUSED = "refused"  # fact: topics whose present command a node does not obey
+DONE = "done"  # message of the scenario that was played to its end
 WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 
 _CONNECTED = ("waiting", "connected")

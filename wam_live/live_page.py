@@ -53,8 +53,8 @@ class LivePage:
     objects: ObjectMeshes | None = None
     panel: Controls | None = None
 
-    def __init__(self, namespace: str, port: int, say: Callable[[str], None], domain_id: int | None = None) -> None:
-        self._namespace, self._port, self._say = namespace, port, say
+    def __init__(self, namespace: str, port: int, notify: Callable[[str], None], domain_id: int | None = None) -> None:
+        self._namespace, self._port, self._notify = namespace, port, notify
         self._connection = Connection(domain_id=domain_id)
         self._asking = Node("live", context=self._connection.context, namespace=namespace)
         self._connection.add(self._asking)
@@ -92,7 +92,7 @@ class LivePage:
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)
             self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
-            self._say(f"live page: {url(self._port)}  ({label}{more})")
+            self._notify(f"live page: {url(self._port)}  ({label}{more})")
             self._draw(source, scene, objects, panel, until)
             self._release(source.stamp)
         finally:
@@ -109,14 +109,14 @@ class LivePage:
         self._connection.close()
 
     def _parameters(self, until: Callable[[], bool]) -> Mapping[str, Mapping[str, Any]] | None:
-        asked = RemoteParameters(self._asking, ["driver", *dict.fromkeys(node for node, _ in SLIDERS)])
+        requested = RemoteParameters(self._asking, ["driver", *dict.fromkeys(node for node, _ in SLIDERS)])
         begin = time.monotonic()
         while not until():
-            asked.ask()
+            requested.ask()
             self._connection.executor.spin_once(timeout_sec=0.05)
             late = time.monotonic() - begin > 2.0
-            if "driver" in asked.found and (late or not asked.missing):
-                return asked.found
+            if "driver" in requested.found and (late or not requested.missing):
+                return requested.found
         return None
 
     def _draw(
@@ -143,7 +143,7 @@ class LivePage:
             count += 1
             self._send(source, panel)
             if self._player is not None and (ended := self._player.ended()):
-                panel.say(ended)
+                panel.notify(ended)
                 self._ask(Call("driver", "pause", False), source, panel, ended)  # a scenario pauses the arm at its end
             while not panel.requests.empty():
                 self._ask(panel.requests.get(), source, panel)
@@ -162,14 +162,14 @@ class LivePage:
         """Stream the push until it is released; end a force whose arm has stopped."""
         if self._press is not None and mode_of(source.statuses) != "enabled":
             self._end_press()
-            panel.say("letting go: the brakes are on")
+            panel.notify("letting go: the brakes are on")
         push = self._push
         if push is None:
             return
         hold = self._holds["sim/disturbance"]
         refusal = hold.send(source.stamp, Wrench(*push)) if push is not RELEASE or hold.is_on else ""
         if refusal:
-            panel.say(f"not pushed: {refusal}", refused=True)
+            panel.notify(f"not pushed: {refusal}", refused=True)
         if (push is RELEASE or refusal) and self._push is push:  # a newer one may have come from the browser meanwhile
             self._push = None
             hold.end()
@@ -177,7 +177,7 @@ class LivePage:
     def _start_press(self, press: Press, source: RunningStack, panel: Controls) -> None:
         """Answer each state with the force from now on."""
         if mode_of(source.statuses) != "enabled":
-            panel.say("not pressed: enable the arm first", refused=True)
+            panel.notify("not pressed: enable the arm first", refused=True)
             return
         self._press = press
         if self._states is None:
@@ -185,7 +185,7 @@ class LivePage:
             self._states = self._asking.create_subscription(
                 message_type(row), row.name, lambda data: self._answer(data, panel), qos(row), raw=True
             )
-        panel.say("")  # the status has what becomes of it
+        panel.notify("")  # the status has what becomes of it
 
     def _answer(self, state: bytes, panel: Controls) -> None:
         if self._press is None:
@@ -193,7 +193,7 @@ class LivePage:
         refusal = self._holds["force_command"].send(stamp_of(state), Wrench(*self._press, (0.0, 0.0, 0.0)))
         if refusal:
             self._press = None
-            panel.say(f"not pressed: {refusal}", refused=True)
+            panel.notify(f"not pressed: {refusal}", refused=True)
 
     def _end_press(self) -> None:
         self._press = None
@@ -215,7 +215,7 @@ class LivePage:
             self._player.stop()
             return
         refusal = self._player.play(script)
-        panel.say(refusal or f"playing {script}", refused=bool(refusal))
+        panel.notify(refusal or f"playing {script}", refused=bool(refusal))
 
     def _bend(self, source: RunningStack, panel: Controls) -> None:
         assert self._player is not None
@@ -227,7 +227,7 @@ class LivePage:
             if len(self._bent) != len(present)
             else self._player.move(present, self._bent)
         )
-        panel.say(f"not moved: {refusal}" if refusal else "bending the arm", refused=bool(refusal))
+        panel.notify(f"not moved: {refusal}" if refusal else "bending the arm", refused=bool(refusal))
 
     def _ask(self, request: Request, source: RunningStack, panel: Controls, text: str = "") -> None:
         """Make a request, and show its answer, or a text in place of it."""
@@ -242,7 +242,7 @@ class LivePage:
                 self._start_press(request, source, panel)
             elif self._press is not None:
                 self._end_press()
-                panel.say("letting go")
+                panel.notify("letting go")
             return
         service, kind, message = service_request(request)
         if (service, kind) not in self._clients:
@@ -250,7 +250,7 @@ class LivePage:
             self._clients[service, kind].wait_for_service(0.5)
         client = self._clients[service, kind]
         if not client.service_is_ready():
-            panel.say(f"{request.node} does not answer", refused=True)
+            panel.notify(f"{request.node} does not answer", refused=True)
             return
         client.call_async(message).add_done_callback(
             lambda future: self._answered(request, future.result(), panel, text)
@@ -259,14 +259,14 @@ class LivePage:
     def _answered(self, request: Call | SetParameters, answer: Any, panel: Controls, text: str) -> None:
         reasons = refusal_of(request, answer)
         if isinstance(request, Call):
-            panel.say(text or answer.message, refused=not answer.success)
+            panel.notify(text or answer.message, refused=not answer.success)
             return
         for name, value in request.values.items():
             if reasons:
                 panel.set_slider(request.node, name, self._live[request.node, name])
             else:
                 self._live[request.node, name] = value
-            panel.say(reasons or f"{name} = {value}", refused=bool(reasons))
+            panel.notify(reasons or f"{name} = {value}", refused=bool(reasons))
 
 
 def dither_text(timing: Timing) -> str:

@@ -43,7 +43,7 @@ def port_is_free(port: int) -> bool:
     return True
 
 
-def free_port(wanted: int | None, say: Callable[[str], None]) -> int:
+def free_port(wanted: int | None, notify: Callable[[str], None]) -> int:
     """The port of a page.
 
     Parameters
@@ -55,7 +55,9 @@ def free_port(wanted: int | None, say: Callable[[str], None]) -> int:
         return PORT if wanted is None else wanted
     port = next(filter(port_is_free, range(PORT + 1, PORT + PORTS)), PORT)
     if port != PORT:
-        say(f"port {PORT} is taken by another program: a page there may be of another arm; this one's is {url(port)}")
+        notify(
+            f"port {PORT} is taken by another program: a page there may be of another arm; this one's is {url(port)}"
+        )
     return port
 
 
@@ -114,7 +116,7 @@ def serve(port: int) -> Any:
     with _only_this_page(server, port), quiet():
         made = viser.ViserServer(host=HOST, port=port, label=TITLE, verbose=False)
     made.initial_camera.position, made.initial_camera.look_at = CAMERA
-    made.on_client_connect(_look_beside_the_panel)
+    made.on_client_connect(_look_next_to_the_panel)
     return made
 
 
@@ -127,7 +129,7 @@ def name_page(server: Any, label: str, more: str = "") -> None:
     server.gui.add_html(f'<img src="data:," alt="" style="display:none" onerror="{script}">')
 
 
-def _look_beside_the_panel(client: Any) -> None:
+def _look_next_to_the_panel(client: Any) -> None:
     """Where the panel covers the lower half of a window, or much of its right, see the arm amid the rest."""
     camera = client.camera
     if camera.image_width >= WIDE:

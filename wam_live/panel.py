@@ -25,7 +25,7 @@ PLACES: Final = ("true", "estimated")
 FORCE_TITLE: Final = "force [N]"
 RANGES: Final = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)  # N, upper ends of its axis
 STATUS_HEIGHT: Final = 150  # px
-SAID_HEIGHT: Final = 40  # px
+NOTE_HEIGHT: Final = 40  # px
 SILENT: Final = 2.0  # s without a state, after which the page reports that
 MARK: Final = 0.5  # s between the rings of a lower bound
 HINT: Final = "Enable releases the brakes; then drag a link to push it."  # until there is an answer
@@ -105,7 +105,7 @@ class Controls:
         if live is not None:
             self._add_buttons()  # above all that changes its height
         self._status = gui.add_html(boxed(status_page(Snapshot()), STATUS_HEIGHT))
-        self._said = gui.add_html(boxed(paragraph(HINT), SAID_HEIGHT) if live is not None else "")
+        self._shown = gui.add_html(boxed(paragraph(HINT), NOTE_HEIGHT) if live is not None else "")
         gui.add_html(legend(LEGEND if live is not None else LEGEND[:-1]))
         if live is not None:
             self._add_press(arm)
@@ -147,10 +147,10 @@ class Controls:
         if self._samples:
             self._draw()
 
-    def say(self, text: str, refused: bool = False) -> None:
+    def notify(self, text: str, refused: bool = False) -> None:
         """Show the answer to the last request."""
-        told = paragraph(f"{'refused: ' * refused}{html.escape(text)}", DOTS[Level.ERROR] if refused else "")
-        self._said.content = boxed(told, SAID_HEIGHT)
+        stated = paragraph(f"{'refused: ' * refused}{html.escape(text)}", DOTS[Level.ERROR] if refused else "")
+        self._shown.content = boxed(stated, NOTE_HEIGHT)
 
     def set_slider(self, node: str, name: str, value: Any) -> None:
         """Put a slider where its parameter is."""
@@ -360,6 +360,6 @@ def contact_text(contact: Contact) -> str:
         return "nothing touches the arm"
     bound, place = "at least ", "somewhere on"
     if math.isfinite(contact.position):
-        spread = f" ± {contact.position_sd * 100:.0f}" if math.isfinite(contact.position_sd) else ""
-        bound, place = "", f"{contact.position * 100:.0f}{spread} cm along"
+        deviation = f" ± {contact.position_sd * 100:.0f}" if math.isfinite(contact.position_sd) else ""
+        bound, place = "", f"{contact.position * 100:.0f}{deviation} cm along"
     return f"<b>{bound}{size(contact.force):.1f} N</b> {place} the {html.escape(contact.cover.replace('_', ' '))}"

@@ -111,7 +111,7 @@ class BagSource:
 
 
 def play(
-    recording: AnalysedRun, port: int, at: float | None, until: Callable[[], bool], say: Callable[[str], None]
+    recording: AnalysedRun, port: int, at: float | None, until: Callable[[], bool], notify: Callable[[str], None]
 ) -> None:
     """Serve the page of a bag until a condition holds; the errors are those of `BagSource` and `serve`.
 
@@ -135,7 +135,7 @@ def play(
         speed = server.gui.add_dropdown("speed", SPEEDS, initial_value="1")
         running = server.gui.add_checkbox("play", at is None)
         panel = Controls(server, source.recorded.arm)
-        say(f"{recording.bag.path}: {url(port)}")
+        notify(f"{recording.bag.path}: {url(port)}")
 
         def moved(event: object) -> None:
             nonlocal place

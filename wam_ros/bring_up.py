@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple, cast
 
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -176,7 +176,7 @@ class Processes:
         if process is None:
             return
         begin = now = moved = time.monotonic()
-        state, said = _work_of(process.pid), begin
+        state, printed = _work_of(process.pid), begin
         while process.poll() is None:
             time.sleep(0.02)
             now = time.monotonic()
@@ -184,8 +184,8 @@ class Processes:
                 state, moved = work, now
             if now - moved > RECORDER_PATIENCE:
                 self._kill(LAST, f"has done nothing for {RECORDER_PATIENCE:.0f} s; 'wam bag repair' closes its bag")
-            elif now - said > TOLD:
-                said = now
+            elif now - printed > TOLD:
+                printed = now
                 LOGGER.warning(f"waiting for the recorder to write the bag, {now - begin:.0f} s")
 
     def _kill(self, name: str, reason: str) -> None:
@@ -269,6 +269,21 @@ def _work_of(pid: int) -> tuple[str, ...]:
     return fields[11], fields[12], written, waits_for_disk
 
 
+class PlayedScenario(NamedTuple):
+    """How the scenario of a composition went.
+
+    Attributes
+    ----------
+    is_done : whether it came to its end, as it is written or by a failure.
+    failure : why it failed, '' where it did not.
+    fault : of the driver, '' for none.
+    """
+
+    is_done: bool
+    failure: str
+    fault: str
+
+
 class Composition:
     """Nodes in this process, in one executor; leaving the context destroys them, brakes first, bag last.
 
@@ -349,6 +364,12 @@ class Composition:
     def spin(self, until: Callable[[], bool]) -> None:
         """Spin until a condition holds."""
         spin(self.executor, until)
+
+    def play(self, is_stopped: Callable[[float], bool] = lambda seconds: False) -> PlayedScenario:
+        """Spin until the node `scenario` is done, or until a function of the arm's time, s, stops it."""
+        scenario, driver = cast(Any, self.nodes["scenario"]), cast(Any, self.nodes["driver"]).driver
+        self.spin(lambda: is_stopped(driver.stamp / 1e9) or bool(scenario.done))
+        return PlayedScenario(bool(scenario.done), str(scenario.failure), driver.safety.fault)
 
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last."""

@@ -88,11 +88,11 @@ class CalledStack:
         NoAnswerError
             where it does not answer, or there is no such node.
         """
-        asked = RemoteParameters(self.node, [node])
+        requested = RemoteParameters(self.node, [node])
 
         def is_answered() -> bool:
-            asked.ask()
-            return not asked.missing
+            requested.ask()
+            return not requested.missing
 
         def nodes() -> list[str]:
             own = self.node.get_namespace()
@@ -100,7 +100,7 @@ class CalledStack:
             return [] if node in found else sorted(found - {self.node.get_name()})
 
         self._wait(is_answered, f"no node '{node}' answers", nodes)
-        return asked.found[node]
+        return requested.found[node]
 
     def live(self, node: str, names: Collection[str]) -> list[str]:
         """Those of the parameters of a node that a request may change while it runs.

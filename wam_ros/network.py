@@ -126,7 +126,7 @@ def require_places(names: Iterable[str], namespace: str) -> None:
     ParameterError
         which names the process that has the place.
     """
-    domain, full = asked_domain(), f"/{namespace.strip('/')}"
+    domain, full = requested_domain(), f"/{namespace.strip('/')}"
     for name in names:
         if occupant(domain, full, name):
             raise ParameterError(_taken(domain, full, name))
@@ -143,7 +143,7 @@ def occupant(domain: int, namespace: str, name: str) -> int:
         return int(pid)
 
 
-def asked_domain(environment: MutableMapping[str, str] = os.environ) -> int:
+def requested_domain(environment: MutableMapping[str, str] = os.environ) -> int:
     """The ROS domain of the environment; ROS itself refuses what is no number."""
     text = environment.get("ROS_DOMAIN_ID", "")
     return int(text) if text.isascii() and text.isdigit() else 0
@@ -158,7 +158,7 @@ def move_to_free_domain(namespace: str, environment: MutableMapping[str, str] = 
     -------
     what was done, '' where nothing had to be.
     """
-    domain, full = asked_domain(environment), f"/{namespace.strip('/')}"
+    domain, full = requested_domain(environment), f"/{namespace.strip('/')}"
     pid = occupant(domain, full, "driver")
     if not pid:
         return ""

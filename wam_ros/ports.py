@@ -109,7 +109,8 @@ class Ports:
         self._full = {row.name: node.resolve_topic_name(topic_name(node, row)) for row in [*rows, *own]}
         self._encoders = {row.name: encoder(row, shared) for row in rows}
         self._last_steps = self._seconds_without_step = 0
-        self._told: tuple[str, bool, tuple[str, ...]] = ("", True, ())  # mode, whether nodes are missing, faulty nodes
+        # mode, whether nodes are missing, faulty nodes
+        self._informed: tuple[str, bool, tuple[str, ...]] = ("", True, ())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._readiness = node.create_timer(0.02, self._look_for_peers, clock=steady)
         node.create_timer(CLAIM_PERIOD, self._look_for_rivals, clock=steady)
@@ -274,16 +275,16 @@ class Ports:
         if status != self._status:
             self._status = status
             self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
-            self._tell()
+            self._inform()
 
-    def _tell(self) -> None:
+    def _inform(self) -> None:
         """Print on the console what the driver's state is and what to call next, where that has changed."""
         mode = self._status.mode
         faulty = tuple(sorted(node for node, fault in self.faults.items() if fault)) if mode == "braked" else ()
         state = (mode, bool(self._absent), faulty)
-        if not self._status.mode or state == self._told:
+        if not self._status.mode or state == self._informed:
             return
-        before, self._told = self._told[0], state
+        before, self._informed = self._informed[0], state
         is_played = "scenario" in self.shared.nodes
         self.node.get_logger().info(guidance(mode, before, self.absent, faulty, self.node.get_namespace(), is_played))
 
@@ -324,7 +325,7 @@ class Ports:
                 self.faults[status.node] = status.fault
             if status.connected:
                 self._absent.discard(status.node)
-                self._tell()
+                self._inform()
             if is_peer and take is not None:
                 take(status)
 

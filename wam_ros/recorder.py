@@ -251,10 +251,10 @@ def summary(counts: Iterable[Count], unfinished: Sequence[str] = ()) -> str:
     listed = list(counts)
     lost = [f"{c.dropped} of {c.topic} from {c.publisher}" for c in listed if c.dropped]
     at_end = [f"{c.lost_at_end} of {c.topic} from {c.publisher}" for c in listed if c.lost_at_end]
-    said = [f"{sum(c.received for c in listed)} messages"]
-    said += [f"lost: {', '.join(lost)}"] * bool(lost) + [f"lost at the end: {', '.join(at_end)}"] * bool(at_end)
-    said += [f"lost at the end: not known of {', '.join(unfinished)}, which gave no final count"] * bool(unfinished)
-    return ", ".join([*said, *["none lost"] * (len(said) == 1)])
+    printed = [f"{sum(c.received for c in listed)} messages"]
+    printed += [f"lost: {', '.join(lost)}"] * bool(lost) + [f"lost at the end: {', '.join(at_end)}"] * bool(at_end)
+    printed += [f"lost at the end: not known of {', '.join(unfinished)}, which gave no final count"] * bool(unfinished)
+    return ", ".join([*printed, *["none lost"] * (len(printed) == 1)])
 
 
 def _counts(channel: _Channel) -> Iterator[Count]:

@@ -30,7 +30,7 @@ class RemoteParameters:
             )
             for name in names
         }
-        self._asked = dict.fromkeys(self._clients, -_PATIENCE)
+        self._requested = dict.fromkeys(self._clients, -_PATIENCE)
 
     @property
     def missing(self) -> list[str]:
@@ -42,11 +42,11 @@ class RemoteParameters:
         now = time.monotonic()
         for name in self.missing:
             lister, getter = self._clients[name]
-            if now - self._asked[name] < _PATIENCE:
+            if now - self._requested[name] < _PATIENCE:
                 continue
             if not (lister.service_is_ready() and getter.service_is_ready()):
                 continue
-            self._asked[name] = now
+            self._requested[name] = now
             lister.call_async(ListParameters.Request()).add_done_callback(partial(self._listed, name))
 
     def _listed(self, name: str, future: Any) -> None:

@@ -3,7 +3,7 @@
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,11 +12,9 @@ from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_description.parameter_history import present_name
 from wam_description.signals import NodeStatus
-from wam_description.status import CHANGES, parse
+from wam_description.status import CHANGES, DONE, parse
 from wam_description.topics import TOPICS
 from wam_sim.recorded_parameters import RecordedParameters, recorded_parameters, untrusted_yaml
-
-DONE: Final = "done"  # outcome of a scenario that was played to its end
 
 
 class RecordedStep(NamedTuple):
@@ -54,7 +52,7 @@ class RecordedRun(NamedTuple):
     statuses : in the order of the bag.
     steps : those that were played to their end.
     unfinished : the step in which the recording ended, None if the scenario came to an end.
-    outcome : 'done', why the scenario failed, or '' if the recording ended before.
+    outcome : DONE, why the scenario failed, or '' if the recording ended before.
     faults : of the driver, each once.
     mode : 'lockstep', 'realtime' or 'unknown'.
     """
@@ -169,11 +167,12 @@ def _steps(statuses: Sequence[NodeStatus], last: int) -> tuple[tuple[RecordedSte
     for status in statuses:
         if status.node != "scenario" or not status.stamp:
             continue
-        if begun and begun[-1][:2] == (status.message, status.stamp):  # published again with what it has set
+        name = status.step or status.message  # the first recordings have a step in the message only
+        if begun and begun[-1][:2] == (name, status.stamp):  # published again with what it has set
             begun[-1] = begun[-1]._replace(settings={**begun[-1].settings, **_settings(status)})
         else:
-            begun.append(RecordedStep(status.message, status.stamp, status.stamp, _settings(status)))
-        if status.message == DONE or status.level:
+            begun.append(RecordedStep(name, status.stamp, status.stamp, _settings(status)))
+        if not status.step and (status.message == DONE or status.level):
             break
     else:
         if not begun:

@@ -136,6 +136,7 @@ def replay(
     run = recorded_run(bag)
     run = run._replace(parameters=run.parameters.with_options(values))
     namespace = run.namespace
+    _require_types(bag, namespace, [rows[topic] for topic in (*inputs, *outputs)])
     shared, own = _parameters(run, declaration, configuration)
     triggers = [reaction.trigger.topic for reaction in declaration.reactions]
     missing = [trigger for trigger in triggers if f"{namespace}/{trigger}" not in bag.topics]
@@ -162,6 +163,17 @@ def replay(
     gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(bag.first_ns)
     return Replay(declaration.name, mode, tuple(compared), gaps, (*lost, *lost_changes))
+
+
+def _require_types(bag: Bag, namespace: str, topics: Sequence[Topic]) -> None:
+    """Refuse a bag in which a topic has another type than now: it would be missing without a word."""
+    for topic in topics:
+        name = f"{namespace}/{topic.name}"
+        if (recorded := bag.types.get(name, topic.type)) != topic.type:
+            raise BagError(
+                f"{bag.path}: {name} was recorded as {recorded}; this version has it as {topic.type}: replay "
+                "the bag with the version that recorded it"
+            )
 
 
 def _gaps(topic: str, columns: Columns | None) -> list[Gap]:

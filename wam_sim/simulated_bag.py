@@ -33,7 +33,7 @@ def record(
     steps: Sequence[ScenarioStep],
     path: Path,
     namespace: str = "wam",
-    tell: Callable[[float, str], None] = lambda seconds, step: None,
+    report: Callable[[float, str], None] = lambda seconds, step: None,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> str:
     """Play a scenario in this process and record it.
@@ -63,7 +63,7 @@ def record(
     shared = configuration.shared
     with BagWriter(path) as bag:
         recording = _Recording(bag, simulation, shared, namespace)
-        simulation.listen(STATUS, lambda _, status: tell(status.stamp / 1e9, status.message), "scenario")
+        simulation.listen(STATUS, lambda _, status: report(status.stamp / 1e9, status.message), "scenario")
         bag.attach(ATTACHMENT, "application/yaml", _parameters(configuration, namespace).encode())
         recording.watch_driver()
         while not is_stopped() and not simulation.step():

@@ -20,7 +20,7 @@ from wam_analysis.table import plain
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 
 
-class Spread(NamedTuple):
+class Quartiles(NamedTuple):
     """Median and quartiles of some rounds."""
 
     median: float
@@ -31,15 +31,15 @@ class Spread(NamedTuple):
         return f"{self.median:{spec}} ({self.low:{spec}}..{self.high:{spec}})"
 
 
-def spread(values: Sequence[float]) -> Spread:
+def quartiles(values: Sequence[float]) -> Quartiles:
     """Median and quartiles of the rounds."""
     low, median, high = statistics.quantiles(values, n=4, method="inclusive") if len(values) > 1 else [values[0]] * 3
-    return Spread(median, low, high)
+    return Quartiles(median, low, high)
 
 
-def ratios(values: Sequence[float], references: Sequence[float]) -> Spread:
+def ratios(values: Sequence[float], references: Sequence[float]) -> Quartiles:
     """Ratio of each round to the reference of the same round."""
-    return spread([value / reference for value, reference in zip(values, references, strict=True)])
+    return quartiles([value / reference for value, reference in zip(values, references, strict=True)])
 
 
 def options(text: str, rounds: int) -> argparse.ArgumentParser:

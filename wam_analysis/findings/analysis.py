@@ -18,6 +18,7 @@ from wam_analysis.foreign.topic_map import NOTHING_GIVEN, TopicMap
 from wam_bag.bag import Bag, BagError, read
 from wam_bag.contents import contents
 from wam_bag.losses import PARAMETERS, RECORDING
+from wam_description.status import DONE
 
 LONGEST = 160  # characters of a note on the parameters
 Progress = Callable[[str], None]
@@ -126,9 +127,9 @@ def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
 
 def _verdict(sections: tuple[Section, ...]) -> Section:
     """The most important findings of all sections, in a few sentences."""
-    said = [sentence for section in sections for sentence in section.verdict]
+    stated = [sentence for section in sections for sentence in section.verdict]
     silent = "No force, contact, cycle or fault was recorded that could be evaluated."
-    return Section("verdict", "Verdict", tuple(said) or (silent,), ())
+    return Section("verdict", "Verdict", tuple(stated) or (silent,), ())
 
 
 def _happened(recording: AnalysedRun, duration: float) -> Section:
@@ -137,7 +138,7 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     sentences = [f"INCOMPLETE: {line}" for line in summary.lost]
     sentences.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {recording.mode}.")
     if summary.steps:
-        ended = " to its end" if summary.outcome == "done" else f"; {summary.outcome}"
+        ended = " to its end" if summary.outcome == DONE else f"; {summary.outcome}"
         sentences.append(f"A scenario of {_count(len(summary.steps), 'step')} was played{ended}.")
     touches = [touch for touch in summary.touches if touch.link_true]
     if recording.holds:
@@ -153,7 +154,7 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     lacking = recording.lacking("motor_states", "joint_states", "force_command", "contact/wrench", "status")
     verdict = [f"INCOMPLETE: {line}" for line in summary.lost]
     verdict += [f"STOPPED: {fault}." for fault in faults]
-    if summary.steps and summary.outcome != "done" and not faults:
+    if summary.steps and summary.outcome != DONE and not faults:
         verdict.append(f"Of the scenario: {summary.outcome}.")
     return Section("happened", "What happened", tuple(sentences), (), lacking, tuple(verdict))
 

@@ -37,11 +37,11 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
         sentences.append("No constant force was commanded.")
     other = _other_reactions(recording)
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found)]
-    range_said, range_findings = _dynamic_range(held)
+    range_stated, range_findings = _dynamic_range(held)
     verdict = (*_reaction_verdict({one.hold.name: one.hold.reactions for one in held} | other), *_forces_verdict(held))
     flagged = [f"{text} {UNLIKE}" for text in deviations(tuple(findings))]
     every = (*findings, *range_findings)
-    return Section("force", "Force", (*sentences, *flagged, *range_said), every, lacking, verdict)
+    return Section("force", "Force", (*sentences, *flagged, *range_stated), every, lacking, verdict)
 
 
 def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction, ...]]:

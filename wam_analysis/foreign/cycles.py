@@ -143,21 +143,21 @@ def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers |
     """A signal less what follows its command linearly, at once, late or slowly; None without a moving command."""
     if quantity not in command.values or len(command.time) < FEWEST or command.time[0] > piece.time[0]:
         return None
-    asked = held(command, quantity, piece.time)
-    if not np.ptp(asked) > 0.0:
+    desired = held(command, quantity, piece.time)
+    if not np.ptp(desired) > 0.0:
         return None
     between = np.interp(piece.time, command.time, command.values[quantity])  # of a path that is sent in points
-    rests = [_less(piece, piece.values[quantity], one) for one in (asked, between)]
+    rests = [_less(piece, piece.values[quantity], one) for one in (desired, between)]
     return min(rests, key=lambda rest: float(np.sum(rest**2)))
 
 
-def _less(piece: Piece, value: Numbers, asked: Numbers) -> Numbers:
+def _less(piece: Piece, value: Numbers, desired: Numbers) -> Numbers:
     """A signal less its linear response to a command at the same times."""
     period = float(piece.time[1] - piece.time[0])
     lags = np.unique(np.round(np.linspace(0.0, LONGEST_LAG / period, MOST_LAGS)).astype(np.int64))
-    late = [np.concatenate([np.full(lag, asked[0]), asked[: len(asked) - lag]]) for lag in lags.tolist()]
-    slow = [_slowed(asked, period / (period + tau)) for tau in SLOW]
-    columns = np.column_stack([np.ones(len(asked)), *late, *slow])
+    late = [np.concatenate([np.full(lag, desired[0]), desired[: len(desired) - lag]]) for lag in lags.tolist()]
+    slow = [_slowed(desired, period / (period + tau)) for tau in SLOW]
+    columns = np.column_stack([np.ones(len(desired)), *late, *slow])
     rest: Numbers = value - columns @ np.linalg.lstsq(columns, value, rcond=SINGULAR)[0]
     return rest
 
@@ -176,11 +176,11 @@ def _commanded_frequency(one: Episode, quantity: str, command: Source | None) ->
     """Frequency of the command during an episode, Hz, 0 if it does not repeat; None if there was no command."""
     if command is None or not len(command.time) or command.time[0] > one.begin:
         return None
-    asked = quantity if quantity in command.values else next(iter(command.values))
+    desired = quantity if quantity in command.values else next(iter(command.values))
     time = np.linspace(one.begin, one.end, max(len(one.cycle.shape), round(40.0 * one.cycle.cycles)))
-    value = held(command, asked, time)
+    value = held(command, desired, time)
     cycle = limit_cycle(time, value)
-    is_small = asked == quantity and cycle.peak_to_peak < COMMANDED * one.cycle.peak_to_peak
+    is_small = desired == quantity and cycle.peak_to_peak < COMMANDED * one.cycle.peak_to_peak
     return 0.0 if math.isnan(cycle.period) or cycle.confidence < 0.5 or is_small else 1.0 / cycle.period
 
 

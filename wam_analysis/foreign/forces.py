@@ -38,18 +38,18 @@ class ForceStep(NamedTuple):
 
 def force_steps(measured: Source, command: Source) -> list[ForceStep]:
     """The steps of a command of a force, and how the measured force followed; its sign may be that of the reaction."""
-    asked = np.column_stack([command.values[axis] for axis in FORCE])
-    changed = np.flatnonzero(np.any(np.abs(np.diff(asked, axis=0)) > SMALL, axis=1)) + 1
+    desired = np.column_stack([command.values[axis] for axis in FORCE])
+    changed = np.flatnonzero(np.any(np.abs(np.diff(desired, axis=0)) > SMALL, axis=1)) + 1
     begins = [0, *changed.tolist()]
     ends = [*command.time[changed].tolist(), float(measured.time[-1])]
     stretches = pieces(measured)
     rows = np.maximum(np.searchsorted(command.time, measured.time, side="right") - 1, 0)
     got = np.column_stack([measured.values[axis] for axis in FORCE])
-    sign = np.sign(float(np.sum((got - got.mean(axis=0)) * (asked[rows] - asked[rows].mean(axis=0))))) or 1.0
+    sign = np.sign(float(np.sum((got - got.mean(axis=0)) * (desired[rows] - desired[rows].mean(axis=0))))) or 1.0
     found = []
     for last, row, end in zip([0, *begins[:-1]], begins, ends, strict=True):
         begin = float(command.time[row])
-        change = asked[row] - asked[last]
+        change = desired[row] - desired[last]
         size = float(np.linalg.norm(change))
         if size <= SMALL or end - begin < SHORTEST:
             continue
@@ -66,5 +66,7 @@ def force_steps(measured: Source, command: Source) -> list[ForceStep]:
                 )
             except ValueError:
                 continue
-            found.append(ForceStep(measured.label, begin, float(asked[last] @ way), float(asked[row] @ way), response))
+            found.append(
+                ForceStep(measured.label, begin, float(desired[last] @ way), float(desired[row] @ way), response)
+            )
     return found

@@ -171,8 +171,8 @@ def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
         error = shown(abs(worst.response.final - worst.commanded), "N")
         verdict = f"{len(steps)} force steps; the largest steady error is {error} of {shown(worst.commanded, 'N')}."
         return Section("force", "Force", (*sentences, *doubts), tuple(findings), (), (verdict, *doubts))
-    told = tuple(doubts) or ("No step of a commanded force was recorded.",)
-    return Section("force", "Force", told, (), (), tuple(doubts))
+    stated = tuple(doubts) or ("No step of a commanded force was recorded.",)
+    return Section("force", "Force", stated, (), (), tuple(doubts))
 
 
 def _settled(seconds: float) -> str:
@@ -200,8 +200,8 @@ def _cycles(states: Sequence[Source], commands: Sequence[Source]) -> Section:
             Finding(f"{label}: end", "s", one.end),
             Finding(f"{label}: confidence", "", one.confidence),
         ]
-    told = tuple(sentences) or ("Nothing in this recording repeats five times.",)
-    return Section("stability", "Cycles", told, tuple(findings), (), tuple(verdict))
+    stated = tuple(sentences) or ("Nothing in this recording repeats five times.",)
+    return Section("stability", "Cycles", stated, tuple(findings), (), tuple(verdict))
 
 
 def _cycle_sentence(one: FoundCycle) -> str:
@@ -231,8 +231,8 @@ def _spectrum(states: Sequence[Source]) -> Section:
         sentences.append(f"{label}: {shown(line.frequency, 'Hz')}, amplitude {shown(line.amplitude, unit)}.")
         findings.append(Finding(f"{label}, {shown(line.frequency, 'Hz')}: amplitude", unit, line.amplitude))
         findings.append(Finding(f"{label}, {shown(line.frequency, 'Hz')}: frequency", "Hz", line.frequency))
-    told = tuple(sentences) or ("No frequency is above the noise.",)
-    return Section("frequency", "Spectrum", told, tuple(findings))
+    stated = tuple(sentences) or ("No frequency is above the noise.",)
+    return Section("frequency", "Spectrum", stated, tuple(findings))
 
 
 # mechanics
@@ -262,8 +262,8 @@ def _stick_slip(states: Sequence[Source], commands: Sequence[Source]) -> Section
             sentence += f"; it sticks: {100.0 * found.commanded:.0f} % of its rest it was commanded to move"
             verdict.append(f"{sentence}.")
         sentences.append(f"{sentence}.")
-    told = tuple(sentences) or ("No velocity was recorded.",)
-    return Section("stick_slip", "Stick and slip", told, tuple(findings), (), tuple(verdict))
+    stated = tuple(sentences) or ("No velocity was recorded.",)
+    return Section("stick_slip", "Stick and slip", stated, tuple(findings), (), tuple(verdict))
 
 
 def _friction(states: Sequence[Source]) -> Section:
@@ -291,21 +291,23 @@ def _friction(states: Sequence[Source]) -> Section:
             inertia = "kg m2" if effort == "N m" else f"{effort} s2/{speed.partition('/')[0]}"
             numbers.append(("inertia", inertia, found.inertia, found.inertia_error))
         findings += [Finding(f"{one.label}: {what}", unit, value, error=error) for what, unit, value, error in numbers]
-        told = ", ".join(f"{what} {shown(value)} +- {shown(error, unit)}" for what, unit, value, error in numbers)
+        stated = ", ".join(f"{what} {shown(value)} +- {shown(error, unit)}" for what, unit, value, error in numbers)
         missing = {"dry friction", "viscous friction", "inertia"} - {what for what, *_ in numbers}
         if math.isnan(found.inertia):
             missing.remove("inertia")
-            told += (
+            stated += (
                 "; it moved at one frequency, so that its inertia cannot be separated from its weight, nor its viscous "
                 f"friction from a delay of the effort, 1 ms of which changes it by {shown(1e-3 * abs(whole.per_lag))}"
             )
-        told += f"; not identifiable: {', '.join(sorted(missing))}" if missing else ""
-        told += "".join(f"; {ALSO[name]}" for name in whole.also)
+        stated += f"; not identifiable: {', '.join(sorted(missing))}" if missing else ""
+        stated += "".join(f"; {ALSO[name]}" for name in whole.also)
         if whole.lag:
-            told += (
+            stated += (
                 f"; the effort is {shown(abs(whole.lag), 's')} {'behind' if whole.lag > 0.0 else 'before'} the motion"
             )
-        sentences.append(f"{one.label}: {told}; {100.0 * found.unexplained:.2g} % of the effort's rms is unexplained.")
+        sentences.append(
+            f"{one.label}: {stated}; {100.0 * found.unexplained:.2g} % of the effort's rms is unexplained."
+        )
     if sentences:
         assumed = (
             "Of the recorded effort, as loaded by friction, inertia and the joint's own weight alone; drag and delays "
@@ -345,5 +347,5 @@ def _timing(found: Sequence[Source]) -> Section:
             gap = shown(timing.longest_gap, "s")
             sentences.append(f"{name}: {timing.missed} periods without a message, the longest gap {gap}.")
             verdict.append(sentences[-1])
-    told = tuple(sentences) or ("Every period has its message." if findings else "No stamped topic was recorded.",)
-    return Section("timing", "Timing", told, tuple(findings), (), tuple(verdict))
+    stated = tuple(sentences) or ("Every period has its message." if findings else "No stamped topic was recorded.",)
+    return Section("timing", "Timing", stated, tuple(findings), (), tuple(verdict))

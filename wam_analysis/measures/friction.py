@@ -108,8 +108,8 @@ def identify_friction(
     static = float(np.median(statics)) if len(statics) else math.nan
     error = math.nan
     if len(statics) > 2:
-        spread = 1.4826 * float(np.median(np.abs(statics - static)))
-        error = math.hypot(_few(len(statics) - 1.0) * spread / math.sqrt(len(statics)), NEGLECTED * static)
+        scatter = 1.4826 * float(np.median(np.abs(statics - static)))
+        error = math.hypot(_few(len(statics) - 1.0) * scatter / math.sqrt(len(statics)), NEGLECTED * static)
     return Friction(
         static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics), *left
     )
@@ -141,8 +141,8 @@ def _in_motion(
     columns = np.column_stack([np.where(onward[rows], 1.0, -1.0), v, acceleration, np.ones(len(rows)), *acting])
     wanted = np.convolve(torque, triangle, "same")[rows]
     solution, errors, left = _robust(columns, wanted, len(triangle), _halves(rows))
-    spread = float(np.subtract(*np.percentile(np.abs(v), (95.0, 5.0))))
-    uneven = UNEVEN * abs(solution[0]) / spread if spread > 0.0 else math.inf
+    scatter = float(np.subtract(*np.percentile(np.abs(v), (95.0, 5.0))))
+    uneven = UNEVEN * abs(solution[0]) / scatter if scatter > 0.0 else math.inf
     return solution, (errors[0], math.hypot(errors[1], uneven), *errors[2:]), left
 
 

@@ -20,7 +20,7 @@ def run(given: argparse.Namespace) -> int:
     if given.what == "info":
         print("\n".join(described(contents(given.bag))))
     else:
-        print("\n".join(told(result) for result in repair(given.bag)))
+        print("\n".join(stated(result) for result in repair(given.bag)))
     return 0
 
 
@@ -45,12 +45,12 @@ def described(found: Contents) -> list[str]:
 
 
 def _lost(found: Contents, lost: Losses) -> str:
-    said = [f"{count} of {where}" for where, count in lost.dropped.items()]
-    said += [f"{lost.gone} of those that were recorded"] if lost.gone else []
+    printed = [f"{count} of {where}" for where, count in lost.dropped.items()]
+    printed += [f"{lost.gone} of those that were recorded"] if lost.gone else []
     if lost.uncounted:
-        said.append("unknown, see above")
-    if said:
-        return ", ".join(said)
+        printed.append("unknown, see above")
+    if printed:
+        return ", ".join(printed)
     return (
         "see above"
         if lost.sentences(found.first)
@@ -64,7 +64,7 @@ def _time(stamp: int) -> str:
     return f"{datetime.fromtimestamp(stamp / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
-def told(result: Repaired) -> str:
+def stated(result: Repaired) -> str:
     """What became of a file; where something was lost, a line about that."""
     if result.losses is None:
         return f"{result.name} is whole, {result.messages} messages"

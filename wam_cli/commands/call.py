@@ -71,10 +71,10 @@ def run(given: argparse.Namespace) -> int:
     with CalledStack(given.namespace) as stack:
         if given.request in others:
             return others[given.request](given, stack)
-        return _told(list(map(stack.request, SERVICES[given.request][1])))
+        return _stated(list(map(stack.request, SERVICES[given.request][1])))
 
 
-def _told(replies: Sequence[Reply]) -> int:
+def _stated(replies: Sequence[Reply]) -> int:
     """Print the last answer, or the first refusal."""
     reply = next((reply for reply in replies if not reply.success), replies[-1])
     print(reply.message, file=sys.stdout if reply.success else sys.stderr)
@@ -120,7 +120,7 @@ def _set(given: argparse.Namespace, stack: CalledStack) -> int:
     else:
         new = _like(value, like, key)
     reply = stack.request(SetParameters(node, {name: new}))
-    return _told([reply._replace(message=reply.message or f"{key}={value}")])
+    return _stated([reply._replace(message=reply.message or f"{key}={value}")])
 
 
 def _like(value: Any, like: Any, name: str) -> Any:
@@ -172,8 +172,8 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
         for message in stack.messages("joint_states", SILENCE, paused):
             driver = statuses["driver"]
             if driver.mode != Mode.ENABLED.value:
-                told = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
-                raise ValueError(f"{told}: the arm is {_state(driver)}")
+                stated = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
+                raise ValueError(f"{stated}: the arm is {_state(driver)}")
             stamp = stamp_of(message)
             begin = begin or stamp
             if stamp - begin > given.seconds * 1e9:
@@ -181,8 +181,8 @@ def _push(given: argparse.Namespace, stack: CalledStack) -> int:
             if refusal := hold.send(stamp, push):
                 raise ValueError(f"not pushed: {refusal}")
     except TimeoutError as error:
-        told = "the push ended" if begin else "not pushed"
-        raise ValueError(f"{told}: {error}; wam call resume") from error
+        stated = "the push ended" if begin else "not pushed"
+        raise ValueError(f"{stated}: {error}; wam call resume") from error
     finally:
         if hold.is_on:
             hold.send(stamp, Wrench(BASE, ZERO, ZERO))

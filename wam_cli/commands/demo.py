@@ -21,9 +21,10 @@ from wam_cli.commands.demo_nodes import play
 from wam_control.scenario import ScenarioStep, script_file
 from wam_control.scenario import load as steps_of
 from wam_description.configuration import Configuration
+from wam_description.status import DONE
 from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
 from wam_ros.program import end_at_once_on_signals
-from wam_sim.recording import DONE, recorded_run
+from wam_sim.recording import recorded_run
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,17 +56,17 @@ def run(given: argparse.Namespace) -> int:
     if task:
         base = with_run(base, task.runs[0]._replace(name=name), directory)
     configuration = base.with_values({"nodes": [*base.shared.nodes, "scenario", "recorder"], "recorder:name": name})
-    steps = tell_task(configuration, bag, task.name if task else "")
+    steps = report_task(configuration, bag, task.name if task else "")
     failures, stopped = play(configuration, steps, bag, given)
     if stopped:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130
     end_at_once_on_signals()  # the bag is closed
-    told = _report(bag, bool(failures), task)
+    stated = _report(bag, bool(failures), task)
     if failures:
-        stream = sys.stdout if told else sys.stderr  # that of the report
+        stream = sys.stdout if stated else sys.stderr  # that of the report
         print(f"\nthe demonstration failed: {_cause(bag) or ', '.join(failures)}", file=stream)
-        for command in _next(configuration.shared.timing.mode, bag if told else None):
+        for command in _next(configuration.shared.timing.mode, bag if stated else None):
             print(f"next: {command}", file=stream)
         return 1
     print(f"next     wam view {bag}       # the recording in the browser, to play and to scrub")
@@ -73,7 +74,7 @@ def run(given: argparse.Namespace) -> int:
     return 0
 
 
-def tell_task(configuration: Configuration, bag: Path, task: str = "") -> list[ScenarioStep]:
+def report_task(configuration: Configuration, bag: Path, task: str = "") -> list[ScenarioStep]:
     """Print what is about to happen, and refuse a task that cannot be played before anything is started.
 
     Returns
@@ -126,8 +127,8 @@ def _report_of_task(task: Experiment, bag: Path) -> str:
 
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
-    told = "\n".join(filter(None, (text(task, result), reaction_report(bag))))
-    return f"{told}\n\nbag      {bag}\npicture  {bag / 'task.png'}"
+    stated = "\n".join(filter(None, (text(task, result), reaction_report(bag))))
+    return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}"
 
 
 def _cause(bag: Path) -> str:

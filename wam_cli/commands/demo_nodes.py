@@ -53,18 +53,18 @@ def _simulated(
         raise ValueError(f"{option} needs ROS; pip install 'wam_stack[ros,live]', or leave it out")
     print(WITHOUT_ROS, flush=True)
     stop = Stop()
-    failure = record(configuration, steps, bag, tell=_told, is_stopped=lambda: stop.is_set)
+    failure = record(configuration, steps, bag, report=_stated, is_stopped=lambda: stop.is_set)
     if failure:
         print(f"error: {failure}", file=sys.stderr, flush=True)
     return PlayedDemo([failure] if failure else [], stop.is_set)
 
 
-def _told(seconds: float, step: str) -> None:
+def _stated(seconds: float, step: str) -> None:
     print(f"{seconds:5.1f} s  {step}", flush=True)
 
 
 def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> PlayedDemo:
-    from wam_cli.commands.live import page_beside
+    from wam_cli.commands.live import page_next_to
     from wam_cli.commands.up import import_nodes
     from wam_ros.bring_up import start
     from wam_ros.network import move_to_free_domain
@@ -77,7 +77,7 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
         print(moved, flush=True)
     late = time.monotonic() + LONGEST_START
     with (
-        page_beside(given, NAMESPACE) as close_page,
+        page_next_to(given, NAMESPACE) as close_page,
         start(configuration, processes_of(configuration, given), lambda: stop.is_set) as stack,
     ):
         driver: Any = getattr(stack, "nodes", {}).get("driver")

@@ -5,7 +5,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import yaml
 
@@ -66,9 +65,7 @@ def play_over_topics(configuration: Configuration, scenario: BenchmarkScenario, 
             "recorder:name": "scenario",
         }
         with Composition(configuration.with_values({**scenario.values, **own}), domain_id=domain_id) as composition:
-            player: Any = composition.nodes["scenario"]
-            composition.spin(lambda: player.done)
-            failure = str(player.failure)
+            failure = composition.play().failure
         return recorded(scenario, Path(folder) / "scenario", shared.arm, failure)
 
 

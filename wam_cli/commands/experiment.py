@@ -4,7 +4,6 @@ import argparse
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 from wam_cli.commands import writable_directory, writable_file
 from wam_experiments.thesis.definition import Experiment, Run, configured, load, names
@@ -58,9 +57,12 @@ def run(given: argparse.Namespace) -> int:
             if not _record(experiment, directory, f"{number}/{len(chosen)} " if given.all else ""):
                 return 130
         result = evaluate(experiment, directory)
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        draw(experiment, result, picture)
-        print(f"{text(experiment, result)}\nbags     {directory}\npicture  {picture}\n", flush=True)
+        drawn = ""
+        if result.panels:
+            picture.parent.mkdir(parents=True, exist_ok=True)
+            draw(experiment, result, picture)
+            drawn = f"picture  {picture}\n"
+        print(f"{text(experiment, result)}\nbags     {directory}\n{drawn}", flush=True)
         results[experiment.name] = (experiment, result, picture)
     if given.write:
         write(Path(given.write), list(results.values()))
@@ -87,26 +89,23 @@ def play(experiment: Experiment, each: Run, directory: Path, label: str, stop: S
         where the scenario failed for another reason than that the driver protected the arm.
     """
     shown = [0.0]
+
+    def is_stopped(seconds: float) -> bool:
+        now = time.monotonic()
+        if now >= shown[0]:
+            shown[0] = now + SHOWN_EVERY
+            _show(f"{label}: {seconds:5.1f} of {each.seconds:.1f} s")
+        return stop.is_set
+
     with Composition(configured(experiment, each, directory)) as composition:
-        scenario: Any = composition.nodes["scenario"]
-        driver: Any = composition.nodes["driver"]
-
-        def is_over() -> bool:
-            now = time.monotonic()
-            if now >= shown[0]:
-                shown[0] = now + SHOWN_EVERY
-                _say(f"{label}: {driver.driver.stamp / 1e9:5.1f} of {each.seconds:.1f} s")
-            return stop.is_set or bool(scenario.done)
-
-        composition.spin(is_over)
-        failure, fault, is_done = scenario.failure, driver.driver.safety.fault, bool(scenario.done)
-    ended = f"stopped by the driver: {fault}" if fault else "done" if is_done else "stopped"
-    _say(f"{label}: {ended}", end="\n")
-    if failure and not fault:
-        raise ValueError(f"{label}: {failure}")
+        played = composition.play(is_stopped)
+    ended = f"stopped by the driver: {played.fault}" if played.fault else "done" if played.is_done else "stopped"
+    _show(f"{label}: {ended}", end="\n")
+    if played.failure and not played.fault:
+        raise ValueError(f"{label}: {played.failure}")
 
 
-def _say(words: str, end: str = "") -> None:
+def _show(words: str, end: str = "") -> None:
     """Show the progress: in one line on a terminal, otherwise only the end."""
     if sys.stderr.isatty():
         print(f"\r\033[K{words}", end=end, file=sys.stderr, flush=True)

@@ -6,7 +6,6 @@ import shlex
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import yaml
 
@@ -131,16 +130,13 @@ def _play(configuration: Configuration, seconds: float) -> bool:
     stop, progress = Stop(), Progress("seconds of motion", sys.stderr)
     if moved := move_to_free_domain(NAMESPACE):
         print(moved, flush=True)
+
+    def is_stopped(now: float) -> bool:
+        progress(min(int(now), int(seconds)), int(seconds))
+        return stop.is_set
+
     with Composition(configuration) as composition:
-        player: Any = composition.nodes["scenario"]
-        driver: Any = composition.nodes["driver"]
-
-        def is_over() -> bool:
-            progress(min(int(driver.driver.stamp / 1e9), int(seconds)), int(seconds))
-            return stop.is_set or bool(player.done)
-
-        composition.spin(is_over)
-        failure = str(player.failure) or driver.driver.safety.fault
-    if failure:
+        played = composition.play(is_stopped)
+    if failure := played.failure or played.fault:
         raise ValueError(f"the motion failed: {failure}")
     return not stop.is_set

@@ -24,7 +24,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def page_beside(given: argparse.Namespace, namespace: str) -> Iterator[Callable[[], None]]:
+def page_next_to(given: argparse.Namespace, namespace: str) -> Iterator[Callable[[], None]]:
     """The page of a stack that is about to start, as its options set it; yields what ends it.
 
     It is to be ended before the stack, which at its end waits for its listeners.

@@ -25,7 +25,7 @@ def run(given: argparse.Namespace) -> int:
     """Replay and print the comparison of each topic; 0 if all are the same bit for bit, else 1."""
     configuration = configuration_of(given) if given.config else None
     done = replay(given.bag, given.node, configuration, {} if given.config else option_values(given.values))
-    for line in (*(f"INCOMPLETE: {line}" for line in done.lost), *map(told, done.topics), *reasons(done)):
+    for line in (*(f"INCOMPLETE: {line}" for line in done.lost), *map(stated, done.topics), *reasons(done)):
         print(line)
     return 0 if done.is_same else 1
 
@@ -57,7 +57,7 @@ def reasons(done: Replay) -> list[str]:
     return lines
 
 
-def told(topic: Compared) -> str:
+def stated(topic: Compared) -> str:
     """A line about a topic, a second one about its first difference."""
     line = f"{topic.topic}: {topic.compared} messages, "
     if topic.different:

@@ -40,7 +40,7 @@ def run(given: argparse.Namespace) -> int:
         entry = entries[experiment.name]
         found = check(experiment, entry, directory)
         wrong += found
-        print(_told(entry, directory, not found))
+        print(_stated(entry, directory, not found))
     size = sum(entry.size for entry in entries.values())
     if size >= LIMIT:
         wrong.append(f"the samples have {size} bytes together; {LIMIT} are allowed: cut less in their experiments")
@@ -69,7 +69,7 @@ def _make(chosen: list[Experiment], directory: Path) -> bool:
     return True
 
 
-def _told(entry: Entry, directory: Path, is_right: bool) -> str:
+def _stated(entry: Entry, directory: Path, is_right: bool) -> str:
     begin, end = entry.seconds
     word = "ok   " if is_right else "WRONG"
     bag = directory / FOLDER / entry.name

@@ -12,7 +12,7 @@ from wam_cli.commands import (
     take_time,
     timed,
 )
-from wam_cli.commands.live import page_beside
+from wam_cli.commands.live import page_next_to
 from wam_control.scenario import load, script_file
 from wam_description.configuration import Configuration
 from wam_description.nodes import EACH, GROUPED, ONE
@@ -68,7 +68,7 @@ def run(given: argparse.Namespace) -> int:
     stop = Stop()
     processes = processes_of(configuration, given)
     with (
-        page_beside(given, given.namespace) as close_page,
+        page_next_to(given, given.namespace) as close_page,
         start(configuration, processes, lambda: stop.is_set, given.namespace, given.log_level) as stack,
     ):
         if not stop.is_set:

@@ -29,8 +29,8 @@ def run(given: argparse.Namespace) -> int:
             writable_file("--save", given.save)
         else:
             viewer()
-        said = view(analysed_run(read(given.bag)), given.save)
-        print(f"{given.save or 'viewer'}: {said}")
+        stated = view(analysed_run(read(given.bag)), given.save)
+        print(f"{given.save or 'viewer'}: {stated}")
         return 0
     with needing_viser():
         from wam_live.playback import play

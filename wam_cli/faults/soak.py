@@ -76,11 +76,8 @@ def soak(configuration: Configuration, seconds: float, report: Callable[[int, in
         own = {"scenario:script": str(script), "recorder:directory": folder, "recorder:name": "soak", "nodes": nodes}
         memory: list[float] = []
         with Composition(configuration.with_values(own)) as composition:
-            scenario: Any = composition.nodes["scenario"]
-            driver: Any = composition.nodes["driver"]
-            clock = _Sampler(driver.driver, memory, seconds, report)
-            composition.spin(lambda: clock() or scenario.done)
-            failure = str(scenario.failure)
+            clock = _Sampler(memory, seconds, report)
+            failure = composition.play(clock).failure
         found = contents(Path(folder, "soak"))
     early, late = memory[len(memory) // 10], memory[-1]
     count = sum(topic.messages for topic in found.topics.values())
@@ -111,20 +108,21 @@ def _steps(arm: Arm, seconds: float) -> list[dict[str, Any]]:
 class _Sampler:
     """Samples memory once in a second of wall time, and the real-time factor; never ends the run."""
 
-    def __init__(self, driver: Any, memory: list[float], seconds: float, report: Callable[[int, int], None]) -> None:
-        self._driver, self._memory, self._seconds, self._report = driver, memory, seconds, report
+    def __init__(self, memory: list[float], seconds: float, report: Callable[[int, int], None]) -> None:
+        self._memory, self._seconds, self._report = memory, seconds, report
         self._next = self._begin = time.monotonic()
-        self._first = driver.stamp * 1e-9
+        self._first: float | None = None
         self.seconds = self.factor = 0.0
 
-    def __call__(self) -> bool:
-        """False."""
+    def __call__(self, seconds: float) -> bool:
+        """False, at an arm's time, s."""
         now = time.monotonic()
+        self._first = seconds if self._first is None else self._first
         if now >= self._next:
             self._next = now + 1.0
             pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
             self._memory.append(pages * resource.getpagesize() / 1e6)
-            self.seconds = self._driver.stamp * 1e-9
+            self.seconds = seconds
             self.factor = (self.seconds - self._first) / max(now - self._begin, 1e-9)
             self._report(min(int(self.seconds), int(self._seconds)), int(self._seconds))
         return False

@@ -87,8 +87,8 @@ def table(result: BenchmarkResult, arm: Arm, metrics: Sequence[Metric]) -> str:
         span = f"{number(found.low, metric.scale)} to {number(found.high, metric.scale)}"
         bounds = [bound_text(metric.required, metric.scale), bound_text(metric.target, metric.scale)]
         value = number(found.value, metric.scale)
-        judged = counted(mark(metric.required, metric.target, found), found.observed)
-        rows.append([metric.name, metric.unit, *bounds, *single, value, span, str(found.observed), judged])
+        assessed = counted(mark(metric.required, metric.target, found), found.observed)
+        rows.append([metric.name, metric.unit, *bounds, *single, value, span, str(found.observed), assessed])
     return markdown(head, rows)
 
 

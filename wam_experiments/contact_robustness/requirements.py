@@ -42,10 +42,10 @@ class RequiredRow(NamedTuple):
         """Value, interval, number of observations, mark."""
         found, scale = self.found, self.scale
         span = "" if found.low == found.high else f"{number(found.low, scale)} to {number(found.high, scale)}"
-        judged = mark(self.must, ANY, found)
-        judged = mark(self.must, self.aim, found) if judged == MET else judged
-        judged = counted(judged, found.observed) if span else judged  # a mean over a whole run is one observation
-        return [number(found.value, scale), span, str(found.observed), judged]
+        assessed = mark(self.must, ANY, found)
+        assessed = mark(self.must, self.aim, found) if assessed == MET else assessed
+        assessed = counted(assessed, found.observed) if span else assessed  # a mean over a whole run is one observation
+        return [number(found.value, scale), span, str(found.observed), assessed]
 
     @property
     def is_missed(self) -> bool:

@@ -7,11 +7,11 @@ from pathlib import Path
 from wam_bag.bag import BagError
 from wam_bag.cut import CUT
 from wam_description.parameters import ParameterError
+from wam_description.status import DONE
 from wam_experiments.thesis.definition import Experiment, Run
 from wam_experiments.thesis.recording import Recording, recording
 from wam_experiments.thesis.rows import Comparison, Result, plain
 
-DONE = "done"  # status of the scenario at its end
 Evaluation = Callable[[Mapping[str, Recording]], Result]
 
 
@@ -91,11 +91,6 @@ def _evaluate(experiment: Experiment, evaluation: str, recordings: Mapping[str, 
 def _stop(run: Run, recorded: Recording) -> Comparison:
     predicted, measured = ("stops the arm" if stops else "does not stop" for stops in (run.stops, bool(recorded.fault)))
     return Comparison(f"{run.name.replace('_', ' ')}, driver", predicted, measured)
-
-
-def evaluation_of(experiment: Experiment) -> Evaluation:
-    """The function that evaluates an experiment."""
-    return function_of(experiment.evaluation)
 
 
 def function_of(evaluation: str) -> Evaluation:

@@ -16,7 +16,7 @@ FEW = 40  # points, below which each is drawn as a circle
 
 
 def draw(experiment: Experiment, result: Result, file: Path) -> None:
-    """Draw the panels of a result side by side.
+    """Draw the panels of a result, of which there is at least one, side by side.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ def write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> Non
     Parameters
     ----------
     page : Markdown; pictures are copied into the folder with its name.
-    results : experiments with their results and pictures.
+    results : experiments with their results and pictures; one without panels has none.
     """
     content = page.read_text(encoding="utf-8")
     folder = page.parent / page.stem
@@ -30,13 +30,15 @@ def write(page: Path, results: Sequence[tuple[Experiment, Result, Path]]) -> Non
             )
         text = _text(experiment, result, f"{folder.name}/{experiment.name}.png")
         content = block.sub(rf"\g<1>{_literal(text)}\g<2>", content)
-        shutil.copyfile(picture, folder / f"{experiment.name}.png")
+        if result.panels:
+            shutil.copyfile(picture, folder / f"{experiment.name}.png")
     page.write_text(content, encoding="utf-8")
 
 
 def _text(experiment: Experiment, result: Result, picture: str) -> str:
     remarks = "".join(f"\n- {remark}" for remark in result.remarks)
-    return f"\n{markdown(result.rows)}{remarks}\n\n![{experiment.title}]({picture})\n\n".replace("\n\n\n", "\n\n")
+    drawn = f"![{experiment.title}]({picture})\n\n" if result.panels else ""
+    return f"\n{markdown(result.rows)}{remarks}\n\n{drawn}".replace("\n\n\n", "\n\n")
 
 
 def _literal(text: str) -> str:

@@ -53,7 +53,7 @@ class Recording(NamedTuple):
     steps : in the order in which they were played; of a bag that was cut only those that are whole in it.
     fault : why the driver stopped, '' where it did not.
     fault_time : s, NaN where it did not.
-    outcome : 'done', why the scenario failed, or the step in which the recording ended.
+    outcome : DONE, why the scenario failed, or the step in which the recording ended.
     """
 
     bag: Bag
