@@ -86,6 +86,7 @@ class TaskControl:
         # by cover and place: m since something is touched there, s since it is no more
         self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
+        self._begun: list[float] = []  # (n,) rad, where the task began
         self._held.release()
         self._feed_forward.reset()
         self._refusal = ""
@@ -119,7 +120,9 @@ class TaskControl:
         own = self._parameters
         self._slide(q, dt)
         has_changed = self._begin(task)
-        states = self._frame.states(task, q, self._points(task, contact))
+        if has_changed:
+            self._begun = list(q)
+        states = self._frame.states(task, q, self._points(task, contact), self._begun)
         anchors = self._find_anchors(states)
         forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
         self._refusal = self._refusal or self._beyond(task) or self._frame.refusal(states)
