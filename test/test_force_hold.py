@@ -124,6 +124,7 @@ def test_a_force_that_cannot_be_sensed_is_refused_with_its_number_and_nothing_mo
     assert (out.velocity, out.effort) == (STILL, STILL)
     assert loop.reaction is ForceReaction.NOT_SENSED
     assert "standard deviation of 2." in loop.refusals["force_command"]
+    assert "allowed to begin: 1.2 N, 0.8 of the limit" in loop.reason
     assert "bend the arm" in loop.reason
     assert out.axis.force_sd > out.sd_limit == 1.5
     exactly = press(force_loop(ARM, PINNED), bent(0.0), radial(bent(0.0)), 5.0)
@@ -494,6 +495,11 @@ def test_a_way_through_free_space_ends_with_a_reason() -> None:
     assert "nothing was touched; allowed: limits.free_travel, 0.05 m" in loop.reason
     ask(loop, world, None)
     assert max(map(abs, ask(loop, world, down(5.0)).velocity)) > 0.0, "commanded again, it goes on"
+    for _ in range(30):
+        ask(loop, World(400.0, force=4.0), down(5.0))
+    for _ in range(400):
+        world.move(ask(loop, world, down(5.0)).velocity)
+    assert "along the force since it last touched something" in loop.reason
 
 
 def test_pressing_is_no_free_travel() -> None:
@@ -679,7 +685,7 @@ def test_a_force_that_is_not_reached_is_reported() -> None:
     for _ in range(3):
         out = ask(loop, World(400.0, force=3.0), down(5.0))
     assert loop.reaction is ForceReaction.NOT_REACHED
-    assert "3 N are measured and 5 N commanded" in loop.reason
+    assert "3 N are measured and 5 N commanded; the force has been too small for 0.51 s" in loop.reason
     assert any(out.velocity), "and it goes on"
     ask(loop, World(400.0, force=4.9), down(5.0))
     assert loop.reaction is ForceReaction.NOT_REACHED, "it is reported until it has been right for some time"
@@ -754,6 +760,7 @@ def test_a_force_that_swings_about_the_commanded_one_is_reported_until_it_rests(
     assert ForceReaction.NOT_REACHED not in reactions[:25]
     assert reactions[-1] is ForceReaction.NOT_REACHED
     assert "the force was reached, and leaves 5 N again and again by more than 0.5 N" in loop.reason
+    assert "something else pushes" in loop.reason
     for periods, left in ((60, ForceReaction.NOT_REACHED), (60, ForceReaction.NONE)):  # of a settling time of 100
         for _ in range(periods):
             ask(loop, World(400.0, force=5.2), down(5.0))
