@@ -8,8 +8,9 @@ from arms import CONFIGURATION, WAM
 from test_force_lasting import DIRECTION, OUTER, PLACE, POSE
 from test_force_plant import MOTORS
 
+from wam_control.arm_push import ArmPush
 from wam_control.force_hold import ForceReaction
-from wam_control.held_arm import HeldArm, HeldPush
+from wam_control.held_arm import HeldArm
 from wam_control.scenario import ScenarioStep
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import ForceCommand
@@ -89,7 +90,7 @@ def test_a_false_contact_does_not_make_the_arm_wander() -> None:
     held.hold(q.tolist(), 0.1)
     way = 0.0
     for _ in range(3000):
-        push = HeldPush(torques, np.full(4, 0.025), place, 1.0, 0.015)
+        push = ArmPush(torques, np.full(4, 0.025), place, 1.0, 0.015)
         velocity, _ = held.step(q.tolist(), [], push, 8.0, 1.5, 0.005)
         jacobian = BODY.point_jacobian(q, OUTER, (PLACE, 0.0, 0.0))
         way += float(np.linalg.norm(jacobian @ velocity)) * 0.005

@@ -18,10 +18,11 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``pressed_pose``                  - when the arm has left what it pressed on, for the contact estimator, too
 ``force_axis``                    - how a force along a direction is sensed, how the arm moves along it, how well
 ``force_hold``                    - when the arm holds its position instead, and why
+``arm_push``                      - what pushes the arm, at least, and how fast it goes against it
 ``held_arm``                      - an arm that holds gives way to what presses it harder than commanded
 ``feed_forward``                  - torques of the forces and dry friction, fed forward
 ``force_swing``                   - limit cycles of the measured force, and the shaking of the arm by a dither
-``motion_limits``                 - limits of the velocities: ends of the joints, contact force
+``motion_limits``                 - limits of the velocities: ends of the joints; gives way above the contact force
 ``force_law``                     - error to velocity of one axis: saturation, deadband, G_I, G_P; delay line
 ``hybrid_velocity``               - joint velocities of force and posture together
 ``task``                          - a task as data: axes of force, velocity, position, impedance

@@ -227,7 +227,14 @@ class ForceAxes:
         return result
 
     def disturbance(
-        self, q: Sequence[float], cover: str, position: float, position_sd: float, direction: Array, force: float
+        self,
+        q: Sequence[float],
+        cover: str,
+        position: float,
+        position_sd: float,
+        direction: Array,
+        force: float,
+        turned: float = 0.0,
     ) -> list[Array]:
         """Torques (n,), N m, of another force and of its friction, each as large as its standard deviation.
 
@@ -236,7 +243,7 @@ class ForceAxes:
         size = max(force, SMALLEST_FORCE)
         jacobian, point = self._jacobian(q, cover, position, direction)
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
-        friction = self._parameters.friction * size * _across(direction, direction)
+        friction = max(self._parameters.friction, turned) * size * _across(direction, direction)
         return [size * direction @ jacobian, *(friction @ jacobian), position_sd * size * direction @ slide]
 
     def slide(self, q: Sequence[float], cover: str, position: float, moved: Array) -> float:
@@ -295,6 +302,7 @@ class ForceAxes:
         direction: Array,
         force: float,
         others: Sequence[Array] = (),
+        turned: float = 0.0,
     ) -> ForceAxis:
         """The axis of a force at a contact.
 
@@ -305,6 +313,7 @@ class ForceAxes:
         direction : unit vector of the force of the arm on the world (3,), base frame.
         force : commanded force, N, to which tangential forces are proportional.
         others : torques (n,), N m, of other forces, each as large as its standard deviation.
+        turned : force across the direction per force along it which the surface may give without friction, too.
         """
         parameters, n = self._parameters, len(q)
         jacobian, point = self._jacobian(q, cover, position, direction)  # friction acts at the surface
@@ -322,13 +331,13 @@ class ForceAxes:
         # the end of a link is round, and other forces at the same position press the surface as well
         is_side = position + 2.0 * position_sd < length - self._covers.radius_of(cover) and not others
         push = aside if is_side else direction
-        friction = parameters.friction * size * _across(direction, push)
+        friction = max(parameters.friction, turned) * size * _across(direction, push)
         tangential = friction @ jacobian
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
         press: Array = push @ jacobian
         shift = push @ slide * size
-        turned = friction @ slide  # friction at another position has another lever
-        moved = np.outer(shift, shift) + turned.T @ turned
+        shifted = friction @ slide  # friction at another position has another lever
+        moved = np.outer(shift, shift) + shifted.T @ shifted
         spread = np.diag(parameters.torque_sd**2 + (parameters.torque_fraction * size * press) ** 2)
         spread += tangential.T @ tangential
         for torque in others:

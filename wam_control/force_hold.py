@@ -322,9 +322,9 @@ class ForceHold:
             )
         return (
             f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
-            f"of {point.cover}; allowed: {limit:.3g} N, and {RESUME:g} of it to begin (sensing.force_sd_limit, "
-            "force_sd_fraction); the arm holds its position: bend the arm, or command more force, another "
-            "direction or position"
+            f"of {point.cover}; allowed to begin: {RESUME * limit:.3g} N, {RESUME:g} of the limit "
+            "(sensing.force_sd_limit, force_sd_fraction); the arm holds its position: bend the arm, or command more "
+            "force, another direction or position"
             f"{'' if point.is_pinned else ', or pin the position'}"
         )
 
@@ -377,8 +377,9 @@ class ForceHold:
         if blind:
             return ForceReaction.NOT_SENSED, blind
         if self._travel > parameters.limits.free_travel:
+            since = "since it last touched something" if self.has_touched else "and nothing was touched"
             return ForceReaction.NOTHING_TOUCHED, (
-                f"the arm has moved {self._travel:.3g} m along the force and nothing was touched; allowed: "
+                f"the arm has moved {self._travel:.3g} m along the force {since}; allowed: "
                 f"limits.free_travel, {parameters.limits.free_travel:g} m; the arm holds its position: command no "
                 "force, then again"
             )
@@ -519,14 +520,16 @@ class ForceHold:
         is_late = self._missed > 0.0 and not self._has_settled
         if abs(self._missed) > (lasting if is_late else LEFT * lasting):
             return (
-                f"{measured:.3g} N are measured and {desired:.3g} N commanded, for {abs(self._missed):.2g} s"
-                f"{_slowed(axis)}: command what can be reached, another direction, or bend the arm"
+                f"{measured:.3g} N are measured and {desired:.3g} N commanded; the force has been too "
+                f"{'small' if error > 0.0 else 'large'} for {abs(self._missed):.2g} s{_slowed(axis)}: command what can "
+                "be reached, another direction, or bend the arm"
             )
         if self._strayed > LEFT * lasting:
             return (
                 f"the force was reached, and leaves {desired:.3g} N again and again by more than "
-                f"{tolerance(desired, parameters):.2g} N: the surface moves, friction turns, the position is unknown, "
-                "or it is a limit cycle; pin the position, or lower force_gain"
+                f"{tolerance(desired, parameters):.2g} N: the surface moves, something else pushes, friction turns, "
+                "the position is unknown, or it is a limit cycle; free the arm of what else touches it, pin the "
+                "position, or, for a cycle, lower force_gain"
             )
         return ""
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.arm_push import ArmPush
 from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.feed_forward import FeedForward
@@ -25,7 +26,7 @@ from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
 from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
-from wam_control.held_arm import HeldArm, HeldPush, RetreatForce
+from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits, WholeForce
 from wam_control.pressed_pose import has_left
@@ -69,7 +70,8 @@ class ForceOutput(NamedTuple):
     point: ForcePoint | None = None  # where it acts
     sd_limit: float = math.inf  # N, of its standard deviation
     rows: tuple[AxisRow, ...] = ()  # of the axes of a task
-    pressed: PressedForce | None = None  # where all of the commanded force acts at one known place
+    desired: float = 0.0  # N, of all that is commanded, where it presses on something
+    pressed: PressedForce | None = None  # where all of it acts at one known place
 
 
 class ForceLoop:
@@ -176,7 +178,7 @@ class ForceLoop:
         self._supervision = Supervision(self._arm, servo, self._timing, parameters, self._joints)
         self._servo, self.parameters = servo, parameters
         self._force_axes = ForceAxes(self._arm, self._body, sensing_of(parameters))
-        self._limits = MotionLimits(self._arm, self._body, parameters.limits)
+        self._limits = MotionLimits(self._arm, self._body, parameters.limits, parameters.joint_speed_limit)
         self._tasks = TaskControl(self._arm, self._body, self._force_axes, parameters, self._supervision)
         self._transfer.restart()
 
@@ -278,19 +280,22 @@ class ForceLoop:
         else:
             out = self._force(joints.position, contact, commands.force, commands.posture, dt)
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        place = _known_place(out.point, task)
-        limited = self._limits.step(velocity, joints.position, self._external[0], place, self._whole(out.pressed))
+        push = self._push(joints.position, _known_place(out.point, task))
+        limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
         if not self.reaction.holds and limited.contact_force:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
         elif not self.reaction.holds and limited.joint_end:
             self._react(ForceReaction.JOINT_END, limited.joint_end)
         return out._replace(velocity=limited.velocity)
 
-    def _whole(self, pressed: PressedForce | None) -> WholeForce | None:
-        """How the force in all is known at the place of a commanded one; None where it is not."""
-        if pressed is None:
+    def _whole(self, out: ForceOutput) -> WholeForce | None:
+        """The force that presses on something, and how it is known in all; None where none does."""
+        if not out.desired:
             return None
-        return WholeForce(pressed.force, lambda: self._force_axes.whole(self._joints, pressed, self._external[0]))
+        axes, pressed = self._force_axes, out.pressed
+        return WholeForce(
+            out.desired, None if pressed is None else lambda: axes.whole(self._joints, pressed, self._external[0])
+        )
 
     def _react(self, reaction: ForceReaction, reason: str) -> None:
         self.reaction, self.reason = reaction, reason
@@ -354,7 +359,7 @@ class ForceLoop:
         force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
         measured, before, free = self._measured(force_axis)
         scalar = law.along(axis)
-        error, is_pressed = desired - measured, point.is_certain and self._hold.is_touching
+        error, is_touching = desired - measured, self._hold.is_touching
         out = ForceOutput(
             [],
             [0.0] * self._n,
@@ -365,7 +370,8 @@ class ForceLoop:
             force_axis,
             point,
             own.sensing.sd_limit(desired, point.is_pinned),
-            pressed=PressedForce(*point[:3], direction, desired) if is_pressed else None,
+            desired=desired if is_touching or contact.cover else 0.0,
+            pressed=PressedForce(*point[:3], direction, desired) if is_touching and point.is_certain else None,
         )
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
@@ -378,7 +384,7 @@ class ForceLoop:
             excess = self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
             factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
             force = RetreatForce(force_axis, factor * scalar.velocity(0, -excess, -excess, dt) if excess else 0.0)
-            velocity, effort = self._hold_still(q, contact, point, force, desired, factor, dt)
+            velocity, effort = self._hold_still(q, contact, point, force, desired, dt)
             self._react(reaction, reason + self._held.push)
             self.refusals["force_command"] = self.reason
             return out._replace(velocity=[] if is_open else velocity, effort=effort)
@@ -488,7 +494,6 @@ class ForceLoop:
         point: ForcePoint,
         force: RetreatForce,
         desired: float,
-        factor: float,
         dt: float,
     ) -> tuple[list[float], list[float]]:
         """Velocities and torques of an arm that holds: to where it does, or away from what pushes too hard."""
@@ -499,22 +504,27 @@ class ForceLoop:
             self._goes_back = goes_back
             self._held.hold(self._free_of(force.axis) if goes_back else q, own.limits.free_travel)
             self._transfer.restart()
-        push = self._push(q, contact, _known_place(point, None))
-        push = push._replace(allowed=min(push.allowed, desired), gain=factor * push.gain)
+        push = self._push(q, self._pushed_place(contact, _known_place(point, None)))
+        push = push._replace(allowed=min(push.allowed, desired))
         velocity, is_yielding = self._held.step(q, [force], push, own.posture_gain, own.joint_speed_limit, dt)
         return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt) if is_yielding else still
 
-    def _push(self, q: Sequence[float], contact: Contact, place: tuple[str, float] | None) -> HeldPush:
-        """What pushes an arm that holds: where it is estimated, if on another cover than that of the known place."""
+    def _push(self, q: Sequence[float], place: tuple[str, float] | None) -> ArmPush:
+        """What pushes the arm, at a place or wherever it does."""
         own = self.parameters
         torques = self._external[0] - self._unknown[0]
         if own.feedback == "joint_sensors":
             torques = torques + self._force_axes.inertia(q) @ self._acceleration
         sd = np.array(self._external_sd or [sensing_of(own).torque_sd] * self._n)
+        gain = self._supervision.present * max(own.force_gain)
+        return ArmPush(torques, sd, place, own.limits.contact_force, gain)
+
+    def _pushed_place(self, contact: Contact, place: tuple[str, float] | None) -> tuple[str, float] | None:
+        """Where an arm that holds is pushed: estimated, if on another cover than that of the known place."""
         if contact.cover and (place is None or place[0] != contact.cover):
             middle = MIDDLE * self._arm.covers.length_of(contact.cover)
             place = contact.cover, middle if math.isnan(contact.position) else contact.position
-        return HeldPush(torques, sd, place, own.limits.contact_force, max(own.force_gain))
+        return place
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
@@ -591,7 +601,7 @@ class ForceLoop:
             # what no mass at the tool explains may be several surfaces that are touched already
             carried = self._carried(q, resting)
             self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
-        push = self._push(q, contact, _known_place(None, task))
+        push = self._push(q, self._pushed_place(contact, _known_place(None, task)))
         found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown, push)
         self._react(found.reaction, found.reason)
         if found.reaction.holds:
@@ -602,7 +612,7 @@ class ForceLoop:
             self._transfer.restart()
         measured, error = _triple(found.measured.tolist()), _triple(found.error.tolist())
         out = ForceOutput(found.velocity, found.effort, measured, error, error, task.frame)
-        return out._replace(rows=found.rows, pressed=found.pressed)
+        return out._replace(rows=found.rows, desired=found.desired, pressed=found.pressed)
 
     def _joint_torque(self, contact: Contact, torque: Sequence[float] | None, dt: float) -> ForceOutput:
         """Torque of each joint; without a command the arm holds still."""

@@ -107,7 +107,12 @@ class Supervision:
         has_changed = watch.step(where, dt)
         if watch.assessed is not before:
             self._report()
-        return 1.0 if self._parameters.guard.mode == "warn" else watch.factor, has_changed
+        return self.present, has_changed
+
+    @property
+    def present(self) -> float:
+        """Factor of the gains in force."""
+        return 1.0 if self.watch is None or self._parameters.guard.mode == "warn" else self.watch.factor
 
     def _contacts(
         self, q: tuple[float, ...], point: ForcePoint, direction: Triple | None, force: float

@@ -1,20 +1,19 @@
 """An arm that holds its position instead of controlling a force, and gives way where it is pressed harder than that."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.arm_push import ArmPush
 from wam_control.force_axis import ForceAxis
 from wam_control.hybrid_velocity import posture_velocity
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
-CERTAIN = 3.0  # standard deviations of the torques that are no push
 ARRIVED = 0.02  # rad, of each joint from the posture that is held
-SHORTEST = 1e-6  # m, lever of a place on the joints
+SLOWEST = 1e-9  # rad/s
 
 
 class RetreatForce(NamedTuple):
@@ -22,24 +21,6 @@ class RetreatForce(NamedTuple):
 
     axis: ForceAxis
     speed: float
-
-
-class HeldPush(NamedTuple):
-    """What pushes an arm that holds.
-
-    Attributes
-    ----------
-    torques, torque_sd : of the world on the joints (n,), N m, and the standard deviation of each.
-    position : cover and position, m, where it pushes; None where that is not known, and the tool is assumed.
-    allowed : N, up to which the arm does not give way.
-    gain : speed per force above it, m/s/N.
-    """
-
-    torques: Array
-    torque_sd: Array
-    position: tuple[str, float] | None
-    allowed: float
-    gain: float
 
 
 class HeldArm:
@@ -82,7 +63,7 @@ class HeldArm:
         self._at, self._way, self._has_arrived, self._pushed = list(at), way, False, 0.0
 
     def step(
-        self, q: Sequence[float], forces: Sequence[RetreatForce], push: HeldPush, gain: float, limit: float, dt: float
+        self, q: Sequence[float], forces: Sequence[RetreatForce], push: ArmPush, gain: float, limit: float, dt: float
     ) -> tuple[list[float], bool]:
         """Joint velocities (n,), rad/s, of one outer period, and whether the arm gives way.
 
@@ -96,34 +77,24 @@ class HeldArm:
         """
         back = posture_velocity(self._at, q, gain, limit)
         self._has_arrived = self._has_arrived or max(abs(a - b) for a, b in zip(self._at, q, strict=True)) < ARRIVED
-        velocity, jacobian = self._yielding(q, forces, push)
-        fastest = float(np.abs(velocity).max())
-        if not fastest or self._way <= 0.0:
-            return back, False
-        velocity *= min(limit / fastest, 1.0)
-        self._way -= float(np.linalg.norm(jacobian @ velocity)) * dt
-        if self._has_arrived:
-            self._at = list(q)
-        else:
-            velocity += back
-        return velocity.tolist(), True
-
-    def _yielding(self, q: Sequence[float], forces: Sequence[RetreatForce], push: HeldPush) -> tuple[Array, Array]:
-        """Joint velocities (n,), rad/s, away from what pushes, and the Jacobian (3, n) of where it does."""
-        jacobian = self._body.tool_jacobian(q)
-        if push.position is not None:
-            cover, position = push.position
-            jacobian = self._body.point_jacobian(q, cover, (position, 0.0, 0.0))
-        size = max(float(np.linalg.norm(push.torques)), 1e-12)
-        lever = max(math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1])), SHORTEST)
-        least = max(size - CERTAIN * float(np.linalg.norm(push.torque_sd)), 0.0) / lever
-        velocity = push.torques * (push.gain * max(least - push.allowed, 0.0) / (lever * size))
-        if least > push.allowed or any(force.speed for force in forces):
-            self._pushed = max(self._pushed, least)
+        least = push.least(self._body, q)
+        is_yielding = least > push.allowed or any(force.speed for force in forces)
+        if self._way <= 0.0:
+            push, is_yielding = push._replace(gain=0.0), False
+        velocity = np.array(back)
+        if least:
+            velocity += push.correction(self._body, q, back, least, limit)
+        if not is_yielding:
+            return velocity.tolist(), False
+        self._pushed = max(self._pushed, least)
         for force in forces:
             if force.speed:
                 row = force.axis.lever
                 velocity -= row * (float(row @ velocity) / float(row @ row))
         for force in forces:
             velocity += force.axis.move * force.speed
-        return velocity, jacobian
+        velocity *= min(limit / max(float(np.abs(velocity).max()), SLOWEST), 1.0)
+        self._way -= float(np.linalg.norm(push.jacobian(self._body, q) @ velocity)) * dt
+        if self._has_arrived:
+            self._at = list(q)
+        return velocity.tolist(), True

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.arm_push import ArmPush
 from wam_description.arm import Arm
 from wam_description.parameters import parameter
 from wam_description.rigid_body import RigidBody
@@ -15,7 +16,6 @@ from wam_description.rigid_body import RigidBody
 Array = NDArray[np.float64]
 PUSH_BACK = 0.3  # rad/s, at which a joint beyond its end is brought back, at most
 BEGIN = 0.9  # of the largest contact force, from which motion against it is slowed down
-REPORTED = 0.5  # of the speed against it, below which that is reported: the force comes near its limit ever more slowly
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class LimitParameters:
         "distance from the end of a joint at which it has to stop", "rad", low=0.0, high=1.0, live=True, before=0.0
     )
     contact_force: float = parameter(
-        "largest force on the arm, as far as the joints measure it; above it the arm does not move against it",
+        "largest force on the arm, as far as the joints measure it; above it the arm gives way",
         "N",
         low=0.0,
         high=1e9,
@@ -42,7 +42,8 @@ class LimitParameters:
         before=1e9,
     )
     whole_force: float = parameter(
-        "largest force in all at a known position, per commanded force; above it the arm does not move against it",
+        "largest force in all, per commanded force, at its position or, where that is not known, wherever it acts; "
+        "above it the arm gives way",
         low=0.0,
         high=1e9,
         live=True,
@@ -111,14 +112,20 @@ class LimitParameters:
 
 
 class WholeForce(NamedTuple):
-    """A force that is commanded at a known place, N, and the one that is measured there in all, in any direction."""
+    """A force that presses on something.
+
+    Attributes
+    ----------
+    desired : commanded, N, in all directions together.
+    measured : the one in all, N, where its place is known; None where it is not.
+    """
 
     desired: float
-    measured: Callable[[], float]
+    measured: Callable[[], float] | None
 
 
 class Limited(NamedTuple):
-    """Joint velocities (n,), rad/s, and why they are less than commanded, '' where they are not."""
+    """Joint velocities (n,), rad/s, and why they are not those commanded, '' where they are."""
 
     velocity: list[float]
     joint_end: str
@@ -128,22 +135,27 @@ class Limited(NamedTuple):
 class MotionLimits:
     """Limits the velocities of one arm.
 
+    What pushes harder than allowed is not moved against, and the arm gives way to it: at rest its velocity loops would
+    hold it against whatever comes.
+
     Parameters
     ----------
     arm : the arm as the controller knows it.
     body : its kinematics.
     parameters : the limits.
+    fastest : speed of a joint, rad/s, with which the arm gives way at most.
     """
 
-    def __init__(self, arm: Arm, body: RigidBody, parameters: LimitParameters) -> None:
-        self._joints, self._body, self._parameters = arm.joints, body, parameters
+    def __init__(self, arm: Arm, body: RigidBody, parameters: LimitParameters, fastest: float) -> None:
+        self._joints, self._body, self._parameters, self._fastest = arm.joints, body, parameters, fastest
+        self._given = self._pushed = 0.0  # m by which the arm has given way, N in the present push
 
     def step(
         self,
         velocity: Sequence[float],
         q: Sequence[float],
-        external: Array,
-        position: tuple[str, float] | None = None,
+        push: ArmPush,
+        dt: float,
         whole: WholeForce | None = None,
     ) -> Limited:
         """Limit commanded velocities.
@@ -152,44 +164,56 @@ class MotionLimits:
         ----------
         velocity : commanded (n,), rad/s; empty for torque only, which is not limited.
         q : joint angles (n,), rad.
-        external : torques of the world on the joints (n,), N m.
-        position : cover and position along it, m, where the commanded force acts; None if that is not known.
-        whole : the force in all there.
+        push : what pushes, where the commanded force acts if that is known.
+        dt : outer period, s.
+        whole : the commanded force, if something is pressed.
         """
         if not velocity:
             return Limited([], "", "")
-        slowed, force = self._against_the_world(list(velocity), q, external, position, whole)
+        slowed, force = self._against_the_world(list(velocity), q, push, dt, whole)
         stopped, end = self._before_the_ends(slowed, q)
         return Limited(stopped, end, force)
 
     def _against_the_world(
-        self,
-        velocity: list[float],
-        q: Sequence[float],
-        external: Array,
-        position: tuple[str, float] | None,
-        whole: WholeForce | None,
+        self, velocity: list[float], q: Sequence[float], push: ArmPush, dt: float, whole: WholeForce | None
     ) -> tuple[list[float], str]:
-        """Without the part that does work on the world, where its force is above the limit."""
-        own, power = self._parameters, float(external.dot(velocity))
-        if power >= 0.0:
+        """Against a force that has come near the largest one no faster than the force law towards that one."""
+        force, allowed, limit = self._push(q, push, whole)
+        if not self._pushed and force <= BEGIN * allowed:
             return velocity, ""
-        most = own.contact_force
-        force, limit = least_force(self._body, q, external, BEGIN * most, position), f"limits.contact_force, {most:g} N"
-        part = _beyond(force, most)
-        if whole and (allowed := own.whole_force * whole.desired) < most:
-            found = whole.measured()
-            if (beyond := _beyond(found, allowed)) > part:
-                force, part = found, beyond
-                limit = f"limits.whole_force, {own.whole_force:g} times the commanded {whole.desired:.3g} N"
-        if not part:
+        has_room = self._given < self._parameters.free_travel
+        push = push._replace(allowed=allowed, gain=push.gain if has_room or force < allowed else 0.0)
+        missing = push.correction(self._body, q, velocity, force, self._fastest)
+        is_bound = bool(missing.any())
+        if not is_bound and force <= BEGIN * allowed:
+            self._given = self._pushed = 0.0
             return velocity, ""
-        slowed: list[float] = (np.array(velocity) - part * power / float(external @ external) * external).tolist()
-        reason = (
-            f"the world pushes with at least {force:.3g} N in all; allowed: {limit}; the arm does not move against it: "
-            "command a direction or a posture away from it, or less force"
+        self._pushed = max(self._pushed, force)
+        limited: list[float] = (np.array(velocity) + missing).tolist()
+        if force > allowed:
+            self._given += float(np.linalg.norm(push.jacobian(self._body, q) @ limited)) * dt
+        if not is_bound:
+            return limited, ""
+        return limited, (
+            f"the world pushes with at least {self._pushed:.2g} N in all; allowed: {limit}; the arm does not move "
+            "against it, and gives way by limits.free_travel at most: command a direction or a posture away from it, "
+            "or less force"
         )
-        return slowed, reason if part > REPORTED else ""
+
+    def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float, str]:
+        """Force, N, the largest one allowed, and its name: of those that count here the one that is nearest to it."""
+        own = self._parameters
+        most, allowed = own.contact_force, math.inf
+        if whole:
+            allowed = min(own.whole_force * whole.desired, math.inf)
+        least = push.least(self._body, q, BEGIN * min(most, allowed))
+        found = least, most, f"limits.contact_force, {most:g} N"
+        if whole and allowed < most:
+            force = whole.measured() if whole.measured else least
+            if force * most >= least * allowed:
+                words = f"limits.whole_force, {own.whole_force:g} times the commanded {whole.desired:.3g} N"
+                found = force, allowed, words
+        return found
 
     def _before_the_ends(self, velocity: list[float], q: Sequence[float]) -> tuple[list[float], str]:
         gain, margin = self._parameters.joint_gain, self._parameters.joint_margin
@@ -208,31 +232,8 @@ class MotionLimits:
         return limited, reason
 
 
-def _beyond(force: float, most: float) -> float:
-    """Part of the motion against a force, N, that the largest one takes away, 0 to 1."""
-    return min(max((force - BEGIN * most) / max((1.0 - BEGIN) * most, 1e-9), 0.0), 1.0)
-
-
 def _approach(distance: float, gain: float, margin: float) -> float:
     """Largest speed towards an end at this distance, rad/s; beyond the end negative, back from it."""
     if distance < 0.0:
         return max(gain * distance, -PUSH_BACK)
     return gain * max(distance - margin, 0.0)
-
-
-def least_force(
-    body: RigidBody, q: Sequence[float], external: Array, above: float = 0.0, position: tuple[str, float] | None = None
-) -> float:
-    """Smallest force, N, that gives external torques of this size: at a position along a cover, m, or at the tool.
-
-    A force nearer to the base than the tool is larger.  One that is certainly not `above` this, N, is returned as 0:
-    the singular values, squared, of the Jacobian have their mean below the largest.
-    """
-    jacobian = (
-        body.tool_jacobian(q) if position is None else body.point_jacobian(q, position[0], (position[1], 0.0, 0.0))
-    )
-    size = math.sqrt(float(external.dot(external)))
-    if size <= above * math.sqrt(float(np.vdot(jacobian, jacobian)) / 3.0):
-        return 0.0
-    largest = math.sqrt(float(np.linalg.eigvalsh(jacobian @ jacobian.T)[-1]))
-    return size / largest if largest > 0.0 else 0.0

@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.arm_push import ArmPush
 from wam_control.contact_position import ForcePoint, position_is_certain, slid_position
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, PressedForce
 from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
-from wam_control.held_arm import HeldArm, HeldPush, RetreatForce
+from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, posture_velocity
 from wam_control.stability_guard import GuardedContact, GuardedForces
 from wam_control.task import AxisKind, TaskCommand
@@ -37,7 +38,8 @@ class TaskOutput(NamedTuple):
     rows : of each axis, as the topic task_axes has them.
     reaction, reason : what is done instead of what is commanded, and why.
     has_changed : whether the law has changed since the period before.
-    pressed : the commanded force, where the task is nothing but forces at one known place.
+    desired : N, of all its forces, where the task is nothing but forces of points, and one touches; else 0.
+    pressed : the commanded force, where that is at one known place.
     """
 
     velocity: list[float]
@@ -48,6 +50,7 @@ class TaskOutput(NamedTuple):
     reaction: ForceReaction
     reason: str
     has_changed: bool
+    desired: float
     pressed: PressedForce | None
 
 
@@ -83,6 +86,7 @@ class TaskControl:
         # by cover and place: m since something is touched there, s since it is no more
         self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
+        self._begun: list[float] = []  # (n,) rad, where the task began
         self._held.release()
         self._feed_forward.reset()
         self._refusal = ""
@@ -98,7 +102,7 @@ class TaskControl:
         rate: Sequence[float] | None,
         dt: float,
         unknown: tuple[Array, str],
-        push: HeldPush,
+        push: ArmPush,
     ) -> TaskOutput:
         """One outer period.
 
@@ -116,7 +120,9 @@ class TaskControl:
         own = self._parameters
         self._slide(q, dt)
         has_changed = self._begin(task)
-        states = self._frame.states(task, q, self._points(task, contact))
+        if has_changed:
+            self._begun = list(q)
+        states = self._frame.states(task, q, self._points(task, contact), self._begun)
         anchors = self._find_anchors(states)
         forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
         self._refusal = self._refusal or self._beyond(task) or self._frame.refusal(states)
@@ -143,7 +149,7 @@ class TaskControl:
         fed = np.sum([self._fed(*pair, dt) for pair in zip(states, self._holds, strict=True)], axis=0)
         if self._held.is_holding:
             allowed = math.fsum(map(_desired, states)) or push.allowed
-            push = push._replace(allowed=min(push.allowed, allowed), gain=factor * push.gain)
+            push = push._replace(allowed=min(push.allowed, allowed))
             back = [self._back(*one, factor, dt) for one in zip(states, forces, self._holds, strict=True)]
             gain, limit = own.posture_gain, own.joint_speed_limit
             velocity, is_yielding = self._held.step(q, [one for one in back if one], push, gain, limit, dt)
@@ -154,8 +160,10 @@ class TaskControl:
             hold.travel(float(state.row @ velocity) * dt)
         rows = tuple(map(_row, states, anchors, forces, resolved.independence, resolved.speed_fraction))
         measured, error = _vectors(states, forces)
-        pressed, has_changed = self._pressed(states), has_changed or is_other
-        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed, pressed)
+        is_pressing = self.is_touching and all(state.point and state.axis.kind is AxisKind.FORCE for state in states)
+        desired = math.fsum(map(_desired, states)) if is_pressing else 0.0
+        pressed, has_changed = self._pressed(states) if is_pressing else None, has_changed or is_other
+        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed, desired, pressed)
 
     def _begin(self, task: TaskCommand) -> bool:
         """Take a task; whether it has other axes than the one before."""
@@ -325,10 +333,10 @@ class TaskControl:
         return RetreatForce(state.sensed, factor * law.velocity(0, -excess, -excess, dt) if excess else 0.0)
 
     def _pressed(self, states: Sequence[AxisState]) -> PressedForce | None:
-        """The commanded force, where all axes are forces at one position that is given, and it presses."""
+        """The commanded force, where all axes, which are forces, are at one position that is given."""
         points = [state.point for state in states if state.point and state.point.is_pinned]
         is_one = len(points) == len(states) and len({point[:2] for point in points}) == 1
-        if not (is_one and self.is_touching and all(state.axis.kind is AxisKind.FORCE for state in states)):
+        if not is_one:
             return None
         whole = np.sum([_desired(state) * state.direction for state in states], axis=0)
         size = float(np.linalg.norm(whole))

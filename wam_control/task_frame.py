@@ -86,7 +86,9 @@ class TaskFrame:
         self._arm, self._body, self._axes = arm, body, axes
         self._parameters, self._sensing = parameters, sensing
 
-    def states(self, task: TaskCommand, q: Sequence[float], points: Sequence[ForcePoint]) -> list[AxisState]:
+    def states(
+        self, task: TaskCommand, q: Sequence[float], points: Sequence[ForcePoint], begun: Sequence[float] = ()
+    ) -> list[AxisState]:
         """Every axis of a task.
 
         Parameters
@@ -94,6 +96,7 @@ class TaskFrame:
         task : what is commanded.
         q : joint angles (n,), rad.
         points : where each axis acts.
+        begun : joint angles at which the task began (n,), rad; as q by default.
         """
         n = len(q)
         rotation = np.eye(3) if task.frame == BASE else self._body.cover_pose(q, task.frame).rotation
@@ -101,7 +104,7 @@ class TaskFrame:
         # a force is positive along its direction, which is the normal of the surface
         directions = [-d if _pulls(axis) else d for axis, d in zip(task.axes, directions, strict=True)]
         torques = [
-            self._torques(q, axis, point, u) if axis.is_sensed and axis.joint < 0 else []
+            self._torques(q, begun, axis, point, u) if axis.is_sensed and axis.joint < 0 else []
             for axis, u, point in zip(task.axes, directions, points, strict=True)
         ]
         found = []
@@ -121,15 +124,24 @@ class TaskFrame:
                 # two axes at one place are parts of one force, whose friction is that of `sensed` already
                 is_same = (task.axes[k].cover, task.axes[k].position) == (axis.cover, axis.position)
                 others += [] if k == i else other[:1] if is_same else other
-            sensed = self._axes.axis(q, axis.cover, place, place_sd, u, _size(axis), others)
+            turned = self._turned(q, begun, axis.cover, u) if others else 0.0
+            sensed = self._axes.axis(q, axis.cover, place, place_sd, u, _size(axis), others, turned)
             found.append(AxisState(axis, sensed.lever, u, coordinate, sensed, points[i]))
         return found
 
-    def _torques(self, q: Sequence[float], axis: TaskAxis, point: ForcePoint, direction: Array) -> list[Array]:
+    def _turned(self, q: Sequence[float], begun: Sequence[float], cover: str, direction: Array) -> float:
+        """By how much a link has turned towards a force since the task began: a smooth rod turns its force with it."""
+        now, then = (self._body.cover_pose(at, cover).rotation[:, 0] for at in (q, begun or q))
+        return abs(float(direction @ (now - then)))
+
+    def _torques(
+        self, q: Sequence[float], begun: Sequence[float], axis: TaskAxis, point: ForcePoint, direction: Array
+    ) -> list[Array]:
         """Torques (n,), N m, by which a force along this axis disturbs the other ones; a hand has no friction."""
         if axis.kind is AxisKind.IMPEDANCE:
             return [HAND * self._axes.lever(q, axis.cover, point.position, direction)]
-        return self._axes.disturbance(q, axis.cover, point.position, point.position_sd, direction, _size(axis))
+        where, turned = (axis.cover, point.position, point.position_sd), self._turned(q, begun, axis.cover, direction)
+        return self._axes.disturbance(q, *where, direction, _size(axis), turned)
 
     def refusal(self, states: Sequence[AxisState]) -> str:
         """Why this task cannot be done in this pose, with the number; '' where it can."""
