@@ -84,7 +84,7 @@ def run_trial(trial: IdentificationTrial) -> IdentificationResult:
         rows = friction_row(found, direction, (np.abs(load) * moves).sum(0) / moves.sum(0))
         true = truth.level(way, SPEED, load, moves)
         errors["level"].append((rows @ found.values - true) / true)
-        errors["level_sd"].append(np.sqrt(np.einsum("ip,pq,iq->i", rows, found.covariance, rows)) / true)
+        errors["level_sd"].append(np.sqrt(found.uncertainty.variances(rows)) / true)
         errors["before"].append((rows @ found.unknowns.present - true) / true)
         at = found.unknowns.places(f"motors.coulomb_{direction}")
         errors["coulomb"].append((found.values[at] - truth.coulomb[way]) / truth.coulomb[way])
