@@ -38,6 +38,16 @@ class ModelPrior(NamedTuple):
     tolerable: Array
 
 
+def friction_error(shaft: str, way: str) -> str:
+    """Name of the error of the friction of a motor or joint in one of `WAYS`."""
+    return f"friction of {shaft} in {way} motion"
+
+
+def load_error(shaft: str) -> str:
+    """Name of the error of its friction by load."""
+    return f"load friction of {shaft}"
+
+
 def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: ArmModel | None) -> ModelPrior:
     """The errors of the model of an arm; `payload_sd` in kg; `model` is the identified one, if there is any."""
     n = len(arm.joints.names)
@@ -64,9 +74,9 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
         _identify(arm, model, errors, covariance)
     shafts = [*motors, *joints]
     names = (
-        *(f"friction of {name} in {way} motion" for way in WAYS for name in shafts),
+        *(friction_error(name, way) for way in WAYS for name in shafts),
         *(f"masses at {name}" for name in joints),
-        *(f"load friction of {name}" for name in shafts),
+        *map(load_error, shafts),
         *(f"torque constant of {name}" for name in motors),
         "delay of the torques",
         "payload",
