@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
+from wam_analysis.findings.analysis import analyse
 from wam_control.contact_estimator import ALONE, ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact_estimator_node import ContactEstimatorNode
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
@@ -24,6 +25,7 @@ from wam_description.transmission_map import TransmissionMap
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
 from wam_experiments.contact_benchmark.scenarios import base_values
+from wam_sim.simulated_bag import record
 from wam_sim.simulation import Simulation
 
 CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
@@ -499,7 +501,25 @@ def test_drift_of_friction_is_followed_and_published_once_a_second() -> None:
     assert len(stamps) > 12
     friction = np.array([row.values for row in rows]).reshape(len(rows), 8, 3)
     at_motor = np.abs(TransmissionMap.of(ARM).joint_from_motor[0, 0])
-    total = friction[:, 0, :2] + at_motor * friction[:, 4, :2]  # of motor 1 and joint 1, which free motion does not separate
+    total = (
+        friction[:, 0, :2] + at_motor * friction[:, 4, :2]
+    )  # of motor 1 and joint 1, which free motion does not separate
     grown = total[-1] - total[5]
     assert grown == pytest.approx([0.3 * level * at_motor] * 2, rel=0.5)
     assert np.abs(total[5] - total[3]).max() < 0.3 * grown.min()
+
+
+@pytest.mark.slow
+def test_the_analysis_of_a_bag_has_the_tracked_friction(tmp_path: Path) -> None:
+    configured = CONFIGURATION.with_values(base_values(CONFIGURATION, False))
+    steps = [ScenarioStep("release", 0.5, request="enable"), ScenarioStep("move", 1.2, posture=(0.5, -0.9, 0.3, 2.0))]
+    record(configured, steps, tmp_path / "moved")
+    (section,) = (each for each in analyse(tmp_path / "moved", lambda _: None).sections if each.key == "contact")
+    found = {finding.name: finding for finding in section.findings}
+    level = ARM.motors.dynamic_friction[0]
+    for way in ("positive", "negative"):
+        finding = found[f"motor1: friction in {way} motion"]
+        assert finding.unit == "N m"
+        assert 0.5 * level < finding.measured < 1.5 * level
+        assert "since the start" in finding.note
+        assert f"joint4: friction in {way} motion" in found
