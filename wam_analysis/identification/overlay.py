@@ -61,7 +61,7 @@ def model_values(shared: Shared, found: Identification, source: str) -> dict[str
     groups = _by_group(result)
     values: dict[str, Any] = {"model.source": source}
     for group, each in groups.items():
-        if group.startswith("motors."):
+        if group.startswith("motors.") and group != "motors.torque_difference":
             values[f"model.{group}"] = _numbers(each)
     values["model.motors.stribeck_velocity"] = _numbers(found.stribeck_velocity)
     values |= _joint_values(shared, found.unknowns, groups)

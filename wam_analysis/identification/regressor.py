@@ -83,6 +83,10 @@ class Regressor:
             columns[:, range(n), unknowns.places(group)] = found
         columns[:, range(n), unknowns.places("motors.inertia")] = motion.thetadd
         self._add_joints(columns, load)
+        driving = self.inertial_torques(values).sum(2)
+        for place, motor in zip(unknowns.places("motors.torque_difference"), unknowns.sharing[1:], strict=True):
+            first = unknowns.sharing[0]
+            columns[:, first, place], columns[:, motor, place] = driving[:, first], -driving[:, motor]
         at, jacobian, constant = self._inertial(values)
         columns[:, :, at] = self._links @ jacobian
         torque = motion.torque - self._carried - self._links @ constant

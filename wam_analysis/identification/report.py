@@ -12,7 +12,7 @@ from wam_description.arm import Shared
 
 UNITS = {
     "coulomb": "N m", "static": "N m", "load": "", "viscous": "N m s/rad", "inertia": "kg m^2", "mass": "kg",
-    "moment": "kg m",
+    "moment": "kg m", "torque": "",
 }  # fmt: skip
 SHORT = 20.0  # s of motion in one direction, less of which is warned about
 FEW = 6  # parts of the motion in which a motor turns both ways

@@ -17,6 +17,7 @@ from wam_analysis.identification.uncertainty import Uncertainty
 Array = NDArray[np.float64]
 
 THEMSELVES = ("motors.coulomb_", "motors.load_", "joints.coulomb.", "joints.load.")  # identified and tracked
+CONSTANTS = "motors.torque_"  # the estimator has errors of the torque constants that are not identified
 LEAST = 1e-12  # size of a column that the motion does not show
 
 
@@ -51,9 +52,10 @@ def tracked_errors(
     own = [i for i, name in enumerate(names) if name.startswith(THEMSELVES)]
     every = np.concatenate((equations.columns[:, :, own], regressor.inertial_torques(values)), axis=2)
     tracked, columns = every[equations.is_used], equations.columns[equations.is_used]
+    columns[:, [i for i, name in enumerate(names) if name.startswith(CONSTANTS)]] = 0.0
     size = np.maximum(np.linalg.norm(tracked, axis=0), LEAST)
     nearest = np.linalg.lstsq(tracked / size, columns, rcond=None)[0] / size[:, None]
-    left = equations.columns - every @ nearest
+    left = np.where(nearest.any(axis=0), equations.columns, 0.0) - every @ nearest
     rms = [
         np.sqrt(uncertainty.variances(left[used, i]).mean()) if used.any() else 0.0
         for i, used in enumerate(equations.is_used.T)
