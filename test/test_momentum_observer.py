@@ -361,7 +361,7 @@ def test_finite_values_whose_sum_overflows_are_refused_and_do_not_end_the_node()
 
 
 def test_errors_that_are_larger_than_stated_widen_what_is_published_detected_and_compared() -> None:
-    """The same signals with errors in free motion three times the variance: every covariance of torques is as many times larger."""
+    """The same signals with errors in free motion of three times the variance: so has every covariance of torques."""
     covariances = []
     for size in (1.0, 3.0):
         observer = MomentumObserver(ARM, dataclasses.replace(EXACT, detection_time=0.008), use_joint_sensors=False)
