@@ -73,7 +73,7 @@ def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:
     """Friction of motors and joints as the estimator followed it, at the end of the recording."""
     run, arm = recording.run, arm_of(recording.run)
     columns = run.bag.topics.get(f"{run.namespace}/contact/tracked_friction")
-    if not isinstance(columns, TableColumns) or arm is None:
+    if not isinstance(columns, TableColumns) or not len(columns.stamp_ns) or arm is None:
         return
     names = (*arm.motors.names, *arm.joints.names)
     for way in FRICTION_COLUMNS[:2]:
