@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from contact_truth import RigidArm, joint_torques, motor_from_joint, torques
 
+from wam_analysis.findings.analysis import analyse
 from wam_control.contact_estimator import ALONE, ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact_estimator_node import ContactEstimatorNode
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
+from wam_control.scenario import ScenarioStep
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
@@ -22,6 +24,9 @@ from wam_description.synchroniser import Inputs
 from wam_description.transmission_map import TransmissionMap
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
+from wam_experiments.contact_benchmark.scenarios import base_values
+from wam_sim.simulated_bag import record
+from wam_sim.simulation import Simulation
 
 CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
 ARM, TIMING = CONFIGURATION.shared.arm, CONFIGURATION.shared.timing
@@ -475,3 +480,46 @@ def test_held_motors_feel_nothing_and_joint_sensors_feel_on() -> None:
         found = estimator.estimate()
         assert found.in_contact is is_felt
         assert found.reason == ("" if is_felt else "brakes hold the motors")
+
+
+@pytest.mark.slow
+def test_drift_of_friction_is_followed_and_published_once_a_second() -> None:
+    configured = CONFIGURATION.with_values(base_values(CONFIGURATION, False))
+    ends = ((0.5, -0.9, 0.3, 2.0), (-0.4, -0.3, -0.3, 1.4))
+    steps = [ScenarioStep("release", 0.5, request="enable")]
+    steps += [ScenarioStep("move", 1.2, posture=ends[i % 2]) for i in range(12)]
+    run = Simulation(configured, steps)
+    level = ARM.joints.dynamic_friction[0]
+    tick = 0
+    while not run.step():
+        tick += 1
+        if tick == 6000:
+            run.driver.set_added_friction([0.3 * level, 0.0, 0.0, 0.0])
+    rows = run.rows["contact/tracked_friction"]
+    stamps = [row.stamp // 1_000_000_000 for row in rows]
+    assert stamps == list(range(stamps[0], stamps[-1] + 1))
+    assert len(stamps) > 12
+    friction = np.array([row.values for row in rows]).reshape(len(rows), 8, 3)
+    at_motor = np.abs(TransmissionMap.of(ARM).joint_from_motor[0, 0])
+    total = (
+        friction[:, 0, :2] + at_motor * friction[:, 4, :2]
+    )  # of motor 1 and joint 1, which free motion does not separate
+    grown = total[-1] - total[5]
+    assert grown == pytest.approx([0.3 * level * at_motor] * 2, rel=0.5)
+    assert np.abs(total[5] - total[3]).max() < 0.3 * grown.min()
+
+
+@pytest.mark.slow
+def test_the_analysis_of_a_bag_has_the_tracked_friction(tmp_path: Path) -> None:
+    configured = CONFIGURATION.with_values(base_values(CONFIGURATION, False))
+    steps = [ScenarioStep("release", 0.5, request="enable"), ScenarioStep("move", 1.2, posture=(0.5, -0.9, 0.3, 2.0))]
+    record(configured, steps, tmp_path / "moved")
+    (section,) = (each for each in analyse(tmp_path / "moved", lambda _: None).sections if each.key == "contact")
+    found = {finding.name: finding for finding in section.findings}
+    level = ARM.motors.dynamic_friction[0]
+    for way in ("positive", "negative"):
+        finding = found[f"motor1: friction in {way} motion"]
+        assert finding.unit == "N m"
+        assert 0.5 * level < finding.measured < 1.5 * level
+        assert "since the start" in finding.note
+        assert f"joint4: friction in {way} motion" in found

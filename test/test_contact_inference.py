@@ -15,6 +15,7 @@ from wam_control.contact_inference import ContactInference, Hypothesis, detectio
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.rigid_body import RigidBody
+from wam_description.units import STANDARD_GRAVITY
 
 CONFIGURATION = Configuration.load(Path(__file__).parents[1] / "config" / "wam.yaml")
 ARM = CONFIGURATION.shared.arm
@@ -30,6 +31,7 @@ S = SD**2 * np.eye(4)
 W = np.linalg.inv(S)
 COARSE = 0.1**2 * np.eye(4)  # as in motion; finer torques tell the links by where their tubes are
 NOISELESS = 1e6 * W
+DETECT = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).detect
 
 
 def infer(
@@ -462,3 +464,38 @@ def test_a_payload_that_is_picked_up_is_no_certain_contact() -> None:
     found = INFERENCE.infer(POSE, push.tolist(), W, load)
     assert sum(each.probability for each in found) > 0.999
     assert contact_inference.PAYLOAD not in found[0].reason
+
+
+def payload_rows() -> list[str]:
+    """Rows of the table of docs/estimator.md: 200 poses, torques with errors of 0.1 N m at each joint, as in motion."""
+    rows = []
+    body, heavier = RigidBody(ARM), RigidBody(dataclasses.replace(ARM, payload=ARM.payload + 1.0))
+    for mass in (0.1, 0.3, 0.5):
+        found: list[list[float]] = [[], [], []]
+        random = np.random.default_rng(54)
+        for q in random.uniform(np.array(ARM.joints.lower) + 0.4, np.array(ARM.joints.upper) - 0.4, (200, 4)):
+            load = np.array(body.gravity_torque(q)) - heavier.gravity_torque(q)
+            rotation = np.array(body.cover_pose(q, "outer_link").rotation)
+            azimuth = random.uniform(-math.pi, math.pi)
+            off = np.array([math.cos(azimuth) / 2.0, math.sin(azimuth) / 2.0, -math.sqrt(3.0) / 2.0])
+            pushes = [np.array([0.0, 0.0, -1.0]), off]
+            weight = mass * STANDARD_GRAVITY
+            noise = 0.1 * random.standard_normal(4)
+            every = [mass * load]
+            every += [torques(q, "outer_link", (L4, 0.0, 0.0), weight * rotation.T @ push) for push in pushes]
+            for probabilities, tau in zip(found, every, strict=True):
+                seen = tau + noise
+                precision = np.linalg.inv(COARSE)
+                if detection_statistic(seen.tolist(), precision) > DETECT:
+                    links = INFERENCE.infer(q, seen.tolist(), precision, load)
+                    probabilities.append(1.0 - sum(each.probability for each in links))
+        cells = [f"{100 * np.mean(np.array(p) > 0.5):.0f} % of {len(p)}" if p else "none" for p in found]
+        medians = [f"{np.median(p):.2f}" if p else "none" for p in found]
+        rows.append(f"| {mass:g} kg | " + " | ".join(f"{m}, {c}" for m, c in zip(medians, cells, strict=True)) + " |")
+    return rows
+
+
+def test_the_odds_of_a_payload_are_those_of_the_table_in_the_page() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "estimator.md").read_text(encoding="utf-8")
+    missing = [row for row in payload_rows() if row not in page]
+    assert not missing, "\n".join(["write these in docs/estimator.md:", *missing])

@@ -26,7 +26,7 @@ from wam_experiments.contact_robustness.evaluation import (
     report_text,
 )
 from wam_experiments.contact_robustness.reasons import ACCOUNTS, Evidence, account_of, missed_table
-from wam_experiments.contact_robustness.recording import Drive, record
+from wam_experiments.contact_robustness.recording import Drive, _identified, record
 from wam_experiments.contact_robustness.replay import (
     FalseAlarm,
     ReplayScore,
@@ -46,6 +46,7 @@ from wam_experiments.contact_robustness.requirements import (
 from wam_experiments.contact_robustness.rows import kinds_table, masses_table
 from wam_experiments.contact_robustness.touches import axis_of
 from wam_experiments.identification.evaluation import IdentificationResult
+from wam_experiments.identification.signals import MeasuredSignals
 
 TOUCH = TouchOutcome("outer", "", 0.2, 5.0, 0.0, True, 1.0, 0.0, True, 0.99, True, 0.0, 0.01, True, 0.1, "")
 OWN = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters)
@@ -234,3 +235,21 @@ def test_a_payload_is_known_by_what_the_links_lack_in_probability_and_named_by_r
     assert not names_payload(nothing._replace(hypotheses=(link,)))
     assert names_payload(nothing._replace(hypotheses=(link._replace(reason="a payload may explain it"),)))
     assert names_payload(nothing._replace(warning="the model is off: payload 0.3 kg"))
+
+
+@pytest.mark.slow
+def test_an_arm_is_identified_from_signals_with_the_degradation_of_its_own() -> None:
+    exact = drawn("as stated", WAM, np.random.default_rng(3401))
+    scaled = exact._replace(torque_scale=(1.1,), delay=1, dropped=0.02)
+    configured = CONFIGURATION.with_values(dict(exact.plant))
+    levels = [
+        np.array(dict(_identified(configured, one, 3401))["model.motors.coulomb_positive"]) for one in (exact, scaled)
+    ]
+    assert levels[1] / levels[0] == pytest.approx([1.1] * 4, abs=0.02), "friction in units of the assumed constants"
+
+
+def test_measured_torques_are_late_and_some_samples_do_not_arrive() -> None:
+    signals = MeasuredSignals(scale=(2.0,), delay=3, dropped=0.5)
+    torque, arrives = signals.of(np.arange(1.0, 2001.0)[:, None], np.random.default_rng(1))
+    assert torque[:5, 0].tolist() == [0.0, 0.0, 0.0, 2.0, 4.0]
+    assert 900 < arrives.sum() < 1100

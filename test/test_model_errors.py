@@ -20,7 +20,7 @@ from wam_control.model_errors import (
     ModelErrors,
     Observation,
 )
-from wam_control.model_prior import INFLATED, ModelPrior, model_prior
+from wam_control.model_prior import ModelPrior, model_prior
 from wam_control.momentum_observer import MomentumObserver
 from wam_description.signals import State
 
@@ -211,7 +211,46 @@ def test_an_identified_model_gives_each_direction_its_friction_and_its_covarianc
     assert by_name["friction of motor1 in negative motion"] == pytest.approx(0.04 / 0.045 - 1.0)
     assert by_name["friction of motor2 in negative motion"] == pytest.approx(0.0, abs=1e-12)
     first = prior.names.index("friction of motor1 in positive motion")
-    assert np.sqrt(prior.covariance[first, first]) == pytest.approx(np.hypot(INFLATED * 0.001 / 0.045, 0.02))
+    assert np.sqrt(prior.covariance[first, first]) == pytest.approx(np.hypot(0.001 / 0.045, 0.02))
     wide = model_prior(WAM, given, 0.1, CONFIGURATION.shared.model)
     assert wide.covariance[first, first] > 10.0 * prior.covariance[first, first]
     assert np.array_equal(wide.limit, prior.limit), "friction may drift from what was identified"
+
+
+def test_the_identified_covariance_is_that_of_masses_and_load_too_with_what_they_have_in_common() -> None:
+    given = CONFIGURATION.node("contact_estimator", ContactEstimatorParameters).observer
+    names = [
+        "motors.coulomb_negative.motor2", "joints.coulomb.joint2", "motors.load_positive.motor2",
+        "motors.load_negative.motor2", "joints.load.joint2", "links.torque.joint2",
+    ]  # fmt: skip
+    mixed = np.random.default_rng(4).standard_normal((6, 6))
+    units = np.array([1e-3, 1e-2, 1e-3, 1e-3, 1e-3, 1e-3])
+    covariance = mixed @ mixed.T * np.outer(units, units)
+    shared = CONFIGURATION.with_values(
+        {
+            "model.source": "bag",
+            "model.motors.load_positive": [0.04, 0.04, 0.0, 0.0],
+            "model.motors.load_negative": [0.04, 0.02, 0.0, 0.0],
+            "model.covariance.parameters": names,
+            "model.covariance.values": covariance.ravel().tolist(),
+        }
+    ).shared
+    prior = model_prior(shared.model_arm, given, 0.1, shared.model)
+    motor, joint = WAM.motors.dynamic_friction[1], WAM.joints.dynamic_friction[1]
+    at = [
+        prior.names.index(name)
+        for name in (
+            "friction of motor2 in negative motion", "friction of joint2 in positive motion",
+            "friction of joint2 in negative motion", "load friction of motor2", "load friction of joint2",
+            "masses at joint2",
+        )
+    ]  # fmt: skip
+    rows = np.zeros((6, 6))
+    rows[0, 0], rows[1:3, 1], rows[3, 2:4], rows[4, 4], rows[5, 5] = 1.0 / motor, 1.0 / joint, 0.5, 1.0, 1.0
+    least = np.diag([0.02**2] * 3 + [0.0] * 3)
+    assert prior.covariance[np.ix_(at, at)] == pytest.approx(rows @ covariance @ rows.T + least)
+    assert prior.errors[at] == pytest.approx([0.0, 0.0, 0.0, 0.03, 0.0, 0.0])
+    others = np.delete(np.arange(len(prior.names)), at)
+    wide = model_prior(WAM, given, 0.1, CONFIGURATION.shared.model)
+    assert np.array_equal(prior.covariance[np.ix_(others, others)], wide.covariance[np.ix_(others, others)])
+    assert not prior.covariance[np.ix_(at, others)].any()

@@ -4,7 +4,7 @@ from typing import Any
 
 from wam_control.contact_estimator import ContactEstimate, ContactEstimator, ContactEstimatorParameters
 from wam_control.contact_inference import SECOND
-from wam_control.contact_table import hypothesis_table
+from wam_control.contact_table import friction_table, hypothesis_table
 from wam_control.task import is_pressing
 from wam_description.arm import Shared, seconds
 from wam_description.signals import (
@@ -24,6 +24,7 @@ from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
 
 DOUBTED = 0.5  # s, in one contact, from which a suspected second one is reported; a release looks like one for 0.4 s
+NANOSECONDS = 1_000_000_000  # of the second in which tracked friction is published once
 ENABLED = "enabled"  # mode of the driver in which no brake holds
 
 
@@ -35,11 +36,12 @@ class ContactEstimatorNode:
 
     def __init__(self, shared: Shared, own: ContactEstimatorParameters) -> None:
         self._estimator = ContactEstimator(shared.model_arm, shared.timing, own, shared.model)
+        self._arm, self._friction_scale = shared.model_arm, own.observer.friction_scale
         self._covers, self._timing = shared.arm.covers.names, shared.timing
         self._samples: list[tuple[State, State | None, float]] = []
         self._in_contact: bool | None = None
         self._warned = ""
-        self._doubted = 0.0
+        self._doubted, self._second = 0.0, -1
         commands = {"force_command", "task_command"}  # the errors of the model are tracked from the motors alone
         self.unused = frozenset(commands if own.use_joint_sensors else {"joint_sensors"})
         self.estimate = self._estimator.estimate()
@@ -55,6 +57,7 @@ class ContactEstimatorNode:
             "contact/wrench",
             "contact/point",
             "contact/hypotheses",
+            "contact/tracked_friction",
             "contact/markers",
             "contact/in_contact",
         ),
@@ -76,6 +79,9 @@ class ContactEstimatorNode:
         }
         if self._timing.is_display(inputs.stamp):
             outputs["contact/markers"] = _view(estimate)
+        if inputs.stamp // NANOSECONDS != self._second and (errors := self._estimator.model_errors):
+            self._second = inputs.stamp // NANOSECONDS
+            outputs["contact/tracked_friction"] = friction_table(errors, self._arm, self._friction_scale)
         if estimate.in_contact is not self._in_contact:
             self._in_contact = estimate.in_contact
             outputs["contact/in_contact"] = estimate.in_contact

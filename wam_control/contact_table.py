@@ -1,8 +1,10 @@
-"""Contact hypotheses as rows of numbers, as the topic `contact/hypotheses` carries them, and back."""
+"""Contact hypotheses as rows of numbers, as the topic `contact/hypotheses` carries them, and back; tracked friction."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, Hypothesis
+from wam_control.model_prior import WAYS, friction_error, load_error
+from wam_description.arm import Arm
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table, Triple
 from wam_description.topics import HYPOTHESIS_COLUMNS
 
@@ -87,3 +89,24 @@ def _hypothesis(row: Sequence[float], covers: Sequence[str]) -> Hypothesis:
         reason="; ".join(reasons_of(row)),
         reasons=int(value["reasons"]),
     )
+
+
+def friction_table(errors: Mapping[str, float], arm: Arm, scale: float) -> Table:
+    """Rows in the order of `FRICTION_COLUMNS`: motors, then joints.
+
+    Parameters
+    ----------
+    errors : of the model, by name.
+    arm : of the observer, with the mean friction of both directions.
+    scale : its friction per that of the arm.
+    """
+    names = (*arm.motors.names, *arm.joints.names)
+    levels = (*arm.motors.dynamic_friction, *arm.joints.dynamic_friction)
+    rows = tuple(
+        (
+            *(scale * level * (1.0 + errors[friction_error(name, way)]) for way in WAYS),
+            errors[load_error(name)],
+        )
+        for name, level in zip(names, levels, strict=True)
+    )
+    return Table(BASE, rows)

@@ -27,7 +27,11 @@ class InferenceParameters:
         before=0.0,
     )
     payload_weight: float = parameter(
-        "relative frequency of a mass that is picked up at the tool", low=0.0, high=1e3, before=0.0
+        "relative frequency of a mass that is picked up at the tool; 0.1 next to weights of links of 2.65 in all: one "
+        "contact of 28, fewer than of any link",
+        low=0.0,
+        high=1e3,
+        before=0.0,
     )
     fusion_time: float = parameter(
         "for how long the torques of a contact explain it together; 0: those of the present moment alone",

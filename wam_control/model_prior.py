@@ -14,8 +14,7 @@ Array = NDArray[np.float64]
 WAYS = ("positive", "negative")
 # friction, masses, load friction and torque constants per torque; delay, s; payload, kg: beyond, a warning
 TOLERABLE = (0.2, 0.04, 0.05, 0.05, 3e-3, 0.05)
-INFLATED = 2.0  # of identified standard deviations: those stated are too small by up to that (docs/identify.md)
-LEAST = 0.02  # sd of an identified friction, per friction
+LEAST = 0.02  # sd of an identified friction, per friction: what changes from the identification to the use
 
 
 class ModelPrior(NamedTuple):
@@ -37,6 +36,16 @@ class ModelPrior(NamedTuple):
     covariance: Array
     limit: Array
     tolerable: Array
+
+
+def friction_error(shaft: str, way: str) -> str:
+    """Name of the error of the friction of a motor or joint in one of `WAYS`."""
+    return f"friction of {shaft} in {way} motion"
+
+
+def load_error(shaft: str) -> str:
+    """Name of the error of its friction by load."""
+    return f"load friction of {shaft}"
 
 
 def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: ArmModel | None) -> ModelPrior:
@@ -65,9 +74,9 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
         _identify(arm, model, errors, covariance)
     shafts = [*motors, *joints]
     names = (
-        *(f"friction of {name} in {way} motion" for way in WAYS for name in shafts),
+        *(friction_error(name, way) for way in WAYS for name in shafts),
         *(f"masses at {name}" for name in joints),
-        *(f"load friction of {name}" for name in shafts),
+        *map(load_error, shafts),
         *(f"torque constant of {name}" for name in motors),
         "delay of the torques",
         "payload",
@@ -76,35 +85,35 @@ def model_prior(arm: Arm, given: ObserverParameters, payload_sd: float, model: A
 
 
 def _identify(arm: Arm, model: ArmModel, errors: Array, covariance: Array) -> None:
-    """Put the friction that was identified, per mean friction of both directions, and its covariance in place."""
-    n = len(arm.joints.names)
-    motors = arm.motors.names
-    rows, names, levels = [], [], []
+    """Put in place what was identified: friction, per mean of both directions, load friction, torques of the inertias.
+
+    Errors of joints in both directions are one identified parameter, errors of load the mean of two.
+    """
+    n, motors, joints = len(arm.joints.names), arm.motors.names, arm.joints.names
+    known = model.covariance.parameters
+    mixing = np.zeros((len(errors), len(known)))
+
+    def add(row: int, name: str, part: float) -> None:
+        if name in known:
+            mixing[row, known.index(name)] = part
+
     for way, values in enumerate((model.motors.coulomb_positive, model.motors.coulomb_negative)):
+        first = 2 * n * way
         for j, (value, level) in enumerate(zip(values, arm.motors.dynamic_friction, strict=True)):
             if level:
-                errors[2 * n * way + j] = value / level - 1.0
-                rows.append(2 * n * way + j)
-                names.append(f"motors.coulomb_{WAYS[way]}.{motors[j]}")
-                levels.append(level)
+                errors[first + j] = value / level - 1.0
+                add(first + j, f"motors.coulomb_{WAYS[way]}.{motors[j]}", 1.0 / level)
         for j, level in enumerate(arm.joints.dynamic_friction):
-            name = f"joints.coulomb.{arm.joints.names[j]}"
-            if level and name in model.covariance.parameters:
-                rows.append(2 * n * way + n + j)
-                names.append(name)
-                levels.append(level)
-    known = model.covariance_of(names)
-    if known is not None:
-        scale = INFLATED / np.array(levels)
-        covariance[rows] = covariance[:, rows] = 0.0
-        covariance[np.ix_(rows, rows)] = known * np.outer(scale, scale) + LEAST**2 * np.eye(len(rows))
-    at_joints = [j for j, name in enumerate(arm.joints.names) if f"joints.load.{name}" in model.covariance.parameters]
-    load = [f"motors.load_{way}.{name}" for way in WAYS for name in motors]
-    known = model.covariance_of([*load, *(f"joints.load.{arm.joints.names[j]}" for j in at_joints)])
-    if known is not None:
-        rows = [*range(5 * n, 6 * n), *(6 * n + j for j in at_joints)]
-        mean = np.zeros((len(rows), len(known)))
-        mean[:n, : 2 * n], mean[n:, 2 * n :] = 0.5 * np.hstack((np.eye(n), np.eye(n))), np.eye(len(at_joints))
-        at_joint = [model.joints.load[j] for j in at_joints]
-        errors[rows] = mean @ np.array([*model.motors.load_positive, *model.motors.load_negative, *at_joint])
-        covariance[np.ix_(rows, rows)] = INFLATED**2 * mean @ known @ mean.T
+            if level:
+                add(first + n + j, f"joints.coulomb.{joints[j]}", 1.0 / level)
+    for j, (motor, joint) in enumerate(zip(motors, joints, strict=True)):
+        add(4 * n + j, f"links.torque.{joint}", 1.0)
+        add(5 * n + j, f"motors.load_positive.{motor}", 0.5)
+        add(5 * n + j, f"motors.load_negative.{motor}", 0.5)
+        add(6 * n + j, f"joints.load.{joint}", 1.0)
+    errors[5 * n : 6 * n] = np.add(model.motors.load_positive, model.motors.load_negative) / 2.0
+    errors[6 * n : 7 * n] = model.joints.load
+    rows = np.flatnonzero(mixing.any(axis=1))
+    found = mixing[rows] @ np.reshape(model.covariance.values, (len(known), len(known))) @ mixing[rows].T
+    covariance[rows] = covariance[:, rows] = 0.0
+    covariance[np.ix_(rows, rows)] = found + np.diag(np.where(rows < 4 * n, LEAST, 0.0) ** 2)

@@ -42,6 +42,12 @@ HYPOTHESIS_COLUMNS: Final = (
     "reasons",  # why the position is unknown or the answer is not to be trusted: sum of 2^i over `wam_control.contact_inference.REASONS`
 )
 
+FRICTION_COLUMNS: Final = (
+    "positive",  # N m, Coulomb friction in positive motion
+    "negative",  # N m, the same in negative motion
+    "load",  # friction per torque that the cables transmit
+)
+
 FORCE_AXIS_COLUMNS: Final = (
     "reaction",  # number of `wam_control.force_hold.ForceReaction`: 0 where the command is obeyed
     "force_sd",  # N, standard deviation of the measured force; infinite where the force has no lever
@@ -244,6 +250,14 @@ TOPICS: Final = (
         "one row per hypothesis, the most probable first, none without contact; float64 columns: "
         "link, probability, position (m) and so on, see docs/estimator.md",
         columns=HYPOTHESIS_COLUMNS,
+    ),
+    Topic(
+        "contact/tracked_friction",
+        TABLE,
+        "1 Hz",
+        "friction that the estimator takes, followed between contacts, one row per shaft: the motors, then the joints; "
+        "only where motors are observed; float64 columns: see docs/estimator.md",
+        columns=FRICTION_COLUMNS,
     ),
     Topic("contact/in_contact", "std_msgs/msg/Bool", "latched", "whether something touches the arm"),
     Topic(

@@ -27,8 +27,8 @@ Progress = Callable[[str], None]
 TOPICS_READ = (
     "motor_states", "motor_current_command", "motor_velocity_command", "joint_states", "joint_sensors",
     "gravity_effort", "force_command", "force_measured", "force_axis", "task_command", "task_axes", "contact/wrench",
-    "contact/point", "contact/hypotheses", "sim/contact/wrench", "sim/contact/point", "sim/disturbance",
-    "sim/joint_states", "status", "/diagnostics",
+    "contact/point", "contact/hypotheses", "contact/tracked_friction", "sim/contact/wrench", "sim/contact/point",
+    "sim/disturbance", "sim/joint_states", "status", "/diagnostics",
 )  # fmt: skip
 OWN = {  # topics of this stack alone; a bag with two of them in a namespace is of this stack
     "motor_states": "sensor_msgs/msg/JointState",

@@ -1,6 +1,7 @@
 """Section about the estimated contacts, compared with the true ones."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -8,6 +9,9 @@ from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
+from wam_analysis.task_forces import arm_of
+from wam_bag.bag import TableColumns
+from wam_description.topics import FRICTION_COLUMNS
 
 
 def contact_section(recording: AnalysedRun) -> Section:
@@ -61,7 +65,23 @@ def contact_section(recording: AnalysedRun) -> Section:
         sentences.append(f"Contact was detected {times(len(runs(sensed.acts)))}; the true contact is not in this bag.")
     if not sentences:
         sentences.append("No contact was recorded.")
+    findings += _tracked_friction(recording)
     return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(verdict))
+
+
+def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:
+    """Friction of motors and joints as the estimator followed it, at the end of the recording."""
+    run, arm = recording.run, arm_of(recording.run)
+    columns = run.bag.topics.get(f"{run.namespace}/contact/tracked_friction")
+    if not isinstance(columns, TableColumns) or not len(columns.stamp_ns) or arm is None:
+        return
+    names = (*arm.motors.names, *arm.joints.names)
+    for way in FRICTION_COLUMNS[:2]:
+        values = columns.columns[way]
+        for name, first, last in zip(names, values[: len(names)], values[-len(names) :], strict=False):
+            if last:
+                note = f"tracked between contacts, {100.0 * (last / first - 1.0):+.1f} % since the start"
+                yield Finding(f"{name}: friction in {way} motion", "N m", float(last), note=note)
 
 
 def _errors(away: float, off: float) -> str:

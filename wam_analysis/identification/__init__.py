@@ -4,6 +4,8 @@ motion      recorded motor states, checked, filtered and thinned
 parameters  what is estimated: names, present values, prior standard deviations
 regressor   motor torques per parameter
 fit         estimate, covariance by jackknife, cross-validation
+uncertainty standard errors and covariance, of parameters and of their combinations
+tracked_errors  the covariance in the errors of the model that the contact estimator tracks
 stribeck    the Stribeck velocity of each motor
 base_set    combinations of inertial parameters that gravity depends on
 recorded_loop  friction node and force loop of chapter 5, as far as a recording of any arm shows them

@@ -14,6 +14,8 @@ from wam_analysis.identification.motion import MotionSamples
 from wam_analysis.identification.parameters import DIRECTIONS, Unknowns, shared_joints, unknowns
 from wam_analysis.identification.regressor import Equations, Regressor
 from wam_analysis.identification.stribeck import VELOCITIES, slopes, stribeck_velocities
+from wam_analysis.identification.tracked_errors import TrackedErrors, tracked_errors
+from wam_analysis.identification.uncertainty import Uncertainty
 from wam_description.arm import Shared
 from wam_description.transmission_map import TransmissionMap
 
@@ -23,6 +25,7 @@ PARTS = 20  # of the motion
 ITERATIONS = 5  # the load on friction and the links' inertia are not linear in the parameters
 HUBER = 1.5  # standard deviations from which a residual counts less
 LAW = 0.003  # standard deviation of friction, per friction, by what its law leaves out
+ASYMMETRY = 0.1  # sd of the part of a shared joint's load friction that has one sign, per load friction
 WARM = 2  # iterations that start near the solution
 IDENTIFIED = 0.3  # standard deviation per prior one, up to which the motion shows a parameter
 NOT_NEGATIVE = ("motors.static_", "motors.load_", "motors.viscous", "joints.")
@@ -36,8 +39,8 @@ class Identification(NamedTuple):
     Attributes
     ----------
     unknowns : names, present values, prior.
-    values, sd : (p,).
-    covariance : (p, p).
+    values : (p,).
+    uncertainty : of the values.
     alone : (p,), standard deviation if all other parameters were known.
     stribeck_velocity : (n,), v_s of each motor, rad/s.
     residual, held_out, before : (n,), rms torque of each motor that the estimate, the estimate from the other parts of
@@ -46,12 +49,12 @@ class Identification(NamedTuple):
     condition : of the identified combinations of parameters, scaled by the prior.
     rank : number of those combinations.
     both_directions : (n,), parts of the motion in which each motor turns both ways.
+    tracked : the covariance in the errors of the model that the contact estimator tracks.
     """
 
     unknowns: Unknowns
     values: Array
-    sd: Array
-    covariance: Array
+    uncertainty: Uncertainty
     alone: Array
     stribeck_velocity: Array
     residual: Array
@@ -61,6 +64,18 @@ class Identification(NamedTuple):
     condition: float
     rank: int
     both_directions: Array
+    tracked: TrackedErrors
+
+    @property
+    def covariance(self) -> Array:
+        """(p, p), of the values."""
+        return self.uncertainty.covariance(np.eye(len(self.values)))
+
+    @property
+    def sd(self) -> Array:
+        """(p,), standard deviations of the values."""
+        found: Array = np.sqrt(self.covariance.diagonal())
+        return found
 
     @property
     def offset_if_alike(self) -> tuple[Array, Array]:
@@ -121,14 +136,17 @@ def identify(shared: Shared, motion: MotionSamples) -> Identification:
     first = estimate(present)
     tried = [estimate(np.full(len(present), velocity), first.values) for velocity in VELOCITIES]
     chosen = stribeck_velocities(present, first.errors, np.array([one.errors for one in tried]))
-    best = estimate(chosen.velocity)
+    regressor = Regressor(shared, sought, motion, chosen.velocity)
+    best = _estimate(regressor, sought)
     # the uncertainty of v_s is part of that of the friction of its motor
     slope = slopes(np.array([one.values for one in tried]), chosen.velocity)
     off = np.log(chosen.without / chosen.velocity)
     for i, name in enumerate(shared.arm.motors.names):
         own = [k for k, each in enumerate(sought.names) if each.endswith(f".{name}")]
         best.without[:, own] += np.outer(off[:, i], slope[i, own])
-    return _result(sought, best, chosen.velocity, _through(shared))
+    uncertainty = _uncertainty(sought, best, _through(shared), regressor.asymmetric_loads(best.values))
+    tracked = tracked_errors(regressor, shared.arm.joints.names, best.values, uncertainty)
+    return _result(sought, best, chosen.velocity, uncertainty, tracked)
 
 
 def _through(shared: Shared) -> Array:
@@ -174,9 +192,7 @@ def _parts(equations: Equations) -> NDArray[np.int64]:
 
 def _normal(equations: Equations, part: NDArray[np.int64], values: Array) -> _Normal:
     """Weighted normal equations; rows far from the present estimate count less (Huber)."""
-    left = equations.torque - equations.columns @ values
-    scale = np.array([_deviation(left[used, i]) for i, used in enumerate(equations.is_used.T)])
-    weight = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-12)) / scale**2 * equations.is_used
+    weight = _weights(equations, values)
     p = equations.columns.shape[2]
     information, vector = np.zeros((PARTS, p, p)), np.zeros((PARTS, p))
     for i in range(PARTS):
@@ -185,6 +201,14 @@ def _normal(equations: Equations, part: NDArray[np.int64], values: Array) -> _No
         information[i] = weighted.T @ rows
         vector[i] = weighted.T @ equations.torque[part == i].ravel()
     return _Normal(information, vector)
+
+
+def _weights(equations: Equations, values: Array) -> Array:
+    """Weights of the rows, (k, n), 1/(N^2 m^2)."""
+    left = equations.torque - equations.columns @ values
+    scale = np.array([_deviation(left[used, i]) for i, used in enumerate(equations.is_used.T)])
+    found: Array = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-12)) / scale**2 * equations.is_used
+    return found
 
 
 def _deviation(residuals: Array) -> float:
@@ -202,20 +226,27 @@ def _rms(left: Array, is_used: NDArray[np.bool_]) -> Array:
     return found
 
 
-def _result(sought: Unknowns, best: _Estimate, velocity: Array, through: Array) -> Identification:
-    equations, information = best.equations, best.normal.information.sum(0)
-    before = equations.torque - equations.columns @ sought.present
-    left = equations.torque - equations.columns @ best.values
-    posterior = np.linalg.inv(information + np.diag(sought.prior_sd**-2))
-    jackknife = best.without - best.without.mean(0)
-    sd = np.sqrt(np.maximum((PARTS - 1) / PARTS * (jackknife**2).sum(0), posterior.diagonal()))
+def _uncertainty(sought: Unknowns, best: _Estimate, through: Array, asymmetric: Array) -> Uncertainty:
+    equations, variance = best.equations, np.zeros(len(sought.names))
     for way in DIRECTIONS:
         coulomb, load = (sought.places(f"motors.{what}_{way}") for what in ("coulomb", "load"))
         # the friction of a joint adds to the load of its motor's friction or takes from it, by the way of the load
         by_joint = best.values[load] * through / np.sqrt(3.0)
-        sd[coulomb] = np.sqrt(sd[coulomb] ** 2 + (LAW * best.values[coulomb]) ** 2 + by_joint**2)
-    # standard deviations of the jackknife, which 20 parts give well; correlations, which they do not, of the posterior
-    unit = sd / np.sqrt(posterior.diagonal())
+        variance[coulomb] = (LAW * best.values[coulomb]) ** 2 + by_joint**2
+    white = np.linalg.inv(best.normal.information.sum(0) + np.diag(sought.prior_sd**-2))
+    # what the estimate takes for other friction, were there one sd of the asymmetry
+    weighted = equations.columns * _weights(equations, best.values)[..., None]
+    size = ASYMMETRY * best.values[sought.places("joints.load")]
+    taken = white @ np.einsum("knp,knj->pj", weighted, asymmetric * size)
+    return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T)
+
+
+def _result(
+    sought: Unknowns, best: _Estimate, velocity: Array, uncertainty: Uncertainty, tracked: TrackedErrors
+) -> Identification:
+    equations, information = best.equations, best.normal.information.sum(0)
+    before = equations.torque - equations.columns @ sought.present
+    left = equations.torque - equations.columns @ best.values
     scaled = information * np.outer(sought.prior_sd, sought.prior_sd)
     strength = np.linalg.eigvalsh(scaled)
     shown = strength[strength >= IDENTIFIED**-2]
@@ -228,8 +259,7 @@ def _result(sought: Unknowns, best: _Estimate, velocity: Array, through: Array) 
     return Identification(
         sought,
         best.values,
-        sd,
-        posterior * np.outer(unit, unit),
+        uncertainty,
         1.0 / np.sqrt(np.maximum(information.diagonal(), 1e-300)),
         velocity,
         _rms(left, equations.is_used),
@@ -239,4 +269,5 @@ def _result(sought: Unknowns, best: _Estimate, velocity: Array, through: Array) 
         float(np.sqrt(shown[-1] / shown[0])) if len(shown) else float("inf"),
         len(shown),
         np.array(both),
+        tracked,
     )

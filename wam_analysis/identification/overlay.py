@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 DIGITS = 6
 LIGHTEST = 1e-6  # kg m^2; an inertia that came out negative
 DEVIATIONS = ("observer.mass_scale", "observer.friction_scale")
-IN_COVARIANCE = ("motors.", "joints.", "links.moment")
 
 
 class Identified(NamedTuple):
@@ -62,14 +61,13 @@ def model_values(shared: Shared, found: Identification, source: str) -> dict[str
     groups = _by_group(result)
     values: dict[str, Any] = {"model.source": source}
     for group, each in groups.items():
-        if group.startswith("motors."):
+        if group.startswith("motors.") and group != "motors.torque_difference":
             values[f"model.{group}"] = _numbers(each)
     values["model.motors.stribeck_velocity"] = _numbers(found.stribeck_velocity)
     values |= _joint_values(shared, found.unknowns, groups)
     values |= _link_values(groups)
-    chosen = [i for i, name in enumerate(result.names) if name.startswith(IN_COVARIANCE)]
-    values["model.covariance.parameters"] = [result.names[i] for i in chosen]
-    values["model.covariance.values"] = _numbers(result.covariance[np.ix_(chosen, chosen)].ravel(), 4)
+    values["model.covariance.parameters"] = list(found.tracked.names)
+    values["model.covariance.values"] = _numbers(found.tracked.covariance.ravel())
     return values
 
 

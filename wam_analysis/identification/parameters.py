@@ -2,7 +2,9 @@
 
 Friction of a joint with a motor of its own cannot be separated from that of the motor and is counted there.  Friction
 of the other joints is alike in both directions: a constant torque looks the same from the motor and from the joint.
-So does a torque offset, which is counted as a difference between the directions of the motor.
+So does a torque offset, which is counted as a difference between the directions of the motor.  A torque constant that
+is off cannot be separated from friction and masses, which are all those of the reported torques; only what it differs
+by between motors that move the same joints, as no masses do.
 """
 
 from typing import NamedTuple
@@ -22,6 +24,7 @@ FRICTION = 0.5  # of the present Coulomb friction
 LOAD = 0.1  # friction per transmitted torque
 VISCOUS = 1.0  # of the present viscous friction
 ROTOR = 0.2  # of the present rotor inertia
+DIFFERENCE = 0.012  # half the difference of two torque constants, each calibrated to 3 %, uniform
 MASS = 0.3  # of the present mass
 CENTRE = 0.05  # m
 INERTIA = 0.5  # of the present inertia of the link
@@ -37,12 +40,14 @@ class Unknowns(NamedTuple):
     present : (p,), values before the identification.
     prior_sd : (p,).
     joints : indices of the joints whose friction is estimated.
+    sharing : indices of the motors that move these joints together.
     """
 
     names: tuple[str, ...]
     present: Array
     prior_sd: Array
     joints: tuple[int, ...]
+    sharing: tuple[int, ...]
 
     def places(self, group: str) -> list[int]:
         """Where the parameters of a group are, as 'motors.viscous'."""
@@ -89,6 +94,13 @@ def unknowns(shared: Shared) -> Unknowns:
     viscous = np.array(motors.viscous) + (lumped**2).T @ at_joints.viscous
     add("motors.viscous", every, viscous, VISCOUS * viscous)
     add("motors.inertia", every, np.array(motors.inertia), ROTOR * np.array(motors.inertia))
+    sharing = [int(m) for m in np.flatnonzero(matrix[list(joints)].any(axis=0))]
+    add(
+        "motors.torque_difference",
+        [every[m] for m in sharing[1:]],
+        np.zeros(len(sharing[1:])),
+        np.full(len(sharing[1:]), DIFFERENCE),
+    )
     chosen = [arm.joints.names[j] for j in joints]
     here = list(joints)
     add("joints.coulomb", chosen, np.array(at_joints.coulomb)[here], FRICTION * np.array(at_joints.coulomb)[here])
@@ -102,4 +114,4 @@ def unknowns(shared: Shared) -> Unknowns:
         add(f"links.moment_{axis}", of_links, mass * centre[:, i], CENTRE * mass)
     for i, axis in enumerate(AXES):
         add(f"links.inertia_{axis}", of_links, inertia[:, i], INERTIA * inertia[:, i])
-    return Unknowns(tuple(names), np.array(present), np.array(sd), joints)
+    return Unknowns(tuple(names), np.array(present), np.array(sd), joints, tuple(sharing))

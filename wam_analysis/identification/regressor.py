@@ -52,7 +52,7 @@ class Regressor:
     """
 
     def __init__(self, shared: Shared, unknowns: Unknowns, motion: MotionSamples, stribeck_velocity: Array) -> None:
-        self._shared, self._unknowns, self._motion = shared, unknowns, motion
+        self._shared, self.unknowns, self._motion = shared, unknowns, motion
         self._matrix = TransmissionMap.of(shared.arm).joint_from_motor
         self._stribeck = stribeck_velocity
         self._qd = motion.velocities @ self._matrix.T  # of each state
@@ -74,7 +74,7 @@ class Regressor:
 
     def equations(self, values: Array) -> Equations:
         """The equations about the values, (p,), of the parameters."""
-        motion, unknowns = self._motion, self._unknowns
+        motion, unknowns = self._motion, self.unknowns
         n = motion.theta.shape[1]
         columns = np.zeros((*motion.theta.shape, len(unknowns.names)))
         load = self.load(values)
@@ -83,6 +83,10 @@ class Regressor:
             columns[:, range(n), unknowns.places(group)] = found
         columns[:, range(n), unknowns.places("motors.inertia")] = motion.thetadd
         self._add_joints(columns, load)
+        driving = self.inertial_torques(values).sum(2)
+        for place, motor in zip(unknowns.places("motors.torque_difference"), unknowns.sharing[1:], strict=True):
+            first = unknowns.sharing[0]
+            columns[:, first, place], columns[:, motor, place] = driving[:, first], -driving[:, motor]
         at, jacobian, constant = self._inertial(values)
         columns[:, :, at] = self._links @ jacobian
         torque = motion.torque - self._carried - self._links @ constant
@@ -102,16 +106,36 @@ class Regressor:
 
     def load(self, values: Array) -> Array:
         """Torque that the cables transmit to each rotor at each state, (k, w, n), N m."""
-        motion, unknowns = self._motion, self._unknowns
+        motion, unknowns = self._motion, self.unknowns
         rotor = values[unknowns.places("motors.inertia")] * motion.thetadd
         load = motion.torques - rotor[:, None, :]
         friction = self._friction(load)
         return load - sum(each * values[unknowns.places(group)] for group, each in friction.items())
 
+    def inertial_torques(self, values: Array) -> Array:
+        """Torque of links, pulleys and rotors at each joint as torques of the motors, (k, n motors, n joints), N m."""
+        motion, unknowns = self._motion, self.unknowns
+        at, jacobian, constant = self._inertial(values)
+        at_motors = self._carried + self._links @ (constant + jacobian @ values[at])
+        at_motors += values[unknowns.places("motors.inertia")] * motion.thetadd
+        at_joints = at_motors @ np.linalg.inv(self._matrix)
+        found: Array = at_joints[:, None, :] * self._matrix.T
+        return found
+
+    def asymmetric_loads(self, values: Array) -> Array:
+        """Torques of the motors, (k, n, joints), by the part of joints' load friction that has one sign, per torque."""
+        at_joints = np.einsum("w,kwn->kn", self._motion.weights, self._at_joints(self.load(values)))
+        joints = list(self.unknowns.joints)
+        found: Array = at_joints[:, None, joints] * self._matrix[joints].T
+        return found
+
+    def _at_joints(self, load: Array) -> Array:
+        """Size of the torque that the cables transmit to each joint at each state, (k, w, n), N m."""
+        return np.abs(load @ np.linalg.inv(self._matrix))  # tau = M^-T tau_motor
+
     def _add_joints(self, columns: Array, load: Array) -> None:
-        weights, matrix, unknowns = self._motion.weights, self._matrix, self._unknowns
-        at_joints = np.abs(load @ np.linalg.inv(matrix))  # tau = M^-T tau_motor
-        sign = np.sign(self._qd)
+        weights, matrix, unknowns = self._motion.weights, self._matrix, self.unknowns
+        at_joints, sign = self._at_joints(load), np.sign(self._qd)
         found = {"joints.coulomb": sign, "joints.load": sign * at_joints, "joints.viscous": self._qd}
         for group, each in found.items():
             mean = np.einsum("w,kwn->kn", weights, each)
@@ -120,7 +144,7 @@ class Regressor:
 
     def _inertial(self, values: Array) -> tuple[list[int], Array, Array]:
         """Where the parameters of the links are, and the ten of each link as jacobian @ parameters + constant."""
-        unknowns, links = self._unknowns, self._shared.arm.links
+        unknowns, links = self.unknowns, self._shared.arm.links
         n = len(links.names)
         groups = ["mass", *(f"moment_{axis}" for axis in AXES), *(f"inertia_{axis}" for axis in AXES)]
         at = np.array([unknowns.places(f"links.{group}") for group in groups])  # (7, n)

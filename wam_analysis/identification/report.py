@@ -12,7 +12,7 @@ from wam_description.arm import Shared
 
 UNITS = {
     "coulomb": "N m", "static": "N m", "load": "", "viscous": "N m s/rad", "inertia": "kg m^2", "mass": "kg",
-    "moment": "kg m",
+    "moment": "kg m", "torque": "",
 }  # fmt: skip
 SHORT = 20.0  # s of motion in one direction, less of which is warned about
 FEW = 6  # parts of the motion in which a motor turns both ways
@@ -23,7 +23,8 @@ NOTES = """{rank} combinations of {count} parameters are identified, condition {
 Friction of a joint with a motor of its own is part of that motor's friction.
 A torque offset is not identifiable from this recording: in motion, at rest and with a dither it gives the torques of a
 difference between the directions of friction. Shown is the offset if friction were alike in both directions; used is
-the sum of both, in coulomb_positive and coulomb_negative."""
+the sum of both, in coulomb_positive and coulomb_negative.
+'not tracked' is the stated error of the torques that the contact estimator has no error of its model for."""
 
 
 def report(shared: Shared, found: Identification, label: str) -> str:
@@ -48,9 +49,9 @@ def report(shared: Shared, found: Identification, label: str) -> str:
     lines = [f"{label}: model of the controllers from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
     parts = (found.before, found.residual, found.held_out)
     lines += plain(
-        [["motor", "motion", "left by the present model", "by the estimate", "held out"]],
+        [["motor", "motion", "left by the present model", "by the estimate", "held out", "not tracked"]],
         [
-            [name, f"{found.seconds[i]:.1f} s", *(f"{1e3 * rms[i]:.3g} mN m" for rms in parts)]
+            [name, f"{found.seconds[i]:.1f} s", *(f"{1e3 * rms[i]:.3g} mN m" for rms in (*parts, found.tracked.left))]
             for i, name in enumerate(shared.arm.motors.names)
         ],
     )

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_description.arm import Arm
+from wam_experiments.identification.signals import MeasuredSignals
 
 Random = np.random.Generator
 Values = tuple[tuple[str, Any], ...]  # of a configuration, by name
@@ -37,6 +38,11 @@ class Degradation(NamedTuple):
     delay: int = 0
     dropped: float = 0.0
     drift: float = 0.0
+
+    @property
+    def signals(self) -> MeasuredSignals:
+        """How the torques of the motors are measured."""
+        return MeasuredSignals(self.torque_scale, self.torque_noise, self.delay, self.dropped)
 
 
 def _degraded(plant: dict[str, Any], model: dict[str, Any] | None = None, **signals: Any) -> Degradation:

@@ -288,8 +288,9 @@ METHOD = """## Method
   whether a link that the tool is not on ever has a probability above 0.95; what is reported at the end. By kind above:
   0.2 s after the start, as for contacts; the payload and the tool's link are right.
 * After an identification: three more arms of each seed, with contacts of 5, 10 and 20 N on both links. Their models
-  come from `wam identify` on 20 s of exciting motion; torque constant, delay and noise of the mix are not in that
-  motion.
+  come from `wam identify` on 20 s of exciting motion, which has every degradation of the mix but the drift that comes
+  after it: torque constant, delay, noise and dropped samples are those of the recording. Friction is that of the
+  reported torques, in units of the torque constants as configured: no motion shows the constants apart from it.
 * Start in contact: an estimator that starts 0.1 s after the contact, with the model errors known (warm) or
   without (cold), detects it within 0.3 s; contacts of at least 9 N.
 """

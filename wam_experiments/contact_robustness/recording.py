@@ -133,15 +133,16 @@ def record(drive: Drive) -> DriveRecording:
         done = run.step() or run.driver.safety.mode is Mode.FAULT
     theta, thetad, torque, speed = (np.array([row[i] for row in rows]) for i in range(4))
     failure = run.driver.safety.fault or run.scenario.failure
-    model = _identified(configured, drive.seed) if drive.is_identified else ()
+    model = _identified(configured, degradation, drive.seed) if drive.is_identified else ()
     return DriveRecording(degradation, theta, thetad, torque, speed, tuple(contacts), failure, model)
 
 
-def _identified(configured: Configuration, seed: int) -> Values:
-    """Values of the model that `wam identify` finds for a plant."""
-    samples, _ = play(configured, seed, EXCITATION)
-    found = identify(configured.shared, samples)
-    values = model_values(configured.shared, found, "an exciting motion") | estimator_values(configured)
+def _identified(configured: Configuration, degradation: Degradation, seed: int) -> Values:
+    """Values of the model that `wam identify` finds for a plant from the signals that the estimator gets."""
+    samples, _ = play(configured, seed, EXCITATION, degradation.signals)
+    known = configured.with_values(dict(degradation.model)).shared
+    found = identify(known, samples)
+    values = model_values(known, found, "an exciting motion") | estimator_values(configured)
     return tuple(values.items())
 
 

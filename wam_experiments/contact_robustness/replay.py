@@ -153,17 +153,14 @@ class SignalFaults:
         self._random = np.random.default_rng((seed, 3))
 
     def __iter__(self) -> Iterator[tuple[int, State, float]]:
-        recording, given, random = self._recording, self._recording.degradation, self._random
-        k = len(recording.theta)
-        noise = 1.0 + given.torque_noise * random.standard_normal(recording.torque.shape)
-        late = np.concatenate((np.zeros((given.delay, recording.torque.shape[1])), recording.torque))[:k]
-        torque = (late * np.array(given.torque_scale) * noise).tolist()
-        arrives = random.random(k) >= given.dropped
-        theta, thetad, gap = recording.theta.tolist(), recording.thetad.tolist(), 0.0
-        for i in range(k):
+        recording = self._recording
+        measured, arrives = recording.degradation.signals.of(recording.torque, self._random)
+        signals = zip(recording.theta.tolist(), recording.thetad.tolist(), measured.tolist(), strict=True)
+        gap = 0.0
+        for i, (theta, thetad, torque) in enumerate(signals):
             gap += self._period
             if arrives[i]:
-                yield i, State(theta[i], thetad[i], torque[i]), gap
+                yield i, State(theta, thetad, torque), gap
                 gap = 0.0
 
 

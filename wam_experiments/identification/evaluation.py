@@ -20,12 +20,14 @@ from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import Driver, DriverParameters
 from wam_experiments.identification.excitation import moves, path
-from wam_experiments.identification.plants import KINDS, plant, true_friction
+from wam_experiments.identification.plants import KINDS, measured_signals, plant, true_friction
+from wam_experiments.identification.signals import EXACT, MeasuredSignals
 
 Array = NDArray[np.float64]
 
 SPEED = 10.0  # rad/s of a motor, at which friction is compared
 POSES = 50
+SIGNALS = 1  # stream of random numbers
 REQUIRED, TARGET = 0.04, 0.02  # error of a motor's friction
 WITHIN = 2.0  # factor between error and standard error
 
@@ -73,7 +75,7 @@ class IdentificationResult(NamedTuple):
 def run_trial(trial: IdentificationTrial) -> IdentificationResult:
     """Play the motion on a plant of its own and identify the model from it."""
     configuration = plant(trial.configuration, trial.kind, trial.seed)
-    samples, failure = play(configuration, trial.seed, trial.seconds)
+    samples, failure = play(configuration, trial.seed, trial.seconds, measured_signals(trial.kind))
     shared = configuration.shared
     found = identify(shared, samples)
     truth = true_friction(configuration)
@@ -84,7 +86,7 @@ def run_trial(trial: IdentificationTrial) -> IdentificationResult:
         rows = friction_row(found, direction, (np.abs(load) * moves).sum(0) / moves.sum(0))
         true = truth.level(way, SPEED, load, moves)
         errors["level"].append((rows @ found.values - true) / true)
-        errors["level_sd"].append(np.sqrt(np.einsum("ip,pq,iq->i", rows, found.covariance, rows)) / true)
+        errors["level_sd"].append(np.sqrt(found.uncertainty.variances(rows)) / true)
         errors["before"].append((rows @ found.unknowns.present - true) / true)
         at = found.unknowns.places(f"motors.coulomb_{direction}")
         errors["coulomb"].append((found.values[at] - truth.coulomb[way]) / truth.coulomb[way])
@@ -96,8 +98,10 @@ def run_trial(trial: IdentificationTrial) -> IdentificationResult:
     )
 
 
-def play(configuration: Configuration, seed: int, seconds: float) -> tuple[MotionSamples, str]:
-    """Samples of the exciting motion on the plant of a configuration, and why it ended early, ''.
+def play(
+    configuration: Configuration, seed: int, seconds: float, signals: MeasuredSignals = EXACT
+) -> tuple[MotionSamples, str]:
+    """Samples of the exciting motion on the plant of a configuration, as measured, and why it ended early, ''.
 
     The motors follow the moves with the gains of the velocity loop, without the nodes, which take most of the time.
     """
@@ -123,7 +127,8 @@ def play(configuration: Configuration, seed: int, seconds: float) -> tuple[Motio
             if driver.safety.fault:
                 break
     n, values = len(matrix), np.array(rows)
-    return motion(evenly(np.array(stamps), values[:, :n], values[:, n:])), driver.safety.fault
+    torque, arrives = signals.of(values[:, n:], np.random.Generator(np.random.PCG64([seed, SIGNALS])))
+    return motion(evenly(np.array(stamps)[arrives], values[arrives, :n], torque[arrives])), driver.safety.fault
 
 
 def link_load(shared: Shared, samples: MotionSamples, found: Identification) -> Array:

@@ -10,10 +10,11 @@ from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
+from wam_experiments.identification.signals import EXACT, MeasuredSignals
 
 Array = NDArray[np.float64]
 
-KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, presliding", "all, real sensors")
+KINDS = ("level", "Stribeck", "asymmetry", "load", "all", "all, presliding", "all, real sensors", "all, real signals")
 FACTOR = (0.8, 1.3)  # of the friction of each motor and joint
 STRIBECK = (0.5, 3.0)  # rad/s, v_s of the motors
 ASYMMETRY = 0.15
@@ -23,6 +24,10 @@ PRESLIDING = (4.0, 500.0)  # N m/rad, of motors and joints: a shape that the reg
 COUNTS = 16384  # of the encoder per turn
 CURRENT_NOISE = 0.02  # A
 OFFSET = 0.004  # N m, largest of a motor's torque
+TORQUE_CONSTANT = 0.02
+COGGING, RIPPLE = 0.003, 0.02  # N m; per torque
+CENTRE = 0.003  # m, of the model's centres of mass
+SIGNALS = MeasuredSignals(noise=0.005, delay=1, dropped=0.02)
 
 
 class TrueFriction(NamedTuple):
@@ -76,11 +81,25 @@ def plant(configuration: Configuration, kind: str, seed: int) -> Configuration:
     if kind == "all, presliding":
         stiffness = zip(("motor", "joint"), PRESLIDING, strict=True)
         values |= {f"driver:friction.{shaft}_presliding_stiffness": [each] for shaft, each in stiffness}
-    if kind == "all, real sensors":
+    if kind in ("all, real sensors", "all, real signals"):
         values["driver:sensors.encoder_resolution"] = [2.0 * np.pi / COUNTS] * n
         values["driver:amplifier.current_noise"] = [CURRENT_NOISE] * n
         values["driver:amplifier.torque_offset"] = random.uniform(-OFFSET, OFFSET, n).tolist()
+    if kind == "all, real signals":
+        centre = np.array(configuration.shared.model.links.centre)
+        values |= {
+            "driver:mismatch.torque_constant": random.uniform(1.0 - TORQUE_CONSTANT, 1.0 + TORQUE_CONSTANT, n).tolist(),
+            "driver:amplifier.torque_ripple": [RIPPLE] * n,
+            "driver:effects.ripples.amplitude": [COGGING] * n,
+            "driver:effects.ripples.phase": random.uniform(-np.pi, np.pi, n).tolist(),
+            "model.links.centre": (centre + random.uniform(-CENTRE, CENTRE, len(centre))).tolist(),
+        }
     return configuration.with_values(values)
+
+
+def measured_signals(kind: str) -> MeasuredSignals:
+    """How the torques of a kind of plant are measured."""
+    return SIGNALS if kind == "all, real signals" else EXACT
 
 
 def true_friction(configuration: Configuration) -> TrueFriction:
@@ -104,7 +123,9 @@ def true_friction(configuration: Configuration) -> TrueFriction:
     at_joint = own.T @ joint_coulomb + signs * ((own.T * np.sign(matrix.T)) @ (joint_lean * joint_coulomb))
     factor = load * (1.0 + signs * lean) + (own.T > 0.0) @ joint_load
     factor += signs * (np.sign(own.T * matrix.T) @ (joint_lean * joint_load))
-    return TrueFriction(
+    # torques are reported with the torque constants as configured
+    scale = 1.0 / np.array(driver.mismatch.torque_constant)
+    found = TrueFriction(
         # the cables transmit the friction of a joint, too, which is a load on the friction of motor and joint
         coulomb * (1.0 + signs * lean)
         + by_tension
@@ -116,6 +137,12 @@ def true_friction(configuration: Configuration) -> TrueFriction:
         factor,
         np.array(arm.motors.viscous_friction) + (own**2).T @ arm.joints.viscous_friction,
         _each(law.motor_stribeck_velocity, n),
+    )
+    return found._replace(
+        coulomb=scale * found.coulomb,
+        at_joint=scale * found.at_joint,
+        drop=scale * found.drop,
+        viscous=scale * found.viscous,
     )
 
 

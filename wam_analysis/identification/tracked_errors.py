@@ -1,0 +1,67 @@
+"""The covariance of what was identified, in the errors of the model that the contact estimator tracks.
+
+It tracks friction of each direction, friction by load, and the torque of the inertias at each joint, per torque.  The
+error of any other parameter has torques, too: viscous friction that is too low is in part Coulomb friction.  Each is
+counted as those tracked errors whose torques are nearest to its own in the motion; what no tracked error explains is
+small, and `left`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_analysis.identification.regressor import Regressor
+from wam_analysis.identification.uncertainty import Uncertainty
+
+Array = NDArray[np.float64]
+
+THEMSELVES = ("motors.coulomb_", "motors.load_", "joints.coulomb.", "joints.load.")  # identified and tracked
+CONSTANTS = "motors.torque_"  # the estimator has errors of the torque constants that are not identified
+LEAST = 1e-12  # size of a column that the motion does not show
+
+
+class TrackedErrors(NamedTuple):
+    """Covariance of the tracked errors.
+
+    Attributes
+    ----------
+    names : t, those of identified parameters; links.torque.J is the torque of links, pulleys and rotors at a joint.
+    covariance : (t, t), of friction in N m, load friction and torque of the inertias per torque.
+    left : (n,), standard deviation of each motor's torque by errors that are no tracked ones, N m.
+    """
+
+    names: tuple[str, ...]
+    covariance: Array
+    left: Array
+
+
+def tracked_errors(
+    regressor: Regressor, joints: tuple[str, ...], values: Array, uncertainty: Uncertainty
+) -> TrackedErrors:
+    """Express the covariance of what was identified in tracked errors.
+
+    Parameters
+    ----------
+    regressor : of the motion.
+    joints : names of all joints.
+    values : (p,), of all parameters.
+    uncertainty : of them.
+    """
+    equations, names = regressor.equations(values), regressor.unknowns.names
+    own = [i for i, name in enumerate(names) if name.startswith(THEMSELVES)]
+    every = np.concatenate((equations.columns[:, :, own], regressor.inertial_torques(values)), axis=2)
+    tracked, columns = every[equations.is_used], equations.columns[equations.is_used]
+    columns[:, [i for i, name in enumerate(names) if name.startswith(CONSTANTS)]] = 0.0
+    size = np.maximum(np.linalg.norm(tracked, axis=0), LEAST)
+    nearest = np.linalg.lstsq(tracked / size, columns, rcond=None)[0] / size[:, None]
+    left = np.where(nearest.any(axis=0), equations.columns, 0.0) - every @ nearest
+    rms = [
+        np.sqrt(uncertainty.variances(left[used, i]).mean()) if used.any() else 0.0
+        for i, used in enumerate(equations.is_used.T)
+    ]
+    return TrackedErrors(
+        (*(names[i] for i in own), *(f"links.torque.{joint}" for joint in joints)),
+        uncertainty.covariance(nearest),
+        np.array(rms),
+    )

@@ -1,0 +1,45 @@
+"""How certain an estimate is, of its parameters and of what they give together."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LEAST = 1e-30  # variance of a combination that has none
+
+
+class Uncertainty(NamedTuple):
+    """What the errors of p estimated parameters are known by.
+
+    Standard deviations are those of the jackknife, which 20 parts give well; correlations, which they do not, those of
+    white residuals.  Both are taken of the combinations in question: a motion shows these, not the single parameters.
+
+    Attributes
+    ----------
+    without : (parts, p), estimates without each part of the motion.
+    white : (p, p), covariance if residuals were white.
+    law : (p, p), covariance by what the law of friction leaves out, which each part has alike.
+    """
+
+    without: Array
+    white: Array
+    law: Array
+
+    def variances(self, combinations: Array) -> Array:
+        """Those of linear combinations, (t, p), of the parameters, (t,)."""
+        white, law = (((combinations @ each) * combinations).sum(1) for each in (self.white, self.law))
+        return np.asarray(white * self._times(combinations, white) + law, np.float64)
+
+    def covariance(self, combinations: Array) -> Array:
+        """That of linear combinations, (t, p), of the parameters, (t, t)."""
+        white = combinations @ self.white @ combinations.T
+        unit = np.sqrt(self._times(combinations, white.diagonal()))
+        return np.asarray(white * np.outer(unit, unit) + combinations @ self.law @ combinations.T, np.float64)
+
+    def _times(self, combinations: Array, white: Array) -> Array:
+        """How many times the white variances, (t,), those of the combinations are."""
+        apart = (self.without - self.without.mean(0)) @ combinations.T
+        parts = len(apart)
+        return np.maximum((parts - 1) / parts * (apart**2).sum(0) / np.maximum(white, LEAST), 1.0)
