@@ -5,12 +5,9 @@ their covariance.
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
-
-import numpy as np
-from numpy.typing import NDArray
 
 from wam_description.parameters import copy_of, lengths, one_each, parameter, require
 
@@ -187,11 +184,3 @@ class ArmModel:
     def is_identified(self) -> bool:
         """Whether the values come from a recording, with their covariance."""
         return self.covariance.parameters != (UNKNOWN,)
-
-    def covariance_of(self, parameters: Sequence[str]) -> NDArray[np.float64] | None:
-        """Covariance (k, k) of k parameters by name, in SI units; None where one of them was not identified."""
-        names, values = self.covariance.parameters, self.covariance.values
-        if not set(parameters) <= set(names):
-            return None
-        rows = [names.index(name) for name in parameters]
-        return np.reshape(values, (len(names), len(names)))[np.ix_(rows, rows)]
