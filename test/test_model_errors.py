@@ -26,6 +26,7 @@ from wam_description.signals import State
 
 TRUE = np.array([0.3, -0.2, 0.1])
 SD = 0.25
+STAYS = np.zeros((2, 0))  # torques of errors of the rest that stay: none
 QUIET = 1.0  # a detection statistic without contact
 
 
@@ -39,7 +40,7 @@ def seen(random: np.random.Generator, external: tuple[float, float] = (0.0, 0.0)
     """One moment of some motion, its residual with the true errors, an external torque and noise of 0.05 N m."""
     effects = random.uniform(-1.0, 1.0, (2, 3))
     residual = effects @ TRUE + external + 0.05 * random.standard_normal(2)
-    return Observation(residual, effects, 0.05**2 * np.eye(2), np.ones(2), random.uniform(-1.0, 1.0, 2))
+    return Observation(residual, effects, 0.05**2 * np.eye(2), np.ones(2), random.uniform(-1.0, 1.0, 2), STAYS)
 
 
 def follow(
@@ -122,10 +123,14 @@ def test_noise_of_a_motor_is_followed_and_widens_the_covariance() -> None:
     for _ in range(400):
         residual = np.array([30.0 * 0.01 * random.standard_normal(), 0.0])
         pose = random.uniform(-1.0, 1.0, 2)
-        tracked.follow(Observation(residual, effects, 1e-4 * np.eye(2), np.ones(2), pose), QUIET, False, LEARN_EVERY)
+        tracked.follow(
+            Observation(residual, effects, 1e-4 * np.eye(2), np.ones(2), pose, STAYS), QUIET, False, LEARN_EVERY
+        )
     assert np.sqrt(tracked.noise[0]) == pytest.approx(0.01, rel=0.3)
     assert tracked.noise[1] == 0.0
-    _, covariance = tracked.corrected(Observation(np.zeros(2), effects, 1e-4 * np.eye(2), np.ones(2), np.zeros(2)))
+    _, covariance = tracked.corrected(
+        Observation(np.zeros(2), effects, 1e-4 * np.eye(2), np.ones(2), np.zeros(2), STAYS)
+    )
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.3, rel=0.3)
 
 
