@@ -499,11 +499,11 @@ def test_drift_of_friction_is_followed_and_published_once_a_second() -> None:
     stamps = [row.stamp // 1_000_000_000 for row in rows]
     assert stamps == list(range(stamps[0], stamps[-1] + 1))
     assert len(stamps) > 12
-    friction = np.array([row.values for row in rows]).reshape(len(rows), 8, 3)
+    friction = np.array([row.values for row in rows]).reshape(len(rows), 8, 6)
     at_motor = np.abs(TransmissionMap.of(ARM).joint_from_motor[0, 0])
-    total = (
-        friction[:, 0, :2] + at_motor * friction[:, 4, :2]
-    )  # of motor 1 and joint 1, which free motion does not separate
+    total = friction[:, 0, :2] + at_motor * friction[:, 4, :2]  # free motion does not separate motor 1 and joint 1
+    assert np.all(friction[:, :4, 3:5] > 0.0)
+    assert np.all(friction[:, :4, 3:5] < 0.25 * friction[:, :4, :2])
     grown = total[-1] - total[5]
     assert grown == pytest.approx([0.3 * level * at_motor] * 2, rel=0.5)
     assert np.abs(total[5] - total[3]).max() < 0.3 * grown.min()

@@ -194,7 +194,7 @@ def test_errors_of_parameters_without_uncertainty_stay_zero() -> None:
         assert observer.observe(State([0.0, 35.0, 0.0, 10.0], [3.0, -2.0, 4.0, 1.0], [0.2] * 4), 1e-3)
         observer.follow(QUIET, False)
     assert np.all(np.isfinite(observer.torques()[1]))
-    assert set(observer.model_errors.values()) == {0.0}
+    assert {error.value for error in observer.model_errors.values()} == {0.0}
 
 
 def test_an_identified_model_gives_each_direction_its_friction_and_its_covariance() -> None:

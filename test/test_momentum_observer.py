@@ -133,7 +133,7 @@ def test_torques_that_come_late_are_no_external_ones() -> None:
             observer.follow(0.0, False)
         worst[name] = np.abs(rows[2000:]).max(axis=0)
         if sd:
-            assert observer.model_errors["delay of the torques"] == pytest.approx(2e-3, rel=0.2)
+            assert observer.model_errors["delay of the torques"].value == pytest.approx(2e-3, rel=0.2)
     assert np.all(worst["with"] < 0.5 * worst["without"])
     assert np.all(sds["with"][:2] > sds["without"][:2])
 

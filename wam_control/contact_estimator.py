@@ -16,6 +16,7 @@ from wam_control.contact_inference import (
     with_second,
 )
 from wam_control.inference_parameters import InferenceParameters
+from wam_control.model_errors import TrackedError
 from wam_control.momentum_observer import MomentumObserver
 from wam_control.observer_parameters import ObserverParameters
 from wam_control.pressed_pose import has_left
@@ -260,7 +261,7 @@ class ContactEstimator:
         return (is_calm and statistic > ALONE * detect) or (self._is_above and was_above)
 
     @property
-    def model_errors(self) -> dict[str, float]:
+    def model_errors(self) -> dict[str, TrackedError]:
         """Errors of the model that are tracked between contacts, by name; of joint sensors none."""
         return self._observer.model_errors
 

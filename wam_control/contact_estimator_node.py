@@ -101,7 +101,7 @@ class ContactEstimatorNode:
 
     def diagnostics(self) -> dict[str, float]:
         """The errors of the model as they are tracked between contacts, by name."""
-        return self._estimator.model_errors
+        return {name: error.value for name, error in self._estimator.model_errors.items()}
 
     def take_status(self, status: NodeStatus) -> None:
         """Follow the brakes in realtime.

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, Hypothesis
+from wam_control.model_errors import TrackedError
 from wam_control.model_prior import WAYS, friction_error, load_error
 from wam_description.arm import Arm
 from wam_description.signals import BASE, NO_CONTACT, Contact, LikelyRange, Table, Triple
@@ -91,7 +92,7 @@ def _hypothesis(row: Sequence[float], covers: Sequence[str]) -> Hypothesis:
     )
 
 
-def friction_table(errors: Mapping[str, float], arm: Arm, scale: float) -> Table:
+def friction_table(errors: Mapping[str, TrackedError], arm: Arm, scale: float) -> Table:
     """Rows in the order of `FRICTION_COLUMNS`: motors, then joints.
 
     Parameters
@@ -104,8 +105,10 @@ def friction_table(errors: Mapping[str, float], arm: Arm, scale: float) -> Table
     levels = (*arm.motors.dynamic_friction, *arm.joints.dynamic_friction)
     rows = tuple(
         (
-            *(scale * level * (1.0 + errors[friction_error(name, way)]) for way in WAYS),
-            errors[load_error(name)],
+            *(scale * level * (1.0 + errors[friction_error(name, way)].value) for way in WAYS),
+            errors[load_error(name)].value,
+            *(scale * level * errors[friction_error(name, way)].sd for way in WAYS),
+            errors[load_error(name)].sd,
         )
         for name, level in zip(names, levels, strict=True)
     )

@@ -57,6 +57,13 @@ class Observation(NamedTuple):
     lasting: Array
 
 
+class TrackedError(NamedTuple):
+    """An error of the model and its standard deviation, in the unit of `ModelPrior`."""
+
+    value: float
+    sd: float
+
+
 class ModelErrors:
     """Kalman filter of the errors of the model.
 
@@ -87,9 +94,10 @@ class ModelErrors:
         self._since = self._contact = self._hold = 0.0
 
     @property
-    def by_name(self) -> dict[str, float]:
+    def by_name(self) -> dict[str, TrackedError]:
         """The errors by name."""
-        return dict(zip(self._prior.names, self.errors.tolist(), strict=True))
+        sds = np.sqrt(self.covariance.diagonal()).tolist()
+        return dict(zip(self._prior.names, map(TrackedError, self.errors.tolist(), sds), strict=True))
 
     def reset(self) -> None:
         """Forget the samples that wait, not the errors."""

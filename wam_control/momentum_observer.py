@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact_fusion import Torques
-from wam_control.model_errors import ALIKE, ModelErrors, Observation
+from wam_control.model_errors import ALIKE, ModelErrors, Observation, TrackedError
 from wam_control.model_prior import model_prior
 from wam_control.observer_parameters import ObserverParameters
 from wam_control.shaft_friction import ShaftFriction
@@ -328,7 +328,7 @@ class MomentumObserver:
         return None if self._load is None else np.array(self._load.torque)
 
     @property
-    def model_errors(self) -> dict[str, float]:
+    def model_errors(self) -> dict[str, TrackedError]:
         """The errors of the model that are tracked, by name: per torque of the model, the payload in kg."""
         return {} if self._link_side else self._errors.by_name
 

@@ -46,6 +46,9 @@ FRICTION_COLUMNS: Final = (
     "positive",  # N m, Coulomb friction in positive motion
     "negative",  # N m, the same in negative motion
     "load",  # friction per torque that the cables transmit
+    "positive_sd",  # N m, standard deviations of these
+    "negative_sd",
+    "load_sd",
 )
 
 FORCE_AXIS_COLUMNS: Final = (

@@ -77,11 +77,12 @@ def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:
         return
     names = (*arm.motors.names, *arm.joints.names)
     for way in FRICTION_COLUMNS[:2]:
-        values = columns.columns[way]
-        for name, first, last in zip(names, values[: len(names)], values[-len(names) :], strict=False):
+        values, sds = columns.columns[way], columns.columns[f"{way}_sd"]
+        for i, name in enumerate(names, start=-len(names)):
+            first, last = values[i % len(names)], float(values[i])
             if last:
                 note = f"tracked between contacts, {100.0 * (last / first - 1.0):+.1f} % since the start"
-                yield Finding(f"{name}: friction in {way} motion", "N m", float(last), note=note)
+                yield Finding(f"{name}: friction in {way} motion", "N m", last, note=note, error=float(sds[i]))
 
 
 def _errors(away: float, off: float) -> str:
