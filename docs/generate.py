@@ -374,8 +374,8 @@ def pushes() -> tuple[resting_push.RestingPush, ...]:
 
 def resting_pushes() -> str:
     """The estimates of the pushes at rest, of each size with each kind of sensing."""
-    head = ["sensing", "push", "detected after 0.4 s", "after 2 s", "force after 0.4 s", "after 2 s"]
-    head += ["stated sd", "outer link", "position error", "stated sd"]
+    head = ["sensing", "push", "detected after 0.4 s", "detected after 2 s", "force after 0.4 s", "force after 2 s"]
+    head += ["its stated sd", "on the outer link", "position error", "its stated sd"]
     rows = []
     for (sensing, newtons), group in itertools.groupby(pushes(), key=lambda row: (row.sensing, row.newtons)):
         found = list(group)

@@ -30,7 +30,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     take_evaluation(parser, SEEDS, "arms and contacts", "docs/contact-robustness.md")
     names = ", ".join(map(repr, degradations.NAMES)).replace("%", "%%")
     parser.epilog = (
-        "All of it takes hours on four cores; one degradation with one seed takes minutes. Progress has the time left."
+        "One degradation with one seed takes about two minutes of one core; --workers share them. Progress on stderr "
+        "has the time left."
     )
     parser.add_argument("--seconds", type=float, default=110.0, help="length of a recording, default 110")
     parser.add_argument(
