@@ -76,7 +76,7 @@ site: $(STAMPS)/docs $(INSTALLED)  ## build the site docs/_build/html from the p
 
 define SITE
 rm -rf docs/api docs/_build/html; \
-$(PY) -P -m sphinx -W --keep-going -n -q -j 2 -d docs/_build/doctrees docs docs/_build/html && \
+$(PY) -P -m sphinx -W --keep-going -n -j 2 -d docs/_build/doctrees docs docs/_build/html && \
 echo "site: docs/_build/html/index.html"
 endef
 

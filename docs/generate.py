@@ -6,6 +6,7 @@ program fills.  `make docs` runs it; a test fails if a block is stale.
 
 import argparse
 import ast
+import itertools
 import math
 import re
 import shutil
@@ -20,6 +21,7 @@ from typing import Any
 from wam_analysis.table import markdown
 from wam_control.dither import Dither
 from wam_control.force_loop import ForceLoop, ForceLoopParameters
+from wam_control.scenario import STEP_KEYS
 from wam_control.velocity_loop import VelocityLoopParameters
 from wam_description.arm import Arm, Shared, Timing
 from wam_description.configuration import Configuration
@@ -286,6 +288,9 @@ def blocks() -> dict[str, Callable[[], str]]:
         "constants of the testbed": lambda: constants(TESTBED),
         "plant": plant_study,
         "resting pushes": resting_pushes,
+        "steps of a scenario": lambda: markdown(
+            ["key", "value"], [[f"`{key}`", text] for key, text in STEP_KEYS.items()]
+        ),
         "dither": lambda: dither(configuration),
         "refusals": refusals,
         "elbow": lambda: f"\n{(ROOT / 'docs' / 'elbow.txt').read_text(encoding='utf-8')}",
@@ -388,27 +393,36 @@ def pushes() -> tuple[resting_push.RestingPush, ...]:
 
 
 def resting_pushes() -> str:
-    """The estimate of each push at rest with each kind of sensing."""
+    """The estimates of the pushes at rest, of each size with each kind of sensing."""
+    head = ["sensing", "push", "detected after 0.4 s", "detected after 2 s", "force after 0.4 s", "force after 2 s"]
+    head += ["its stated sd", "on the outer link", "position error", "its stated sd"]
     rows = []
-    for row in pushes():
-        estimate = row.estimate
-        error = estimate.position - resting_push.POSITION if estimate.in_contact else math.nan
-        sd = max(estimate.torque_sd)
-        known = not math.isnan(error)
+    for (sensing, newtons), group in itertools.groupby(pushes(), key=lambda row: (row.sensing, row.newtons)):
+        found = list(group)
+        late = [row.estimate for row in found if row.late]
+        known = [estimate for estimate in late if not math.isnan(estimate.position)]
+        errors = [100.0 * abs(estimate.position - resting_push.POSITION) for estimate in known]
         rows.append(
             [
-                row.sensing,
-                f"{row.newtons:g} N",
-                estimate.link.replace("_", " ") or "missed",
-                f"{100.0 * error:.1f} cm" if known else "–",
-                f"{100.0 * estimate.position_sd:.1f} cm" if known else "–",
-                f"{row.force_error:.1f} N" if estimate.in_contact else "–",
-                f"{sd:.2g} N m",
+                sensing,
+                f"{newtons:g} N",
+                f"{sum(row.early > 0.0 for row in found)} of {len(found)}",
+                f"{len(late)} of {len(found)}",
+                between([row.early for row in found if row.early], "N"),
+                between([row.late for row in found if row.late], "N"),
+                between([estimate.hypotheses[0].force_sd for estimate in late], "N"),
+                f"{sum(estimate.link == 'outer_link' for estimate in late)} of {len(late)}",
+                f"up to {max(errors):.1f} cm" if errors else "–",
+                between([100.0 * estimate.position_sd for estimate in known], "cm"),
             ]
         )
-    return markdown(
-        ["sensing", "push", "estimated link", "position error", "position sd", "force error", "largest torque sd"], rows
-    )
+    return markdown(head, rows)
+
+
+def between(values: Sequence[float], unit: str) -> str:
+    """Least and greatest of some values."""
+    known = [f"{value:.1f}" for value in sorted(values) if not math.isnan(value)]
+    return " to ".join(dict.fromkeys((known[0], known[-1]))) + f" {unit}" if known else "–"
 
 
 def dither(configuration: Configuration) -> str:
@@ -416,7 +430,7 @@ def dither(configuration: Configuration) -> str:
     shared = configuration.with_values({"timing.dither_cycle": resting_push.CYCLE}).shared
     own = configuration.node("velocity_loop", VelocityLoopParameters).dither
     cost = Dither(shared.arm, shared.timing, own).cost(resting_push.POSE)
-    moved = next(row.tip_motion for row in pushes() if row.sensing == "motors, dither")
+    moved = next(row.tip_motion for row in pushes() if (row.sensing, row.pose) == ("motors, dither", resting_push.POSE))
     rows = [
         ["frequency", f"{1.0 / (shared.timing.dither_cycle * shared.timing.period):g} Hz"],
         ["amplitude over static friction of motor and joints", f"{own.level:g}"],

@@ -6,6 +6,7 @@ The stability guard is off, so that the unstable gains are seen, too; its verdic
 """
 
 import argparse
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from wam_control.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import ForceCommand
 from wam_sim.batch import processes, results
+from wam_sim.progress import Progress
 from wam_sim.simulation import Simulation
 
 NEWTONS = 10.0
@@ -60,8 +62,7 @@ def main() -> None:
     given = parser.parse_args()
     gains = np.geomspace(0.002, 0.2, given.gains).tolist()
     with processes() as executor:
-        found = results(press, gains, executor, report=lambda done, of: print(f"\r{done} of {of}", end="", flush=True))
-    print()
+        found = results(press, gains, executor, report=Progress("sweep", sys.stderr))
     steady = [row.gain for row in found if row.ripple < 0.1 * NEWTONS]
     limit = largest_stable_gain()
     print(f"at rest after 2 s up to a gain of {max(steady, default=0.0):.3g} m/s/N")

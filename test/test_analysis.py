@@ -5,6 +5,7 @@ import hashlib
 import json
 import math
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -402,7 +403,7 @@ def test_the_verdict_on_a_press_is_that_of_the_guard_and_chapter_five_names_its_
     node = node_at(recorded_set, recorded_set.arm, q, "outer_link", position, direction)
     assert node is not None
     assert predict(node, 0.12, 0.0, 0.005, 1).regime == "unstable for every step (domain III)"
-    for gain, words in ((0.09, "domain I; the gains may be "), (2.0, "NOT stable")):
+    for gain, words in ((0.015, "domain I, linearly stable "), (2.0, "NOT stable")):
         own = replace(
             recorded_set.force_loop, force_gain=(gain,), contact_cover="outer_link", contact_position=position
         )
@@ -414,6 +415,12 @@ def test_the_verdict_on_a_press_is_that_of_the_guard_and_chapter_five_names_its_
             taken = ForceLoop(recorded_set.arm, recorded_set.servo, loop, recorded_set.timing).assessment
             assert taken is not None
             assert found.assessment.scale >= taken.scale  # of one axis; the loop takes the worst of two
+            named = float(re.search(r"accepts a gain up to ([0-9.]+),", sentence(found))[1])
+            assert gain < named
+            for factor in (1.0, 1.02):  # what the sentence names is taken, and hardly more than that
+                more = replace(loop, force_gain=(factor * named,))
+                with nullcontext() if factor == 1.0 else pytest.raises(ParameterError, match="allowed: force_gain"):
+                    ForceLoop(recorded_set.arm, recorded_set.servo, more, recorded_set.timing)
         else:
             with pytest.raises(ParameterError, match=r"times the largest linearly stable"):
                 ForceLoop(recorded_set.arm, recorded_set.servo, loop, recorded_set.timing)
@@ -658,6 +665,10 @@ def test_a_number_far_from_its_prediction_is_flagged(samples: dict[str, Analysis
     """In wam-touch the cables creep while motor2 turns: that is alike for long, and no viscous friction."""
     assert "More than 3 standard errors" not in verdict_of(samples["wam-touch"])
     assert "viscous not identifiable (-4.88e-04 +- " in " ".join(text(samples["wam-touch"]).split())
+    (friction,) = [section for section in samples["wam-touch"].sections if section.key == "friction"]
+    (dry,) = [one for one in friction.findings if one.name == "motor3: dynamic friction"]
+    known = f"{shown(dry.measured)} +- {shown(dry.error, 'N m')}"  # one number, whether in a sentence or for a program
+    assert f"motor3: dry friction {known}, breakaway" in " ".join(friction.sentences)
     assert deviations((Finding("a", "N", 1.0, 1.2, "", 0.05),)) == (
         "More than 3 standard errors from the prediction: a 1 +- 0.05 N, predicted 1.2.",
     )

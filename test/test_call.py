@@ -10,6 +10,9 @@ import pytest
 import yaml
 from conftest import LONG
 
+from wam_description.wiring import Call
+from wam_ros.call import CalledStack
+
 WAM = [sys.executable, "-P", "-m", "wam_cli.program"]
 
 
@@ -83,6 +86,10 @@ def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: N
         there = set(err.partition("; there are ")[2].strip().split(", "))
         assert ({"joint_states", "status"} if words[0] == "echo" else {"driver", "force_loop"}) <= there
         assert "wam_call" not in there
+    with CalledStack("wam") as here:
+        refused = here.request(Call("nosuch", "tare")).message
+    assert refused.startswith("no service /wam/nosuch/tare within ")
+    assert {"driver", "force_loop"} <= set(refused.partition("; there are ")[2].split(", "))
 
 
 @pytest.mark.parametrize(
@@ -90,6 +97,8 @@ def test_an_unknown_node_or_topic_is_answered_with_those_that_there_are(stack: N
     [
         (("nan", "0", "0"), "the force is nan; it must be finite"),
         (("0", "0", "1e6"), "the force is 1e+06 N; allowed: up to disturbance_force_limit, 500 N"),
+        (("0", "-inf", "0"), "the force is inf; it must be finite"),
+        (("0", "-6e2", "0"), "the force is 600 N; allowed: up to disturbance_force_limit, 500 N"),
         (("0", "0", "1", "--seconds", "inf"), "--seconds is inf; it must be finite"),
     ],
 )

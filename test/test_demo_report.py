@@ -598,6 +598,6 @@ def test_what_the_estimated_position_gains_is_the_force_of_the_same_torques_at_e
     table = next(i for i, line in enumerate(lines) if line.startswith("What the estimated contact position gains"))
     (row,) = [line for line in lines[table : table + 8] if line.strip().startswith("press 8 N")]
     assert "25.0  8.40" in row
-    assert "  used by the force loop [cm]: 28.0 +- 5.0, 28.0 +- 5.0" in lines
+    assert "  used by the force loop, +- its standard deviation [cm]: 28.0 +- 5.0, 28.0 +- 5.0" in lines
     assert all(len(line) <= 100 for line in lines)
     assert not any("position gains" in line for line in text(Recording().summary()).splitlines()), "nothing is invented"

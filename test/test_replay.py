@@ -297,7 +297,13 @@ def test_the_command_prints_each_topic_and_says_by_its_code(bag: Path, capsys: p
     with pytest.raises(SystemExit) as ended:
         cli.main(["replay", str(bag), "transform"])
     assert ended.value.code == 0
-    assert capsys.readouterr().out.splitlines()[0] == "joint_states: 101 messages, the same bit for bit"
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "joint_states: 101 messages, the same bit for bit"
+    assert not any("nothing changed" in line for line in lines)
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["replay", str(bag), "gravity", "--set", "force_loop:force_gain=[0.01]"])
+    assert ended.value.code == 0
+    assert "nothing changed with force_loop:force_gain=[0.01]: " in capsys.readouterr().out.splitlines()[-1]
     with pytest.raises(SystemExit) as ended:
         cli.main(["replay", str(bag), "gravity", "--config", "wam"])
     assert ended.value.code == 0

@@ -318,6 +318,22 @@ def test_three_stated_errors_hold_the_friction_under_a_disturbance_that_is_alike
     assert np.sqrt(np.mean(np.square(off))) > 0.1, "errors that hold everything say nothing"
 
 
+def test_three_stated_errors_hold_the_static_friction_of_a_shaft_that_creeps_before_it_moves_off():
+    """A thousandth of the speed of rest, with the torque of dynamic friction: starts alike, all too low."""
+    static, dynamic = 0.25, 0.18
+    time, velocity, torque = shaft(static, dynamic, 0.0, 0.0)
+    starts = np.flatnonzero((velocity[:-1] == 0.0) & (velocity[1:] != 0.0))
+    for start in starts[1:]:  # the first one was at rest
+        torque[start - 60 : start + 1] = np.sign(velocity[start + 1]) * np.append(
+            np.full(57, dynamic), dynamic + (static - dynamic) * np.array([0.3, 0.4, 0.5, 0.6])
+        )
+        velocity[start - 60 : start + 1] = np.sign(velocity[start + 1]) * 1e-4
+    found = identify_friction(time, velocity, torque, rest=0.1, window=0.02)
+    assert found.breakaways > 5
+    assert found.static < 0.93 * static
+    assert abs(found.static - static) < 3.0 * found.static_error < 0.5 * static
+
+
 def test_impacts_do_not_spoil_the_friction():
     time, velocity, torque = shaft(0.25, 0.18, 0.012, 0.004)
     torque[np.random.default_rng(9).integers(0, len(time), 60)] += 5.0

@@ -202,8 +202,9 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
     head = ["step", "true", "at", "[N]", "error", "at", "[N]", "error", "at", "[N]", "error"]
     title = "What the estimated contact position gains: the same torques, measured as a force there"
     error = "  error: to the true force; at the true position, the error of the torques alone"
-    places = _wrapped(f"  used by the force loop [cm]: {', '.join(used)}", "    ")
-    return ["", title, *_table(rows, first, head), error, *places]
+    places = _wrapped(f"  used by the force loop, +- its standard deviation [cm]: {', '.join(used)}", "    ")
+    other = "  measured above: by all positions that this leaves open, so by none of these three"
+    return ["", title, *_table(rows, first, head), error, *places, other]
 
 
 def _reactions(summary: DemoSummary) -> list[str]:

@@ -20,6 +20,24 @@ from wam_description.parameters import ParameterError, flatten, parameter, requi
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, Contact, ForceCommand, PathPoint, PosturePath, Triple
 
+STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md has them as a table
+    "name": "text; needed",
+    "seconds": "s of the arm's time, at most where the step waits for a contact; needed",
+    "posture": "rad, an angle for each joint, reached at the end of the step",
+    "trajectory": "`{postures: [[...], ...], times: [...]}`, rad through which the arm goes; `times`, s, may be "
+    "left out",
+    "tip": "`[x, y, z]`, m in the base frame, to which the tool goes along a straight line",
+    "force": "`{frame, newtons: [x, y, z], contact_position}`: N on the world in `base` or in the frame of a link; "
+    "`contact_position`, m along the link, may be left out and pins it",
+    "task": "`{frame, axes: [...]}`, see [task frame](task-frame.md)",
+    "torque": "N m, a torque for each joint",
+    "until_force": "N; the step ends when a contact of this force is detected, and the scenario fails where none is",
+    "chirp": "`{newtons, from, to}`: a sine along the force, from one frequency to another, Hz",
+    "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm, m along the link, N"
+    " in its frame, s from the start of the step",
+    "request": "`enable` or `disable` at the start of the step",
+    "set": "`{force_loop: {force_gain: [0.01]}}`: live parameters of driver or force_loop from the start of the step",
+}
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
 REQUESTS = ("", "enable", "disable")
@@ -280,8 +298,7 @@ def load(path: Path, arm: Arm) -> list[ScenarioStep]:
 def _step(where: str, body: Any, arm: Arm) -> ScenarioStep:
     if not isinstance(body, dict):
         raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
-    keys = ("name", "seconds", *MOTIONS, *FORCES, "until_force", "chirp", "push", "request", "set")
-    known(where, body, keys, ("name", "seconds"))
+    known(where, body, tuple(STEP_KEYS), ("name", "seconds"))
     name = body["name"]
     require(isinstance(name, str) and name != "", f"{where}: name is {name!r}; it must be a text (quote it)")
     request = body.get("request", "")

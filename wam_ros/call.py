@@ -71,7 +71,9 @@ class CalledStack:
         client = self.node.create_client(kind, service)
         name = self.node.resolve_service_name(service)
         if not client.wait_for_service(PATIENCE):
-            return Reply(False, f"no service {name} within {PATIENCE:g} s; {START}")
+            there = self._nodes_without(request.node)
+            advice = f"there are {', '.join(there)}" if there else START
+            return Reply(False, f"no service {name} within {PATIENCE:g} s; {advice}")
         attempts = SET_ATTEMPTS if isinstance(request, SetParameters) else ATTEMPTS
         wait = partial(self._connection.executor.spin_until_future_complete, timeout_sec=PATIENCE / attempts)
         answer = answer_of(client, message, attempts, wait)
@@ -94,13 +96,14 @@ class CalledStack:
             requested.ask()
             return not requested.missing
 
-        def nodes() -> list[str]:
-            own = self.node.get_namespace()
-            found = {name for name, where in self.node.get_node_names_and_namespaces() if where == own}
-            return [] if node in found else sorted(found - {self.node.get_name()})
-
-        self._wait(is_answered, f"no node '{node}' answers", nodes)
+        self._wait(is_answered, f"no node '{node}' answers", partial(self._nodes_without, node))
         return requested.found[node]
+
+    def _nodes_without(self, node: str) -> list[str]:
+        """The nodes of the stack, none where this one is among them."""
+        own = self.node.get_namespace()
+        found = {name for name, where in self.node.get_node_names_and_namespaces() if where == own}
+        return [] if node in found else sorted(found - {self.node.get_name()})
 
     def live(self, node: str, names: Collection[str]) -> list[str]:
         """Those of the parameters of a node that a request may change while it runs.

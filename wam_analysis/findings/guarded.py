@@ -12,7 +12,15 @@ from wam_analysis.findings.finding import shown
 from wam_analysis.recorded import PredictionParameters
 from wam_control.force_loop_parameters import force_law, task_of
 from wam_control.friction_verdict import Domain
-from wam_control.stability_guard import LARGEST, GuardAssessment, GuardedContact, StabilityGuard
+from wam_control.guard_supervision import Supervision
+from wam_control.stability_guard import (
+    LARGEST,
+    GuardAssessment,
+    GuardedContact,
+    StabilityGuard,
+    posture_of,
+    rounded_down,
+)
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 
@@ -28,13 +36,16 @@ class Guarded(NamedTuple):
     assessment : at this contact.
     surface : its stiffness, N/m.
     gain : G_I along the force, m/s/N.
-    fraction : of the largest linearly stable gain, up to which the guard accepts gains.
+    posture : of this contact, in words.
+    accepted : factor of the gains up to which the force loop accepts them with the arm in this posture, in both
+        directions across the link, in `guard.posture`, and with the surface of its parameters.
     """
 
     assessment: GuardAssessment
     surface: float
     gain: float
-    fraction: float
+    posture: str
+    accepted: float
 
 
 def guarded(
@@ -67,21 +78,31 @@ def guarded(
     if not touches or not any((*law.gain, *law.proportional_gain)):
         return None
     found = guard.assess(task_of(loop, law), touches)
-    return Guarded(found, parameters.contact_stiffness, max(law.gain), parameters.stability_fraction)
+    warning = replace(loop, guard=replace(loop.guard, mode="warn"))
+    own = Supervision(arm, servo, timing, warning, tuple(q)).assessment
+    accepted = parameters.stability_fraction * min(found.scale, math.inf if own is None else own.scale)
+    return Guarded(
+        found,
+        parameters.contact_stiffness,
+        max(law.gain),
+        posture_of(touches[0]._replace(q=tuple(np.round(q, 3)))),
+        accepted,
+    )
 
 
 def sentence(found: Guarded) -> str:
     """The result as a sentence."""
     assessment = found.assessment
-    text = f"Stability guard (sampled loop with its velocity loops, contact of {shown(found.surface)} N/m)"
+    surface = f"contact of {shown(found.surface)} N/m"
+    text = f"Stability guard (sampled loop with its velocity loops, {surface}, {found.posture})"
     over = f"{shown(1.0 / assessment.scale)} times the largest linearly stable ones" if assessment.scale else ""
     if assessment.domain is Domain.I:
-        more = f"more than {LARGEST:g}" if assessment.scale >= LARGEST else shown(assessment.scale)
-        return f"{text}: domain I; the gains may be {more} times as large."
+        more = f"even with {LARGEST:g}" if assessment.scale >= LARGEST else f"with up to {shown(assessment.scale)}"
+        return f"{text}: domain I, linearly stable {more} times these gains. {_accepted(found)}"
     if assessment.scale >= 1.0:
         return (
-            f"{text}: stable, but the gains may be only {shown(assessment.scale)} times as large; "
-            f"the guard requires {shown(1.0 / found.fraction)}."
+            f"{text}: linearly stable, but only with up to {shown(assessment.scale)} times these gains. "
+            f"{_accepted(found)}"
         )
     if not over:
         return f"{text}: NOT stable, not even with a hundredth of the gains."
@@ -91,3 +112,11 @@ def sentence(found: Guarded) -> str:
             f"{shown(assessment.stable_error, 'N')}."
         )
     return f"{text}: NOT stable, domain {assessment.domain}; the gains are {over}."
+
+
+def _accepted(found: Guarded) -> str:
+    """What the force loop accepts, which is less than what is stable here."""
+    return (
+        f"In this posture, guard.posture and any direction across the link the force loop accepts a gain up to "
+        f"{rounded_down(found.accepted * found.gain):g}, {shown(rounded_down(found.accepted))} times the recorded one."
+    )

@@ -60,7 +60,7 @@ def motion_sections(recording: AnalysedRun) -> MotionFindings:
         about = _friction_section(recording, arm, signals, {}, joints)
         about = about._replace(sentences=(drowned, *about.sentences))
         return MotionFindings((stick, about, frequency_section(recording, arm)), None, {}, {})
-    friction = _friction_of_motors(signals, arm)
+    friction = _friction_of_motors(signals, arm, effects)
     ripple = _ripples(signals, arm, friction)
     sections = (
         stick,
@@ -132,14 +132,17 @@ def _stick_sentence(name: str, phases: Phases) -> str:
 # friction
 
 
-def _friction_of_motors(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
-    free = signals.torque - signals.load
-    return {
-        name: _possible(
+def _friction_of_motors(signals: TransmissionSignals, arm: Arm, effects: Effects | None) -> dict[str, Friction]:
+    """Of the motors; their cogging may be part of what was measured at some angles, and adds to the errors."""
+    free, found = signals.torque - signals.load, {}
+    for i, name in enumerate(arm.motors.names):
+        alone = _possible(
             identify_friction(signals.time, signals.velocity[:, i], free[:, i], MOTOR_REST, WINDOW, signals.use)
         )
-        for i, name in enumerate(arm.motors.names)
-    }
+        cogging = effects.ripple(name) / math.sqrt(2.0) if effects else 0.0  # N m, rms
+        static_error, dynamic_error = math.hypot(alone.static_error, cogging), math.hypot(alone.dynamic_error, cogging)
+        found[name] = alone._replace(static_error=static_error, dynamic_error=dynamic_error)
+    return found
 
 
 def _friction_of_joints(signals: TransmissionSignals, arm: Arm) -> dict[str, Friction]:
@@ -178,10 +181,8 @@ def _friction_section(
         else f"with the joint's friction; load from the {signals.load_from}"
     )
     findings = []
-    effects = recording.parameters.effects
     for i, (name, found) in enumerate(friction.items()):
-        cogging = effects.ripple(name) / math.sqrt(2.0) if effects else 0.0
-        findings += _friction_findings(name, found, _of_motor(arm, i, alone), note, cogging)
+        findings += _friction_findings(name, found, _of_motor(arm, i, alone), note)
     for i, (name, found) in enumerate(joints.items()):
         bearing = arm.joints
         configured = (bearing.static_friction[i], bearing.dynamic_friction[i], bearing.viscous_friction[i])
@@ -234,12 +235,9 @@ def _of_motor(arm: Arm, i: int, alone: bool) -> tuple[float, float, float]:
     return own[0], own[1], own[2]
 
 
-def _friction_findings(
-    name: str, found: Friction, configured: tuple[float, float, float], note: str, cogging: float = 0.0
-) -> list[Finding]:
-    """Of one shaft; cogging of this rms, N m, may be part of what was measured at some angles."""
+def _friction_findings(name: str, found: Friction, configured: tuple[float, float, float], note: str) -> list[Finding]:
+    """Of one shaft."""
     static, dynamic, viscous = configured
-    errors = math.hypot(found.static_error, cogging), math.hypot(found.dynamic_error, cogging)
 
     def one(kind: str, unit: str, value: float, error: float, predicted: float, first: str = "") -> Finding:
         identified = _is_identified(value, error)
@@ -251,8 +249,8 @@ def _friction_findings(
         return Finding(f"{name}: {kind} friction", unit, measured, predicted, text, error if identified else math.nan)
 
     return [
-        one("static", "N m", found.static, errors[0], static, f"{found.breakaways} breakaways"),
-        one("dynamic", "N m", found.dynamic, errors[1], dynamic),
+        one("static", "N m", found.static, found.static_error, static, f"{found.breakaways} breakaways"),
+        one("dynamic", "N m", found.dynamic, found.dynamic_error, dynamic),
         one("viscous", "N m s/rad", found.viscous, found.viscous_error, viscous),
     ]
 

@@ -17,6 +17,7 @@ STILL = 0.01  # of the speed of rest: below it the shaft has not begun to move
 PRECISE = 0.01  # of the torque: noise at a breakaway after the line
 SIGMAS = 3.0  # standard errors that are meant to hold the truth
 FREEDOM = 2.0  # least degrees of freedom: with fewer, an error could be anything
+CREEP = 0.5  # of the rise of static above dynamic friction: what creep at a speed that is taken for rest may hide of it
 NEGLECTED = 2e-3  # of a number: what the averaged law neglects, where a recording without noise leaves no error
 UNEVEN = 0.003  # of dry friction, by which it changes with load and position: over few speeds that looks like viscous
 SINGULAR = 1e12  # condition of normal equations beyond which a column has no information
@@ -35,7 +36,9 @@ class Friction(NamedTuple):
     inertia : torque per acceleration.
     offset : torque that does not change its sign.
     static_error, dynamic_error, viscous_error, inertia_error : standard errors of the first four; three of them hold
-        the truth also where there are few breakaways or motions.  NaN of fewer than three breakaways.
+        the truth also where there are few breakaways or motions.  That of `static` is at least half of its rise above
+        `dynamic`: what creeps, too slowly to be seen, moves off at any torque between both, and as often as you like.
+        NaN of fewer than three breakaways.
     breakaways : their number.
     residual : rms of the averaged torque that the fit in motion leaves.
     unexplained : the same as a share of the rms of that torque about its mean.
@@ -109,7 +112,8 @@ def identify_friction(
     error = math.nan
     if len(statics) > 2:
         scatter = 1.4826 * float(np.median(np.abs(statics - static)))
-        error = math.hypot(_few(len(statics) - 1.0) * scatter / math.sqrt(len(statics)), NEGLECTED * static)
+        alike = _few(len(statics) - 1.0) * scatter / math.sqrt(len(statics))
+        error = math.hypot(alike, CREEP * (static - dynamic), NEGLECTED * static)
     return Friction(
         static, dynamic, viscous, inertia, offset, error, errors[0], errors[1], errors[2], len(statics), *left
     )

@@ -3,6 +3,7 @@
 import argparse
 import difflib
 import math
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -37,6 +38,7 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "resume": ("let the time go on", (Call("driver", "pause", False),)),
 }
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+NEGATIVE: Final = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|-(inf|infinity|nan)$", re.IGNORECASE)
 ZERO: Final = (0.0, 0.0, 0.0)
 
 
@@ -59,6 +61,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     heard.add_argument("topic", help="as in docs/topics.md, for example force_measured")
     heard.add_argument("--count", type=int, metavar="N", help="end after so many; default: Ctrl-C")
     push = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
+    push._negative_number_matcher = NEGATIVE  # that of argparse takes -1e1 and -inf for options, up to Python 3.13
     push.add_argument("cover", help="link that is pushed, for example outer_link")
     push.add_argument("force", type=float, nargs=3, metavar="N", help="x, y and z, in the frame of the link")
     push.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")

@@ -28,13 +28,18 @@ SEEDS = (1, 2, 3)
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     take_evaluation(parser, SEEDS, "arms and contacts", "docs/contact-robustness.md")
+    names = ", ".join(map(repr, degradations.NAMES)).replace("%", "%%")
+    parser.epilog = (
+        "One degradation with one seed takes about two minutes of one core; --workers share them. Progress on stderr "
+        "has the time left."
+    )
     parser.add_argument("--seconds", type=float, default=110.0, help="length of a recording, default 110")
     parser.add_argument(
         "--only",
         nargs="+",
         default=list(degradations.NAMES),
         metavar="DEGRADATION",
-        help="default: all, and the first benchmark on the same seeds",
+        help=f"of: {names}; default: all, and the first benchmark on the same seeds",
     )
     parser.add_argument(
         "--recordings", type=Path, metavar="DIRECTORY", help="keep the recordings here, and use those that are here"

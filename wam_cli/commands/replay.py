@@ -25,9 +25,24 @@ def run(given: argparse.Namespace) -> int:
     """Replay and print the comparison of each topic; 0 if all are the same bit for bit, else 1."""
     configuration = configuration_of(given) if given.config else None
     done = replay(given.bag, given.node, configuration, {} if given.config else option_values(given.values))
-    for line in (*(f"INCOMPLETE: {line}" for line in done.lost), *map(stated, done.topics), *reasons(done)):
+    for line in (
+        *(f"INCOMPLETE: {line}" for line in done.lost),
+        *map(stated, done.topics),
+        *reasons(done),
+        *without_effect(given.values, done),
+    ):
         print(line)
     return 0 if done.is_same else 1
+
+
+def without_effect(values: list[str], done: Replay) -> list[str]:
+    """That nothing has changed with new values, which one would else take for a result."""
+    if not values or not done.is_same:
+        return []
+    why = f"either the recording had these values, or with its other parameters they have no effect on {done.node}"
+    return [
+        f"nothing changed with {', '.join(values)}: {why}, as the model of friction has none with use_joint_sensors"
+    ]
 
 
 def reasons(done: Replay) -> list[str]:

@@ -1,7 +1,8 @@
-"""One push at rest, estimated from the motors, with dither, and from joint sensors: a figure and a table."""
+"""Pushes at rest, estimated from the motors, with dither, and from joint sensors: a figure and a table."""
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,11 +22,11 @@ from wam_description.signals import Contact
 from wam_description.world import Obstacles
 from wam_sim.simulation import Simulation
 
+Triple = tuple[float, float, float]
 SIZE = (11.0, 4.6)  # in
 METRES_PER_NEWTON = 0.02
 NOWHERE = Obstacles((), (), (), (), (), (), (), (), ())
 POSE = (0.1, -0.9, 0.2, 0.9)  # rad
-Triple = tuple[float, float, float]
 POSITION, FORCE = 0.28, (0.0, 6.0, 8.0)  # m, N
 CYCLE = 40  # periods of the dither: 25 Hz
 SENSING = {
@@ -35,6 +36,8 @@ SENSING = {
 }
 TITLES = ("(a) at rest: the motors alone", "(b) at rest, with dither")
 SIZES = (5.0, 10.0, 20.0)  # N
+DIRECTIONS: tuple[Triple, ...] = ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))  # of the link
+EARLY, LATE = 0.4, 2.0  # s after the start of a push
 PUSH_BEGINS = 0.45  # s after power-up
 TIP_ROWS = slice(60, 90)  # outer periods between release and push
 
@@ -45,7 +48,7 @@ def save(path: Path, configuration: Configuration) -> list[str]:
     FigureCanvasAgg(figure)
     lines = []
     for i, (title, values) in enumerate(zip(TITLES, SENSING.values(), strict=False)):
-        run, arm = _pushed(configuration, FORCE, values), configuration.shared.arm
+        run, arm = _pushed(configuration, FORCE, values, POSE, EARLY), configuration.shared.arm
         axes = figure.add_axes((0.5 * i, 0.0, 0.5, 1.0))
         estimate, q = run.estimate, run.driver.true_joint_state.position
         draw(axes, arm, q, estimate, Contact("outer_link", POSITION, FORCE))
@@ -111,44 +114,57 @@ class RestingPush(NamedTuple):
 
     Attributes
     ----------
-    sensing, newtons : which.
-    estimate : 0.4 s after the start of the push.
-    force_error : N, size of the error of the force; the whole force if the push is missed.
+    sensing, newtons, pose : which.
+    early : N, size of the estimated force `EARLY` after the start of the push; 0 where it is missed.
+    estimate : `LATE` after the start of the push.
     tip_motion : m, peak to peak, of the tool before the push.
     """
 
     sensing: str
     newtons: float
+    pose: tuple[float, ...]
+    early: float
     estimate: ContactEstimate
-    force_error: float
     tip_motion: float
+
+    @property
+    def late(self) -> float:
+        """N, size of the force that is estimated at the end, 0 where it is missed."""
+        return math.hypot(*self.estimate.force) if self.estimate.in_contact else 0.0
+
+
+def poses(configuration: Configuration) -> tuple[tuple[float, ...], ...]:
+    """Joint angles in which the arm is pushed, rad: that in which it starts, and one that is bent and turned."""
+    return configuration.shared.arm.joints.start, POSE
 
 
 def study(configuration: Configuration) -> list[RestingPush]:
-    """Push the resting arm with each force, and estimate it with each kind of sensing."""
-    found = []
-    for sensing, values in SENSING.items():
-        for newtons in SIZES:
-            force = tuple(newtons / 10.0 * part for part in FORCE)
-            run = _pushed(configuration, (force[0], force[1], force[2]), values)
-            body, estimate = RigidBody(configuration.shared.arm), run.estimate
-            n = len(POSE)
+    """Push the resting arm with each force, in each pose and direction, and estimate it with each kind of sensing."""
+    found, body, n = [], RigidBody(configuration.shared.arm), len(POSE)
+    for (sensing, values), newtons in product(SENSING.items(), SIZES):
+        for pose, (x, y, z) in product(poses(configuration), DIRECTIONS):
+            force = (newtons * x, newtons * y, newtons * z)
+            run = _pushed(configuration, force, values, pose, LATE)
             tips = [body.tool_pose(row.values[:n]).position for row in run.rows["sim/joint_states"][TIP_ROWS]]
-            error = math.dist(estimate.force, force)
-            found.append(RestingPush(sensing, newtons, estimate, error, float(np.linalg.norm(np.ptp(tips, axis=0)))))
+            rows = run.rows["contact/wrench"]
+            early = min(rows, key=lambda row: abs(row.stamp / 1e9 - PUSH_BEGINS - EARLY)).values[:3]
+            moved = float(np.linalg.norm(np.ptp(tips, axis=0)))
+            found.append(RestingPush(sensing, newtons, pose, math.hypot(*early), run.estimate, moved))
     return found
 
 
-def _pushed(configuration: Configuration, force: Triple, own: Mapping[str, object]) -> Simulation:
+def _pushed(
+    configuration: Configuration, force: Triple, own: Mapping[str, object], pose: Sequence[float], seconds: float
+) -> Simulation:
     values = {
         **own,
-        "arm.joints.start": POSE,
+        "arm.joints.start": pose,
         "driver:world.obstacles.positions": [5.0] * 3,
     }
     steps = [
         ScenarioStep("release", 0.05, request="enable"),
         ScenarioStep("settle", PUSH_BEGINS - 0.05),
-        ScenarioStep("rest", 0.4, push=Push("outer_link", POSITION, force, 0.0, 2.0)),
+        ScenarioStep("rest", seconds, push=Push("outer_link", POSITION, force, 0.0, seconds)),
     ]
     run = Simulation(configuration.with_values(values), steps)
     if failure := run.play():
