@@ -26,9 +26,9 @@ ROWS = {  # must, aim
 
 
 def kept(run: Run) -> float:
-    """Periods in time of a demonstration in realtime, per cent; also of one that a late node has ended."""
+    """Periods in time of a demonstration in realtime, per cent; also of one that a late node has ended, or prevented."""
     loop = summarize(read(run.bag)).loop
-    return 100.0 * (1.0 - loop.missed / loop.periods)
+    return 100.0 * (1.0 - loop.missed / loop.periods) if loop.periods else 0.0
 
 
 def first_motion(folder: Path, name: str, options: list[str]) -> float:
