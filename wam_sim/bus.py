@@ -101,7 +101,7 @@ class _Route:
     Attributes
     ----------
     takers : of its messages.
-    kept : rows that nobody has asked for yet.
+    kept : rows since the last call of `Bus.rows`.
     """
 
     __slots__ = ("_row", "kept", "takers")
