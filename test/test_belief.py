@@ -292,6 +292,6 @@ def test_the_force_ends_where_nobody_measures_it() -> None:
     assert loop.needs == {"external_joint_torques", "contact/hypotheses"}
     state = (5 * MS, State([0.0, -1.8, 0.0, 1.45], [0.0] * 4, [1.0] * 4))
     force = (5 * MS, Wrench("outer_link", (0.0, -10.0, 0.0), ZERO))
-    out = loop.step(Inputs(5 * MS, 0.005, {"joint_states": state, "force_command": force}))
+    out = loop.step(Inputs.of(5 * MS, 0.005, {"joint_states": state, "force_command": force}))
     assert not any(out["joint_effort_command"].effort)
     assert not any(out["joint_velocity_command"].velocity)

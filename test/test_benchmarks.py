@@ -47,6 +47,7 @@ ROWS = {
         "substep over mj_step, testbed, moving",
     ],
     "contact.py": ["observe", "infer", "estimate", "update"],
+    "messages.py": ["taken by all", "taken by nobody"],
     "parts.py": [
         "whole",
         "driver",

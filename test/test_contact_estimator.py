@@ -206,7 +206,7 @@ def test_a_second_contact_is_reported_once_in_a_contact_if_it_lasts() -> None:
             "motor_states": (tick, State(arm.theta, arm.thetad, ZERO)),
             "joint_sensors": (tick, State(arm.q, arm.qd, arm.strain_torque)),
         }
-        out = node.step(Inputs((tick + 1) * 1_000_000, DT, state))
+        out = node.step(Inputs.of((tick + 1) * 1_000_000, DT, state))
         reported += [(tick, out["status"].message)] if "status" in out else []
     ((begin, warning), (end, nothing)) = reported
     assert (warning, nothing) == (SECOND, "")

@@ -209,7 +209,7 @@ def test_the_overlay_is_a_configuration_that_the_nodes_use(
     assert shared.model.motors.coulomb_negative == pytest.approx(planted.coulomb[1], rel=0.01)
     assert shared.model.joints.coulomb[0] == 0.0, "it is part of its motor's"
     q = [0.3, -0.7, 0.2, 0.9]
-    inputs = Inputs(0, 0.005, {"joint_states": (0, State(q, [], []))})
+    inputs = Inputs.of(0, 0.005, {"joint_states": (0, State(q, [], []))})
     (effort,) = GravityNode(shared, build(GravityNode.parameters, {})).step(inputs).values()
     assert effort.effort == pytest.approx(RigidBody(planted.arm).gravity_torque(q), abs=0.02)
 

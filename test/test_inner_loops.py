@@ -133,8 +133,8 @@ def test_a_torque_loop_reports_a_velocity_which_it_does_not_control() -> None:
         "motor_velocity_command": (1, State([], [], [])),
         "motor_effort_command": (1, State([], [], [0.1])),
     }
-    (current,) = node.step(Inputs(1, 1e-3, values))["motor_current_command"].effort
+    (current,) = node.step(Inputs.of(1, 1e-3, values))["motor_current_command"].effort
     assert current * configuration.shared.arm.motors.torque_constant[0] == pytest.approx(0.1)
     assert not node.refusals
-    node.step(Inputs(1, 1e-3, {**values, "motor_velocity_command": (1, State([], [0.5], []))}))
+    node.step(Inputs.of(1, 1e-3, {**values, "motor_velocity_command": (1, State([], [0.5], []))}))
     assert "set force_loop:mode open_loop" in node.refusals["motor_velocity_command"]

@@ -224,8 +224,10 @@ def test_in_realtime_a_step_takes_the_newest_and_never_waits() -> None:
     assert puts(synchroniser, "state", 9_000_000, "s9") == [(9_000_000, 0.008, "s9", "new")]
 
 
-def test_the_age_of_an_input_counts_from_the_state_that_caused_it() -> None:
-    synchroniser = Synchroniser(TIMING, "state", {"command": InputSpec(outer=True, delay=1)})
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_the_age_of_an_input_counts_from_the_state_that_caused_it(mode: str) -> None:
+    timing = dataclasses.replace(TIMING, mode=mode)
+    synchroniser = Synchroniser(timing, "state", {"command": InputSpec(outer=True, delay=1)})
     assert list(synchroniser.put("command", 1_000_000, "c1")) == []
     (inputs,) = synchroniser.put("state", 4_000_000, "s4")
     assert (inputs.age("command"), inputs.stamp_of("command")) == (0.003, 1_000_000)

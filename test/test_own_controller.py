@@ -164,7 +164,7 @@ def test_the_example_holds_the_last_posture_where_one_is_beyond_the_stops(config
 
     def effort(stamp: int, posture: list[float]) -> Any:
         taken = {"joint_states": (stamp, joints), "joint_posture_command": (stamp, State(posture, [], []))}
-        return loop.step(Inputs(stamp, 0.005, taken))["joint_effort_command"]
+        return loop.step(Inputs.of(stamp, 0.005, taken))["joint_effort_command"]
 
     good = effort(5_000_000, [0.0, -1.3, 0.0, 0.9])
     assert loop.refusals == {}

@@ -321,7 +321,7 @@ def test_a_force_with_a_place_is_commanded_with_the_torque_that_pins_it(tmp_path
     sizes = []
     for tick in range(100):
         joints = {"joint_states": (tick, State(list(START), [], []))}
-        command = node.step(Inputs(tick + 1, 0.005, joints))["force_command"]
+        command = node.step(Inputs.of(tick + 1, 0.005, joints))["force_command"]
         assert pinned_position(ForceCommand(*command)) == ("outer_link", pytest.approx(0.28))
         sizes.append(math.hypot(*command.force))
     assert max(sizes) > min(sizes) + 0.5

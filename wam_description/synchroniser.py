@@ -16,7 +16,7 @@ Nothing is used that is from the future, too old, or from before the driver's se
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wam_description.arm import Timing, seconds
@@ -51,29 +51,40 @@ class InputSpec(NamedTuple):
     is_command: bool = False
 
 
-class Inputs:
-    """The inputs of one step, by topic.
+Origin = tuple[int, Collection[str]]
+
+
+class Inputs(dict[str, Any]):
+    """The inputs of one step, by topic: None where there is none, it is too old, or this arm does not have the topic.
+
+    A dictionary answers in a quarter of the time of a method of ours, and nodes read nine times in a period.
 
     Attributes
     ----------
     stamp : time of the trigger, ns.
     dt : time since the step before, s; the nominal period at the first step.
+    origins : stamps, ns, each with the topics whose inputs have it.
     """
 
-    __slots__ = ("_taken", "dt", "stamp")
+    __slots__ = ("dt", "origins", "stamp")
+    stamp: int
+    dt: float
+    origins: list[Origin]
 
-    def __init__(self, stamp: int, dt: float, taken: Mapping[str, tuple[int, Any] | None]) -> None:
-        self.stamp, self.dt, self._taken = stamp, dt, taken
+    @classmethod
+    def of(cls, stamp: int, dt: float, taken: Mapping[str, tuple[int, Any] | None]) -> "Inputs":
+        """Inputs made by hand: time of the trigger, ns, since the step before, s, and stamp and value by topic."""
+        inputs = cls({topic: found and found[1] for topic, found in taken.items()})
+        inputs.stamp, inputs.dt = stamp, dt
+        inputs.origins = [(found[0], (topic,)) for topic, found in taken.items() if found is not None]
+        return inputs
 
-    def __getitem__(self, topic: str) -> Any:
-        """The value, None where there is none, it is too old, or the topic does not exist on this arm."""
-        found = self._taken.get(topic)
-        return found[1] if found is not None else None
+    def __missing__(self, topic: str) -> None:
+        """None."""
 
     def stamp_of(self, topic: str) -> int:
         """Stamp of an input, ns; that of the trigger where there is none."""
-        found = self._taken.get(topic)
-        return found[0] if found is not None else self.stamp
+        return next((stamp for stamp, topics in self.origins if topic in topics), self.stamp)
 
     def age(self, topic: str) -> float:
         """Time from the state that caused an input to the trigger, s; 0 where there is none."""
@@ -126,7 +137,7 @@ class Synchroniser:
             self._groups.append(group)
             self._inlets.update({topic: self._waited(topic, group, limit) for topic, limit in limits.items()})
         self._inlets.update({topic: self._unwaited(topic, newest) for topic, newest in self._newest.items()})
-        self._lacks: tuple[_Group, int, int] | None = None  # see `_taken`
+        self._lacks: tuple[_Group, int, int] | None = None  # see `_inputs`
         self._announced: int | None = None  # first state of a session that none of its states has confirmed yet, ns
         self._early: deque[tuple[str, int, Any]] = deque(maxlen=MOST_EARLY)
         self.strays = 0
@@ -200,11 +211,11 @@ class Synchroniser:
                 self._require_present(stamp, limit_ns)
             slot = kept.get(stamp)
             if slot is None:
-                kept[stamp] = {topic: (stamp, value)}
+                kept[stamp] = {topic: value}
             elif topic in slot:
                 self.strays += 1
             else:
-                slot[topic] = stamp, value
+                slot[topic] = value
             return self._complete(stamp) if triggers else ()
 
         return take
@@ -226,9 +237,9 @@ class Synchroniser:
 
     def _start(self, stamp: int, value: Any) -> Sequence[Inputs]:
         """Take a trigger; returns the inputs of its step, where that is complete."""
-        last = self._last
         if self._thinned and stamp % self._outer_period != self._outer_phase:
             return ()
+        last = self._last
         if (
             not last < stamp <= last + self._longest_jump
             and (last or stamp <= 0)
@@ -237,8 +248,8 @@ class Synchroniser:
             return ()
         self._last, self._suspect = stamp, 0
         if not self._triggers:  # most often: nothing waits, and all inputs are there
-            if (taken := self._taken(stamp)) is not None:
-                return (self._step(stamp, value, taken),)
+            if (inputs := self._inputs(stamp, value)) is not None:
+                return (inputs,)
             if self._has_missed(stamp):
                 self._lacks = None
                 return ()
@@ -253,13 +264,14 @@ class Synchroniser:
                 return ()  # nothing that the first step waits for, or shows that it waits in vain
         complete: list[Inputs] = []
         while self._triggers:
-            taken = self._taken(self._triggers[0][0])
-            if taken is None and not self._has_missed(self._triggers[0][0]):
+            stamp, value = self._triggers[0]
+            inputs = self._inputs(stamp, value)
+            if inputs is None and not self._has_missed(stamp):
                 break
-            stamp, value = self._triggers.popleft()
+            self._triggers.popleft()
             self._lacks = None
-            if taken is not None:
-                complete.append(self._step(stamp, value, taken))
+            if inputs is not None:
+                complete.append(inputs)
         return complete
 
     def _require_present(self, stamp: int, limit_ns: int) -> None:
@@ -296,13 +308,6 @@ class Synchroniser:
         """Whether an input of this step can no longer come, as a later one is there: the node began too late for it."""
         return any(group.has_missed(stamp) for group in self._groups)
 
-    def _step(self, stamp: int, value: Any, taken: dict[str, tuple[int, Any] | None]) -> Inputs:
-        """The inputs of a step that is complete, with the time since the one before."""
-        taken[self._trigger] = stamp, value
-        before, self._last_done = self._last_done, stamp
-        is_next = not before or stamp - before == self._period
-        return Inputs(stamp, self._nominal if is_next else seconds(stamp - before), taken)
-
     def missing(self, stamp: int) -> list[str]:
         """Topics whose message the step of this stamp still waits for."""
         return [
@@ -328,21 +333,32 @@ class Synchroniser:
             if newest.stamp
         }
 
-    def _taken(self, stamp: int) -> dict[str, tuple[int, Any] | None] | None:
-        """The inputs of a step, None where it still waits for one; older ones are forgotten.
+    def _inputs(self, stamp: int, value: Any) -> Inputs | None:
+        """The inputs of the step of a trigger, None where it still waits for one; older ones are forgotten.
 
         Where it waits, `_lacks` is the group that lacks one, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
-        taken: dict[str, tuple[int, Any] | None] = {}
+        inputs = Inputs()
+        origins: list[Origin] = []
         for topic, newest in self._newest.items():
-            taken[topic] = newest.taken(stamp)
+            if (found := newest.taken(stamp)) is None:
+                inputs[topic] = None
+            else:
+                inputs[topic] = found[1]
+                origins.append((found[0], (topic,)))
         for group in self._groups:
             if stamp >= group.until and not group.find(stamp):
                 self._lacks = group, group.cause(stamp), min(each.cause(stamp) for each in self._groups)
                 return None
-            taken.update(group.found)
-        return taken
+            inputs.update(group.found)
+            origins.append(group.origin)
+        inputs[self._trigger] = value
+        before, self._last_done = self._last_done, stamp
+        is_next = not before or stamp - before == self._period
+        inputs.stamp, inputs.dt = stamp, self._nominal if is_next else seconds(stamp - before)
+        inputs.origins = origins
+        return inputs
 
 
 class _Newest:
@@ -403,21 +419,35 @@ class _Group:
     ----------
     kept : the inputs by stamp and topic.
     found : those of the last step, by topic.
+    origin : their stamp, ns, and their topics.
     until : stamp from which a step needs others, ns.
     """
 
-    __slots__ = ("_begin", "_delay_ns", "_phase_ns", "_repeats_ns", "found", "kept", "topics", "until")
+    __slots__ = (
+        "_begin",
+        "_count",
+        "_delay_ns",
+        "_phase_ns",
+        "_repeats_ns",
+        "found",
+        "kept",
+        "origin",
+        "topics",
+        "until",
+    )
 
     def __init__(self, delay_ns: int, repeats_ns: int, phase_ns: int, topics: tuple[str, ...]) -> None:
         self._delay_ns, self._repeats_ns, self._phase_ns, self.topics = delay_ns, repeats_ns, phase_ns, topics
-        self.kept: dict[int, dict[str, tuple[int, Any]]] = {}
+        self._count = len(topics)
+        self.kept: dict[int, dict[str, Any]] = {}
         self.restart(0)
 
     def restart(self, begin: int) -> None:
         """Forget all; nothing can come in answer to a state before this one, ns."""
         self.kept.clear()
         self._begin = max(begin, 1)
-        self.found: dict[str, tuple[int, Any]] = {}
+        self.found: dict[str, Any] = {}
+        self.origin: Origin = (0, ())
         self.until = 0
 
     def cause(self, stamp: int) -> int:
@@ -428,7 +458,7 @@ class _Group:
 
     def has(self, cause: int) -> bool:
         """Whether all inputs of this stamp, ns, are there."""
-        return len(self.kept.get(cause, ())) == len(self.topics)
+        return len(self.kept.get(cause, ())) == self._count
 
     def has_missed(self, stamp: int) -> bool:
         """Whether an input of the step of this stamp, ns, is not there, and a later one of its topic is."""
@@ -440,13 +470,16 @@ class _Group:
 
     def find(self, stamp: int) -> bool:
         """Take the inputs of the step of this stamp, ns, and forget those before; False where one is not there yet."""
-        cause = self.cause(stamp)
-        if not cause:
+        cause = stamp - self._delay_ns  # as `cause` does, without a call in every period
+        cause -= (cause - self._phase_ns) % self._repeats_ns
+        if cause < self._begin:
             return True
-        slot = self.kept.get(cause)
-        if slot is None or len(slot) < len(self.topics):
+        kept = self.kept
+        slot = kept.get(cause)
+        if slot is None or len(slot) < self._count:
             return False
-        self.found, self.until = slot, cause + self._delay_ns + self._repeats_ns
-        while (oldest := next(iter(self.kept))) < cause:
-            del self.kept[oldest]
+        self.found, self.origin, self.until = slot, (cause, slot), cause + self._delay_ns + self._repeats_ns
+        if len(kept) > 1:
+            while (oldest := next(iter(kept))) < cause:
+                del kept[oldest]
         return True

@@ -1,6 +1,7 @@
 """The topics of a simulation: a message goes at once to every reaction that takes it, and its numbers are kept."""
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 from wam_description.defects import Check
@@ -31,7 +32,7 @@ class Bus:
     """
 
     def __init__(self, topics: Mapping[str, Topic]) -> None:
-        self._routes = {name: _Route(_Log(), [], _WRITES.get(topic.type)) for name, topic in topics.items()}
+        self._routes = {name: _Route(_ROWS.get(topic.type)) for name, topic in topics.items()}
         self._rows: Rows = {}
 
     def listen(self, topic: str, take: Callable[[int, Any], None]) -> None:
@@ -51,9 +52,9 @@ class Bus:
         """
         outlets = _Outlets(declaration)
         for name in declaration.outputs:
-            outlets[name] = self._routes.setdefault(name, _Route(_Log(), []))
+            outlets[name] = self._routes.setdefault(name, _Route()).publish
         for name in EVERY_NODE:  # each node has its own, so that a listener knows who speaks
-            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route(_Log(), []))
+            outlets[name] = self._routes.setdefault(of_node(declaration.name, name), _Route()).publish
         # a node of the stack reads what it declares, as the same bits over topics show: it needs no mask
         inlet = _inlet if is_packaged(declaration) else _masked_inlet
         for topic, found in feeds.items():
@@ -65,22 +66,19 @@ class Bus:
 
     def publish(self, topic: str, stamp: int, value: Any) -> None:
         """Publish a value of a stamp, ns, and what the nodes publish in turn."""
-        self._deliver(self._routes[topic], stamp, value)
+        self._routes[topic].publish(stamp, value)
 
-    def _deliver(self, route: "_Route", stamp: int, value: Any) -> None:
-        if (write := route.write) is not None:
-            write(route.log, stamp, value)
-        for inlet, work, outlets in route.takers:
-            for inputs in inlet(stamp, value) or ():
-                for name, output in work(inputs).items():
-                    self._deliver(outlets[name], inputs.stamp, output)
+    def publisher(self, topic: str) -> Callable[[int, Any], None]:
+        """What `publish` does on one topic, as a function of stamp and value."""
+        return self._routes[topic].publish
 
     @property
     def rows(self) -> Rows:
         """What was published on each topic of numbers so far; a JointState as position, velocity and effort."""
         for name, route in self._routes.items():
-            if new := route.log.take():
-                self._rows.setdefault(name, []).extend(new)
+            if route.kept:
+                self._rows.setdefault(name, []).extend(map(_topic_value, route.kept))
+                route.kept.clear()
         return self._rows
 
 
@@ -89,61 +87,54 @@ def of_node(node: str, topic: str) -> str:
     return f"{node}: {topic}" if topic in EVERY_NODE else topic
 
 
-class _Log:
-    """The numbers of a topic, one after the other: a tuple for each message would keep the garbage collector busy.
+# stamp, frame and the numbers of a message: the garbage collector leaves a plain tuple of these alone, a NamedTuple not
+_Row = tuple[Any, ...]
+
+
+class _Route:
+    """One topic.
+
+    Parameters
+    ----------
+    row : what is kept of a message; None of a topic without numbers.
 
     Attributes
     ----------
-    stamps, frames : of the messages.
-    numbers : of all of them.
-    ends : of the numbers of each message.
+    takers : of its messages.
+    kept : rows since the last call of `Bus.rows`.
     """
 
-    __slots__ = ("ends", "frames", "numbers", "stamps")
+    __slots__ = ("_row", "kept", "takers")
 
-    def __init__(self) -> None:
-        self.stamps: list[int] = []
-        self.frames: list[str] = []
-        self.numbers: list[float] = []
-        self.ends: list[int] = []
+    def __init__(self, row: Callable[[int, Any], _Row] | None = None) -> None:
+        self._row = row
+        self.takers: list[_Taker] = []
+        self.kept: list[_Row] = []
 
-    def end(self, stamp: int, frame: str) -> None:
-        """End a message, whose numbers are there."""
-        self.stamps.append(stamp)
-        self.frames.append(frame)
-        self.ends.append(len(self.numbers))
-
-    def take(self) -> list[TopicValue]:
-        """The messages since the last call."""
-        numbers, begins = tuple(self.numbers), [0, *self.ends]
-        each = zip(self.stamps, begins, self.ends, self.frames, strict=False)
-        rows = [TopicValue(stamp, numbers[begin:end], frame) for stamp, begin, end, frame in each]
-        for kept in (self.stamps, self.frames, self.numbers, self.ends):
-            kept.clear()
-        return rows
-
-
-class _Route(NamedTuple):
-    """One topic: its messages, who takes them, and what keeps their numbers, where it carries any."""
-
-    log: _Log
-    takers: list["_Taker"]
-    write: Callable[[_Log, int, Any], None] | None = None
+    def publish(self, stamp: int, value: Any) -> None:
+        """Keep the numbers of a value of a stamp, ns, hand it to the takers, and publish what they answer."""
+        if (row := self._row) is not None:
+            self.kept.append(row(stamp, value))
+        for inlet, work, outlets in self.takers:
+            for inputs in inlet(stamp, value) or ():
+                for name, output in work(inputs).items():
+                    outlets[name](inputs.stamp, output)
 
 
 Work = Callable[[Any], Outputs]
 # where its inputs go, its step, the topics that it may publish
-_Taker = tuple[Callable[[int, Any], Sequence[Any] | None], Work, Mapping[str, _Route]]
+_Taker = tuple[Callable[[int, Any], Sequence[Any] | None], Work, "Mapping[str, _Outlet]"]
+_Outlet = Callable[[int, Any], None]
 
 
-class _Outlets(dict[str, _Route]):
-    """The topics that a node declares."""
+class _Outlets(dict[str, _Outlet]):
+    """What publishes on the topics that a node declares."""
 
     def __init__(self, declaration: Declaration) -> None:
         super().__init__()
         self._declaration = declaration
 
-    def __missing__(self, topic: str) -> _Route:
+    def __missing__(self, topic: str) -> _Outlet:
         self._declaration.require_declared({topic: None})
         raise KeyError(topic)
 
@@ -194,42 +185,34 @@ def _nothing(_: Any) -> Outputs:
     return {}
 
 
-def _write_state(log: _Log, stamp: int, value: State) -> None:
-    numbers = log.numbers
-    for array in value:
-        numbers += array
-    log.stamps.append(stamp)
-    log.frames.append("")
-    log.ends.append(len(numbers))
+def _state_row(stamp: int, value: State) -> _Row:
+    return stamp, "", *value[0], *value[1], *value[2]
 
 
-def _write_wrench(log: _Log, stamp: int, value: Wrench) -> None:
-    log.numbers += value.force
-    log.numbers += value.torque
-    log.end(stamp, value.frame)
+def _wrench_row(stamp: int, value: Wrench) -> _Row:
+    return stamp, value.frame, *value.force, *value.torque
 
 
-def _write_point(log: _Log, stamp: int, value: Point) -> None:
-    log.numbers += value.position
-    log.end(stamp, value.frame)
+def _point_row(stamp: int, value: Point) -> _Row:
+    return stamp, value.frame, *value.position
 
 
-def _write_table(log: _Log, stamp: int, value: Table) -> None:
-    for row in value.rows:
-        log.numbers += row
-    log.end(stamp, value.frame)
+def _table_row(stamp: int, value: Table) -> _Row:
+    return stamp, value.frame, *chain.from_iterable(value.rows)
 
 
-_WRITES: dict[str, Callable[[_Log, int, Any], None]] = {
-    JOINT_STATE: _write_state,
-    WRENCH: _write_wrench,
-    POINT: _write_point,
-    TABLE: _write_table,
+_ROWS: dict[str, Callable[[int, Any], _Row]] = {
+    JOINT_STATE: _state_row,
+    WRENCH: _wrench_row,
+    POINT: _point_row,
+    TABLE: _table_row,
 }
+
+
+def _topic_value(row: _Row) -> TopicValue:
+    return TopicValue(row[0], row[2:], row[1])
 
 
 def flat(topic: Topic, stamp: int, value: Any) -> TopicValue:
     """A value of a topic of numbers as one row."""
-    log = _Log()
-    _WRITES[topic.type](log, stamp, value)
-    return log.take()[0]
+    return _topic_value(_ROWS[topic.type](stamp, value))

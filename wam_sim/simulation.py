@@ -65,6 +65,7 @@ class Simulation:
         self._bus.listen("motor_current_command", self._command)
         self._bus.listen("sim/disturbance", lambda _, wrench: self.driver.disturb(wrench))
         self._publish = self._bus.publish
+        self._publish_states = self._bus.publisher("motor_states")
         self._currents: tuple[int, list[float]] = (0, [])
         self._fault = ""
         self.nodes: dict[str, Any] = {}
@@ -73,7 +74,8 @@ class Simulation:
             if name != "driver":
                 self._connect(name, declaration, shared, configuration, steps)
         self._motors = len(shared.arm.motors.names)
-        self._has_sensors = "joint_sensors" in self._interface.topics
+        has_sensors = "joint_sensors" in self._interface.topics
+        self._publish_sensors = self._bus.publisher("joint_sensors") if has_sensors else None
 
     def _connect(
         self,
@@ -147,14 +149,15 @@ class Simulation:
         driver, stamp = self.driver, self.driver.stamp
         if driver.is_outer:
             self._publish_truth(stamp)
-        if self._has_sensors:
-            self._publish("joint_sensors", stamp, driver.joint_sensors)
-        self._publish("motor_states", stamp, driver.motor_state)
-        if self.scenario.done:
+        if self._publish_sensors is not None:
+            self._publish_sensors(stamp, driver.joint_sensors)
+        self._publish_states(stamp, driver.motor_state)
+        if self.nodes["scenario"].done:
             return True
         driver.command(*self._currents)
         driver.advance(0.0)
-        self._watch_driver()
+        if driver.safety.fault != self._fault:
+            self._report_fault()
         return False
 
     def _publish_truth(self, stamp: int) -> None:
@@ -169,7 +172,7 @@ class Simulation:
 
     def _command(self, stamp: int, command: State) -> None:
         currents = command.effort
-        if len(currents) != self._motors or not all(map(math.isfinite, currents)):
+        if len(currents) != self._motors or not math.isfinite(sum(currents)):
             raise ValueError(
                 f"motor_current_command of {stamp} ns is {currents}; it needs {self._motors} finite numbers, A"
             )
@@ -224,12 +227,9 @@ class Simulation:
         found = self._interface.unanswered(["motor_current_command"], awaited)
         return unpublished(found) if found else "list a node in 'nodes' that publishes motor_current_command"
 
-    def _watch_driver(self) -> None:
+    def _report_fault(self) -> None:
         """Report a new fault of the driver to every node that takes status."""
-        safety = self.driver.safety
-        if safety.fault == self._fault:
-            return
-        self._fault = safety.fault
+        self._fault = self.driver.safety.fault
         status = self.driver_status
         for node_name, node in self.nodes.items():
             if hasattr(node, "take_status"):
