@@ -26,7 +26,7 @@ ROWS = {  # must, aim
 
 
 def kept(run: Run) -> float:
-    """Periods in time of a demonstration in realtime, per cent; also of one that a late node has ended, or prevented."""
+    """Periods in time of a demonstration in realtime, per cent; also of one that a late node has ended."""
     loop = summarize(read(run.bag)).loop
     return 100.0 * (1.0 - loop.missed / loop.periods) if loop.periods else 0.0
 
