@@ -7,6 +7,7 @@ import numpy as np
 from wam_analysis.identification.base_set import gravity_base_set
 from wam_analysis.identification.fit import PARTS, Identification
 from wam_analysis.identification.overlay import identified
+from wam_analysis.identification.regressor import SLOWEST_MOTOR
 from wam_analysis.table import plain
 from wam_description.arm import Shared
 
@@ -20,11 +21,18 @@ UNEXPLAINED = 1.5  # rms of held-out motion per rms of the estimate's own
 LEFT = 0.1  # rms that stays unexplained, per Coulomb friction
 NOTES = """{rank} combinations of {count} parameters are identified, condition {condition:.3g}.
 'In combination': only together with others.
+'{by_shape}': static friction is where the fitted curve of friction ends at rest, with the error of that curve. Stiction
+that acts below {slowest:g} rad/s of a motor only is not in it: see `wam analyse` for the torques of breakaway.
+The inertia of rotors that move a joint together may err by a fifth, more than its standard error: see docs/identify.md.
 Friction of a joint with a motor of its own is part of that motor's friction.
 A torque offset is not identifiable from this recording: in motion, at rest and with a dither it gives the torques of a
 difference between the directions of friction. Shown is the offset if friction were alike in both directions; used is
 the sum of both, in coulomb_positive and coulomb_negative.
 'not tracked' is the stated error of the torques that the contact estimator has no error of its model for."""
+
+
+STATIC = "motors.static_"
+BY_SHAPE = "by the curve"
 
 
 def report(shared: Shared, found: Identification, label: str) -> str:
@@ -39,6 +47,7 @@ def report(shared: Shared, found: Identification, label: str) -> str:
     for i, name in enumerate(result.names):
         unit = UNITS[name.split(".")[1].partition("_")[0]]
         state = "yes" if found.is_identified[i] else "in combination" if found.is_combined[i] else "no"
+        state = BY_SHAPE if state == "yes" and name.startswith(STATIC) else state
         cells = [f"{value:.4g}" for value in (result.values[i], result.sd[i], result.present[i])]
         rows.append([name, *cells, unit, state])
     offset, offset_sd = found.offset_if_alike
@@ -55,9 +64,15 @@ def report(shared: Shared, found: Identification, label: str) -> str:
             for i, name in enumerate(shared.arm.motors.names)
         ],
     )
-    lines += ["", NOTES.format(rank=found.rank, count=len(result.names), condition=found.condition)]
+    lines += ["", _notes(found, len(result.names))]
     lines += [f"Gravity depends on {'; '.join(gravity_base_set(shared.arm))}."]
     return "\n".join([*lines, *(f"warning: {text}" for text in warnings(shared, found)), ""])
+
+
+def _notes(found: Identification, count: int) -> str:
+    return NOTES.format(
+        rank=found.rank, count=count, condition=found.condition, by_shape=BY_SHAPE, slowest=SLOWEST_MOTOR
+    )
 
 
 def warnings(shared: Shared, found: Identification) -> Iterator[str]:
