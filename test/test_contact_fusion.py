@@ -133,3 +133,20 @@ def test_a_force_that_grows_is_followed_at_once() -> None:
     assert fusion.count > contact_fusion.MOST
     assert best.force == pytest.approx(force, rel=0.05, abs=0.3)
     assert best.position == pytest.approx(PLACE, abs=0.01)
+
+
+@pytest.mark.parametrize("sd", [1e-6, 1e-5, 1e-4, 1e-3])
+def test_errors_so_small_that_rounding_counts_end_no_estimate(sd: float) -> None:
+    """A mass uncertainty keeps the covariance of one moment large, that of what changes is tiny."""
+    random, inference = np.random.default_rng(2), ContactInference(ARM, RigidBody(ARM), INFERENCE)
+    for _ in range(8):
+        fusion = ContactFusion(1.0)
+        force = random.uniform(-40.0, 40.0, 3).tolist()
+        for k in range(12):
+            q = START + k * STEP * SPEED
+            seen = torques(q, "outer_link", (PLACE, 0.0, 0.0), force)
+            weight = np.diag(0.3 * random.uniform(0.5, 5.0, 4))
+            now = Torques(k * STEP, seen, np.hstack((weight, sd * np.eye(4))), np.eye(8), sd**2 * np.eye(4), q)
+            precision = np.linalg.inv(weight @ weight.T + 2.0 * sd**2 * np.eye(4))
+            found = inference.infer(q.tolist(), seen.tolist(), precision, None, fusion, now)
+            assert sum(one.probability for one in found) == pytest.approx(1.0)

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 
 EVERY = 0.0299  # s, between moments: one and a half time constants of the observer, within which errors are alike
 MOST = 6  # past moments
+FINEST = 1e-3  # N m, sd of the errors of one moment, below which rounding decides what moments have in common
 MOVED = 2e-3  # rad, of any joint: in one pose the errors stay, and more moments show nothing
 TURNED = 0.15  # of the size of the force: sd of the change of its components from moment to moment
 SLIPS = 0.03  # m/rad: sd of the way of a contact along its link, per way of the joints
@@ -152,7 +153,9 @@ class ContactFusion:
             if self._widening > DIFFERENT:
                 self.reset()
         moments, last = self._moments, self._last
-        if not self._duration or (last and now.time - last.torques.time < EVERY):
+        is_exact = now.own.diagonal().min() < FINEST**2
+        is_early = last is not None and now.time - last.torques.time < EVERY
+        if is_exact or is_early or not self._duration:
             return
         has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > MOVED
         if has_moved:
