@@ -448,6 +448,7 @@ def test_a_payload_is_no_alarm_within_what_is_declared_and_can_be_tared() -> Non
     assert abs(after.external_torques[3]) < 0.1 * abs(before.external_torques[3])
 
 
+@pytest.mark.slow
 def test_from_the_motors_a_payload_is_tracked_and_not_tared() -> None:
     """Taken twice, as the tracked payload and as the tared one, its weight was a contact at once."""
     arm = RigidArm(carrying(0.3), (0.2, -1.05, 0.3, 0.5), friction=0.0)

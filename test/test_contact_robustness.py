@@ -170,6 +170,7 @@ def test_the_sets_are_counted_by_force_too() -> None:
     assert (held["outer"], held["0 to 7.5 N"], held["30 to 80 N"]) == ("33 (3)", "100 (1)", "0 (2)")
 
 
+@pytest.mark.slow
 def test_the_forces_of_the_contacts_act_in_full_all_the_time() -> None:
     """By the joint torques that the estimator finds in motion: they are those of the drawn force, within 4 %."""
     drive = Drive(CONFIGURATION.with_values(base_values(CONFIGURATION, False)), STATED, 905, 14.0, "level")
@@ -209,6 +210,7 @@ def test_a_coarse_encoder_and_an_unknown_payload_make_no_false_alarms_and_the_pa
     assert all(f"| {name} | " in text for name in (COARSE, LOADED))
 
 
+@pytest.mark.slow
 def test_a_mass_that_is_picked_up_is_in_the_plant_while_it_is_carried_and_its_report_is_counted() -> None:
     """0.9 kg are 9 N at the tool, which nobody overlooks."""
     drive = Drive(CONFIGURATION, STATED, 3402, 14.0, "masses")

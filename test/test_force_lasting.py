@@ -18,6 +18,8 @@ from wam_experiments.force_benchmark.tasks import RELEASE, triple
 from wam_experiments.force_benchmark.trial import with_accepted_gain
 from wam_sim.simulation import Simulation
 
+pytestmark = pytest.mark.slow  # seconds each: the plant in contact
+
 BODY = RigidBody(WAM)
 OUTER, PLACE = "outer_link", 0.28
 POSE = (0.0, -1.8, 0.0, 1.45)  # of the demonstration

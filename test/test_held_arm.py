@@ -19,6 +19,8 @@ from wam_experiments.force_benchmark.tasks import RELEASE, triple
 from wam_experiments.force_benchmark.trial import with_accepted_gain
 from wam_sim.simulation import Simulation
 
+pytestmark = pytest.mark.slow  # seconds each: the plant in contact
+
 BODY = RigidBody(WAM)
 DOWN = np.array(DIRECTION)
 ASIDE = BODY.cover_pose(POSE, OUTER).rotation[:, 2]

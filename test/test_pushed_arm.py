@@ -16,6 +16,8 @@ from wam_experiments.force_benchmark.tasks import RELEASE, triple
 from wam_experiments.force_benchmark.trial import with_accepted_gain
 from wam_sim.simulation import Simulation
 
+pytestmark = pytest.mark.slow  # seconds each: the plant in contact
+
 SPEED, WAY = 0.02, 0.02  # m/s, m: a rod that comes so fast, to both sides of where it would touch
 INNER = "inner_link"
 UNBOUND = {"force_loop:limits.whole_force": 1e9}
