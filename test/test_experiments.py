@@ -425,13 +425,13 @@ def test_an_experiment_without_curves_has_no_picture(
 ) -> None:
     root = Path(__file__).resolve().parents[1]
     monkeypatch.syspath_prepend(str(tmp_path))
-    (tmp_path / "my_laboratory.py").write_text(
+    (tmp_path / "my_laboratory_without_curves.py").write_text(
         "from wam_experiments.thesis.rows import Comparison, Result\n"
         "def steps(runs):\n    return Result([Comparison('steps', 9.0, 9.0, '', 0.01)], [])\n"
     )
     mine, page = tmp_path / "mine.yaml", tmp_path / "page.md"
     creep = (root / "config" / "experiments" / "creep.yaml").read_text()
-    mine.write_text(creep.replace("evaluation: cables.creeping", "evaluation: my_laboratory:steps"))
+    mine.write_text(creep.replace("evaluation: cables.creeping", "evaluation: my_laboratory_without_curves:steps"))
     page.write_text("# Title\n")
     bag = str(root / "bags" / "sample" / "creep")
     assert run_command(str(mine), "--evaluate", bag, "--directory", str(tmp_path), "--write", str(page)) == 0

@@ -125,7 +125,8 @@ def test_the_limit_cycle_of_the_sample_is_that_of_the_thesis() -> None:
 @pytest.mark.slow
 def test_nodes_replayed_from_the_sample_say_the_same_but_for_the_last_digits_of_another_processor() -> None:
     for node in ("contact_estimator", "velocity_loop"):
-        for topic in replay(BAGS / "sample" / "wam-touch", node).topics:
+        topics = replay(BAGS / "sample" / "wam-touch", node).topics
+        for topic in (one for one in topics if one.topic != "contact/tracked_friction"):  # not with joint sensors
             assert topic.compared > 400
             assert topic.only_recorded == topic.only_replayed == 0
             assert topic.largest < 1e-6, topic.first
