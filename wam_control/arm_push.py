@@ -37,10 +37,10 @@ class ArmPush(NamedTuple):
         One that is certainly not `above` this, N, is returned as 0: the singular values, squared, of the Jacobian have
         their mean below the largest.
         """
-        size = self._size
-        if above and size <= above * float(np.linalg.norm(self.jacobian(body, q))) / math.sqrt(3.0):
+        size, jacobian = self._size, self.jacobian(body, q)
+        if above and size <= above * float(np.linalg.norm(jacobian)) / math.sqrt(3.0):
             return 0.0
-        return size / self._lever(self.jacobian(body, q))
+        return size / self._lever(jacobian)
 
     def correction(
         self, body: RigidBody, q: Sequence[float], velocity: Sequence[float], force: float, fastest: float

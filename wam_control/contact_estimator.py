@@ -156,10 +156,13 @@ class ContactEstimator:
     def reset(self) -> None:
         """Forget all samples."""
         self._observer.reset()
-        self._fusion.reset()
-        self._second.reset()
+        self._end_contact()
         self._in_contact = self._is_above = False
         self._ended = -math.inf
+
+    def _end_contact(self) -> None:
+        self._fusion.reset()
+        self._second.reset()
 
     def observe(self, motor: State, sensors: State | None, dt: float) -> bool:
         """Take the signals of one inner period.
@@ -200,8 +203,7 @@ class ContactEstimator:
         if not observer.is_ready:
             self._in_contact = self._is_above = False
             self._ended = -math.inf
-            self._fusion.reset()
-            self._second.reset()
+            self._end_contact()
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
         precision = np.asarray(np.linalg.inv(covariance), np.float64)
         statistic = detection_statistic(torques, precision)
@@ -215,11 +217,11 @@ class ContactEstimator:
             self._ended = observer.age
         observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
-            self._fusion.reset()
-            self._second.reset()
+            self._end_contact()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
-        hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, observer.moment())
+        now = observer.moment() if parameters.inference.fusion_time else None
+        hypotheses = self._inference.infer(observer.pose, torques, precision, load, self._fusion, now)
         self._second.step(observer.age, hypotheses, observer, self._inference)
         if self._second.is_suspected:
             self._fusion.reset()

@@ -24,7 +24,6 @@ from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
 
 DOUBTED = 0.5  # s, in one contact, from which a suspected second one is reported; a release looks like one for 0.4 s
-NANOSECONDS = 1_000_000_000  # of the second in which tracked friction is published once
 ENABLED = "enabled"  # mode of the driver in which no brake holds
 
 
@@ -79,8 +78,9 @@ class ContactEstimatorNode:
         }
         if self._timing.is_display(inputs.stamp):
             outputs["contact/markers"] = _view(estimate)
-        if inputs.stamp // NANOSECONDS != self._second and (errors := self._estimator.model_errors):
-            self._second = inputs.stamp // NANOSECONDS
+        second = int(seconds(inputs.stamp))
+        if second != self._second and (errors := self._estimator.model_errors):
+            self._second = second
             outputs["contact/tracked_friction"] = friction_table(errors, self._arm, self._friction_scale)
         if estimate.in_contact is not self._in_contact:
             self._in_contact = estimate.in_contact

@@ -107,19 +107,16 @@ class ModelErrors:
     def corrected(self, seen: Observation) -> tuple[Array, Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2."""
         effects = seen.effects
-        # dot: of small arrays faster than @, the same bits
-        noise = (self._through * (self.noise * seen.moving)).dot(self._through.T)
-        covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest + noise
+        covariance = effects.dot(self.covariance).dot(effects.T) + seen.rest + self._noise_of(seen)
         return seen.residual - effects.dot(self.errors), covariance
 
     def parts(self, seen: Observation) -> tuple[Array, Array, Array]:
         """Effects, (n, k), N m, of the errors that stay, their covariance, (k, k), and that of the others, (n, n)."""
-        noise = (self._through * (self.noise * seen.moving)).dot(self._through.T)
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
         k = len(self.errors)
         covariance = np.eye(effects.shape[1])
         covariance[:k, :k] = self.covariance
-        return effects, self.size * covariance, self.size * (seen.rest + noise)
+        return effects, self.size * covariance, self.size * (seen.rest + self._noise_of(seen))
 
     def change(self, now: Observation, then: Observation) -> tuple[Array, Array]:
         """Change of the external torques, (n,), N m, and its covariance, (n, n): errors that stay drop out.
@@ -127,9 +124,14 @@ class ModelErrors:
         `then` is a mean, of which the noise of the motors is left out.
         """
         effects = now.effects - then.effects
-        noise = (self._through * (self.noise * now.moving)).dot(self._through.T)
-        covariance = effects.dot(self.covariance).dot(effects.T) + ALIKE * (now.rest + then.rest) + noise
+        covariance = effects.dot(self.covariance).dot(effects.T) + ALIKE * (now.rest + then.rest) + self._noise_of(now)
         return now.residual - then.residual - effects.dot(self.errors), covariance
+
+    def _noise_of(self, seen: Observation) -> Array:
+        """Covariance, (n, n), N^2 m^2, of the torques by the noise of the motors."""
+        # dot: of small arrays faster than @, the same bits
+        found: Array = (self._through * (self.noise * seen.moving)).dot(self._through.T)
+        return found
 
     def follow(self, seen: Observation, statistic: float, in_contact: bool, span: float) -> None:
         """Learn from what was observed, `span` seconds after the time before; not in contact, and with hindsight."""

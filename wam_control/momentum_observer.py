@@ -285,8 +285,7 @@ class MomentumObserver:
         if seen is None:
             raise RuntimeError("nothing has been observed")
         if not self._link_side:
-            residual = seen.residual - seen.effects.dot(self._errors.errors)
-            return Torques(self.age, residual, *self._errors.parts(seen), seen.pose)
+            return Torques(self.age, self.corrected(seen), *self._errors.parts(seen), seen.pose)
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
         return Torques(self.age, seen.residual, effects, np.eye(effects.shape[1]), seen.rest, seen.pose)
 
@@ -370,11 +369,11 @@ class MomentumObserver:
             effects[:, -1] = load.torque
             residual -= load.mass * effects[:, -1]
         variance = np.square(self._rest_sd * resting) + np.square(self._shape_sd * shape)
+        lasting = self._through * np.sqrt(variance)
         # a faster filter averages less of what is noise
         less, least = self._times[0] / self._times[which], given.motor_torque_sd**2
         sds = [given.motor_torque_fraction * torque for torque in modelled]
         variance[:n] += [less * (least + sd * sd) for sd in sds]
-        lasting = self._through * np.sqrt(np.square(self._rest_sd * resting) + np.square(self._shape_sd * shape))
         rest = (self._through * variance).dot(self._through.T)
         speed = self._map.joint_from_motor * (np.array(self._velocity.sd) / self._times[which])
         momentum = self._inertia.dot(speed)

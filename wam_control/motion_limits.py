@@ -203,9 +203,7 @@ class MotionLimits:
     def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float, str]:
         """Force, N, the largest one allowed, and its name: of those that count here the one that is nearest to it."""
         own = self._parameters
-        most, allowed = own.contact_force, math.inf
-        if whole:
-            allowed = min(own.whole_force * whole.desired, math.inf)
+        most, allowed = own.contact_force, own.whole_force * whole.desired if whole else math.inf
         least = push.least(self._body, q, BEGIN * min(most, allowed))
         found = least, most, f"limits.contact_force, {most:g} N"
         if whole and allowed < most:

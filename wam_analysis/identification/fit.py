@@ -84,8 +84,9 @@ class Identification(NamedTuple):
         (n,) each, N m, true less reported torque.  No recording shows which of both a difference of the directions is.
         """
         positive, negative = (self.unknowns.places(f"motors.coulomb_{way}") for way in DIRECTIONS)
-        variance = self.covariance.diagonal()
-        both = variance[positive] + variance[negative] - 2.0 * self.covariance[positive, negative]
+        covariance = self.covariance
+        variance = covariance.diagonal()
+        both = variance[positive] + variance[negative] - 2.0 * covariance[positive, negative]
         return 0.5 * (self.values[negative] - self.values[positive]), 0.5 * np.sqrt(np.maximum(both, 0.0))
 
     @property

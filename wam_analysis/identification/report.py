@@ -44,9 +44,10 @@ def report(shared: Shared, found: Identification, label: str) -> str:
     """
     result = identified(found)
     rows = []
+    is_identified, is_combined = found.is_identified, found.is_combined  # each of them computes the covariance
     for i, name in enumerate(result.names):
         unit = UNITS[name.split(".")[1].partition("_")[0]]
-        state = "yes" if found.is_identified[i] else "in combination" if found.is_combined[i] else "no"
+        state = "yes" if is_identified[i] else "in combination" if is_combined[i] else "no"
         state = BY_SHAPE if state == "yes" and name.startswith(STATIC) else state
         cells = [f"{value:.4g}" for value in (result.values[i], result.sd[i], result.present[i])]
         rows.append([name, *cells, unit, state])
