@@ -36,6 +36,7 @@ from wam_bag.bag import read
 from wam_bag.bag_writer import BagWriter
 from wam_bag.contents import contents
 from wam_bag.losses import losses
+from wam_bag.message_layout import stamp_reader
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError, flatten
 from wam_description.signals import Level, NodeStatus
@@ -582,3 +583,14 @@ def test_in_lockstep_a_message_without_a_stamp_is_recorded_at_the_newest_state(t
     machine.receive("/wam/sim/disturbance", serialize_message(WrenchStamped()), 2, 2, 1)
     machine.finish()
     assert read(tmp_path / "bag").topics["/wam/sim/disturbance"].log_time_ns.tolist() == [5_000_000]
+
+
+def test_topics_without_a_stamp_are_taken_first(ros: Any, tmp_path: Path) -> None:
+    """Or the stamp that gives a status its time comes in the next round, where both are sent while a round is on."""
+    node = recorder(ros, tmp_path)
+    stamped = [
+        stamp_reader(BY_NAME.get(name, BY_NAME[name.removeprefix("/wam/")]).type)(bytes([1] * 100)) is not None
+        for name in node._inlets
+    ]
+    assert stamped == sorted(stamped)
+    assert set(stamped) == {True, False}

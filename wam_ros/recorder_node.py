@@ -75,8 +75,10 @@ class RecorderNode(TolerantNode):
         publishers = {full_name: interface.publishers(topic.name) for full_name, topic in topics.items()}
         self.recorder = Recorder(self.bag, chosen, shared.timing.mode, offered, self._sender, self.get_namespace())
         self._diagnostics_name = self.resolve_topic_name(DIAGNOSTICS)
-        # it subscribes to all topics, recorded or not: every publisher waits for its subscription
-        self._inlets = {name: self._listen(name, topic) for name, topic in topics.items()}
+        # it subscribes to all topics, recorded or not: every publisher waits for its subscription;
+        # those without a stamp are drained first: what a node sent before them is there by then and gives the time
+        stampless_first = sorted(topics.items(), key=lambda item: not item[1].latched)
+        self._inlets = {name: self._listen(name, topic) for name, topic in stampless_first}
         own_name = RecorderInterface.name
         self._nodes = frozenset(interface.names) - {own_name}
         self._ends_last = own_name in interface.names  # one that was started by hand may end before the others
