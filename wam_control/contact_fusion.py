@@ -9,7 +9,9 @@ motor that has moved on), and part stays (a wrong friction level, a shaft at res
 H the effects of the model's errors and P their covariance, which are the same in all moments; L the errors of shafts at
 rest or just reversed.  These may stay or change: they count as both, in L and in R.  One contact position explains all
 moments, by a force that grows and shrinks with the torques; how else it may change is in the covariance, too, by the
-links' probabilities: its direction by a fraction of its size, its position by the way that the arm has moved since.
+links' probabilities: its direction by a fraction of its size, its position by the way that the arm has moved since,
+and by the speed of a contact that slides along its link.  Few do: how probable that is follows from the same moments,
+by how much better a speed explains them, whatever the force and the position.
 How large all errors of this contact are, over what is stated, follows from what the fit leaves unexplained, and from
 `BELIEF` degrees of freedom of the statement itself.
 
@@ -18,6 +20,7 @@ computed when one joins them; with the present one, of covariance C_nn, they are
 2006, A.6) Z_n - C_np C_pp^-1 Z_p with C_nn - C_np C_pp^-1 C_pn, added to those of the past.
 """
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -34,10 +37,15 @@ MOVED = 2e-3  # rad, of any joint: in one pose the errors stay, and more moments
 TURNED = 0.15  # of the size of the force: sd of the change of its components from moment to moment
 SLIPS = 0.03  # m/rad: sd of the way of a contact along its link, per way of the joints
 DRIFTS = 0.02  # m/s: the same, of what touches an arm that does not move
+FAST = 0.5  # m/s: sd of the speed along its link of a contact that slides
+SLIDES = 0.1  # probability of such a contact
+ANY_FORCE, ANY_PLACE = 2.0, 0.1  # of its size, and m: sd of its force and position where only its speed is asked for
+LATE = 0.03  # s that a contact moves on after the last moment: torques are 20 ms late, and moments that far apart
 UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a lever is as likely as errors of 0.14 N m
 LIKE, GROWN = 0.25, 4.0  # least and largest torques of the same contact, of those of its last moment
 BELIEF = 10.0  # degrees of freedom
 UNKNOWN = 3  # of a contact: its position and the force across the link
+LARGEST_EXPONENT = 500.0
 DIFFERENT = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
 
 
@@ -85,7 +93,8 @@ class _Past(NamedTuple):
     predicts: Array
     explains: Array
     expected: float  # chi^2 of the errors alone, without what the force may have changed
-    last: Array  # (n,), torques of the last moment
+    last: Torques  # of the last moment
+    slope: Array  # (links, n), N m per m of its contact position, by the square roots of the links' probabilities
     moments: int
 
 
@@ -111,6 +120,7 @@ class ContactFusion:
         self._moments: deque[_Seen] = deque()
         self._past: _Past | None = None
         self._widening = 1.0
+        self._speed = _speed(SLIDES)
         self.count = 1
 
     def gram(self, rows: Array, now: Torques) -> Array | None:
@@ -127,8 +137,8 @@ class ContactFusion:
             return None
         effects = now.effects
         covariance = effects.dot(now.covariance).dot(effects.T) + now.own
-        weighted = np.linalg.solve(covariance, past.last)
-        grown = float(now.residual.dot(weighted)) / float(past.last.dot(weighted))
+        way = self._speed * (now.time - past.last.time)
+        grown = _grown(now.residual, past.last.residual, covariance, way * past.slope)
         if not LIKE < grown < GROWN:
             self.reset()
             return None
@@ -172,35 +182,50 @@ class ContactFusion:
         effects = np.concatenate([moment.torques.effects for moment in moments])
         shared = effects @ last.covariance
         common = shared @ effects.T
-        weighted = np.linalg.solve(common[-n:, -n:] + last.own, last.residual)
-        size = float(last.residual.dot(weighted))
-        sizes = np.array([float(moment.torques.residual.dot(weighted)) / size for moment in moments])
-        # (links, 7, moments, n)
-        rows = np.stack([moment.rows for moment in moments], axis=2)
-        rows = rows * np.concatenate((np.ones((1, len(moments))), np.tile(sizes, (6, 1))))[None, :, :, None]
+        found, count = len(guess), len(moments)
+        rows = np.stack([moment.rows for moment in moments], axis=2)  # (links, 7, moments, n)
+        chances = np.sqrt([each.probability for each in guess])
+        sides, slopes = _sides(rows[:found], guess)
+        present = sides[:, :, -1]
+        levers = present @ present.transpose(0, 2, 1) + UNMEASURED
+        forces = np.linalg.solve(levers, present @ last.residual[:, None])[:, :, 0]  # (links, 3), N
+        moved = np.array([SLIPS * np.abs(moment.torques.pose - now.pose).max() for moment in moments])
+        elapsed = np.array([now.time + LATE - moment.torques.time for moment in moments])
+        slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, -1]).sum(axis=1)
+        certain = common[-n:, -n:] + last.own
+        ways = (moved + self._speed * elapsed).tolist()
+        sizes = [
+            _grown(moment.torques.residual, last.residual, certain, way * slope)
+            for moment, way in zip(moments, ways, strict=True)
+        ]
+        rows = rows * np.concatenate((np.ones((1, count)), np.tile(sizes, (6, 1))))[None, :, :, None]
+        sides, slopes = _sides(rows[:found], guess)
         for j, moment in enumerate(moments):
             common[n * j : n * j + n, n * j : n * j + n] += moment.torques.own
         covariance = common.copy()
-        found, count = len(guess), len(moments)
-        places = np.array([each.position for each in guess])[:, None, None, None]
-        sides = rows[:found, [1, 2, 6]]  # of forces across the link and along it, at the contact position
-        sides[:, :2] += places * rows[:found, 3:5]
-        present = sides[:, :, -1]
-        levers = present @ present.transpose(0, 2, 1) + UNMEASURED
-        forces = np.linalg.solve(levers, present @ last.residual[:, None])  # (links, 3, 1), N
-        weights = np.sqrt([each.probability for each in guess])
-        slopes = (forces[:, :2, :, None] * rows[:found, 3:5]).sum(axis=1)  # (links, moments, n), N m per m
-        ways = [
-            SLIPS * np.abs(moment.torques.pose - now.pose).max() + DRIFTS * (now.time - moment.torques.time)
-            for moment in moments
-        ]
-        slips = (slopes * np.multiply.outer(weights, ways)[:, :, None]).reshape(found, -1)
-        covariance += slips.T @ slips
-        sides *= (weights * TURNED * np.sqrt((forces**2).sum(axis=(1, 2))))[:, None, None, None]
+        turned = sides * (chances * TURNED * np.sqrt((forces**2).sum(axis=1)))[:, None, None, None]
         for j in range(count):
             of = slice(n * j, n * j + n)
-            side = sides[:, :, j].reshape(-1, n)
+            side = turned[:, :, j].reshape(-1, n)
             covariance[of, of] += side.T @ side
+        per_metre = (forces[:, :2, None, None] * slopes).sum(axis=1)  # (links, moments, n), N m per m
+        link = int(np.argmax(chances))
+        unknown = np.concatenate(
+            (
+                ANY_FORCE * np.sqrt(forces[link].dot(forces[link])) * sides[link].reshape(3, -1),
+                ANY_PLACE * per_metre[link].reshape(1, -1),
+                (per_metre[link] * (moved + DRIFTS * elapsed)[:, None]).reshape(1, -1),
+            )
+        )
+        slides = probability_of_slide(
+            np.concatenate([moment.torques.residual for moment in moments]),
+            self._widening * (covariance + unknown.T @ unknown),
+            FAST * (per_metre[link] * elapsed[:, None]).reshape(-1),
+        )
+        self._speed = _speed(slides)
+        far = np.multiply.outer(chances, moved + self._speed * elapsed)
+        slips = (per_metre * far[:, :, None]).reshape(found, -1)
+        covariance += slips.T @ slips
         rows = rows.reshape(len(rows), 7, count * n)
         inverse = np.linalg.inv(covariance)
         weighted_rows = inverse @ rows.transpose(0, 2, 1)
@@ -209,6 +234,42 @@ class ContactFusion:
             predicts=shared.T @ weighted_rows,
             explains=shared.T @ inverse @ shared,
             expected=float((inverse * common).sum()),
-            last=last.residual,
+            last=last,
+            slope=slope,
             moments=count,
         )
+
+
+def _sides(rows: Array, guess: Sequence[Guess]) -> tuple[Array, Array]:
+    """Torques of a force across a link and along it, (links, 3, moments, n), m, and those across per metre, (2)."""
+    places = np.array([each.position for each in guess])[:, None, None, None]
+    sides, slopes = rows[:, [1, 2, 6]], rows[:, 3:5]
+    sides[:, :2] += places * slopes
+    return sides, slopes
+
+
+def _grown(torques: Array, before: Array, covariance: Array, slips: Array) -> float:
+    """How much larger torques are than those before, (n,), apart from a slip, (links, n), N m."""
+    weighted = np.linalg.solve(covariance + slips.T @ slips, before)
+    return float(torques.dot(weighted)) / float(before.dot(weighted))
+
+
+def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> float:
+    """Probability that a contact slides, by the ratio of the evidence with and without, of prior odds `SLIDES`.
+
+    Parameters
+    ----------
+    torques : (m,), N m, of all moments.
+    covariance : (m, m), N^2 m^2, if it does not slide, whatever its force and position.
+    slide : (m,), N m, torques of the standard deviation of its speed.
+    """
+    weighted = np.linalg.solve(covariance, slide)
+    gain = float(slide.dot(weighted))
+    evidence = 0.5 * (float(torques.dot(weighted)) ** 2 / (1.0 + gain) - math.log1p(gain))
+    odds = SLIDES / (1.0 - SLIDES) * math.exp(min(evidence, LARGEST_EXPONENT))
+    return odds / (1.0 + odds)
+
+
+def _speed(slides: float) -> float:
+    """Standard deviation of the speed along the link, m/s, of a contact that slides with a probability."""
+    return math.sqrt(slides * FAST**2 + (1.0 - slides) * DRIFTS**2)
