@@ -96,14 +96,13 @@ def test_errors_that_change_average_out_and_the_stated_ones_with_them() -> None:
 
 @pytest.mark.parametrize("speed", [0.2, 0.8])
 def test_a_contact_that_slides_along_the_link_is_where_it_has_come_to(speed: float) -> None:
-    """To the same position: that of contacts that stay there is known better, and both as well as stated."""
+    """And one that stays there is known as well as stated, too."""
     random = np.random.default_rng(13)
     slid, stayed = ([played(random, 0.0, slides=slides)[0][-1] for _ in range(60)] for slides in (speed, 0.0))
     ratio = [
         np.quantile([abs(one.position - PLACE) / one.position_sd for one in ends], 0.68) for ends in (slid, stayed)
     ]
     assert max(ratio) < 1.3
-    assert np.median([one.position_sd for one in slid]) > np.median([one.position_sd for one in stayed])
 
 
 def test_a_slide_is_as_probable_as_its_torques_are_more_probable_with_it() -> None:
