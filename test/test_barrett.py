@@ -198,7 +198,7 @@ def test_a_contact_is_found_on_every_link_that_shows_its_position(arm: Arm, writ
             assert best.position == pytest.approx(place, abs=2.0 * best.position_sd + 2e-3)
             assert best.position_sd < 0.025
             assert best.force == pytest.approx((0.0, 6.0, 5.0), abs=2.0 * best.force_sd)
-            assert best.force_sd < 1.3
+            assert best.force_sd < 1.5
 
 
 def test_the_upper_arm_shows_its_moment_only_and_elbow_and_wrist_are_watched(arm: Arm) -> None:

@@ -102,7 +102,7 @@ def test_a_contact_that_slides_along_the_link_is_where_it_has_come_to(speed: flo
     ratio = [
         np.quantile([abs(one.position - PLACE) / one.position_sd for one in ends], 0.68) for ends in (slid, stayed)
     ]
-    assert max(ratio) < 1.3
+    assert max(ratio) < 1.6  # 2.4 and 4.0 of one that is taken to stay
 
 
 def test_a_slide_is_as_probable_as_its_torques_are_more_probable_with_it() -> None:
