@@ -23,8 +23,8 @@ class Claim(NamedTuple):
     section : of the thesis.
     text : what is claimed.
     shown : references, see `unresolved`; none if nothing shows it.
-    near : agreement with the thesis, in words; `{figure}`, `{effect}` or `{experiment}` stands for the greatest distance that was
-        measured for those that `shown` names, see `near_of`.
+    near : agreement with the thesis, in words; `{figure}`, `{effect}` or `{experiment}` stands for the greatest
+        distance that was measured for those that `shown` names, see `near_of`.
     missing : what is not shown, and why; empty if nothing is missing.
     """
 

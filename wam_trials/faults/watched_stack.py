@@ -13,7 +13,6 @@ from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import deserialize_message, serialize_message
 from std_srvs.srv import SetBool, Trigger
 
-from wam_cli.faults.answered_clock import AnsweredClock
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface
 from wam_description.signals import State, Wrench
@@ -26,6 +25,7 @@ from wam_ros.qos import qos
 from wam_ros.requests import answer_of, switch_request
 from wam_ros.run import NAMESPACE
 from wam_ros.wire import Encode, encoder, stamp_of
+from wam_trials.faults.answered_clock import AnsweredClock
 
 LONGEST_START: Final = 120.0  # s of wall time
 PATIENCE: Final = 15.0  # s of work without progress and without a fault that is a hang
