@@ -356,7 +356,7 @@ class ForceLoop:
         direction = rotation @ (np.array(command.force) / desired)
         axis = (rotation.T @ direction).tolist()
         point = self._point(contact, command, direction)
-        force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
+        force_axis = self._force_axes.axis(q, PressedForce(*point[:3], direction, desired))
         measured, before, free = self._measured(force_axis)
         scalar = law.along(axis)
         error, is_touching = desired - measured, self._hold.is_touching
@@ -472,9 +472,9 @@ class ForceLoop:
 
         Otherwise they are an error of the force.  What a mass at the tool explains may always be one.
         """
-        axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, 0.0)
-        force = -float(axis.sense @ resting)
-        axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, abs(force))
+        pressed = PressedForce(*point[:3], direction, 0.0)
+        force = -float(self._force_axes.axis(q, pressed).sense @ resting)
+        axis = self._force_axes.axis(q, pressed._replace(force=abs(force)))
         carried = self._carried(q, resting)
         is_pressed = force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED
         is_contact = (is_pressed or self._is_moving) and not carried
@@ -580,7 +580,7 @@ class ForceLoop:
         """Largest force along a direction, N, that the torques would be of at a part of the length of other covers."""
         found = -math.inf
         for cover, length in self._other_covers(point):
-            axis = self._force_axes.axis(q, cover, part * length, 0.0, direction, desired)
+            axis = self._force_axes.axis(q, PressedForce(cover, part * length, 0.0, direction, desired))
             if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired, is_pinned=False):
                 found = max(found, -float(axis.sense @ self._external[0]))
         return found

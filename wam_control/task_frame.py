@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact_position import ForcePoint
-from wam_control.force_axis import ForceAxes, ForceAxis, SensingParameters
+from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce, SensingParameters
 from wam_control.force_law import ForceLaw
 from wam_control.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.task_parameters import TaskParameters
@@ -125,7 +125,8 @@ class TaskFrame:
                 is_same = (task.axes[k].cover, task.axes[k].position) == (axis.cover, axis.position)
                 others += [] if k == i else other[:1] if is_same else other
             turned = self._turned(q, begun, axis.cover, u) if others else 0.0
-            sensed = self._axes.axis(q, axis.cover, place, place_sd, u, _size(axis), others, turned)
+            pressed = PressedForce(axis.cover, place, place_sd, u, _size(axis))
+            sensed = self._axes.axis(q, pressed, others, turned)
             found.append(AxisState(axis, sensed.lever, u, coordinate, sensed, points[i]))
         return found
 
@@ -140,8 +141,8 @@ class TaskFrame:
         """Torques (n,), N m, by which a force along this axis disturbs the other ones; a hand has no friction."""
         if axis.kind is AxisKind.IMPEDANCE:
             return [HAND * self._axes.lever(q, axis.cover, point.position, direction)]
-        where, turned = (axis.cover, point.position, point.position_sd), self._turned(q, begun, axis.cover, direction)
-        return self._axes.disturbance(q, *where, direction, _size(axis), turned)
+        pressed = PressedForce(axis.cover, point.position, point.position_sd, direction, _size(axis))
+        return self._axes.disturbance(q, pressed, self._turned(q, begun, axis.cover, direction))
 
     def refusal(self, states: Sequence[AxisState]) -> str:
         """Why this task cannot be done in this pose, with the number; '' where it can."""

@@ -8,8 +8,7 @@ from wam_cli.commands import (
     BASE_CONFIGURATION,
     at_least,
     batch_of,
-    configuration_of,
-    require_evaluation,
+    evaluation_of,
     take_evaluation,
 )
 from wam_cli.commands import evaluate_faults as faults
@@ -90,8 +89,7 @@ def _run_contact(given: argparse.Namespace) -> int:
     at_least("--contacts", given.contacts, 1)
     at_least("--resting", given.resting, 0)
     at_least("--free", given.free, 0.0)
-    require_evaluation(given)
-    configuration = configuration_of(given)
+    configuration = evaluation_of(given)
     arm = configuration.shared.arm
     extent = BenchmarkExtent(given.contacts, given.resting, given.free)
     dither = dither_values(configuration)
