@@ -293,9 +293,9 @@ class WatchedStack:
         found = [one for node in nodes for one in node.publishers if node.resolve_topic_name(one.topic) == full]
         return chance.choice(found) if found else None
 
-    def foreign_publisher(self, topic: str, node: Node | None = None) -> Publisher:
+    def foreign_publisher(self, topic: str) -> Publisher:
         """A second publisher, matched; `remove` destroys it."""
-        publisher = (node or self.node).create_publisher(self.type_of(topic), topic, self.qos_of(topic))
+        publisher = self.node.create_publisher(self.type_of(topic), topic, self.qos_of(topic))
         wanted = 1 + len(self.interface.subscribers(topic)) if topic != EVENTS else 1
         self.wait(lambda: publisher.get_subscription_count() >= wanted, 1.0)
         return publisher
