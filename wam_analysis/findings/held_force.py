@@ -17,11 +17,12 @@ from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
-from wam_analysis.measures.stability import Stability, StabilityVerdict, stability
+from wam_analysis.measures.stability import Stability, stability
 from wam_analysis.task_forces import measured_force
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
+from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ LEAST_STEP = 0.1  # of the force; a smaller change is not evaluated as a step
 FRESH = 0.2  # s; the force of a more recent contact is that of the impact
 FEW = 20  # samples below which a signal is not evaluated
 UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
-UNDECIDED = Stability(StabilityVerdict.UNDECIDED, math.nan, 0.0, np.empty(0))
+UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
 
 
 class HeldForce(NamedTuple):
@@ -138,7 +139,7 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
 
 def _moved(recording: AnalysedRun, node: Node | None, found: Swinging | None) -> float:
     arm = recording.parameters.arm
-    if arm is None or node is None or found is None or found.swings.verdict is not StabilityVerdict.CYCLES:
+    if arm is None or node is None or found is None or found.swings.verdict is not Verdict.LIMIT_CYCLE:
         return math.nan
     return at_the_contact(found, arm.motors.names, TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre)
 
