@@ -701,7 +701,13 @@ def test_a_force_that_is_not_reached_is_reported() -> None:
     [
         ("estimated", 0.4, 0.1, ForceReaction.OTHER_LINK, "something is touched, and it is not known whether on outer"),
         ("estimated", 1.0, 0.1, ForceReaction.NONE, ""),
-        ("estimated", 1.0, 0.3, ForceReaction.PLACE_ASSUMED, "the torques alone, so that the force is known to 0.56 N"),
+        (
+            "estimated",
+            1.0,
+            0.3,
+            ForceReaction.POSITION_ASSUMED,
+            "the torques alone, so that the force is known to 0.56 N",
+        ),
         ("pinned", 0.4, 0.3, ForceReaction.NONE, ""),
     ],
 )

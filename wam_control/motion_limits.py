@@ -84,7 +84,7 @@ class WholeForce(NamedTuple):
     Attributes
     ----------
     desired : commanded, N, in all directions together.
-    measured : the one in all, N, where its place is known; None where it is not.
+    measured : the one in all, N, where its position is known; None where it is not.
     """
 
     desired: float
