@@ -102,27 +102,29 @@ $(STAMPS)/venv:
 		echo "Could not make $(VENV); on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	@mkdir -p $(STAMPS) && touch $@
 
+ROS_EXTRAS := completion,live,ros
+TEST_EXTRAS := $(ROS_EXTRAS),test
+DOCS_EXTRAS := $(TEST_EXTRAS),docs
+
+define INSTALL_WITH
+@$(TIDY)
+@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[$(1)]'
+@$(TIDY)
+@touch $@
+endef
+
 $(STAMPS)/ros: $(STAMPS)/venv constraints.txt setup.py
 	@echo "Installing into $(VENV): about 1 GB, a minute or two the first time"
-	@$(TIDY)
 	@$(PIP) install -q -c constraints.txt setuptools
-	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[completion,live,ros]'
-	@$(TIDY)
-	@touch $@
+	$(call INSTALL_WITH,$(ROS_EXTRAS))
 
 $(STAMPS)/test: $(STAMPS)/ros
 	@echo "Installing the tools of the tests"
-	@$(TIDY)
-	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[completion,live,ros,test]'
-	@$(TIDY)
-	@touch $@
+	$(call INSTALL_WITH,$(TEST_EXTRAS))
 
 $(STAMPS)/docs: $(STAMPS)/test
 	@echo "Installing what builds the site"
-	@$(TIDY)
-	@$(PIP) install -q --use-pep517 --no-build-isolation -c constraints.txt '.[completion,docs,live,ros,test]'
-	@$(TIDY)
-	@touch $@
+	$(call INSTALL_WITH,$(DOCS_EXTRAS))
 
 $(INSTALLED): $(STAMPS)/ros
 	@rm -f $(STAMPS)/installed-*

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from wam_description.arm import Arm, Cables, Covers, Joints, Links, Motors
+from wam_description.arm import Arm, Cables, Covers
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
+from wam_description.parts import Joints, Links, Motors
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.plant import Plant
 

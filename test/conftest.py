@@ -24,7 +24,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.g
 os.environ["ROS_DOMAIN_ID"] = "tests take the fixture domain_id"
 for elsewhere in (SWITCH, "ROS_LOCALHOST_ONLY"):
     os.environ.pop(elsewhere, None)
-limit_to_this_machine()
+limit_to_this_machine(os.environ)
 
 # The tests' own: nobody uses them by default, and their ports lie above those that Linux gives to any program.
 DOMAINS = range(215, 233)

@@ -24,9 +24,12 @@ ARROWS = {
         "wam_theory", "wam_description", "wam_bag", "wam_driver", "wam_control", "wam_sim", "wam_analysis",
     },
     "wam_live": {"wam_description", "wam_bag", "wam_control", "wam_ros", "wam_sim", "wam_analysis"},
+    "wam_trials": {
+        "wam_description", "wam_bag", "wam_driver", "wam_ros", "wam_sim", "wam_experiments",
+    },
     "wam_cli": {
         "wam_theory", "wam_description", "wam_bag", "wam_driver", "wam_control", "wam_ros", "wam_sim", "wam_analysis",
-        "wam_experiments", "wam_live",
+        "wam_experiments", "wam_live", "wam_trials",
     },
 }  # fmt: skip
 # package -> all that it may import of others; the rest take what they need
@@ -35,7 +38,7 @@ DEPENDENCIES = {
     # ament_index_python where there is ROS, pandas where somebody asks for a DataFrame
     "wam_bag": {"numpy", "mcap", "lz4", "zstandard", "yaml", "ament_index_python", "pandas"},
 }
-KNOW_ROS = ("wam_ros", "wam_cli", "wam_live")
+KNOW_ROS = ("wam_ros", "wam_cli", "wam_live", "wam_trials")
 WITHOUT_CLOCK = ("wam_theory", "wam_description", "wam_driver", "wam_control")
 # ament_index_python is left out: it lists what is installed, in plain Python; wam_bag looks up message definitions
 ROS = {"builtin_interfaces", "launch", "launch_ros", "rcl_interfaces", "rclpy", "std_srvs"}
@@ -205,6 +208,7 @@ def test_arrows_point_downwards():
         ("wam_control/base.py", ""),
         ("wam_control/unnamed.py", ""),
         ("wam_live/page.py", "from wam_driver.plant import Plant"),
+        ("wam_trials/losses.py", "from wam_cli import main"),
     ],
 )
 def test_a_planted_fault_is_found(tmp_path, path, source):
@@ -232,6 +236,7 @@ def plant_a_sound_tree(root: Path) -> None:
         "wam_analysis/report.py": "import matplotlib\nimport wam_sim.simulation\nimport wam_control.gravity",
         "wam_experiments/press.py": "from wam_analysis import report\nimport wam_driver.plant\nimport wam_sim",
         "wam_live/page.py": "import viser\nimport rclpy\nfrom wam_ros import messages\nfrom wam_analysis import report",
+        "wam_trials/losses.py": "import rclpy\nimport wam_ros.messages\nfrom wam_experiments import press",
         "wam_cli/main.py": "import importlib",
         "wam_cli/commands/up.py": "import rclpy\nimport wam_ros.messages\nfrom wam_experiments import press\nprint(1)",
     }

@@ -410,7 +410,7 @@ def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
 ) -> None:
     import yaml
 
-    from wam_cli.commands.evaluate import play_over_topics
+    from wam_trials import contact_scenarios
 
     scenario = pick("sphere")
     file = tmp_path / "scenario.yaml"
@@ -418,7 +418,7 @@ def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
     assert tuple(load_script(file, ARM)) == scenario.steps
     short = scenario._replace(steps=scenario.steps[:3])
     direct = play(CONFIGURATION, short)
-    over = play_over_topics(CONFIGURATION, short, domain_id)
+    over = contact_scenarios.play(CONFIGURATION, short, domain_id)
     assert over.failure == direct.failure == ""
     assert len(over.records) == len(direct.records)
     for one, other in zip(direct.records, over.records, strict=True):

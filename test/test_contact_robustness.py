@@ -109,7 +109,7 @@ def test_a_row_that_is_missed_has_its_reason_as_counted_and_its_bound() -> None:
     assert shown.count(name) == 1
     assert "| 2 to 20 |" in shown
     assert "of 3 contacts 2 err by more than 1.2 cm: 0 not detected, 1 on the other link, 0 without a position" in shown
-    assert "the 90 % sets hold 1 of them" in shown
+    assert "the 90 % sets contain 1 of them" in shown
     assert missed_table([met], evidence()) == "Nothing."
 
 

@@ -26,7 +26,7 @@ from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, Tabl
 from wam_cli.commands.demo import _report
 from wam_cli.main import main
 from wam_control.contact_inference import REASONS
-from wam_control.force_axis import ForceAxes
+from wam_control.force_axis import ForceAxes, PressedForce
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.scenario import load as load_steps
 from wam_description.configuration import Configuration, packaged
@@ -582,7 +582,7 @@ def test_what_the_estimated_position_gains_is_the_force_of_the_same_torques_at_e
     axes = ForceAxes(arm, body, configuration.node("force_loop", ForceLoopParameters).sensing)
     recording, direction = Recording(), body.cover_pose(POSE, "outer_link").rotation @ (0.0, -1.0, 0.0)
     torque = -8.4 * axes.lever(POSE, "outer_link", 0.25, direction)
-    measured = -float(axes.axis(POSE, "outer_link", 0.28, 0.05, direction, 8.0).sense @ torque)
+    measured = -float(axes.axis(POSE, PressedForce("outer_link", 0.28, 0.05, direction, 8.0)).sense @ torque)
     recording.set(recording.measured, 5.0, 7.0, "outer_link", (0.0, -measured, 0.0))
     bag = recording.bag()
     every = joints()._replace(effort=np.tile(torque, (len(STAMPS), 1)))

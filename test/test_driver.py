@@ -66,6 +66,13 @@ def until_fault(hardware: Driver, extra: tuple[float, ...], seconds: float = 2.0
     return warnings
 
 
+def answered(hardware: Driver, current: float) -> list[float]:
+    """Currents, A, in the period after a command that answers the present state."""
+    hardware.command(hardware.stamp, [current] * 4)
+    hardware.advance(0.0)
+    return hardware.currents
+
+
 def test_starts_braked_and_does_not_sag() -> None:
     hardware = driver()
     for _ in range(2000):
@@ -83,13 +90,9 @@ def test_brakes_released_without_currents_let_the_arm_fall() -> None:
 
 def test_commands_are_ignored_while_braked_and_in_a_fault() -> None:
     hardware = driver()
-    hardware.command(hardware.stamp, [5.0] * 4)
-    hardware.advance(0.0)
-    assert hardware.currents == [0.0] * 4
+    assert answered(hardware, 5.0) == [0.0] * 4
     hardware.fault("test")
-    hardware.command(hardware.stamp, [5.0] * 4)
-    hardware.advance(0.0)
-    assert hardware.currents == [0.0] * 4
+    assert answered(hardware, 5.0) == [0.0] * 4
 
 
 def test_enable_discards_every_command_before_it() -> None:
@@ -103,9 +106,7 @@ def test_enable_discards_every_command_before_it() -> None:
     hardware.enable("")
     hardware.advance(0.0)
     assert hardware.currents == [0.0] * 4
-    hardware.command(hardware.stamp, [5.0] * 4)
-    hardware.advance(0.0)
-    assert hardware.currents == [5.0] * 4
+    assert answered(hardware, 5.0) == [5.0] * 4
 
 
 def test_to_enable_an_enabled_driver_changes_nothing() -> None:
@@ -126,9 +127,7 @@ def test_answer_to_a_state_before_the_release_of_the_brakes_is_ignored_when_it_c
     hardware.command(before, [5.0] * 4)
     hardware.advance(0.0)
     assert hardware.currents == [0.0] * 4
-    hardware.command(hardware.stamp, [1.0] * 4)
-    hardware.advance(0.0)
-    assert hardware.currents == [1.0] * 4
+    assert answered(hardware, 1.0) == [1.0] * 4
 
 
 def test_newer_command_is_not_undone_by_an_older_one() -> None:

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 from conftest import LONG
 
-from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, build, fields, values
@@ -19,6 +18,7 @@ from wam_experiments.faults.page import faults_section, report, with_section
 from wam_experiments.faults.parameter_faults import UNKNOWN_CODES, parameter_set
 from wam_experiments.faults.trials import MOST_ESCAPES, FaultKind, FaultTrial, KindResult, played
 from wam_ros.messages import joint_state
+from wam_trials.faults.watched_stack import StackSource, WatchedStack
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 NOW = 5_000_000_000
@@ -206,14 +206,14 @@ def test_nothing_escapes_in_the_short_form(domain_id: int) -> None:
 
 @pytest.mark.slow
 def test_ctrl_c_leaves_nothing(domain_id: int) -> None:
-    from wam_cli.faults import interruptions
+    from wam_trials.faults import interruptions
 
     assert [trial.escapes for trial in interruptions.play(1, 1, 1)] == [()]
 
 
 @pytest.mark.slow
 def test_a_short_soak_loses_nothing(domain_id: int) -> None:
-    from wam_cli.faults.soak import soak
+    from wam_trials.faults.soak import soak
 
     seconds: list[int] = []
     found = soak(in_lockstep(), 4.0, lambda done, of: seconds.append(done))

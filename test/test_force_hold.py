@@ -28,7 +28,7 @@ from test_force_loop import (
 
 from wam_control.arm_push import ArmPush
 from wam_control.contact_position import pinned_position, torque_of_position
-from wam_control.force_axis import ForceAxes, ForceAxis
+from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceCommand, ForceLoop
 from wam_control.motion_limits import MotionLimits, WholeForce
@@ -62,7 +62,7 @@ def lateral(q: Sequence[float]) -> np.ndarray:
 
 
 def axis_of(q: Sequence[float], direction: np.ndarray, force: float = 10.0, position_sd: float = 0.0) -> ForceAxis:
-    return ForceAxes(ARM, BODY, GIVEN.sensing).axis(q, "outer_link", TIP, position_sd, direction, force)
+    return ForceAxes(ARM, BODY, GIVEN.sensing).axis(q, PressedForce("outer_link", TIP, position_sd, direction, force))
 
 
 def press(
@@ -361,7 +361,7 @@ def test_friction_at_an_unknown_position_makes_the_force_as_uncertain_as_it_is()
     u = np.array([-0.852, -0.2663, 0.4506])
     u /= np.linalg.norm(u)
     for position_sd in (0.0, 0.14):
-        found = ForceAxes(ARM, BODY, GIVEN.sensing).axis(q, "outer_link", 0.28, position_sd, u, 27.5)
+        found = ForceAxes(ARM, BODY, GIVEN.sensing).axis(q, PressedForce("outer_link", 0.28, position_sd, u, 27.5))
         tip, _ = ForceAxes(ARM, BODY, GIVEN.sensing)._jacobian(q, "outer_link", TIP, u)
         error = 0.3 * 27.5 * np.linalg.norm((tip - np.outer(u, u @ tip)) @ found.sense)
         assert error < 3.0 * found.free_sd
@@ -375,7 +375,7 @@ def test_on_the_side_of_a_link_that_slides_the_force_is_taken_to_be_across_it(le
     normal = pose[:, 2]
     u = math.cos(lean) * normal + math.sin(lean) * pose[:, 0]
     for place, is_side in ((0.2, True), (TIP, False)):
-        found = axes.axis(POSE, "outer_link", place, 0.0, u, 10.0)
+        found = axes.axis(POSE, PressedForce("outer_link", place, 0.0, u, 10.0))
         jacobian, _ = axes._jacobian(POSE, "outer_link", place, u)
         along = normal if follows and is_side else u
         assert found.sense @ (10.0 * along @ jacobian) == pytest.approx(10.0 * along @ u)
@@ -473,7 +473,9 @@ def test_errors_of_estimated_torques_grow_with_the_force() -> None:
     for sensing, ratio in ((GIVEN.sensing, 1.0), (GIVEN.sensing.of_estimate, 3.0)):
         quiet = replace(sensing, friction=0.0)
         small, large = (
-            ForceAxes(ARM, BODY, quiet).axis(POSE, "outer_link", 0.28, 0.0, np.array(DOWNWARDS), force).force_sd
+            ForceAxes(ARM, BODY, quiet)
+            .axis(POSE, PressedForce("outer_link", 0.28, 0.0, np.array(DOWNWARDS), force))
+            .force_sd
             for force in (1.0, 40.0)
         )
         assert large / small >= ratio
@@ -699,7 +701,13 @@ def test_a_force_that_is_not_reached_is_reported() -> None:
     [
         ("estimated", 0.4, 0.1, ForceReaction.OTHER_LINK, "something is touched, and it is not known whether on outer"),
         ("estimated", 1.0, 0.1, ForceReaction.NONE, ""),
-        ("estimated", 1.0, 0.3, ForceReaction.PLACE_ASSUMED, "the torques alone, so that the force is known to 0.56 N"),
+        (
+            "estimated",
+            1.0,
+            0.3,
+            ForceReaction.POSITION_ASSUMED,
+            "the torques alone, so that the force is known to 0.56 N",
+        ),
         ("pinned", 0.4, 0.3, ForceReaction.NONE, ""),
     ],
 )
@@ -738,7 +746,7 @@ def test_torques_of_a_force_elsewhere_than_at_the_pinned_position_are_reported(
     direction = lateral(q)
     levers = lever(q, direction, "outer_link", 0.28)
     command = ForceCommand("base", tuple((20.0 * direction).tolist()))
-    sense = ForceAxes(ARM, BODY, OWN.sensing).axis(q, "outer_link", place, 0.0, direction, 20.0).sense
+    sense = ForceAxes(ARM, BODY, OWN.sensing).axis(q, PressedForce("outer_link", place, 0.0, direction, 20.0)).sense
     size = 20.0 / float(sense @ levers)  # N, which is measured as the commanded force
     sensed = State(q, STILL, (BODY.gravity_torque(q) + size * levers).tolist())
     for _ in range(103):

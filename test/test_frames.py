@@ -72,7 +72,7 @@ def test_a_running_stack_has_its_frames_on_tf(domain_id: int, namespace: str, pr
     from rclpy.qos import DurabilityPolicy, QoSProfile
     from sensor_msgs.msg import JointState
 
-    from wam_cli.frame_publisher import FramesNode
+    from wam_live.frame_publisher import FramesNode
 
     configuration = Configuration.load(packaged("wam"))
     shared = configuration.shared

@@ -16,7 +16,6 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
-from wam_cli.faults.answered_clock import AnsweredClock
 from wam_control.transform import Transform
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import Interface
@@ -32,6 +31,7 @@ from wam_ros.messages import diagnostic_status, joint_state, message_type, read_
 from wam_ros.node import make_node
 from wam_ros.ports import READY
 from wam_ros.qos import DEPTH, qos
+from wam_trials.faults.answered_clock import AnsweredClock
 
 WAM = Configuration.load(packaged("wam"))
 ARM = WAM.shared.arm

@@ -18,7 +18,7 @@ from wam_description.arm import Servo, Shared
 from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.interface import declared
 from wam_description.nodes import NODES
-from wam_description.parameters import ParameterError, build, copy_of, fields, parameter, require, values
+from wam_description.parameters import ParameterError, build, fields, like, parameter, require, tunable, values
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, declaration, reaction
 from wam_ros.bring_up import parameter_file
@@ -99,7 +99,13 @@ def test_a_set_with_something_wrong_is_refused_by_name(change: dict[str, Any], t
 @dataclass(frozen=True)
 class Derived:
     gain: float = parameter("gain", low=0.0, high=2.0)
-    copy: float = parameter("copy", low=0.0, high=2.0, derived=copy_of("gain"))
+    copy: float = like(Gains, "gain", "copy")
+
+
+@dataclass(frozen=True)
+class Late:
+    late: float = tunable("came later", "N", before=0.5)
+    counted: tuple[float, ...] = tunable("the same", "N", high=2.0, before=lambda others: (0.5,) * others["n"])
 
 
 def test_a_derived_parameter_follows_another_one_unless_it_is_given() -> None:
@@ -107,6 +113,26 @@ def test_a_derived_parameter_follows_another_one_unless_it_is_given() -> None:
     assert build(Derived, {"gain": 1.5, "copy": 0.5}) == Derived(1.5, 0.5)
     with pytest.raises(ParameterError, match="missing parameter 'gain'; missing parameter 'copy'"):
         build(Derived, {})
+
+
+def test_a_derived_parameter_has_unit_and_range_of_the_other_one_and_its_meaning_unless_another_is_given() -> None:
+    _, copy = fields(Derived)
+    assert (copy.doc, copy.unit, copy.low, copy.high, copy.live) == ("copy", "1/s", 0.0, 2.0, False)
+    found = like(Late, "a.late").metadata
+    assert (found["doc"], found["unit"], found["high"]) == ("came later", "N", 1e9)
+
+
+@pytest.mark.parametrize(("name", "value"), [("a.late", 0.5), ("a.counted", (0.5, 0.5))])
+def test_a_derived_parameter_of_a_recording_is_what_the_other_one_was_before_it_existed(name: str, value: Any) -> None:
+    derived = like(Late, name).metadata["derived"]
+    assert derived({"n": 2}) == value
+    assert derived({"n": 2, name: 0.7}) == 0.7
+
+
+def test_a_tunable_is_live_and_not_negative() -> None:
+    late, counted = fields(Late)
+    assert (late.low, late.high, late.live, late.before) == (0.0, 1e9, True, 0.5)
+    assert (counted.high, counted.is_array) == (2.0, True)
 
 
 @pytest.mark.parametrize("node", ["", *NODES])

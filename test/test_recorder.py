@@ -379,7 +379,7 @@ def fill_disk(bag: BagWriter) -> None:
 def test_a_full_disk_is_reported_once_and_the_rest_counted(tmp_path: Path) -> None:
     row = BY_NAME["contact/in_contact"]
     bag = BagWriter(tmp_path / "bag")
-    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)}, lambda name: "")
+    machine = Recorder(bag, {row.name: row}, "realtime", {row.name: qos(row)}, lambda name: "", "/wam")
     machine.receive(row.name, b"\0\1\0\0\1", 1, 1, 1)
     assert not machine.failure
     fill_disk(bag)
@@ -496,7 +496,7 @@ def test_a_bag_that_vanishes_is_told_at_once_and_is_a_fault_if_it_was_required(
 def test_foreign_names_do_not_fill_the_memory(tmp_path: Path) -> None:
     row = BY_NAME["status"]
     with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: "")
+        machine = Recorder(bag, {row.name: row}, "lockstep", {row.name: qos(row)}, lambda name: "", "/wam")
         for k in range(300):
             status = DiagnosticStatus(name=f"\x1b{k}" + "x" * 10_000)
             machine.receive(row.name, bytes(serialize_message(status)), 0, 0, 1)
@@ -511,7 +511,7 @@ def test_no_bytes_on_any_topic_end_the_recorder(tmp_path: Path) -> None:
     chance = random.Random(20261120)
     rows = list(BY_NAME.values())
     with BagWriter(tmp_path / "bag") as bag:
-        machine = Recorder(bag, BY_NAME, "lockstep", {row.name: qos(row) for row in rows}, lambda name: "")
+        machine = Recorder(bag, BY_NAME, "lockstep", {row.name: qos(row) for row in rows}, lambda name: "", "/wam")
         for k in range(5000):
             row = chance.choice(rows)
             data = bytearray(serialize_message(message_type(row)()) + bytes(chance.randrange(40)))

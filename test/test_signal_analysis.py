@@ -15,10 +15,11 @@ from wam_analysis.measures.loop_timing import latency, stamp_timing
 from wam_analysis.measures.response import step_response
 from wam_analysis.measures.ripple import ripple_spectrum
 from wam_analysis.measures.runs import runs, without_short
-from wam_analysis.measures.stability import StabilityVerdict, half_cycle_peaks, stability
+from wam_analysis.measures.stability import half_cycle_peaks, stability
 from wam_analysis.measures.stick_slip_phases import stick_slip_phases, without_turns
 from wam_analysis.measures.swings import swings
 from wam_theory.stick_slip import FrictionNode, IntegralLoop, simulate
+from wam_theory.verdicts import Verdict
 
 MS = 1_000_000
 PRECISE = pytest.approx
@@ -159,9 +160,7 @@ def test_a_recording_with_a_gap_has_no_cycle_to_be_confident_of():
     assert limit_cycle(late, value).confidence == 0.0
 
 
-@pytest.mark.parametrize(
-    ("growth", "expected"), [(1.003, StabilityVerdict.DIVERGES), (0.992, StabilityVerdict.SETTLES)]
-)
+@pytest.mark.parametrize(("growth", "expected"), [(1.003, Verdict.DIVERGED), (0.992, Verdict.SETTLED)])
 def test_a_slow_trend_is_no_limit_cycle(growth, expected):
     turns = np.arange(0.0, 100.0, 0.01)
     assert stability(growth**turns * np.cos(math.pi * turns), 1e-3).verdict is expected
@@ -426,15 +425,15 @@ def test_the_trap_of_the_first_two_peaks_is_not_fallen_into():
     first = half_cycle_peaks(error, 0.01)[:5]
     assert first == PRECISE([4.00, 2.70, 2.94, 3.06, 3.24], abs=0.01)
     found = stability(error, 0.01)
-    assert found.verdict is StabilityVerdict.DIVERGES
+    assert found.verdict is Verdict.DIVERGED
     assert found.growth > 1.01
     early = stability(error[: np.flatnonzero(np.abs(error) >= 3.05)[-1]][:300], 0.01)
-    assert early.verdict in {StabilityVerdict.UNDECIDED, StabilityVerdict.DIVERGES}
+    assert early.verdict in {Verdict.UNDECIDED, Verdict.DIVERGED}
 
 
 @pytest.mark.parametrize(("gamma", "step", "verdict"), [
-    (0.2, 5.0, StabilityVerdict.SETTLES), (0.8, 6.0, StabilityVerdict.SETTLES), (1.5, 3.0, StabilityVerdict.SETTLES),
-    (1.5, 6.0, StabilityVerdict.DIVERGES), (2.4, 1.5, StabilityVerdict.DIVERGES),
+    (0.2, 5.0, Verdict.SETTLED), (0.8, 6.0, Verdict.SETTLED), (1.5, 3.0, Verdict.SETTLED),
+    (1.5, 6.0, Verdict.DIVERGED), (2.4, 1.5, Verdict.DIVERGED),
 ])  # fmt: skip
 def test_the_verdict_agrees_with_the_regimes(gamma, step, verdict):
     error = response(gamma, step) + draws(14, len(response(gamma, step)), 0.01)
@@ -445,14 +444,14 @@ def test_a_limit_cycle_is_neither_settled_nor_divergent():
     time = np.arange(0.0, 30.0, 0.01)
     error = (1.0 + 3.0 * np.exp(-time / 3.0)) * np.cos(5.0 * time) + draws(15, len(time), 0.01)
     found = stability(error, 0.1)
-    assert found.verdict is StabilityVerdict.CYCLES
+    assert found.verdict is Verdict.LIMIT_CYCLE
     assert found.growth == PRECISE(1.0, abs=0.02)
     assert found.confidence > 0.5
 
 
 def test_two_peaks_decide_nothing():
     time = np.arange(0.0, 1.6, 0.01)
-    assert stability(np.exp(-0.1 * time) * np.cos(5.0 * time), 0.01).verdict is StabilityVerdict.UNDECIDED
+    assert stability(np.exp(-0.1 * time) * np.cos(5.0 * time), 0.01).verdict is Verdict.UNDECIDED
 
 
 # power
@@ -545,7 +544,7 @@ def test_force_accuracy_is_bias_and_ripple_and_gives_the_dynamic_range():
 
 @pytest.mark.parametrize(
     ("factor", "verdict"),
-    [(1.0, StabilityVerdict.CYCLES), (1.08, StabilityVerdict.DIVERGES), (0.92, StabilityVerdict.SETTLES)],
+    [(1.0, Verdict.LIMIT_CYCLE), (1.08, Verdict.DIVERGED), (0.92, Verdict.SETTLED)],
 )
 def test_four_swings_tell_whether_a_motion_cycles(factor, verdict):
     time = np.arange(0.0, 5.6, 0.001)
@@ -560,8 +559,8 @@ def test_four_swings_tell_whether_a_motion_cycles(factor, verdict):
 def test_a_motion_that_has_ended_and_one_that_never_turned_do_not_cycle():
     time = np.arange(0.0, 12.0, 0.001)
     value = np.sin(math.pi * np.minimum(time, 4.5))
-    assert swings(time, value, 0.05).verdict is StabilityVerdict.SETTLES
-    assert swings(time[:3000], value[:3000], 0.05).verdict is StabilityVerdict.UNDECIDED
+    assert swings(time, value, 0.05).verdict is Verdict.SETTLED
+    assert swings(time[:3000], value[:3000], 0.05).verdict is Verdict.UNDECIDED
     assert swings(time, time, 0.05).number == 0
 
 

@@ -15,9 +15,9 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from wam_cli.trajectory_action import TrajectoryActionNode
 from wam_control.trajectory_goal import GoalCode
 from wam_description.configuration import Configuration, packaged
+from wam_live.trajectory_action import TrajectoryActionNode
 from wam_ros.bring_up import Composition
 
 JOINTS = ("joint1", "joint2", "joint3", "joint4")

@@ -7,9 +7,10 @@ import pytest
 from wam_control.dither import DitherParameters
 from wam_control.servo_guard import ServoGuardParameters
 from wam_control.velocity_loop import VelocityLoop, VelocityLoopParameters
-from wam_description.arm import Motors, Servo
+from wam_description.arm import Servo
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
+from wam_description.parts import Motors
 
 INERTIA, CONSTANT, PEAK = 4.0e-5, 0.25, 4.0
 KP, KI = 0.015, 0.8

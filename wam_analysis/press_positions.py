@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wam_analysis.demo_traces import NAN, Mask, Traces
 from wam_analysis.task_forces import arm_of
 from wam_bag.bag import BagError, TableColumns
-from wam_control.force_axis import ForceAxes
+from wam_control.force_axis import ForceAxes, PressedForce
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_description.rigid_body import RigidBody
 from wam_sim.recording import RecordedRun
@@ -83,7 +83,8 @@ def press_positions(run: RecordedRun, traces: Traces, steady: Mask, measured: fl
             size = float(np.linalg.norm(command))
             direction = body.cover_pose(pose, cover).rotation @ command / size
             here, before = (
-                axes.axis(pose, cover, where, sd, direction, size).sense for where, sd in ((position, 0.0), there)
+                axes.axis(pose, PressedForce(cover, where, sd, direction, size)).sense
+                for where, sd in ((position, 0.0), there)
             )
             changes.append(float((before - here) @ torque))  # of the world on the joints, so the sign is the other one
         return PositionedForce(position, measured + float(np.mean(changes)))

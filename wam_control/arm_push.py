@@ -11,7 +11,7 @@ from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
 CERTAIN = 3.0  # standard deviations of the torques that are no push
-SHORTEST = 1e-6  # m, lever of a place on the joints
+SHORTEST = 1e-6  # m, lever of a point on the joints
 
 
 class ArmPush(NamedTuple):
@@ -22,7 +22,7 @@ class ArmPush(NamedTuple):
     torques, torque_sd : of the world on the joints (n,), N m, and the standard deviation of each.
     position : cover and position, m, where it pushes; None where that is not known, and the tool is assumed.
     allowed : N, up to which the arm does not give way.
-    gain : speed of the tool per force above it, m/s/N: near the base the arm is stiffer, and its places are slower.
+    gain : speed of the tool per force above it, m/s/N: near the base the arm is stiffer and moves less.
     """
 
     torques: Array
@@ -59,7 +59,7 @@ class ArmPush(NamedTuple):
         return missing
 
     def jacobian(self, body: RigidBody, q: Sequence[float]) -> Array:
-        """Velocity of the place per joint velocity (3, n), m/rad."""
+        """Velocity of the pushed point per joint velocity (3, n), m/rad."""
         if self.position is None:
             return body.tool_jacobian(q)
         cover, position = self.position

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_description.arm import Arm, Timing
-from wam_description.parameters import parameter, require
+from wam_description.parameters import parameter, require, tunable
 from wam_description.rigid_body import RigidBody
 from wam_description.transmission_map import TransmissionMap
 
@@ -21,11 +21,8 @@ from wam_description.transmission_map import TransmissionMap
 class DitherParameters:
     """Size and shape of the dither; its period is `timing.dither_cycle`."""
 
-    level: float = parameter(
-        "amplitude per static friction of motor and joints, reflected to the motor; 0: off",
-        low=0.0,
-        high=3.0,
-        live=True,
+    level: float = tunable(
+        "amplitude per static friction of motor and joints, reflected to the motor; 0: off", high=3.0
     )
     phase: tuple[float, ...] = parameter("phase of each motor's dither, in cycles", low=-1.0, high=1.0)
 

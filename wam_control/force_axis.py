@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_description.arm import Arm
-from wam_description.parameters import parameter
+from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
 REACH = 1e-3  # m; a force with a shorter lever on the joints cannot be applied
@@ -30,94 +31,60 @@ SMALLEST_FORCE = 1.0  # N, for the size of tangential forces
 class SensingParameters:
     """What disturbs the measured force, and how well it has to be known."""
 
-    torque_sd: float = parameter(
-        "sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, live=True, before=0.1
+    torque_sd: float = tunable("sd of the error of each measured joint torque", "N m", low=1e-6, high=1e3, before=0.1)
+    torque_fraction: float = tunable("the same, per torque of the commanded force", high=1.0, before=0.0)
+    estimated_torque_sd: float = tunable(
+        "torque_sd with feedback contact_estimate", "N m", low=1e-6, high=1e3, before=0.1
     )
-    torque_fraction: float = parameter(
-        "the same, per torque of the commanded force", low=0.0, high=1.0, live=True, before=0.0
+    estimated_torque_fraction: float = tunable(
+        "torque_fraction with feedback contact_estimate: constants and friction of the motors", high=1.0, before=0.0
     )
-    estimated_torque_sd: float = parameter(
-        "torque_sd with feedback contact_estimate", "N m", low=1e-6, high=1e3, live=True, before=0.1
-    )
-    estimated_torque_fraction: float = parameter(
-        "torque_fraction with feedback contact_estimate: constants and friction of the motors",
-        low=0.0,
-        high=1.0,
-        live=True,
-        before=0.0,
-    )
-    friction: float = parameter(
-        "sd of the tangential force on the link, per commanded force", low=0.0, high=2.0, live=True, before=0.0
-    )
-    zero_limit: float = parameter(
+    friction: float = tunable("sd of the tangential force on the link, per commanded force", high=2.0, before=0.0)
+    zero_limit: float = tunable(
         "largest external torque of a joint that is taken as zero when a force is commanded, where the arm is at rest "
         "and the contact estimator finds no contact; 0: never",
         "N m",
-        low=0.0,
         high=1e3,
-        live=True,
         before=0.0,
     )
-    force_sd_limit: float = parameter(
+    force_sd_limit: float = tunable(
         "standard deviation of the measured force up to which any force is controlled; where it is larger, and larger "
         "than force_sd_fraction, the arm holds its position",
         "N",
-        low=0.0,
-        high=1e9,
-        live=True,
         before=1e9,
     )
-    force_sd_fraction: float = parameter(
+    force_sd_fraction: float = tunable(
         "standard deviation of the measured force, per commanded force, up to which it is controlled",
-        low=0.0,
         high=1.0,
-        live=True,
         before=0.0,
     )
-    force_sd_fraction_unpinned: float = parameter(
+    force_sd_fraction_unpinned: float = tunable(
         "the same where the position is estimated, if it is larger: once touched, the position is known better",
-        low=0.0,
         high=1.0,
-        live=True,
         before=0.0,
     )
-    stated_fraction: float = parameter(
+    stated_fraction: float = tunable(
         "standard deviation of the measured force with what the contact estimator states of its torques, per commanded "
         "force, up to which a force is begun with feedback contact_estimate",
-        low=0.0,
-        high=1e9,
-        live=True,
         before=1e9,
     )
-    reported_fraction: float = parameter(
-        "standard deviation of the measured force, per commanded force, above which it is reported",
-        low=0.0,
-        high=1e9,
-        live=True,
-        before=1e9,
+    reported_fraction: float = tunable(
+        "standard deviation of the measured force, per commanded force, above which it is reported", before=1e9
     )
-    least_signal: float = parameter(
+    least_signal: float = tunable(
         "commanded force per standard deviation with which the contact estimator knows the torques, from which a force "
         "at a pinned position is controlled with feedback contact_estimate: what is not detected is not measured",
-        low=0.0,
         high=1e3,
-        live=True,
         before=0.0,
     )
-    least_signal_unpinned: float = parameter(
-        "the same where the position is estimated, so that the link has to be identified, too",
-        low=0.0,
-        high=1e3,
-        live=True,
-        before=0.0,
+    least_signal_unpinned: float = tunable(
+        "the same where the position is estimated, so that the link has to be identified, too", high=1e3, before=0.0
     )
-    apparent_mass_limit: float = parameter(
+    apparent_mass_limit: float = tunable(
         "largest mass of the arm that the loop may see in the measured force; the motion along directions in which it "
         "is larger is slowed down; 0: no limit",
         "kg",
-        low=0.0,
         high=1e6,
-        live=True,
         before=0.0,
     )
 
@@ -189,7 +156,14 @@ class ForceAxis(NamedTuple):
 
 
 class PressedForce(NamedTuple):
-    """A force, N, that is commanded along a direction (3,), base frame, at a known position of a cover, m."""
+    """A force that the arm is to press with, and where.
+
+    Attributes
+    ----------
+    cover, position, position_sd : where it acts, m along the cover, and how uncertain that is, m.
+    direction : unit vector of the force of the arm on the world (3,), base frame.
+    force : commanded, N; tangential forces are proportional to it.
+    """
 
     cover: str
     position: float
@@ -210,36 +184,26 @@ class ForceAxes:
 
     def __init__(self, arm: Arm, body: RigidBody, parameters: SensingParameters) -> None:
         self._body, self._covers, self._parameters = body, arm.covers, parameters
-        n = len(arm.joints.names)
-        motor_from_joint = np.linalg.inv(np.reshape(arm.joint_from_motor, (n, n)))
+        through = TransmissionMap.of(arm)
         self._armature = np.diag(arm.joints.armature)
-        self._rotors = motor_from_joint.T @ (np.array(arm.motors.inertia)[:, None] * motor_from_joint)
-        cables = np.array([circuit.stiffness for circuit in arm.circuits])
-        self._compliance = np.linalg.inv(motor_from_joint.T @ (cables[:, None] * motor_from_joint))
+        self._rotors = through.at_joints(arm.motors.inertia)
+        self._compliance = np.linalg.inv(through.at_joints([circuit.stiffness for circuit in arm.circuits]))
 
     def inertia(self, q: Sequence[float]) -> Array:
         """Inertia at the joints with their armature (n, n), kg m^2, without rotors."""
         return self._body.mass_matrix(q) + self._armature
 
     def lever(self, q: Sequence[float], cover: str, position: float, direction: Array) -> Array:
-        """Torque on each joint per force (n,), m; arguments as those of `axis`."""
+        """Torque on each joint per force (n,), m, along a direction (3,), base frame, at a position of a cover, m."""
         result: Array = direction @ self._jacobian(q, cover, position, direction)[0]
         return result
 
-    def disturbance(
-        self,
-        q: Sequence[float],
-        cover: str,
-        position: float,
-        position_sd: float,
-        direction: Array,
-        force: float,
-        turned: float = 0.0,
-    ) -> list[Array]:
+    def disturbance(self, q: Sequence[float], pressed: PressedForce, turned: float = 0.0) -> list[Array]:
         """Torques (n,), N m, of another force and of its friction, each as large as its standard deviation.
 
         Arguments as those of `axis`.
         """
+        cover, position, position_sd, direction, force = pressed
         size = max(force, SMALLEST_FORCE)
         jacobian, point = self._jacobian(q, cover, position, direction)
         slide = self._body.point_jacobian(q, cover, point + ALONG) - jacobian
@@ -294,28 +258,19 @@ class ForceAxes:
         return force / float(force @ direction)
 
     def axis(
-        self,
-        q: Sequence[float],
-        cover: str,
-        position: float,
-        position_sd: float,
-        direction: Array,
-        force: float,
-        others: Sequence[Array] = (),
-        turned: float = 0.0,
+        self, q: Sequence[float], pressed: PressedForce, others: Sequence[Array] = (), turned: float = 0.0
     ) -> ForceAxis:
         """The axis of a force at a contact.
 
         Parameters
         ----------
         q : joint angles (n,), rad.
-        cover, position, position_sd : where the force acts, m along the cover, and how uncertain that is, m.
-        direction : unit vector of the force of the arm on the world (3,), base frame.
-        force : commanded force, N, to which tangential forces are proportional.
+        pressed : the force.
         others : torques (n,), N m, of other forces, each as large as its standard deviation.
         turned : force across the direction per force along it which the surface may give without friction, too.
         """
         parameters, n = self._parameters, len(q)
+        cover, position, position_sd, direction, force = pressed
         jacobian, point = self._jacobian(q, cover, position, direction)  # friction acts at the surface
         lever: Array = direction @ jacobian
         square = float(lever @ lever)

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from wam_control.contact_position import pinned_position, torque_of_position
 from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_description.arm import Covers, Joints
+from wam_description.arm import Covers
+from wam_description.parts import Joints
 from wam_description.signals import ZERO, ForceCommand
 
 ASIDE = 1e-3  # m, lever of the part of a torque that is not that of the force at a position on the cover

@@ -53,7 +53,7 @@ class ForceReaction(IntEnum):
     CONTACT_FORCE = 4  # does not move against the world
     JOINT_END = 5  # a joint is at its end
     NOT_REACHED = 6  # goes on: the force is not reached within the time for it
-    PLACE_ASSUMED = 7  # goes on: where the force acts is not known well, and not pinned
+    POSITION_ASSUMED = 7  # goes on: where the force acts is not known well, and not pinned
     NOT_EXPLAINED = 8  # goes on: the torques are not those of the commanded force where it is thought to act
     TASK_REFUSED = 9  # holds: the axes of the task cannot be done here
     UNCERTAIN = 10  # goes on: the force is not known as well as it has to be reached
@@ -440,7 +440,7 @@ class ForceHold:
                 "link, or is not the only one; pin it where it acts, or free the arm"
             )
         if self._assumed > lasting:
-            return ForceReaction.PLACE_ASSUMED, _place_assumed(axis, point)
+            return ForceReaction.POSITION_ASSUMED, _position_assumed(axis, point)
         if self._uncertain > lasting:
             return ForceReaction.UNCERTAIN, (
                 f"the force is known to +-{force_sd:.2g} N, {force_sd / desired:.0%} of the commanded "
@@ -611,7 +611,7 @@ def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) ->
     )
 
 
-def _place_assumed(axis: ForceAxis, point: ForcePoint) -> str:
+def _position_assumed(axis: ForceAxis, point: ForcePoint) -> str:
     known = (
         f"where it is known from the torques alone, so that the force is known to {axis.free_sd:.2g} N"
         if point.is_identified

@@ -71,7 +71,7 @@ class ForceOutput(NamedTuple):
     sd_limit: float = math.inf  # N, of its standard deviation
     rows: tuple[AxisRow, ...] = ()  # of the axes of a task
     desired: float = 0.0  # N, of all that is commanded, where it presses on something
-    pressed: PressedForce | None = None  # where all of it acts at one known place
+    pressed: PressedForce | None = None  # where all of it acts at one known position
 
 
 class ForceLoop:
@@ -280,7 +280,7 @@ class ForceLoop:
         else:
             out = self._force(joints.position, contact, commands.force, commands.posture, dt)
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        push = self._push(joints.position, _known_place(out.point, task))
+        push = self._push(joints.position, _known_position(out.point, task))
         limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
         if not self.reaction.holds and limited.contact_force:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
@@ -356,7 +356,7 @@ class ForceLoop:
         direction = rotation @ (np.array(command.force) / desired)
         axis = (rotation.T @ direction).tolist()
         point = self._point(contact, command, direction)
-        force_axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, desired)
+        force_axis = self._force_axes.axis(q, PressedForce(*point[:3], direction, desired))
         measured, before, free = self._measured(force_axis)
         scalar = law.along(axis)
         error, is_touching = desired - measured, self._hold.is_touching
@@ -412,9 +412,9 @@ class ForceLoop:
         self, q: Sequence[float], point: ForcePoint, axis: ForceAxis, held: list[float], desired: float, gain: float
     ) -> list[float]:
         """Velocities of the posture (n,), rad/s, slower where the link would slide fast on what it presses."""
-        place = (point.position, *self._arm.covers.aside(point.cover, point.position))
+        on_axis = (point.position, *self._arm.covers.aside(point.cover, point.position))
         across = np.array(hybrid_velocity(held, axis, 0.0, self.parameters.joint_speed_limit))
-        slow: list[float] = followed(across, self._body.point_jacobian(q, point.cover, place), desired, gain).tolist()
+        slow: list[float] = followed(across, self._body.point_jacobian(q, point.cover, on_axis), desired, gain).tolist()
         return slow
 
     def _measured(self, axis: ForceAxis) -> tuple[float, float, float]:
@@ -472,9 +472,9 @@ class ForceLoop:
 
         Otherwise they are an error of the force.  What a mass at the tool explains may always be one.
         """
-        axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, 0.0)
-        force = -float(axis.sense @ resting)
-        axis = self._force_axes.axis(q, point.cover, point.position, point.position_sd, direction, abs(force))
+        pressed = PressedForce(*point[:3], direction, 0.0)
+        force = -float(self._force_axes.axis(q, pressed).sense @ resting)
+        axis = self._force_axes.axis(q, pressed._replace(force=abs(force)))
         carried = self._carried(q, resting)
         is_pressed = force > 0.0 and axis.unexplained(resting) <= UNEXPLAINED
         is_contact = (is_pressed or self._is_moving) and not carried
@@ -504,27 +504,27 @@ class ForceLoop:
             self._goes_back = goes_back
             self._held.hold(self._free_of(force.axis) if goes_back else q, own.limits.free_travel)
             self._transfer.restart()
-        push = self._push(q, self._pushed_place(contact, _known_place(point, None)))
+        push = self._push(q, self._pushed_position(contact, _known_position(point, None)))
         push = push._replace(allowed=min(push.allowed, desired))
         velocity, is_yielding = self._held.step(q, [force], push, own.posture_gain, own.joint_speed_limit, dt)
         return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt) if is_yielding else still
 
-    def _push(self, q: Sequence[float], place: tuple[str, float] | None) -> ArmPush:
-        """What pushes the arm, at a place or wherever it does."""
+    def _push(self, q: Sequence[float], where: tuple[str, float] | None) -> ArmPush:
+        """What pushes the arm, at a position of a cover or wherever it does."""
         own = self.parameters
         torques = self._external[0] - self._unknown[0]
         if own.feedback == "joint_sensors":
             torques = torques + self._force_axes.inertia(q) @ self._acceleration
         sd = np.array(self._external_sd or [sensing_of(own).torque_sd] * self._n)
         gain = self._supervision.present * max(own.force_gain)
-        return ArmPush(torques, sd, place, own.limits.contact_force, gain)
+        return ArmPush(torques, sd, where, own.limits.contact_force, gain)
 
-    def _pushed_place(self, contact: Contact, place: tuple[str, float] | None) -> tuple[str, float] | None:
-        """Where an arm that holds is pushed: estimated, if on another cover than that of the known place."""
-        if contact.cover and (place is None or place[0] != contact.cover):
+    def _pushed_position(self, contact: Contact, where: tuple[str, float] | None) -> tuple[str, float] | None:
+        """Where an arm that holds is pushed: estimated, if on another cover than that of the known position."""
+        if contact.cover and (where is None or where[0] != contact.cover):
             middle = MIDDLE * self._arm.covers.length_of(contact.cover)
-            place = contact.cover, middle if math.isnan(contact.position) else contact.position
-        return place
+            where = contact.cover, middle if math.isnan(contact.position) else contact.position
+        return where
 
     def _is_watching(self, axis: ForceAxis, moved: Array, dt: float) -> bool:
         """Whether it is still watched how the dither shakes the arm, by the motion of the joints (n,), rad."""
@@ -580,7 +580,7 @@ class ForceLoop:
         """Largest force along a direction, N, that the torques would be of at a part of the length of other covers."""
         found = -math.inf
         for cover, length in self._other_covers(point):
-            axis = self._force_axes.axis(q, cover, part * length, 0.0, direction, desired)
+            axis = self._force_axes.axis(q, PressedForce(cover, part * length, 0.0, direction, desired))
             if axis.force_sd <= VAGUE * self.parameters.sensing.sd_limit(desired, is_pinned=False):
                 found = max(found, -float(axis.sense @ self._external[0]))
         return found
@@ -601,7 +601,7 @@ class ForceLoop:
             # what no mass at the tool explains may be several surfaces that are touched already
             carried = self._carried(q, resting)
             self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
-        push = self._push(q, self._pushed_place(contact, _known_place(None, task)))
+        push = self._push(q, self._pushed_position(contact, _known_position(None, task)))
         found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown, push)
         self._react(found.reaction, found.reason)
         if found.reaction.holds:
@@ -653,13 +653,13 @@ class ForceLoop:
         return factor
 
 
-def _known_place(point: ForcePoint | None, task: TaskCommand | None) -> tuple[str, float] | None:
+def _known_position(point: ForcePoint | None, task: TaskCommand | None) -> tuple[str, float] | None:
     """Cover and position, m, where the one commanded force acts; None where that is not known."""
     if point is not None:
         return (point.cover, point.position) if point.is_pinned or point.is_certain else None
     forces = [axis for axis in task.axes if axis.kind is AxisKind.FORCE] if task is not None else []
-    places = [(axis.cover, axis.position) for axis in forces if axis.cover and axis.position is not None]
-    return places[0] if len(forces) == len(places) == 1 else None
+    positions = [(axis.cover, axis.position) for axis in forces if axis.cover and axis.position is not None]
+    return positions[0] if len(forces) == len(positions) == 1 else None
 
 
 def _triple(values: Sequence[float]) -> Triple:

@@ -9,7 +9,7 @@ from wam_control.sampled_loop import Feedback
 from wam_control.stability_guard import GuardedTask, GuardParameters
 from wam_control.task_parameters import TaskParameters
 from wam_description.arm import Arm
-from wam_description.parameters import lengths, parameter, require
+from wam_description.parameters import lengths, parameter, require, tunable
 
 AXES = ("x", "y", "z")  # of the force command's frame
 
@@ -31,93 +31,64 @@ class ForceLoopParameters:
     feedback: str = parameter(
         "source of the measured force F_c", choices=("joint_sensors", "contact_estimate", "joint_position"), live=True
     )
-    force_gain: tuple[float, ...] = parameter(
+    force_gain: tuple[float, ...] = tunable(
         "G_I of each axis x y z of the force command's frame, or one for all: velocity per force error",
         "m/s/N",
-        low=0.0,
         high=100.0,
-        live=True,
     )
-    force_proportional_gain: tuple[float, ...] = parameter(
-        "G_P of each axis (5.23), or one for all: displacement per force error", "m/N", low=0.0, high=100.0, live=True
+    force_proportional_gain: tuple[float, ...] = tunable(
+        "G_P of each axis (5.23), or one for all: displacement per force error", "m/N", high=100.0
     )
-    force_error_limit: tuple[float, ...] = parameter(
-        "saturation of F_error of each axis, or one for all; above the deadband", "N", low=0.0, high=1e9, live=True
+    force_error_limit: tuple[float, ...] = tunable(
+        "saturation of F_error of each axis, or one for all; above the deadband", "N"
     )
-    force_deadband: tuple[float, ...] = parameter(
-        "deadband at the input of G_I of each axis (5.7), or one for all", "N", low=0.0, high=1e3, live=True
+    force_deadband: tuple[float, ...] = tunable(
+        "deadband at the input of G_I of each axis (5.7), or one for all", "N", high=1e3
     )
-    force_limit: float = parameter("largest force that may be commanded", "N", low=0.0, high=1e3, live=True)
-    force_rate_limit: float = parameter(
-        "largest rate at which the desired force follows its command", "N/s", low=1.0, high=1e9, live=True, before=1e9
+    force_limit: float = tunable("largest force that may be commanded", "N", high=1e3)
+    force_rate_limit: float = tunable(
+        "largest rate at which the desired force follows its command", "N/s", low=1.0, before=1e9
     )
-    torque_gain: tuple[float, ...] = parameter(
-        "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", low=0.0, high=100.0, live=True
+    torque_gain: tuple[float, ...] = tunable(
+        "G_I of each joint in the joint_torque mode, or one for all", "rad/s/(N m)", high=100.0
     )
-    torque_proportional_gain: tuple[float, ...] = parameter(
-        "G_P of each joint, or one for all", "rad/(N m)", low=0.0, high=100.0, live=True
+    torque_proportional_gain: tuple[float, ...] = tunable("G_P of each joint, or one for all", "rad/(N m)", high=100.0)
+    torque_error_limit: tuple[float, ...] = tunable(
+        "saturation of the torque error of each joint, or one for all; above the deadband", "N m"
     )
-    torque_error_limit: tuple[float, ...] = parameter(
-        "saturation of the torque error of each joint, or one for all; above the deadband",
-        "N m",
-        low=0.0,
-        high=1e9,
-        live=True,
+    torque_deadband: tuple[float, ...] = tunable(
+        "deadband at the input of each joint's G_I, or one for all", "N m", high=1e3
     )
-    torque_deadband: tuple[float, ...] = parameter(
-        "deadband at the input of each joint's G_I, or one for all", "N m", low=0.0, high=1e3, live=True
-    )
-    torque_limit: float = parameter("largest joint torque that may be commanded", "N m", low=0.0, high=1e3, live=True)
-    torque_rate_limit: float = parameter(
-        "largest rate at which the desired torque of a joint follows its command",
-        "N m/s",
-        low=1.0,
-        high=1e9,
-        live=True,
-        before=1e9,
+    torque_limit: float = tunable("largest joint torque that may be commanded", "N m", high=1e3)
+    torque_rate_limit: float = tunable(
+        "largest rate at which the desired torque of a joint follows its command", "N m/s", low=1.0, before=1e9
     )
     delay_samples: int = parameter("delay of the law's velocity in outer periods", low=0, high=20, live=True)
-    blend_time: float = parameter(
+    blend_time: float = tunable(
         "time constant of the bumpless transfer of the velocity when a command begins or ends, the mode or a gain is "
         "changed, or the motors start; zero for none",
         "s",
-        low=0.0,
         high=60.0,
-        live=True,
     )
-    force_feedforward: float = parameter(
+    force_feedforward: float = tunable(
         "fraction of the torque of the commanded force that is fed forward at once, as in the thesis; it throws a free "
         "arm at the surface",
-        low=0.0,
         high=1.0,
-        live=True,
         before=1.0,
     )
-    friction_feedforward: float = parameter(
+    friction_feedforward: float = tunable(
         "fraction of the dry friction of the model that is fed forward along the commanded motion while a force is "
         "controlled; with feedback contact_estimate none, as a dither does the same",
-        low=0.0,
         high=1.0,
-        live=True,
         before=0.0,
     )
-    posture_gain: float = parameter("joint velocity per posture error", "1/s", low=0.0, high=1e3, live=True)
-    joint_speed_limit: float = parameter(
-        "largest joint speed due to the posture and to the force", "rad/s", low=0.0, high=1e3, live=True
+    posture_gain: float = tunable("joint velocity per posture error", "1/s", high=1e3)
+    joint_speed_limit: float = tunable("largest joint speed due to the posture and to the force", "rad/s", high=1e3)
+    force_filter: float = tunable("time constant of the low pass on the measured force", "s", high=10.0)
+    spring_stiffness: tuple[float, ...] = tunable(
+        "stiffness of a known spring at each joint, for the feedback joint_position", "N m/rad"
     )
-    force_filter: float = parameter(
-        "time constant of the low pass on the measured force", "s", low=0.0, high=10.0, live=True
-    )
-    spring_stiffness: tuple[float, ...] = parameter(
-        "stiffness of a known spring at each joint, for the feedback joint_position",
-        "N m/rad",
-        low=0.0,
-        high=1e9,
-        live=True,
-    )
-    spring_rest: tuple[float, ...] = parameter(
-        "joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0, live=True
-    )
+    spring_rest: tuple[float, ...] = tunable("joint angle at which that spring is relaxed", "rad", low=-13.0, high=13.0)
     contact_source: str = parameter(
         "where the force acts: estimated: at the estimated contact if it is certain enough, else as pinned; pinned: at "
         "contact_position.  The torque of a force command in the frame of a cover pins the position in either case",
@@ -126,13 +97,11 @@ class ForceLoopParameters:
         before="estimated",
     )
     contact_cover: str = parameter("cover that is assumed in contact while no contact is detected", live=True)
-    contact_position: float = parameter("contact position assumed along it", "m", low=0.0, high=3.0, live=True)
-    contact_position_sd: float = parameter(
+    contact_position: float = tunable("contact position assumed along it", "m", high=3.0)
+    contact_position_sd: float = tunable(
         "standard deviation of a pinned contact position, as of a surface that moves along the link",
         "m",
-        low=0.0,
         high=1.0,
-        live=True,
         before=0.0,
     )
     schedule: str = parameter(
@@ -141,11 +110,11 @@ class ForceLoopParameters:
         choices=("off", "position"),
         live=True,
     )
-    position_uncertainty_limit: float = parameter(
-        "largest standard deviation of an estimated contact position that is used", "m", low=0.0, high=10.0, live=True
+    position_uncertainty_limit: float = tunable(
+        "largest standard deviation of an estimated contact position that is used", "m", high=10.0
     )
-    link_probability_limit: float = parameter(
-        "least probability of the estimated link with which its contact position is used", low=0.0, high=1.0, live=True
+    link_probability_limit: float = tunable(
+        "least probability of the estimated link with which its contact position is used", high=1.0
     )
 
     @property

@@ -1,6 +1,6 @@
 """The guard while the arm moves: it scales the gains with pose, force direction and contact position.
 
-A assessment takes milliseconds, so it is distributed: a part of it in each outer period, and a new
+An assessment takes milliseconds, so it is distributed: a part of it in each outer period, and a new
 one only after the arm has moved.
 """
 
@@ -64,7 +64,7 @@ class Watch:
 
         Parameters
         ----------
-        where : gives the contacts that are possible now; called when a assessment is due.
+        where : gives the contacts that are possible now; called when an assessment is due.
         dt : outer period, s.
         """
         self._since += dt

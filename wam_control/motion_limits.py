@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wam_control.arm_push import ArmPush
 from wam_description.arm import Arm
-from wam_description.parameters import parameter
+from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
@@ -22,91 +22,58 @@ BEGIN = 0.9  # of the largest contact force, from which motion against it is slo
 class LimitParameters:
     """Where the force loop stops the arm."""
 
-    joint_gain: float = parameter(
+    joint_gain: float = tunable(
         "largest speed of a joint per distance from where it has to stop; 0: the ends of the joints are not watched",
         "1/s",
-        low=0.0,
         high=100.0,
-        live=True,
         before=0.0,
     )
-    joint_margin: float = parameter(
-        "distance from the end of a joint at which it has to stop", "rad", low=0.0, high=1.0, live=True, before=0.0
+    joint_margin: float = tunable(
+        "distance from the end of a joint at which it has to stop", "rad", high=1.0, before=0.0
     )
-    contact_force: float = parameter(
-        "largest force on the arm, as far as the joints measure it; above it the arm gives way",
-        "N",
-        low=0.0,
-        high=1e9,
-        live=True,
-        before=1e9,
+    contact_force: float = tunable(
+        "largest force on the arm, as far as the joints measure it; above it the arm gives way", "N", before=1e9
     )
-    whole_force: float = parameter(
+    whole_force: float = tunable(
         "largest force in all, per commanded force, at its position or, where that is not known, wherever it acts; "
         "above it the arm gives way",
-        low=0.0,
-        high=1e9,
-        live=True,
         before=1e9,
     )
-    impact: float = parameter(
+    impact: float = tunable(
         "predicted peak of the impact (3.1) on a surface of guard.contact_stiffness, per commanded force: it limits "
         "the speed along the force until something is touched; 0: no limit",
-        low=0.0,
         high=1e3,
-        live=True,
         before=0.0,
     )
-    settling_time: float = parameter(
-        "time after which a force that is still not reached is reported", "s", low=0.0, high=1e9, live=True, before=1e9
-    )
-    free_travel: float = parameter(
+    settling_time: float = tunable("time after which a force that is still not reached is reported", "s", before=1e9)
+    free_travel: float = tunable(
         "largest way along a commanded force without touching anything; then the arm holds its position",
         "m",
-        low=0.0,
-        high=1e9,
-        live=True,
         before=1e9,
     )
-    least_tolerance: float = parameter(
-        "least error up to which a force counts as reached, however small it is",
-        "N",
-        low=0.0,
-        high=1e3,
-        live=True,
-        before=0.3,
+    least_tolerance: float = tunable(
+        "least error up to which a force counts as reached, however small it is", "N", high=1e3, before=0.3
     )
-    cycle_force: float = parameter(
-        "swing of the measured force, per commanded force, from which it is reported as a limit cycle",
-        low=0.0,
-        high=1e9,
-        live=True,
-        before=1e9,
+    cycle_force: float = tunable(
+        "swing of the measured force, per commanded force, from which it is reported as a limit cycle", before=1e9
     )
-    shake_force: float = parameter(
+    shake_force: float = tunable(
         "swing of the force, per commanded force, that a shaking arm (dither) may make on a surface of "
         "guard.contact_stiffness; above it the arm holds its position; with feedback contact_estimate",
-        low=0.0,
-        high=1e9,
-        live=True,
         before=1e9,
     )
-    surface_speed: float = parameter(
+    surface_speed: float = tunable(
         "largest speed along the force of the surface that will be touched: a force that is off by more than "
         "sensing.reported_fraction while it follows is refused",
         "m/s",
-        low=0.0,
         high=10.0,
-        live=True,
         before=0.0,
     )
-    slide_speed: float = parameter(
+    slide_speed: float = tunable(
         "largest speed across the force of the surface that will be touched: one that comes nearer by more of the "
         "force than it may be off while the friction of the arm turns round is refused",
         "m/s",
-        low=0.0,
         high=10.0,
-        live=True,
         before=0.0,
     )
 
@@ -117,7 +84,7 @@ class WholeForce(NamedTuple):
     Attributes
     ----------
     desired : commanded, N, in all directions together.
-    measured : the one in all, N, where its place is known; None where it is not.
+    measured : the one in all, N, where its position is known; None where it is not.
     """
 
     desired: float

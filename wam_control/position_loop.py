@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 from wam_control.servo_guard import DEAD, ServoGuard, ServoGuardParameters
 from wam_control.servo_reaction import SERVO_REACTION
-from wam_description.arm import Motors, Servo, Shared
+from wam_description.arm import Servo, Shared
+from wam_description.parts import Motors
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Outputs

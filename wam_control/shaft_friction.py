@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from wam_control.observer_parameters import ObserverParameters
-from wam_description.arm import Joints, Motors
+from wam_description.parts import Joints, Motors
 
 SLOW = 12.0  # rest velocities: speed up to which the shape of the friction counts (Stribeck)
 # of `shape_uncertainty`, and seconds at the rest velocity: angle after a reversal over which it counts (presliding)

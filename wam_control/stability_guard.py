@@ -16,13 +16,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.force_axis import REACH, ForceAxes, ForceAxis, SensingParameters
+from wam_control.force_axis import REACH, ForceAxes, ForceAxis, PressedForce, SensingParameters
 from wam_control.force_law import ForceLaw
 from wam_control.friction_trial import FrictionTrial
 from wam_control.friction_verdict import SOFTER, Domain, PredictedCycle, stiction_cycle
 from wam_control.sampled_loop import Axes, Feedback, SampledLoop
 from wam_description.arm import Arm, Servo, Timing
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import lengths, parameter, tunable
 from wam_theory.linear_loop import series_stiffness
 from wam_theory.stick_slip import FrictionNode
 
@@ -44,30 +44,25 @@ class GuardParameters:
         choices=("off", "warn", "refuse", "limit"),
         live=True,
     )
-    contact_stiffness: float = parameter(
-        "stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0, high=1e9, live=True
+    contact_stiffness: float = tunable("stiffness of the stiffest surface that the arm will touch", "N/m", low=1.0)
+    posture: tuple[float, ...] = tunable(
+        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0
     )
-    posture: tuple[float, ...] = parameter(
-        "joint angles at which parameters are assessed before the arm moves", "rad", low=-13.0, high=13.0, live=True
+    stability_fraction: float = tunable(
+        "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0
     )
-    stability_fraction: float = parameter(
-        "fraction of the largest linearly stable gain that is accepted as domain I", low=0.05, high=1.0, live=True
-    )
-    feedback_lag: float = parameter(
-        "time constant of the estimate with feedback contact_estimate", "s", low=0.0, high=10.0, live=True
-    )
+    feedback_lag: float = tunable("time constant of the estimate with feedback contact_estimate", "s", high=10.0)
     extra_delay: int = parameter(
         "inner periods by which a command may be later than timing.outer_delay, as in real time",
         low=0,
         high=100,
         live=True,
     )
-    interval: float = parameter(
+    interval: float = tunable(
         "shortest time between two assessments while pose, force direction or contact position change",
         "s",
         low=0.01,
         high=3600.0,
-        live=True,
     )
 
 
@@ -215,7 +210,7 @@ class StabilityGuard:
     def axis(self, contact: GuardedContact) -> ForceAxis:
         """How the force loop senses the force of a contact, and moves along it."""
         q, cover, position, position_sd, direction, force = contact
-        return self._force_axes.axis(q, cover, position, position_sd, np.array(direction), force)
+        return self._force_axes.axis(q, PressedForce(cover, position, position_sd, np.array(direction), force))
 
     def scales(
         self, task: GuardedTask, contacts: Sequence[Guarded], tried: Sequence[float] = SCALES

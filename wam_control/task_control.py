@@ -39,7 +39,7 @@ class TaskOutput(NamedTuple):
     reaction, reason : what is done instead of what is commanded, and why.
     has_changed : whether the law has changed since the period before.
     desired : N, of all its forces, where the task is nothing but forces of points, and one touches; else 0.
-    pressed : the commanded force, where that is at one known place.
+    pressed : the commanded force, where that is at one known position.
     """
 
     velocity: list[float]
@@ -83,14 +83,14 @@ class TaskControl:
         self._task: TaskCommand | None = None
         self._anchors: dict[object, float] = {}
         self._holds: list[ForceHold] = []
-        # by cover and place: m since something is touched there, s since it is no more
+        # by cover and position: m since something is touched there, s since it is no more
         self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
         self._begun: list[float] = []  # (n,) rad, where the task began
         self._held.release()
         self._feed_forward.reset()
         self._refusal = ""
-        self._places: dict[str, tuple[float, float]] = {}  # m, of the last certain estimate, and its sd, by cover
+        self._positions: dict[str, tuple[float, float]] = {}  # m, of the last certain estimate, and its sd, by cover
 
     def step(
         self,
@@ -264,19 +264,21 @@ class TaskControl:
             and not (contact.probability < own.link_probability_limit)
         ):
             sd = 0.0 if math.isnan(contact.position_sd) else contact.position_sd
-            self._places[contact.cover] = contact.position, sd
+            self._positions[contact.cover] = contact.position, sd
         found = []
         for axis in task.axes:
             if axis.position is not None:
                 slid, _ = self._slid.get((axis.cover, axis.position), (0.0, 0.0))
-                place = slid_position(self._covers, axis.cover, axis.position, slid) if slid else axis.position
+                position = slid_position(self._covers, axis.cover, axis.position, slid) if slid else axis.position
                 sd = own.contact_position_sd
-                found.append(ForcePoint(axis.cover, place, sd, True, True, True, False, "", conflict, is_single))
+                found.append(ForcePoint(axis.cover, position, sd, True, True, True, False, "", conflict, is_single))
                 continue
             length = self._covers.length_of(axis.cover)
-            place, sd = self._places.get(axis.cover, (length / 2.0, length / math.sqrt(12.0)))
-            is_known = axis.cover in self._places
-            found.append(ForcePoint(axis.cover, place, sd, is_known, False, is_known, False, "", conflict, is_single))
+            position, sd = self._positions.get(axis.cover, (length / 2.0, length / math.sqrt(12.0)))
+            is_known = axis.cover in self._positions
+            found.append(
+                ForcePoint(axis.cover, position, sd, is_known, False, is_known, False, "", conflict, is_single)
+            )
         return found
 
     def _guarded(self, states: Sequence[AxisState], q: Sequence[float]) -> list[GuardedForces]:
@@ -318,8 +320,8 @@ class TaskControl:
         for state, hold in zip(states, self._holds, strict=True):
             if hold.has_touched and state.point and state.axis.kind is AxisKind.FORCE:
                 gain = law.along(state.axis.direction).gain[0]
-                place = (state.point.position, *self._covers.aside(state.point.cover, state.point.position))
-                jacobian = self._body.point_jacobian(q, state.point.cover, place)
+                on_axis = (state.point.position, *self._covers.aside(state.point.cover, state.point.position))
+                jacobian = self._body.point_jacobian(q, state.point.cover, on_axis)
                 posture = followed(posture, jacobian, _desired(state), gain)
         return posture
 
@@ -371,8 +373,8 @@ def _limited(velocity: Array, limit: float) -> list[float]:
 
 def _row(state: AxisState, anchor: float, force: float, independence: float, fraction: float) -> AxisRow:
     axis = state.axis
-    is_place = axis.kind in (AxisKind.POSITION, AxisKind.IMPEDANCE)
-    commanded = anchor if is_place else _desired(state) if axis.kind is AxisKind.FORCE else axis.value or 0.0
+    is_coordinate = axis.kind in (AxisKind.POSITION, AxisKind.IMPEDANCE)
+    commanded = anchor if is_coordinate else _desired(state) if axis.kind is AxisKind.FORCE else axis.value or 0.0
     measured = force if axis.is_sensed else state.coordinate
     return float(axis.kind), commanded, measured, state.force_sd, independence, fraction
 

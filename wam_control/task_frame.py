@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact_position import ForcePoint
-from wam_control.force_axis import ForceAxes, ForceAxis, SensingParameters
+from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce, SensingParameters
 from wam_control.force_law import ForceLaw
 from wam_control.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.task_parameters import TaskParameters
@@ -112,8 +112,8 @@ class TaskFrame:
             if axis.joint >= 0:
                 found.append(AxisState(axis, np.eye(n)[axis.joint], u, q[axis.joint], None))
                 continue
-            place, place_sd = points[i].position, points[i].position_sd
-            axis_point = np.array([place, *self._arm.covers.aside(axis.cover, place)])
+            position, position_sd = points[i].position, points[i].position_sd
+            axis_point = np.array([position, *self._arm.covers.aside(axis.cover, position)])
             coordinate = float(u @ self._body.point(q, axis.cover, axis_point))
             if not own:
                 row: Array = u @ self._body.point_jacobian(q, axis.cover, axis_point)
@@ -121,11 +121,12 @@ class TaskFrame:
                 continue
             others = []
             for k, other in enumerate(torques):
-                # two axes at one place are parts of one force, whose friction is that of `sensed` already
+                # two axes at one position are parts of one force, whose friction is that of `sensed` already
                 is_same = (task.axes[k].cover, task.axes[k].position) == (axis.cover, axis.position)
                 others += [] if k == i else other[:1] if is_same else other
             turned = self._turned(q, begun, axis.cover, u) if others else 0.0
-            sensed = self._axes.axis(q, axis.cover, place, place_sd, u, _size(axis), others, turned)
+            pressed = PressedForce(axis.cover, position, position_sd, u, _size(axis))
+            sensed = self._axes.axis(q, pressed, others, turned)
             found.append(AxisState(axis, sensed.lever, u, coordinate, sensed, points[i]))
         return found
 
@@ -140,8 +141,8 @@ class TaskFrame:
         """Torques (n,), N m, by which a force along this axis disturbs the other ones; a hand has no friction."""
         if axis.kind is AxisKind.IMPEDANCE:
             return [HAND * self._axes.lever(q, axis.cover, point.position, direction)]
-        where, turned = (axis.cover, point.position, point.position_sd), self._turned(q, begun, axis.cover, direction)
-        return self._axes.disturbance(q, *where, direction, _size(axis), turned)
+        pressed = PressedForce(axis.cover, point.position, point.position_sd, direction, _size(axis))
+        return self._axes.disturbance(q, pressed, self._turned(q, begun, axis.cover, direction))
 
     def refusal(self, states: Sequence[AxisState]) -> str:
         """Why this task cannot be done in this pose, with the number; '' where it can."""
@@ -154,10 +155,10 @@ class TaskFrame:
                     "bend the arm, or command another axis"
                 )
         forces = [state.axis for state in states if state.sensed and state.axis.kind is AxisKind.FORCE]
-        places = {(axis.cover, axis.position) for axis in forces}
-        if len(places) > 1 and self._sensing.friction < LEAST_FRICTION:
+        positions = {(axis.cover, axis.position) for axis in forces}
+        if len(positions) > 1 and self._sensing.friction < LEAST_FRICTION:
             return (
-                f"{len(places)} forces at once: the friction of each is measured as a part of the others, and "
+                f"{len(positions)} forces at once: the friction of each is measured as a part of the others, and "
                 f"sensing.friction is {self._sensing.friction:g}; allowed: {LEAST_FRICTION:g} and above; declare it"
             )
         limit = own.condition_limit

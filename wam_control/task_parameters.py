@@ -2,41 +2,35 @@
 
 from dataclasses import dataclass
 
-from wam_description.parameters import parameter
+from wam_description.parameters import tunable
 
 
 @dataclass(frozen=True)
 class TaskParameters:
     """Limits of tasks."""
 
-    condition_limit: float = parameter(
-        "largest condition number of the axes of a task, each scaled to length 1", low=1.0, high=1e6, live=True,
-        before=20.0,
-    )  # fmt: skip
-    speed_limit: float = parameter(
-        "largest speed along an axis of a task", "m/s", low=0.0, high=10.0, live=True, before=0.5
+    condition_limit: float = tunable(
+        "largest condition number of the axes of a task, each scaled to length 1", low=1.0, high=1e6, before=20.0
     )
-    joint_speed_limit: float = parameter(
-        "largest speed of a joint that is an axis of a task", "rad/s", low=0.0, high=10.0, live=True, before=1.5
+    speed_limit: float = tunable("largest speed along an axis of a task", "m/s", high=10.0, before=0.5)
+    joint_speed_limit: float = tunable(
+        "largest speed of a joint that is an axis of a task", "rad/s", high=10.0, before=1.5
     )
-    least_damping: float = parameter(
-        "least damping of an impedance along an axis", "N s/m", low=1e-3, high=1e6, live=True, before=70.0
+    least_damping: float = tunable(
+        "least damping of an impedance along an axis", "N s/m", low=1e-3, high=1e6, before=70.0
     )
-    least_joint_damping: float = parameter(
-        "least damping of an impedance of a joint", "N m s/rad", low=1e-3, high=1e6, live=True, before=5.0
+    least_joint_damping: float = tunable(
+        "least damping of an impedance of a joint", "N m s/rad", low=1e-3, high=1e6, before=5.0
     )
-    largest_rate: float = parameter(
+    largest_rate: float = tunable(
         "largest stiffness of an impedance per damping, and velocity per error of a commanded position",
         "1/s",
-        low=0.0,
         high=100.0,
-        live=True,
         before=8.0,
     )
-    deadband: float = parameter(
-        "force along an impedance below which the arm does not yield", "N", low=0.0, high=100.0, live=True, before=0.3
+    deadband: float = tunable(
+        "force along an impedance below which the arm does not yield", "N", high=100.0, before=0.3
     )
-    joint_deadband: float = parameter(
-        "torque of a joint impedance below which the joint does not yield", "N m", low=0.0, high=100.0, live=True,
-        before=0.1,
-    )  # fmt: skip
+    joint_deadband: float = tunable(
+        "torque of a joint impedance below which the joint does not yield", "N m", high=100.0, before=0.1
+    )

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wam_control.transform import Transform
-from wam_description.arm import Motors, Shared
+from wam_description.arm import Shared
 from wam_description.parameters import lengths, parameter
+from wam_description.parts import Motors
 from wam_description.signals import State
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction

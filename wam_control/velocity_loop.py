@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from wam_control.dither import DitherParameters
 from wam_control.servo_guard import DEAD, ServoGuardParameters
-from wam_description.arm import Motors, Servo
+from wam_description.arm import Servo
 from wam_description.parameters import lengths, parameter
+from wam_description.parts import Motors
 
 
 @dataclass(frozen=True)

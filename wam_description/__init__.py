@@ -5,7 +5,7 @@
 - parameters: parameter classes with unit, range and meaning, and their checks
 - parameter_history: what parameters were in earlier versions, for old recordings
 - configuration, yaml_text: parameter files, which may build on one another
-- arm: parameters that every node shares
+- arm: parameters that every node shares; parts: those of motors, joints and links
 - model: what the controllers know of the arm, where it is not the arm's own parameters
 - cables, effects, mismatch: parameters of the cables, of further effects of the plant, of model mismatch
 - world: parameters of what the arm can touch

@@ -5,145 +5,19 @@ arrays are flattened row by row because ROS parameters cannot be nested.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wam_description.cables import Cables, Circuit, circuits
 from wam_description.model import ArmModel
-from wam_description.parameters import lengths, one_each, parameter, require
+from wam_description.parameters import lengths, one_each, parameter, require, tunable
+from wam_description.parts import Joints, Links, Motors, distinct
 from wam_description.units import STANDARD_GRAVITY
 
 TOLERANCE = 1e-3  # m, by which numbers that describe the same point may differ
-
-
-def _no_products(others: Mapping[str, Any]) -> tuple[float, ...]:
-    return (0.0,) * (3 * len(others["arm.links.names"]))
-
-
-def _distinct(group: str, names: tuple[str, ...]) -> None:
-    require(len(names) > 0, f"parameter '{group}.names' is empty; name at least one")
-    require(len(set(names)) == len(names), f"parameter '{group}.names' has a duplicate name: {', '.join(names)}")
-
-
-@dataclass(frozen=True)
-class Motors:
-    """The motors, one per cable circuit."""
-
-    names: tuple[str, ...] = parameter("motor names, as in JointState messages")
-    inertia: tuple[float, ...] = parameter("rotor inertia", "kg m^2", low=1e-9, high=1e5)
-    torque_constant: tuple[float, ...] = parameter("torque per current", "N m/A", low=1e-6, high=100.0)
-    peak_torque: tuple[float, ...] = parameter("peak torque, at which the amplifier clips", "N m", low=0.0, high=1e9)
-    continuous_torque: tuple[float, ...] = parameter("rated (continuous) torque", "N m", low=1e-6, high=1e9)
-    static_friction: tuple[float, ...] = parameter(
-        "static friction F_s (breakaway torque) of rotor and first pinion", "N m", low=0.0, high=100.0
-    )
-    dynamic_friction: tuple[float, ...] = parameter("dynamic friction F_d in motion", "N m", low=0.0, high=100.0)
-    viscous_friction: tuple[float, ...] = parameter("viscous friction", "N m s/rad", low=0.0, high=10.0)
-
-    def __post_init__(self) -> None:
-        _check_shafts("arm.motors", self)
-        for name, peak, continuous in zip(self.names, self.peak_torque, self.continuous_torque, strict=True):
-            require(
-                continuous <= peak,
-                f"{name}: arm.motors.continuous_torque {continuous:g} N m is above peak_torque {peak:g} N m",
-            )
-
-
-@dataclass(frozen=True)
-class Joints:
-    """The joints in Craig's Denavit-Hartenberg convention (A.4)."""
-
-    names: tuple[str, ...] = parameter("joint names, as in JointState messages")
-    twist: tuple[float, ...] = parameter("alpha_(i-1), link twist before the joint", "rad", low=-6.3, high=6.3)
-    length: tuple[float, ...] = parameter("a_(i-1), link length before the joint", "m", low=-3.0, high=3.0)
-    offset: tuple[float, ...] = parameter("d_i, link offset along the joint axis", "m", low=-3.0, high=3.0)
-    lower: tuple[float, ...] = parameter("lower stop", "rad", low=-13.0, high=13.0)
-    upper: tuple[float, ...] = parameter("upper stop", "rad", low=-13.0, high=13.0)
-    start: tuple[float, ...] = parameter("angle at power-up, brakes on", "rad", low=-13.0, high=13.0)
-    armature: tuple[float, ...] = parameter(
-        "inertia of the pulleys that turn with the joint", "kg m^2", low=0.0, high=1e3
-    )
-    static_friction: tuple[float, ...] = parameter(
-        "static friction F_s (breakaway torque) at the joint", "N m", low=0.0, high=1e3
-    )
-    dynamic_friction: tuple[float, ...] = parameter(
-        "dynamic friction F_d in motion, at the joint", "N m", low=0.0, high=1e3
-    )
-    viscous_friction: tuple[float, ...] = parameter("viscous friction at the joint", "N m s/rad", low=0.0, high=1e3)
-    speed_limit: tuple[float, ...] = parameter("speed above which there is a fault", "rad/s", low=0.0, high=100.0)
-
-    def __post_init__(self) -> None:
-        _check_shafts("arm.joints", self)
-        for name, low, start, high in zip(self.names, self.lower, self.start, self.upper, strict=True):
-            require(low < high, f"{name}: arm.joints.lower {low:g} rad is not below upper {high:g} rad")
-            require(low <= start <= high, f"{name}: arm.joints.start {start:g} rad is outside {low:g} to {high:g} rad")
-
-    def beyond(self, posture: Sequence[float]) -> str:
-        """Why a posture (n,), rad, is refused: the first joint beyond its stops; '' where none is."""
-        for name, angle, low, high in zip(self.names, posture, self.lower, self.upper, strict=True):
-            if not low <= angle <= high:
-                return (
-                    f"{name} is to be at {angle:.4g} rad; allowed: {low:.4g} to {high:.4g} rad; "
-                    "the last good posture remains in force"
-                )
-        return ""
-
-
-def _check_shafts(group: str, shafts: Motors | Joints) -> None:
-    """Refuse a name twice, a list that has not one value each, and friction that grows with the motion."""
-    _distinct(group, shafts.names)
-    lengths(group, shafts.names, {key: value for key, value in vars(shafts).items() if key != "names"})
-    for name, f_static, f_dynamic in zip(shafts.names, shafts.static_friction, shafts.dynamic_friction, strict=True):
-        require(
-            f_dynamic <= f_static,
-            f"{name}: {group}.dynamic_friction {f_dynamic:g} N m is above static_friction {f_static:g} N m",
-        )
-
-
-@dataclass(frozen=True)
-class Links:
-    """The rigid links; link i moves with joint i, its frame is frame i of (A.4)."""
-
-    names: tuple[str, ...] = parameter("link names, one per joint, as in frame ids")
-    mass: tuple[float, ...] = parameter("mass", "kg", low=1e-6, high=500.0)
-    centre: tuple[float, ...] = parameter(
-        "centre of mass in the link's frame, x y z of each link", "m", low=-3.0, high=3.0
-    )
-    inertia: tuple[float, ...] = parameter(
-        "moments of inertia about the centre of mass, along the axes of the link's frame, xx yy zz",
-        "kg m^2",
-        low=0.0,
-        high=100.0,
-    )
-    product: tuple[float, ...] = parameter(
-        "the other elements xy xz yz of the same inertia tensor; zero where the axes are principal",
-        "kg m^2",
-        low=-100.0,
-        high=100.0,
-        before=_no_products,
-    )
-
-    def __post_init__(self) -> None:
-        _distinct("arm.links", self.names)
-        lengths("arm.links", self.names, {"mass": self.mass})
-        spatial = {"centre": self.centre, "inertia": self.inertia, "product": self.product}
-        lengths("arm.links", self.names, spatial, width=3)
-        for i, name in enumerate(self.names):
-            least = float(np.linalg.eigvalsh(self.tensor(i))[0])
-            require(
-                least >= 0.0,
-                f"{name}: arm.links.inertia and product give a principal inertia of {least:.3g} kg m^2, below 0",
-            )
-
-    def tensor(self, i: int) -> NDArray[np.float64]:
-        """Inertia tensor of link i, counted from 0, about its centre of mass in its frame, (3, 3), kg m^2."""
-        (xx, yy, zz), (xy, xz, yz) = (values[3 * i : 3 * i + 3] for values in (self.inertia, self.product))
-        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 @dataclass(frozen=True)
@@ -171,7 +45,7 @@ class Covers:
     radius: tuple[float, ...] = parameter("outer radius of the tube, rounded ends", "m", low=1e-4, high=0.5)
 
     def __post_init__(self) -> None:
-        _distinct("arm.covers", self.names)
+        distinct("arm.covers", self.names)
         lengths("arm.covers", self.names, {"links": self.links, "length": self.length, "radius": self.radius})
         spatial = {key: getattr(self, key) for key in ("origin", "rotation", "start", "end")}
         lengths("arm.covers", self.names, spatial, width=3)
@@ -424,10 +298,8 @@ class Timing:
 class Servo:
     """Gains of the velocity loop of each motor; the velocity loop uses them, the stability guard relies on them."""
 
-    proportional_gain: tuple[float, ...] = parameter(
-        "torque per velocity error", "N m s/rad", low=0.0, high=1e9, live=True
-    )
-    integral_gain: tuple[float, ...] = parameter("torque per angle error", "N m/rad", low=0.0, high=1e9, live=True)
+    proportional_gain: tuple[float, ...] = tunable("torque per velocity error", "N m s/rad")
+    integral_gain: tuple[float, ...] = tunable("torque per angle error", "N m/rad")
 
 
 def seconds(nanoseconds: int) -> float:

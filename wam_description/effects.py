@@ -4,8 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from wam_description.arm import Arm, Motors
-from wam_description.parameters import lengths, parameter, require
+from wam_description.arm import Arm
+from wam_description.parameters import lengths, parameter, require, tunable
+from wam_description.parts import Motors
 
 
 @dataclass(frozen=True)
@@ -42,12 +43,10 @@ class Effects:
         before=(0.0,),
     )
     slack: bool = parameter("true if the loose strand can go slack; otherwise the pretension is taken to be infinite")
-    pretension_share: tuple[float, ...] = parameter(
+    pretension_share: tuple[float, ...] = tunable(
         "active pretension (6.5): part of arm.cables.pretension to which cables are tightened, one for all or one "
         "each; it changes at once",
-        low=0.0,
         high=10.0,
-        live=True,
         before=(1.0,),
     )
     tension_friction: tuple[float, ...] = parameter(
@@ -61,12 +60,8 @@ class Effects:
         "of the motor are a part (7.2.2): the plant's dry friction is what they leave; otherwise they are added",
         before=False,
     )
-    added_coulomb_friction: tuple[float, ...] = parameter(
-        "added Coulomb friction at each joint, like the Teflon rod of section 5.6",
-        "N m",
-        low=0.0,
-        high=100.0,
-        live=True,
+    added_coulomb_friction: tuple[float, ...] = tunable(
+        "added Coulomb friction at each joint, like the Teflon rod of section 5.6", "N m", high=100.0
     )
 
     def tightened(self, motor: int) -> float:

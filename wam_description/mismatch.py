@@ -7,8 +7,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from wam_description.arm import Arm, Joints, Links, Motors
+from wam_description.arm import Arm
 from wam_description.parameters import lengths, one_each, parameter
+from wam_description.parts import Joints, Links, Motors
 
 Shafts = TypeVar("Shafts", Motors, Joints)
 

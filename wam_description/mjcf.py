@@ -11,11 +11,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from wam_description.arm import Arm, Links, Motors
+from wam_description.arm import Arm
 from wam_description.contact_pairs import ContactPair, contact_pairs, folded
 from wam_description.effects import Effects, Ripples
 from wam_description.mjcf_objects import add_bodies, add_doors, require_names
 from wam_description.parameters import lengths, require
+from wam_description.parts import Links, Motors
 from wam_description.world import SHAPES, Folding, Obstacles, Pushers, Springs, World
 
 NEVER_SLACK = 1e3  # rad of stretch before a strand is slack, if slack is switched off

@@ -5,46 +5,25 @@ their covariance.
 """
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
-from wam_description.parameters import copy_of, lengths, one_each, parameter, require
+from wam_description.parameters import lengths, like, one_each, parameter, require
+from wam_description.parts import Joints, Links, Motors
 
 FROM_ARM: Final = "arm"  # source of a model that was not identified
 UNKNOWN: Final = "none"  # in place of the names of identified parameters, where there are none
-
-
-def _products(others: Mapping[str, Any]) -> tuple[float, ...]:
-    """Those of the arm, none in a recording from before there were any."""
-    return tuple(others.get("arm.links.product", (0.0,) * (3 * len(others["arm.links.names"]))))
 
 
 @dataclass(frozen=True)
 class LinkModel:
     """The links as the controllers model them; of identified ones only the base set counts."""
 
-    mass: tuple[float, ...] = parameter("mass", "kg", low=1e-6, high=500.0, derived=copy_of("arm.links.mass"))
-    centre: tuple[float, ...] = parameter(
-        "centre of mass in the link's frame, x y z of each link",
-        "m",
-        low=-3.0,
-        high=3.0,
-        derived=copy_of("arm.links.centre"),
-    )
-    inertia: tuple[float, ...] = parameter(
-        "moments of inertia about the centre of mass, along the axes of the link's frame, xx yy zz",
-        "kg m^2",
-        low=0.0,
-        high=100.0,
-        derived=copy_of("arm.links.inertia"),
-    )
-    product: tuple[float, ...] = parameter(
-        "the other elements xy xz yz of the same inertia tensor",
-        "kg m^2",
-        low=-100.0,
-        high=100.0,
-        derived=_products,
+    mass: tuple[float, ...] = like(Links, "arm.links.mass")
+    centre: tuple[float, ...] = like(Links, "arm.links.centre")
+    inertia: tuple[float, ...] = like(Links, "arm.links.inertia")
+    product: tuple[float, ...] = like(
+        Links, "arm.links.product", "the other elements xy xz yz of the same inertia tensor"
     )
 
 
@@ -56,32 +35,16 @@ class MotorModel:
     cables transmit; F_c, F_s and k have a value for each direction.
     """
 
-    inertia: tuple[float, ...] = parameter(
-        "rotor inertia", "kg m^2", low=1e-9, high=1e5, derived=copy_of("arm.motors.inertia")
+    inertia: tuple[float, ...] = like(Motors, "arm.motors.inertia")
+    coulomb_positive: tuple[float, ...] = like(
+        Motors, "arm.motors.dynamic_friction", "dynamic friction F_c in positive motion"
     )
-    coulomb_positive: tuple[float, ...] = parameter(
-        "dynamic friction F_c in positive motion",
-        "N m",
-        low=0.0,
-        high=100.0,
-        derived=copy_of("arm.motors.dynamic_friction"),
+    coulomb_negative: tuple[float, ...] = like(Motors, "arm.motors.dynamic_friction", "the same in negative motion")
+    static_positive: tuple[float, ...] = like(
+        Motors, "arm.motors.static_friction", "friction F_s towards zero speed, in positive motion"
     )
-    coulomb_negative: tuple[float, ...] = parameter(
-        "the same in negative motion", "N m", low=0.0, high=100.0, derived=copy_of("arm.motors.dynamic_friction")
-    )
-    static_positive: tuple[float, ...] = parameter(
-        "friction F_s towards zero speed, in positive motion",
-        "N m",
-        low=0.0,
-        high=100.0,
-        derived=copy_of("arm.motors.static_friction"),
-    )
-    static_negative: tuple[float, ...] = parameter(
-        "the same in negative motion", "N m", low=0.0, high=100.0, derived=copy_of("arm.motors.static_friction")
-    )
-    viscous: tuple[float, ...] = parameter(
-        "viscous friction b", "N m s/rad", low=0.0, high=10.0, derived=copy_of("arm.motors.viscous_friction")
-    )
+    static_negative: tuple[float, ...] = like(Motors, "arm.motors.static_friction", "the same in negative motion")
+    viscous: tuple[float, ...] = like(Motors, "arm.motors.viscous_friction", "viscous friction b")
     stribeck_velocity: tuple[float, ...] = parameter(
         "v_s", "rad/s", low=1e-6, high=1e3, before=one_each("arm.motors.names", 0.5)
     )
@@ -100,26 +63,14 @@ class MotorModel:
 class JointModel:
     """Pulleys and friction that a joint adds; the friction law is that of `MotorModel`, alike in both directions."""
 
-    armature: tuple[float, ...] = parameter(
-        "inertia of the pulleys that turn with the joint",
-        "kg m^2",
-        low=0.0,
-        high=1e3,
-        derived=copy_of("arm.joints.armature"),
-    )
-    coulomb: tuple[float, ...] = parameter(
+    armature: tuple[float, ...] = like(Joints, "arm.joints.armature")
+    coulomb: tuple[float, ...] = like(
+        Joints,
+        "arm.joints.dynamic_friction",
         "dynamic friction F_c; identified: 0 at a joint with a motor of its own, where it is part of the motor's",
-        "N m",
-        low=0.0,
-        high=1e3,
-        derived=copy_of("arm.joints.dynamic_friction"),
     )
-    static: tuple[float, ...] = parameter(
-        "friction F_s towards zero speed", "N m", low=0.0, high=1e3, derived=copy_of("arm.joints.static_friction")
-    )
-    viscous: tuple[float, ...] = parameter(
-        "viscous friction b", "N m s/rad", low=0.0, high=1e3, derived=copy_of("arm.joints.viscous_friction")
-    )
+    static: tuple[float, ...] = like(Joints, "arm.joints.static_friction", "friction F_s towards zero speed")
+    viscous: tuple[float, ...] = like(Joints, "arm.joints.viscous_friction", "viscous friction b")
     stribeck_velocity: tuple[float, ...] = parameter(
         "v_s", "rad/s", low=1e-6, high=1e3, before=one_each("arm.joints.names", 0.02)
     )

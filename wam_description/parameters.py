@@ -73,7 +73,7 @@ def parameter(
         other parameters, see `one_each`.  Only recordings may lack a parameter; a configuration has to give it.
     length : of a list, the number of values that it must have, 0 where that is checked elsewhere.
     derived : the value where a configuration does not give one, a function of the other parameters of its section,
-        see `copy_of`; recordings without the parameter had the same value.
+        see `like`; recordings without the parameter had the same value.
     """
     return dataclasses.field(
         metadata={
@@ -83,9 +83,29 @@ def parameter(
     )  # fmt: skip
 
 
-def copy_of(name: str) -> Callable[[Mapping[str, Any]], Value]:
-    """The value of another parameter of the section, as ``derived=copy_of("arm.links.mass")``."""
-    return lambda others: others[name]
+def tunable(doc: str, unit: str = "", low: float = 0.0, high: float = 1e9, before: Any = None) -> Any:
+    """Declare numbers that a running node may change, not negative unless `low` is given; as `parameter` else."""
+    return parameter(doc, unit, low, high, live=True, before=before)
+
+
+def like(cls: type, name: str, doc: str = "") -> Any:
+    """Declare a field that has unit, range and, without a configured value, the value of another parameter.
+
+    Parameters
+    ----------
+    cls : class of the other parameter.
+    name : its name in the section, as 'arm.links.mass'.
+    doc : what the field is, where that is another sentence.
+    """
+    other = next(field for field in fields(cls) if field.name == name.rpartition(".")[2])
+
+    def value(others: Mapping[str, Any]) -> Value:
+        if name in others or other.before is None:
+            found: Value = others[name]
+            return found
+        return other.before(others) if callable(other.before) else other.before
+
+    return parameter(doc or other.doc, other.unit, other.low, other.high, derived=value)
 
 
 def one_each(names: str, value: bool | int | float | str) -> Callable[[Mapping[str, Any]], Value]:

@@ -71,6 +71,12 @@ class TransmissionMap:
         """Motor torques M^T tau, n, N m, of joint torques, n, N m (A.5, by power)."""
         return _product(self._forward_transposed, tau)
 
+    def at_joints(self, per_motor: Sequence[float]) -> NDArray[np.float64]:
+        """M^-T diag M^-1, (n, n): an inertia, a stiffness or a damping of each motor as the joints have it (A.5)."""
+        inverse = self.motor_from_joint
+        result: NDArray[np.float64] = inverse.T @ (np.array(per_motor)[:, None] * inverse)
+        return result
+
     def largest_joint_torques(self, peak_torque: Sequence[float]) -> list[float]:
         """Largest torque at each joint alone, n, N m, with up to peak_torque, n, N m, from each motor."""
         absolute = [[(j, abs(factor)) for j, factor in row] for row in self._inverse_transposed]

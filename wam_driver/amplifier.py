@@ -6,8 +6,8 @@ from operator import add, mul
 
 import numpy as np
 
-from wam_description.arm import Motors
 from wam_description.parameters import lengths
+from wam_description.parts import Motors
 from wam_driver.imperfections import AmplifierParameters
 
 

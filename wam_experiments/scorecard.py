@@ -51,7 +51,7 @@ def measures(configuration: Configuration) -> Measures:
     driver = configuration.node("driver", DriverParameters)
     body, gears = RigidBody(arm), TransmissionMap.of(arm).motor_from_joint
     pose = printed("pose in the middle of the workspace")
-    rotor = gears.T @ np.diag(arm.motors.inertia) @ gears
+    rotor = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
     links = body.mass_matrix(pose) + np.diag(arm.joints.armature)
     levers = normal_directions(body, pose) @ body.tool_jacobian(pose)  # (directions, joints), m
     friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction

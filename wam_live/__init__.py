@@ -10,4 +10,11 @@
 - scenario_player: a scenario or task played into a running stack
 - hold: a topic that is published while somebody drags or presses
 - playback: a bag as the source
+
+Other programs next to a running stack:
+
+- stack_client: a node with the parameters of the driver
+- push: a push as by hand, of `wam call push`
+- frame_publisher: /tf and /tf_static
+- trajectory_action: the action FollowJointTrajectory
 """

@@ -5,7 +5,8 @@
 - local_bus: messages between nodes of one process, without the middleware
 - display: copies of topics for a viewer, few a second
 - claims: one publisher for each topic that a node works on
-- messages: ROS messages to values and back; header: stamps and frames; markers: what viewers draw
+- messages: ROS messages to values and back; message_text: to plain data, to print
+- header: stamps and frames; markers: what viewers draw
 - wire: the same from and to bytes, faster, for the types that carry numbers
 - tolerance: a node that goes on when a callback raises, and reports it as a fault
 - parameters: declared, described, live; remote_parameters: those of other nodes

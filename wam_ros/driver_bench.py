@@ -28,7 +28,7 @@ class DriverBench:
     """
 
     def __init__(
-        self, probe: DriverProbe, contract: DriverContract, end: Restart | None = None, restart: Restart | None = None
+        self, probe: DriverProbe, contract: DriverContract, end: Restart | None, restart: Restart | None
     ) -> None:
         self.probe, self.contract = probe, contract
         self.end, self.restart = end, restart

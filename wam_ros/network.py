@@ -26,7 +26,7 @@ LONGEST_ADDRESS = 100  # bytes
 _PEER: Final = struct.Struct("3i")  # struct ucred: pid, uid, gid
 
 
-def limit_to_this_machine(environment: MutableMapping[str, str] = os.environ) -> None:
+def limit_to_this_machine(environment: MutableMapping[str, str]) -> None:
     """Let ROS reach and be reached from this machine alone, unless the switch is `open`.
 
     It has to be called before this process starts ROS.  Programs that this one starts inherit it.
@@ -149,10 +149,10 @@ def requested_domain(environment: MutableMapping[str, str] = os.environ) -> int:
     return int(text) if text.isascii() and text.isdigit() else 0
 
 
-def move_to_free_domain(namespace: str, environment: MutableMapping[str, str] = os.environ) -> str:
+def move_to_free_domain(namespace: str, environment: MutableMapping[str, str]) -> str:
     """Leave a ROS domain in which an arm runs in this namespace, for one that nobody is in.
 
-    For programs that nobody has to find, such as the demonstration.
+    For programs that nobody has to find, such as the demonstration.  `environment` is changed.
 
     Returns
     -------
@@ -169,16 +169,15 @@ def move_to_free_domain(namespace: str, environment: MutableMapping[str, str] = 
     return f"another arm runs in ROS domain {domain} (process {pid}), so this one runs in ROS_DOMAIN_ID={free}"
 
 
-def is_inhabited(domain: int, table: str | None = None) -> bool:
-    """Whether a program of this machine takes part in a ROS domain: it has bound UDP ports of the domain.
+def is_inhabited(domain: int) -> bool:
+    """Whether a program of this machine takes part in a ROS domain: it has bound UDP ports of the domain."""
+    return has_ports(Path("/proc/net/udp").read_text(encoding="utf-8"), domain)
 
-    Parameters
-    ----------
-    domain : ROS domain.
-    table : sockets as in /proc/net/udp, which is read where None.
-    """
+
+def has_ports(sockets: str, domain: int) -> bool:
+    """Whether a table of sockets, as /proc/net/udp, has a port of a ROS domain."""
     first = FIRST_PORT + PORTS * domain
-    lines = (Path("/proc/net/udp").read_text(encoding="utf-8") if table is None else table).splitlines()[1:]
+    lines = sockets.splitlines()[1:]
     return any(first <= int(line.split()[1].rpartition(":")[2], 16) < first + PORTS for line in lines)
 
 

@@ -132,7 +132,7 @@ def follow_other(
     take: Any,
     prefix: str,
     refuse: Callable[[str], None],
-    report: Callable[[Mapping[str, Any]], None] = lambda values: None,
+    report: Callable[[Mapping[str, Any]], None],
 ) -> None:
     """Take the live changes of shared parameters at another node of the same namespace.
 

@@ -314,7 +314,7 @@ class Ports:
                 f"ends before all listeners took the last messages of {', '.join(late)}: one is very slow, or gone"
             )
 
-    def watch_peers(self, take: Callable[[NodeStatus], None] | None = None) -> None:
+    def watch_peers(self, take: Callable[[NodeStatus], None]) -> None:
         """Listen to the status of the other nodes, for `absent` and `faults`, and hand each to `take`."""
         self._absent = set(self.interface.names) - {self._name}
 
@@ -326,7 +326,7 @@ class Ports:
             if status.connected:
                 self._absent.discard(status.node)
                 self._inform()
-            if is_peer and take is not None:
+            if is_peer:
                 take(status)
 
         self.listen(STATUS, receive)

@@ -123,7 +123,7 @@ class Recorder:
         last stamp of the same publisher (0 before its first), so that no wall clock is in the bag.
     qos : what each topic's publishers offer, by full name.
     sender : finds the only publisher of a topic.
-    namespace : of the arm, '' where its nodes are not named by it in /diagnostics.
+    namespace : of the arm, by which its nodes are named in /diagnostics.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class Recorder:
         mode: str,
         qos: Mapping[str, object],
         sender: Callable[[str], str],
-        namespace: str = "",
+        namespace: str,
     ) -> None:
         self.failure = ""
         self._received = 0
@@ -144,7 +144,7 @@ class Recorder:
         self._channels: dict[str, _Channel] = {}
         for name, topic in topics.items():
             bag.add_topic(name, topic.type, qos[name])
-            self._channels[name] = _Channel(topic, name, sender, diagnosed_name(namespace, "") if namespace else "")
+            self._channels[name] = _Channel(topic, name, sender, diagnosed_name(namespace, ""))
 
     def announce(self, node: str, name: str, total: int) -> None:
         """Take the number of messages that a node reports as published on a topic, by its full name."""

@@ -114,7 +114,7 @@ class Connection:
     """
 
     def __init__(self, arguments: Sequence[str] = (), domain_id: int | None = None) -> None:
-        limit_to_this_machine()
+        limit_to_this_machine(os.environ)
         prepare_logging_directory()
         self.context = Context()
         rclpy.init(

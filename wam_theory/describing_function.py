@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wam_theory.arguments import Array, above_zero
-from wam_theory.linear_loop import characteristic_polynomial, damping_ratio, gain_ratio
+from wam_theory.linear_loop import characteristic_polynomial, damping_ratio, gain_ratio, polynomial_at
 
 
 class UnstableCycle(NamedTuple):
@@ -48,9 +48,8 @@ def friction_to_velocity(
         `linear_loop.characteristic_polynomial`.
     """
     coefficients = characteristic_polynomial(gain, inertia, damping, transmission_stiffness, contact_stiffness)
-    c3, c2, c1, c0 = np.moveaxis(coefficients, -1, 0)
-    frequency = np.asarray(s, dtype=complex)
-    return frequency * frequency / (((c3 * frequency + c2) * frequency + c1) * frequency + c0)
+    frequency, below = polynomial_at(coefficients, s)
+    return frequency * frequency / below
 
 
 def coulomb_describing_function(friction: ArrayLike, amplitude: ArrayLike) -> Array:

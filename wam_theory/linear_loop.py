@@ -107,11 +107,23 @@ def closed_loop(
     polynomial_ = characteristic_polynomial(
         gain, inertia, damping, transmission_stiffness, contact_stiffness, proportional_gain
     )
-    frequency = np.asarray(s, dtype=complex)
+    frequency, below = polynomial_at(polynomial_, s)
     stiffness = np.asarray(transmission_stiffness, dtype=float) * np.asarray(contact_stiffness, dtype=float)
     feedforward = (np.asarray(gain, dtype=float) + np.asarray(proportional_gain, dtype=float) * frequency) * stiffness
-    c3, c2, c1, c0 = np.moveaxis(polynomial_, -1, 0)
-    return feedforward / (((c3 * frequency + c2) * frequency + c1) * frequency + c0)
+    return feedforward / below
+
+
+def polynomial_at(coefficients: Array, s: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """A complex frequency s, rad/s, as an array, and the value there of a polynomial of degree three.
+
+    Parameters
+    ----------
+    coefficients : (..., 4), as `characteristic_polynomial` returns them.
+    s : complex frequency, rad/s.
+    """
+    c3, c2, c1, c0 = np.moveaxis(coefficients, -1, 0)
+    frequency = np.asarray(s, dtype=complex)
+    return frequency, ((c3 * frequency + c2) * frequency + c1) * frequency + c0
 
 
 def characteristic_polynomial(

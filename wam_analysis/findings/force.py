@@ -14,11 +14,11 @@ from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
-from wam_analysis.measures.stability import StabilityVerdict
 from wam_analysis.reactions import FAULT, RecordedReaction, within
 from wam_analysis.reactions import sentences as reaction_sentences
 from wam_control.stability_guard import LARGEST
 from wam_description.signals import BASE
+from wam_theory.verdicts import Verdict
 
 SURE = 0.8  # confidence from which a limit cycle is reported as one
 UNLIKE = "The prediction leaves out friction, inertia and feed-forward."
@@ -201,7 +201,7 @@ def cycle_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
         findings += [*_cycle_findings(one), *_theory_findings(one, seen)]
     if not held and not refused:
         sentences.append("No constant force was commanded, so stability cannot be evaluated.")
-    settled = sum(one.is_recorded and one.stability.verdict is StabilityVerdict.SETTLES for one in held)
+    settled = sum(one.is_recorded and one.stability.verdict is Verdict.SETTLED for one in held)
     if settled and not verdict:
         verdict.append(f"{settled} of {len(held)} forces settle, none cycles.")
     return Section("stability", "Stability and limit cycles", tuple(sentences), tuple(findings), (), tuple(verdict))
@@ -215,15 +215,15 @@ def _fate(one: HeldForce) -> tuple[str, str]:
             return swinging_words(name, one.swinging)
         return f"{name}: neither the force nor a motor or joint was recorded; its stability is not known.", ""
     words = {
-        StabilityVerdict.SETTLES: "settles",
-        StabilityVerdict.CYCLES: "oscillates with constant amplitude",
-        StabilityVerdict.DIVERGES: f"DIVERGES, by {shown(100.0 * (verdict.growth - 1.0))} % per half cycle",
-        StabilityVerdict.UNDECIDED: "is recorded too briefly to decide on its stability",
+        Verdict.SETTLED: "settles",
+        Verdict.LIMIT_CYCLE: "oscillates with constant amplitude",
+        Verdict.DIVERGED: f"DIVERGES, by {shown(100.0 * (verdict.growth - 1.0))} % per half cycle",
+        Verdict.UNDECIDED: "is recorded too briefly to decide on its stability",
     }
     text = f"{name}: the force {words[verdict.verdict]}"
-    is_bad = verdict.verdict in (StabilityVerdict.CYCLES, StabilityVerdict.DIVERGES)
+    is_bad = verdict.verdict in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED)
     if cycle.confidence >= SURE and cycle.peak_to_peak > SEEN * one.hold.commanded:
-        if verdict.verdict is not StabilityVerdict.DIVERGES:
+        if verdict.verdict is not Verdict.DIVERGED:
             text = f"{name}: the force oscillates"
         text += (
             f"; limit cycle of {shown(cycle.peak_to_peak, 'N')} peak to peak, period {shown(cycle.period, 's')} "

@@ -17,11 +17,12 @@ from wam_analysis.measures.force_accuracy import ForceAccuracy, force_accuracy
 from wam_analysis.measures.limit_cycle import NO_CYCLE, LimitCycle, limit_cycle
 from wam_analysis.measures.response import StepResponse, step_response
 from wam_analysis.measures.runs import noise
-from wam_analysis.measures.stability import Stability, StabilityVerdict, stability
+from wam_analysis.measures.stability import Stability, stability
 from wam_analysis.task_forces import measured_force
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 from wam_description.transmission_map import TransmissionMap
+from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
 
@@ -32,11 +33,12 @@ LOUD = 0.1  # of the force: an error that stays within it has settled
 LEAST_STEP = 0.1  # of the force; a smaller change is not evaluated as a step
 FRESH = 0.2  # s; the force of a more recent contact is that of the impact
 FEW = 20  # samples below which a signal is not evaluated
-UNDECIDED = Stability(StabilityVerdict.UNDECIDED, math.nan, 0.0, np.empty(0))
+UNMEASURED = force_accuracy(np.empty(0), np.empty(0))
+UNDECIDED = Stability(Verdict.UNDECIDED, math.nan, 0.0, np.empty(0))
 
 
 class HeldForce(NamedTuple):
-    """A hold with its signals along the force, N, their measures and predictions.
+    """A hold with its signals along the force, N, their measures and predictions; without these where it was refused.
 
     Attributes
     ----------
@@ -60,19 +62,19 @@ class HeldForce(NamedTuple):
     measured: Numbers
     time_true: Numbers
     true: Numbers
-    response: StepResponse | None
-    touched: float
-    measured_accuracy: ForceAccuracy
-    true_accuracy: ForceAccuracy
-    cycle: LimitCycle
-    stability: Stability
-    node: Node | None
-    predicted: Predicted | None
-    largest: LargestForce | None
-    guarded: Guarded | None
-    position: float
-    swinging: Swinging | None
-    moved_at_contact: float
+    response: StepResponse | None = None
+    touched: float = math.nan
+    measured_accuracy: ForceAccuracy = UNMEASURED
+    true_accuracy: ForceAccuracy = UNMEASURED
+    cycle: LimitCycle = NO_CYCLE
+    stability: Stability = UNDECIDED
+    node: Node | None = None
+    predicted: Predicted | None = None
+    largest: LargestForce | None = None
+    guarded: Guarded | None = None
+    position: float = math.nan
+    swinging: Swinging | None = None
+    moved_at_contact: float = math.nan
 
     @property
     def is_recorded(self) -> bool:
@@ -88,21 +90,7 @@ def held_forces(recording: AnalysedRun) -> tuple[HeldForce, ...]:
 
 
 def _refused(held: HeldForce) -> HeldForce:
-    nothing = force_accuracy(np.empty(0), np.empty(0))
-    return held._replace(
-        response=None,
-        touched=math.nan,
-        measured_accuracy=nothing,
-        true_accuracy=nothing,
-        cycle=NO_CYCLE,
-        stability=UNDECIDED,
-        node=None,
-        predicted=None,
-        largest=None,
-        guarded=None,
-        swinging=None,
-        moved_at_contact=math.nan,
-    )
+    return HeldForce(*held[:5], position=held.position)
 
 
 def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
@@ -151,7 +139,7 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
 
 def _moved(recording: AnalysedRun, node: Node | None, found: Swinging | None) -> float:
     arm = recording.parameters.arm
-    if arm is None or node is None or found is None or found.swings.verdict is not StabilityVerdict.CYCLES:
+    if arm is None or node is None or found is None or found.swings.verdict is not Verdict.LIMIT_CYCLE:
         return math.nan
     return at_the_contact(found, arm.motors.names, TransmissionMap.of(arm).motor_from_joint @ node.joint_per_metre)
 
@@ -239,10 +227,10 @@ def _median_position(signal: ForceSignal, rows: NDArray[np.bool_]) -> tuple[str,
 
 
 class _Theory(NamedTuple):
-    node: Node | None
-    predicted: Predicted | None
-    largest: LargestForce | None
-    guarded: Guarded | None
+    node: Node | None = None
+    predicted: Predicted | None = None
+    largest: LargestForce | None = None
+    guarded: Guarded | None = None
 
 
 NO_THEORY = _Theory(None, None, None, None)

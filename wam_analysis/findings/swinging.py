@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from wam_analysis.findings.analysed_run import AnalysedRun, Hold
 from wam_analysis.findings.finding import Finding, shown
 from wam_analysis.measures.runs import noise
-from wam_analysis.measures.stability import StabilityVerdict
 from wam_analysis.measures.swings import Swings, swings
 from wam_bag.bag import JointColumns
+from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def swinging(recording: AnalysedRun, hold: Hold) -> Swinging | None:
                 found.append(Swinging(name, topic, one))
         if found:
             break
-    order = (StabilityVerdict.DIVERGES, StabilityVerdict.CYCLES, StabilityVerdict.SETTLES, StabilityVerdict.UNDECIDED)
+    order = (Verdict.DIVERGED, Verdict.LIMIT_CYCLE, Verdict.SETTLED, Verdict.UNDECIDED)
     return min(found, key=lambda one: (order.index(one.swings.verdict), -one.swings.number), default=None)
 
 
@@ -61,13 +61,13 @@ def swinging_words(name: str, found: Swinging) -> tuple[str, str]:
     """A sentence on a hold, and its verdict ('' for none)."""
     one, where = found.swings, f"{found.name} (the force was not recorded)"
     size = f"{shown(one.peak_to_peak, 'rad')} peak to peak, period {shown(one.period, 's')}"
-    if one.verdict is StabilityVerdict.CYCLES:
+    if one.verdict is Verdict.LIMIT_CYCLE:
         text = f"{name}: limit cycle, seen on {where}: {size}."
         return text, text
-    if one.verdict is StabilityVerdict.DIVERGES:
+    if one.verdict is Verdict.DIVERGED:
         text = f"{name}: DIVERGES, seen on {where}: {shown(100.0 * (one.growth - 1.0))} % per half cycle, last {size}."
         return text, text
-    settled = one.verdict is StabilityVerdict.SETTLES
+    settled = one.verdict is Verdict.SETTLED
     text = (
         f"{name}: {where} {'ceases to swing' if settled else 'swings too seldom to decide'}; no limit cycle detected."
     )
@@ -77,7 +77,7 @@ def swinging_words(name: str, found: Swinging) -> tuple[str, str]:
 def swinging_findings(name: str, found: Swinging) -> list[Finding]:
     """Size, period and growth of the swings of a hold."""
     one = found.swings
-    if one.verdict not in (StabilityVerdict.CYCLES, StabilityVerdict.DIVERGES):
+    if one.verdict not in (Verdict.LIMIT_CYCLE, Verdict.DIVERGED):
         return []
     return [
         Finding(f"{name}: swing of {found.name}, peak to peak", "rad", one.peak_to_peak),

@@ -1,13 +1,13 @@
 """Whether a recorded response settles, cycles or diverges, from its late peaks."""
 
 import math
-from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.measures.runs import require_usable
+from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
 
@@ -17,28 +17,19 @@ STEADY = 0.002  # growth per half cycle below which the amplitude is constant
 FLATTENED = 0.3  # of the earlier decay; a response whose decay is slower goes to a cycle, not to rest
 
 
-class StabilityVerdict(StrEnum):
-    """Fate of a response."""
-
-    SETTLES = "settles"
-    CYCLES = "limit cycle"
-    DIVERGES = "diverges"
-    UNDECIDED = "undecided"
-
-
 class Stability(NamedTuple):
     """The verdict and its basis.
 
     Attributes
     ----------
-    verdict : see `StabilityVerdict`.
+    verdict : see `Verdict`.
     growth : factor from one half cycle to the next at the end; NaN if there are too few.
     confidence : 0 to 1, from the scatter about the trend and the number of peaks; 1 if the error
         has come to rest within the tolerance.
     peaks : (k,), largest |error| of each half cycle, whole ones only.
     """
 
-    verdict: StabilityVerdict
+    verdict: Verdict
     growth: float
     confidence: float
     peaks: Numbers
@@ -64,21 +55,21 @@ def stability(error: Numbers, tolerance: float) -> Stability:
     peaks = half_cycle_peaks(error, tolerance)
     quiet = len(error) > 4 and bool(np.all(np.abs(error[-max(len(error) // 5, 2) :]) <= tolerance))
     if quiet:
-        return Stability(StabilityVerdict.SETTLES, math.nan, 1.0, peaks)
+        return Stability(Verdict.SETTLED, math.nan, 1.0, peaks)
     late = peaks[TRANSIENT:]
     if len(late) < FEWEST:
-        return Stability(StabilityVerdict.UNDECIDED, math.nan, 0.0, peaks)
+        return Stability(Verdict.UNDECIDED, math.nan, 0.0, peaks)
     late = late[-max(len(late) // 2 + 1, FEWEST) :]
     slope, error_of_slope = trend(np.log(late))
     sure = abs(slope) / error_of_slope if error_of_slope > 0.0 else math.inf
     last = trend(np.log(late[-max(len(late) // 2, FEWEST) :]))[0]
     if slope > STEADY and sure > 2.0:
-        verdict = StabilityVerdict.DIVERGES
+        verdict = Verdict.DIVERGED
     elif abs(last) <= STEADY or sure <= 2.0 or (slope < 0.0 and last > FLATTENED * slope):
-        verdict = StabilityVerdict.CYCLES
+        verdict = Verdict.LIMIT_CYCLE
         sure = STEADY / error_of_slope if error_of_slope > 0.0 else math.inf
     else:
-        verdict = StabilityVerdict.SETTLES
+        verdict = Verdict.SETTLED
     confidence = (1.0 - math.exp(-sure / 2.0)) * min(1.0, (len(peaks) - TRANSIENT) / 5.0)
     return Stability(verdict, math.exp(slope), confidence, peaks)
 

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.measures.stability import StabilityVerdict, trend
+from wam_analysis.measures.stability import trend
+from wam_theory.verdicts import Verdict
 
 Numbers = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -29,7 +30,7 @@ class Swings(NamedTuple):
     number : of swings in all.
     """
 
-    verdict: StabilityVerdict
+    verdict: Verdict
     peak_to_peak: float
     period: float
     growth: float
@@ -55,19 +56,19 @@ def swings(time: Numbers, value: Numbers, least: float) -> Swings:
     rows = turning_points(value, least)
     sizes, lengths = np.abs(np.diff(value[rows])), np.diff(time[rows])
     if len(sizes) < FEWEST:
-        return Swings(StabilityVerdict.UNDECIDED, math.nan, math.nan, math.nan, len(sizes))
+        return Swings(Verdict.UNDECIDED, math.nan, math.nan, math.nan, len(sizes))
     late = sizes[-max(len(sizes) // 2, FEWEST) :]
     slope, error = trend(np.log(late))
     ended = float(time[-1] - time[rows[-1]]) > QUIET * float(np.max(lengths[-FEWEST:]))
     changes = abs(slope) * (len(late) - 1) > ALIKE and abs(slope) > SURE * error
     if ended or (changes and slope < 0.0):
-        verdict = StabilityVerdict.SETTLES
+        verdict = Verdict.SETTLED
     elif changes:
-        verdict = StabilityVerdict.DIVERGES
+        verdict = Verdict.DIVERGED
     elif float(np.ptp(late)) <= 2.0 * ALIKE * float(np.mean(late)):
-        verdict = StabilityVerdict.CYCLES
+        verdict = Verdict.LIMIT_CYCLE
     else:
-        verdict = StabilityVerdict.UNDECIDED
+        verdict = Verdict.UNDECIDED
     return Swings(verdict, float(np.mean(late)), float(time[rows[-1]] - time[rows[-3]]), math.exp(slope), len(sizes))
 
 

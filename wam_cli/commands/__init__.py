@@ -232,7 +232,7 @@ def topic_map_of(given: argparse.Namespace) -> TopicMap:
 def take_evaluation(parser: argparse.ArgumentParser, seeds: Sequence[int], of: str, page: str) -> None:
     """Let a command take several seeds of what is drawn, a page, a configuration and a batch.
 
-    `require_evaluation` checks the first two.
+    `evaluation_of` is the configuration, and checks the first two.
     """
     words = f"seeds of {of}, default {' '.join(str(seed) for seed in seeds)}"  # `map` is a command here
     parser.add_argument("--seed", type=int, nargs="+", default=list(seeds), help=words)
@@ -241,12 +241,13 @@ def take_evaluation(parser: argparse.ArgumentParser, seeds: Sequence[int], of: s
     take_batch(parser)
 
 
-def require_evaluation(given: argparse.Namespace) -> None:
-    """Refuse a seed that is negative, as `at_least` does, and a page that could not be written."""
+def evaluation_of(given: argparse.Namespace) -> Configuration:
+    """The configuration that --config names; refuses a seed that is negative and a page that could not be written."""
     for seed in given.seed:
         at_least("--seed", seed, 0)
     if given.write:
         writable_file("--write", given.write)
+    return configuration_of(given)
 
 
 def at_least(option: str, value: float, low: float) -> None:

@@ -6,7 +6,6 @@ import math
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from functools import partial
 from itertools import islice
 from typing import Any, Final
 
@@ -16,15 +15,11 @@ from wam_cli.commands import at_least, namespace
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part, fields
-from wam_description.signals import BASE, NodeStatus, Wrench
-from wam_description.status import PAUSED
-from wam_description.topics import BY_NAME, TABLE
+from wam_description.signals import Wrench
 from wam_description.wiring import Call, SetParameters
-from wam_driver.safety import Mode
-from wam_live.hold import HeldTopic
-from wam_ros.call import SILENCE, CalledStack, Reply
-from wam_ros.header import stamp_of
-from wam_ros.messages import read_table
+from wam_live.push import push
+from wam_ros.call import CalledStack, Reply
+from wam_ros.message_text import plain
 
 SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
     "enable": ("release the brakes", (Call("driver", "enable", True),)),
@@ -39,7 +34,6 @@ SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
 }
 KINDS: Final[dict[type, str]] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 NEGATIVE: Final = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|-(inf|infinity|nan)$", re.IGNORECASE)
-ZERO: Final = (0.0, 0.0, 0.0)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,12 +54,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     heard = requests.add_parser("echo", parents=[where], help="print messages of a topic")
     heard.add_argument("topic", help="as in docs/topics.md, for example force_measured")
     heard.add_argument("--count", type=int, metavar="N", help="end after so many; default: Ctrl-C")
-    push = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
-    push._negative_number_matcher = NEGATIVE  # that of argparse takes -1e1 and -inf for options, up to Python 3.13
-    push.add_argument("cover", help="link that is pushed, for example outer_link")
-    push.add_argument("force", type=float, nargs=3, metavar="N", help="x, y and z, in the frame of the link")
-    push.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")
-    push.add_argument("--seconds", type=float, default=1.0, help="of the arm's time; default: %(default)g")
+    pushed = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
+    pushed._negative_number_matcher = NEGATIVE  # that of argparse takes -1e1 and -inf for options, up to Python 3.13
+    pushed.add_argument("cover", help="link that is pushed, for example outer_link")
+    pushed.add_argument("force", type=float, nargs=3, metavar="N", help="x, y and z, in the frame of the link")
+    pushed.add_argument("--at", type=float, metavar="M", help="position along the link; default: its middle")
+    pushed.add_argument("--seconds", type=float, default=1.0, help="of the arm's time; default: %(default)g")
 
 
 def run(given: argparse.Namespace) -> int:
@@ -149,62 +143,11 @@ def _echo(given: argparse.Namespace, stack: CalledStack) -> int:
     return 0
 
 
-def plain(message: Any, topic: str = "") -> Any:
-    """A message as mappings, lists and numbers; a table of the stack as its rows."""
-    row = BY_NAME.get(topic)
-    if row is not None and row.type == TABLE:
-        table = read_table(message, row.columns, [message.header.frame_id, *[""] * 100])
-        return {
-            "stamp": stamp_of(message),
-            "rows": [dict(zip(row.columns, found, strict=True)) for found in table.rows],
-        }
-    if hasattr(message, "get_fields_and_field_types"):
-        return {name: plain(getattr(message, name)) for name in message.get_fields_and_field_types()}
-    if isinstance(message, bytes) or hasattr(message, "tolist"):
-        return list(message)
-    return [plain(item) for item in message] if isinstance(message, list) else message
-
-
 def _push(given: argparse.Namespace, stack: CalledStack) -> int:
-    push, at, shared = _wrench(given, stack.parameters("driver"))
-    statuses = stack.statuses()
-    hold = HeldTopic(stack.node, "sim/disturbance", shared)
-    begin = stamp = 0
-    try:
-        paused = partial(_raise_if_paused, statuses)
-        for message in stack.messages("joint_states", SILENCE, paused):
-            driver = statuses["driver"]
-            if driver.mode != Mode.ENABLED.value:
-                stated = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
-                raise ValueError(f"{stated}: the arm is {_state(driver)}")
-            stamp = stamp_of(message)
-            begin = begin or stamp
-            if stamp - begin > given.seconds * 1e9:
-                break
-            if refusal := hold.send(stamp, push):
-                raise ValueError(f"not pushed: {refusal}")
-    except TimeoutError as error:
-        stated = "the push ended" if begin else "not pushed"
-        raise ValueError(f"{stated}: {error}; wam call resume") from error
-    finally:
-        if hold.is_on:
-            hold.send(stamp, Wrench(BASE, ZERO, ZERO))
-            hold.end()
-    newtons = math.hypot(*push.force)
-    print(f"pushed {given.cover} with {newtons:g} N at {at:.2f} m for {(stamp - begin) / 1e9:.2f} s")
+    wrench, at, shared = _wrench(given, stack.parameters("driver"))
+    seconds = push(stack, shared, wrench, given.seconds)
+    print(f"pushed {given.cover} with {math.hypot(*wrench.force):g} N at {at:.2f} m for {seconds:.2f} s")
     return 0
-
-
-def _raise_if_paused(statuses: Mapping[str, NodeStatus]) -> None:
-    if PAUSED in statuses["driver"].facts:
-        raise TimeoutError("the arm is paused")
-
-
-def _state(driver: NodeStatus) -> str:
-    """Why the arm does not move, and what to do."""
-    if driver.fault:
-        return f"in fault ({driver.fault}); wam call reset_fault, then wam call enable"
-    return f"{driver.mode}; wam call enable"
 
 
 def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrench, float, Shared]:
@@ -223,11 +166,11 @@ def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrenc
     if not low <= at <= high:
         raise ValueError(f"--at is {at:g} m; {given.cover} is from {low:g} to {high:g} m")
     x, y, z = given.force
-    push = Wrench(given.cover, (x, y, z), (0.0, -at * z, at * y))
-    for what, vector, unit in (("force", push.force, "N"), ("torque", push.torque, "N m")):
+    wrench = Wrench(given.cover, (x, y, z), (0.0, -at * z, at * y))
+    for what, vector, unit in (("force", wrench.force, "N"), ("torque", wrench.torque, "N m")):
         name = f"disturbance_{what}_limit"
         if math.hypot(*vector) > driver.get(name, math.inf):  # a driver of one's own need not have one
             raise ValueError(
                 f"the {what} is {math.hypot(*vector):.4g} {unit}; allowed: up to {name}, {driver[name]:g} {unit}"
             )
-    return push, at, shared
+    return wrench, at, shared

@@ -73,7 +73,7 @@ def _with_nodes(configuration: Configuration, given: argparse.Namespace) -> Play
     os.environ.setdefault("RCUTILS_CONSOLE_OUTPUT_FORMAT", PLAIN_LOG)
     import_nodes(configuration, given)
     stop = Stop()
-    if moved := move_to_free_domain(NAMESPACE):
+    if moved := move_to_free_domain(NAMESPACE, os.environ):
         print(moved, flush=True)
     late = time.monotonic() + LONGEST_START
     with (

@@ -2,18 +2,13 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
-
-import yaml
 
 from wam_cli.commands import (
     BASE_CONFIGURATION,
     at_least,
     batch_of,
-    configuration_of,
-    require_evaluation,
+    evaluation_of,
     take_evaluation,
 )
 from wam_cli.commands import evaluate_faults as faults
@@ -24,49 +19,13 @@ from wam_cli.commands import evaluate_soak as soak
 from wam_description.configuration import Configuration
 from wam_experiments.contact_benchmark.evaluation import BenchmarkExtent, BenchmarkResult, evaluate, scenarios
 from wam_experiments.contact_benchmark.figure import figure
-from wam_experiments.contact_benchmark.over_topics import recorded, script
 from wam_experiments.contact_benchmark.page import missed, page, report
 from wam_experiments.contact_benchmark.scenarios import BenchmarkScenario, dither_values
-from wam_experiments.contact_benchmark.score import ScenarioScore, score
-from wam_experiments.contact_benchmark.simulation import Played
 from wam_experiments.contact_benchmark.timing import section, times
-from wam_ros.bring_up import Composition
 from wam_sim.progress import Progress
+from wam_trials.contact_scenarios import scores
 
 SEEDS = (1, 2, 3)
-
-
-def over_topics(
-    configuration: Configuration, chosen: Sequence[BenchmarkScenario], report: Progress
-) -> list[ScenarioScore]:
-    """Play scenarios with the nodes, in lockstep, and score the recordings."""
-    found: list[ScenarioScore] = []
-    for scenario in chosen:
-        report(len(found), len(chosen))
-        found.append(score(play_over_topics(configuration, scenario), configuration.shared.arm))
-    report(len(found), len(chosen))
-    return found
-
-
-def play_over_topics(configuration: Configuration, scenario: BenchmarkScenario, domain_id: int | None = None) -> Played:
-    """Play a scenario with the nodes in this process, in lockstep; its records come from the bag."""
-    shared = configuration.shared
-    with TemporaryDirectory(prefix="wam_benchmark_") as folder:
-        steps = Path(folder) / "scenario.yaml"
-        steps.write_text(yaml.safe_dump(script(scenario)), encoding="utf-8")
-        own = {
-            "nodes": [*shared.nodes, "scenario", "recorder"],
-            "timing.mode": "lockstep",
-            "timing.real_time_factor": 0.0,
-            "timing.timeout": 60.0,
-            "timing.display_divisor": 1,
-            "scenario:script": str(steps),
-            "recorder:directory": folder,
-            "recorder:name": "scenario",
-        }
-        with Composition(configuration.with_values({**scenario.values, **own}), domain_id=domain_id) as composition:
-            failure = composition.play().failure
-        return recorded(scenario, Path(folder) / "scenario", shared.arm, failure)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -130,8 +89,7 @@ def _run_contact(given: argparse.Namespace) -> int:
     at_least("--contacts", given.contacts, 1)
     at_least("--resting", given.resting, 0)
     at_least("--free", given.free, 0.0)
-    require_evaluation(given)
-    configuration = configuration_of(given)
+    configuration = evaluation_of(given)
     arm = configuration.shared.arm
     extent = BenchmarkExtent(given.contacts, given.resting, given.free)
     dither = dither_values(configuration)
@@ -142,7 +100,7 @@ def _run_contact(given: argparse.Namespace) -> int:
         with batch_of(given) as batch:
             scored = evaluate(configuration, every_scenario, *batch)
     else:
-        scored = over_topics(configuration, every_scenario, Progress("scenarios", sys.stderr))
+        scored = scores(configuration, every_scenario, Progress("scenarios", sys.stderr))
     result = BenchmarkResult(tuple(given.seed), {seed: [] for seed in given.seed})
     for (seed, _), scenario in zip(order, scored, strict=True):
         result.scores[seed].append(scenario)

@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 
 from wam_cli.commands import at_least, configuration_of, take_configuration, writable_file
-from wam_cli.faults import interruptions
-from wam_cli.faults.kinds import REPLAYED, kinds
 from wam_experiments.faults.page import INTERRUPTIONS, faults_section, report, section_of, with_section
 from wam_experiments.faults.trials import FaultKind, KindResult, played
 from wam_sim.progress import Progress
+from wam_trials.faults import interruptions
+from wam_trials.faults.kinds import REPLAYED, kinds
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from wam_cli.commands import at_least, batch_of, configuration_of, require_evaluation, take_evaluation
+from wam_cli.commands import at_least, batch_of, evaluation_of, take_evaluation
 from wam_experiments.faults.page import with_section
 from wam_experiments.identification.evaluation import missed, run_trial, table, trials
 from wam_sim.batch import results
@@ -22,11 +22,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Play, identify, compare; 1 if a required value is missed."""
     at_least("--seconds", given.seconds, SHORTEST)
-    require_evaluation(given)
+    configuration = evaluation_of(given)
     if given.write:
         with_section(given.write, SECTION, "")  # refuses a page without the section, before the work
     with batch_of(given) as batch:
-        found = results(run_trial, trials(configuration_of(given), given.seed, given.seconds), *batch)
+        found = results(run_trial, trials(configuration, given.seed, given.seconds), *batch)
     text, short = table(found), list(missed(found))
     print(text)
     if given.write:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from wam_cli.commands import at_least, batch_of, configuration_of, require_evaluation, take_evaluation
+from wam_cli.commands import at_least, batch_of, evaluation_of, take_evaluation
 from wam_experiments.contact_benchmark.evaluation import evaluate_scenario
 from wam_experiments.contact_benchmark.timing import reference_time
 from wam_experiments.contact_robustness import degradations
@@ -50,9 +50,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Evaluate and print the tables."""
     at_least("--seconds", given.seconds, SHORTEST)
-    require_evaluation(given)
     before = given.before.read_text(encoding="utf-8") if given.before else ""
-    configuration = configuration_of(given)
+    configuration = evaluation_of(given)
     chosen = drives(configuration, given.seed, given.only, given.seconds)
     with batch_of(given) as batch:
         groups = [evaluate(each, *batch, recordings=given.recordings) for each in chosen]

@@ -18,7 +18,7 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()
     die_with_parent()
     with of_installation("control_msgs"):
-        from wam_cli.trajectory_action import serve
+        from wam_live.trajectory_action import serve
     stop = Stop()
     serve(given.namespace, lambda: stop.is_set, lambda line: print(line, flush=True))
     return 0

@@ -128,7 +128,7 @@ def _play(configuration: Configuration, seconds: float) -> bool:
         where it failed.
     """
     stop, progress = Stop(), Progress("seconds of motion", sys.stderr)
-    if moved := move_to_free_domain(NAMESPACE):
+    if moved := move_to_free_domain(NAMESPACE, os.environ):
         print(moved, flush=True)
 
     def is_stopped(now: float) -> bool:

@@ -22,8 +22,8 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()
     die_with_parent()
     with of_installation("tf2_msgs"):
-        from wam_cli.frame_publisher import FramesNode
-    from wam_cli.stack_client import run_next_to
+        from wam_live.frame_publisher import FramesNode
+    from wam_live.stack_client import run_next_to
 
     stop = Stop()
     run_next_to(

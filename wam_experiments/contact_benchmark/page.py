@@ -163,6 +163,12 @@ PREFACE = f"""# Benchmark of contact estimation{{arm}}
 
 Written by `{{command}}`; nothing here is written by hand.
 
+How well the [contact estimator](estimator.md) detects, locates and measures contacts on simulated arms that are as
+well known as after an identification: to decide whether its output is good enough for a purpose. The
+required values come first, further results and the method after them. sd: standard deviation; mu: friction coefficient
+of the contact; 90 % set: the positions that the estimator gives with 90 % probability; 95 %: confidence interval of
+the value of all seeds; n: number of observations, "too few" below 20, or where no interval can show what is required.
+
 Poses, moves, contacts and the true arm are drawn from each seed. The true arm differs from the controllers' model,
 uniformly distributed: friction of each motor and joint by up to {FRICTION:.0%}, mass of each link by {MASS:.0%},
 stiffness of each cable by {STIFFNESS:.0%}. In every second scenario of free motion the tool carries an unmodelled
@@ -193,6 +199,6 @@ RULES = f"""## Method
   of a contact.
 * A false alarm is a detection that starts without contact, from the release of the brakes on.
 * The 90 % set is the estimator's own if it reports one, else the set of highest density of its hypotheses.
-* 95 %: Wilson for shares, order statistics for quantiles, bootstrap over scenarios for rms values, Poisson for counts.
-  Marginal: the interval includes the limit.
+* 95 %: Wilson for fractions, order statistics for quantiles, bootstrap over scenarios for rms values, Poisson for
+  counts. Marginal: the interval includes the limit.
 """

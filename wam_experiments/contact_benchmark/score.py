@@ -290,10 +290,11 @@ def required_metrics(arm: Arm) -> list[Metric]:
 def further_metrics(arm: Arm) -> list[Metric]:
     """The metrics without required or target values."""
     links = outer_links(arm)
+    inner = " or ".join(name for name in arm.covers.names if name not in outer_covers(arm)).replace("_", " ")
     metrics = [
         percentage("link identified with a probability above 0.95", _share_of_high_probability),
-        percentage("inner link: relative error of the moment, median", _moment(arm)),
-        percentage("inner link: true force is at least the reported bound", _force_bound(arm)),
+        percentage(f"{inner}: relative error of the moment, median", _moment(arm)),
+        percentage(f"{inner}: true force is at least the reported bound", _force_bound(arm)),
         Metric("position: 68 % quantile of error over reported sd", "", 1.0, ANY, ANY, _position_z(arm)),
         Metric("torque: rms of error over reported sd, in motion", "", 1.0, ANY, ANY, _torque_z),
         Metric("false alarms between contacts", "", 1.0, ANY, ANY, _alarms(False)),

@@ -1,4 +1,4 @@
-"""What torques leave open: the inference alone, with exact torques and with torques of known errors.
+"""What torques cannot show: the inference alone, with exact torques and with torques of known errors.
 
 No dynamics and no observer: drawn poses and contacts, their joint torques by the Jacobian, errors added, the position
 inferred with a covariance that is just that of the errors.  Friction of the contact is not observable: four torques
@@ -25,7 +25,8 @@ EXACT = 2e-3  # N m, sd that stands for none
 CONSTANT = 0.02  # largest error of a torque constant, as in the realistic mix
 SMALL_SD, NEAR = 0.02, 0.2  # m; of a force
 BOUNDS = (
-    "errors of the torques", "median 5/10/20 N, cm", "95 %", "sd < 2 cm, %", "90 % set holds, %", "inner link, 10 N, %",
+    "errors of the torques", "median 5/10/20 N, cm", "95 %", "sd < 2 cm, %", "90 % set contains the truth, %",
+    "inner link, 10 N, %",
 )  # fmt: skip
 
 

@@ -21,8 +21,8 @@ ALIKE: Final = (
         (f"position on the outer link, moving, {force} N, median", f"position on the outer link at {force} N, median")
         for force in (5, 10, 20)
     ),
-    ("share with sd below 2 cm", "contacts with a reported sd below 2 cm"),
-    ("90 % set at 20 N, mu 0.8", "90 % set contains the truth at 20 N, mu 0.8"),
+    ("contacts with a reported sd below 2 cm",) * 2,
+    ("90 % set contains the truth at 20 N, mu 0.8",) * 2,
     ("wrong link where p > 0.95", "wrong link with a probability above 0.95"),
 )
 

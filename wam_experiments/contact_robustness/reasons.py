@@ -75,7 +75,7 @@ def missed_table(rows: Sequence[RequiredRow], evidence: Evidence) -> str:
     for row in filter(lambda row: row.is_missed, rows):
         bound, why = account_of(row)(row, evidence)
         missed.append([row.name, row.unit, bound_text(row.must, row.scale), row.measured[0], bound, why])
-    head = ("quantity", "unit", "required", "measured", "bound of physics", "why, as counted")
+    head = ("quantity", "unit", "required", "measured", "best possible", "why, as counted")
     return markdown(head, missed) if missed else "Nothing."
 
 
@@ -131,7 +131,7 @@ def _position(column: int, part: int, force: float) -> Account:
         limit = f"{row.scale * row.must[1]:g} cm"
         return evidence.bound(column, part), (
             f"of {len(found)} contacts {len(beyond)} err by more than {limit}: {missing} not detected, "
-            f"{elsewhere} on the other link, {unknown} without a position; the 90 % sets hold {held} of them"
+            f"{elsewhere} on the other link, {unknown} without a position; the 90 % sets contain {held} of them"
         )
 
     return account
@@ -166,7 +166,9 @@ def _rough(row: RequiredRow, evidence: Evidence) -> tuple[str, str]:
     found = [one for one in evidence.every if one.detected and abs(one.force - STRONG) <= WITHIN]
     groups = [[one.in_set for one in found if (one.friction == ROUGH) is most] for most in (True, False)]
     rough, smooth = map(_part, groups)
-    return NO_BOUND.format(OWN), f"at mu {ROUGH:g} the sets hold {rough}, at less {smooth} contacts of the same forces"
+    return NO_BOUND.format(
+        OWN
+    ), f"at mu {ROUGH:g} the sets contain {rough}, at less {smooth} contacts of the same forces"
 
 
 def _wrong(row: RequiredRow, evidence: Evidence) -> tuple[str, str]:
@@ -175,7 +177,7 @@ def _wrong(row: RequiredRow, evidence: Evidence) -> tuple[str, str]:
     kinds = Counter(one.kind for one in sure if not one.right_link)
     of = Counter(one.kind for one in sure)
     counted = ", ".join(f"{count} of {of[kind]} {kind}" for kind, count in kinds.most_common())
-    return NO_BOUND.format(OWN), f"wrong and sure: {counted}"
+    return NO_BOUND.format(OWN), f"wrong with p > 0.95: {counted}"
 
 
 def _inner(row: RequiredRow, evidence: Evidence) -> tuple[str, str]:
@@ -195,13 +197,13 @@ def _second(row: RequiredRow, evidence: Evidence) -> tuple[str, str]:
     for kind in sorted({one.kind for one in found}):
         times = [one.latency for one in found if one.kind == kind]
         shares.append(f"{kind.removeprefix('second ')} {_part([time <= SECOND_WITHIN for time in times])}")
-    return NO_BOUND.format("a lower threshold finds more, at more false changes"), f"reported {', '.join(shares)}"
+    return NO_BOUND.format("a lower threshold finds more, with more false ones"), f"reported {', '.join(shares)}"
 
 
 def _changes(row: RequiredRow, evidence: Evidence) -> tuple[str, str]:
     where = {name: sum(score.changes for score in own) for name, own in evidence.second.items()}
     counted = ", ".join(f"{count} with {name}" for name, count in where.items() if count)
-    return NO_BOUND.format("with a higher threshold there are fewer"), f"false changes: {counted}"
+    return NO_BOUND.format("with a higher threshold there are fewer"), f"false ones: {counted}"
 
 
 def _start(which: int) -> Account:
@@ -249,13 +251,13 @@ ACCOUNTS: tuple[tuple[str, Account], ...] = (  # how the name of a row begins
         for column, (_, title, limits) in enumerate(POSITIONS, 1)
         for part, (force, *_) in enumerate(limits)
     ),
-    ("share with sd", _small),
-    ("90 % set holds the truth, any", _coverage),
-    ("90 % set at 20 N", _rough),
+    ("contacts with a reported sd", _small),
+    ("90 % set contains the truth, any", _coverage),
+    ("90 % set contains the truth at 20 N", _rough),
     ("wrong link where", _wrong),
     ("inner link", _inner),
     ("second contact detected", _second),
-    ("at false changes", _changes),
+    ("false second contacts", _changes),
     ("start in contact, warm", _start(0)),
     ("start in contact, cold", _start(1)),
     ("identified friction per motor and direction, largest", _friction),

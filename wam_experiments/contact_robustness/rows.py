@@ -165,7 +165,7 @@ POSITION = (
     ScoreColumn("95 %", position(0.95)),
     ScoreColumn("sd < 2 cm, %", small),
     ScoreColumn("error / stated sd", calibration),
-    ScoreColumn("90 % set holds, %", covered()),
+    ScoreColumn("90 % set contains the truth, %", covered()),
     ScoreColumn("its length 50/95 %, cm", length),
     ScoreColumn("wrong link, %", wrong(0.0)),
     ScoreColumn("wrong, p > .95, %", wrong(SURE)),
@@ -188,7 +188,9 @@ def kinds_table(scores: Scores) -> str:
     rows = [
         (name, _wrong(found, 0.0), _wrong(found, SURE), _covered(found), _detected(found)) for name, found in groups
     ]
-    return markdown(("contact", "wrong link, %", "wrong, p > .95, %", "90 % set holds, %", "detected, %"), rows)
+    return markdown(
+        ("contact", "wrong link, %", "wrong, p > .95, %", "90 % set contains the truth, %", "detected, %"), rows
+    )
 
 
 def masses_table(scores: Scores) -> str:

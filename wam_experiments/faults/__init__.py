@@ -1,4 +1,4 @@
-"""The evaluation of faults (`wam evaluate faults`), without ROS; `wam_cli.faults` plays the trials on the nodes.
+"""The evaluation of faults (`wam evaluate faults`), without ROS; `wam_trials.faults` plays the trials on the nodes.
 
 trials             what a trial is, the limits of motion, force and delay, and the results by kind
 message_faults     messages broken field by field, stamp by stamp, byte by byte

@@ -56,7 +56,7 @@ class Backdriving:
 
     def __init__(self, arm: Arm) -> None:
         self._body, gears = RigidBody(arm), TransmissionMap.of(arm).motor_from_joint
-        self._rotors = gears.T @ np.diag(arm.motors.inertia) @ gears
+        self._rotors = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
         self._armature = np.diag(arm.joints.armature)
         self._friction = np.array(arm.joints.static_friction) + np.abs(gears.T) @ arm.motors.static_friction
         directions = np.random.default_rng(SEED).normal(size=(DIRECTIONS, 3))

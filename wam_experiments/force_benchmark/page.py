@@ -268,7 +268,7 @@ def page(trials: Sequence[ForceTrial], seed: int, code: str, repeat: str, pictur
         markdown(("", "required", "found", ""), rows),
         "## Outcomes",
         "",
-        "Shares of all tasks of a class; the last two columns are numbers of tasks, whatever their outcome.",
+        "Fractions of all tasks of a class; the last two columns are numbers of tasks, whatever their outcome.",
         "",
     ]
     for grouping in GROUPINGS:
@@ -306,7 +306,7 @@ masses by up to {MASS:.0%}, friction by {FRICTION:.0%}, cable stiffness by {CABL
 with friction {FRICTIONS[0]:g} to {FRICTIONS[1]:g}.
 
 A task is *accepted* where it is neither refused before the arm moves, nor given up before the true force was above the
-commanded one. An accepted task that ends with a wrong force counts against the shares below, whatever was reported.
+commanded one. An accepted task that ends with a wrong force counts against the fractions below, whatever was reported.
 
 Code and configuration: `{{code}}`, a hash of the packages that control and simulate, of the tasks and how they are
 evaluated, and of the configuration. The command prints that of the code it runs.
@@ -340,6 +340,6 @@ RULES = f"""## Method
   declined with a reason, the task is given up if the true force is not above the second. {LONG:.0%} are
   {SMALL_FORCES[0]:g} to {SMALL_FORCES[1]:g} N for {LONGER:g} times as long, {LONGER * SECONDS:g} s, at a pinned
   position of a surface of up to {SOFT:g} N/m.
-* {LOADED:.0%} of the arms carry {PAYLOADS[0]:g} to {PAYLOADS[1]:g} kg that nobody declares, and in {OTHERWISE:.0%}
+* {LOADED:.0%} of the arms carry an undeclared {PAYLOADS[0]:g} to {PAYLOADS[1]:g} kg, and in {OTHERWISE:.0%}
   friction falls with the speed as Stribeck's and is up to {ASYMMETRY:.0%} larger in one direction.
 """

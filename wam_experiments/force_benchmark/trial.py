@@ -14,6 +14,7 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.mismatch import true_arm
 from wam_description.rigid_body import RigidBody
+from wam_description.transmission_map import TransmissionMap
 from wam_driver.driver import DriverParameters
 from wam_experiments.force_benchmark.outcome import TaskResult, TaskTrace, evaluated, refused, worst
 from wam_experiments.force_benchmark.surfaces import NAMES
@@ -164,7 +165,5 @@ class TaskWatch:
 
 def inertia(arm: Arm, body: RigidBody, q: list[float]) -> Array:
     """Inertia at the joints, (n, n), kg m^2: links, pulleys, and rotors as if the cables were stiff."""
-    n = len(q)
-    motor_from_joint = np.linalg.inv(np.reshape(arm.joint_from_motor, (n, n)))
-    rotors = motor_from_joint.T @ (np.array(arm.motors.inertia)[:, None] * motor_from_joint)
+    rotors = TransmissionMap.of(arm).at_joints(arm.motors.inertia)
     return body.mass_matrix(q) + np.diag(arm.joints.armature) + rotors

@@ -23,8 +23,8 @@ class Claim(NamedTuple):
     section : of the thesis.
     text : what is claimed.
     shown : references, see `unresolved`; none if nothing shows it.
-    near : how near, in words; `{figure}`, `{effect}` or `{experiment}` stands for the greatest distance that was
-        measured for those that `shown` names, see `near_of`.
+    near : agreement with the thesis, in words; `{figure}`, `{effect}` or `{experiment}` stands for the greatest
+        distance that was measured for those that `shown` names, see `near_of`.
     missing : what is not shown, and why; empty if nothing is missing.
     """
 
@@ -150,7 +150,7 @@ def deviations_in(page: str) -> dict[str, str]:
 
 def table(claims: tuple[Claim, ...], measured: Mapping[str, Mapping[str, str]]) -> str:
     """Claims as Markdown, with the distances that were measured, see `near_of`."""
-    head = ("section", "claimed", "shown by", "how near", "not shown, because")
+    head = ("section", "claimed", "shown by", "agreement", "not shown, because")
     rows = [(c.section, c.text, "; ".join(map(_cell, c.shown)), near_of(c, measured), c.missing) for c in claims]
     return markdown(head, rows)
 

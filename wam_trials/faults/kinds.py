@@ -3,8 +3,8 @@
 from functools import partial
 from pathlib import Path
 
-from wam_cli.faults import bags, disks, losses, messages, parameter_sets, second_publishers
 from wam_experiments.faults.trials import FaultKind
+from wam_trials.faults import bags, disks, losses, messages, parameter_sets, second_publishers
 
 REPLAYED = Path("bags/sample/wam-touch")  # of the repository; `--bag` names another one
 

@@ -14,8 +14,8 @@ from typing import Final
 
 from wam_bag.bag import BagError
 from wam_bag.contents import contents
-from wam_cli.faults.soak import lost_in
 from wam_experiments.faults.trials import FaultTrial
+from wam_trials.faults.soak import lost_in
 
 MARK: Final = "WAM_STACK_INTERRUPTED"  # environment variable by which the processes of a trial are found
 PYTHON: Final = 0.3  # s, in which Python starts; a Ctrl-C before the first line of the program is its own

@@ -7,11 +7,11 @@ from typing import Final, NamedTuple
 
 from rclpy.publisher import Publisher
 
-from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.configuration import Configuration
 from wam_driver.driver import DriverParameters
 from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
 from wam_experiments.faults.trials import HELD_MOTION, MOTION, FaultTrial
+from wam_trials.faults.watched_stack import StackSource, WatchedStack
 
 MESSAGES: Final = 20  # of one trial
 BETWEEN: Final = 0.001  # s of the arm's time between two of them

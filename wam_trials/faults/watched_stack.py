@@ -13,7 +13,6 @@ from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import deserialize_message, serialize_message
 from std_srvs.srv import SetBool, Trigger
 
-from wam_cli.faults.answered_clock import AnsweredClock
 from wam_description.configuration import Configuration
 from wam_description.interface import Interface
 from wam_description.signals import State, Wrench
@@ -26,6 +25,7 @@ from wam_ros.qos import qos
 from wam_ros.requests import answer_of, switch_request
 from wam_ros.run import NAMESPACE
 from wam_ros.wire import Encode, encoder, stamp_of
+from wam_trials.faults.answered_clock import AnsweredClock
 
 LONGEST_START: Final = 120.0  # s of wall time
 PATIENCE: Final = 15.0  # s of work without progress and without a fault that is a hang
@@ -293,9 +293,9 @@ class WatchedStack:
         found = [one for node in nodes for one in node.publishers if node.resolve_topic_name(one.topic) == full]
         return chance.choice(found) if found else None
 
-    def foreign_publisher(self, topic: str, node: Node | None = None) -> Publisher:
+    def foreign_publisher(self, topic: str) -> Publisher:
         """A second publisher, matched; `remove` destroys it."""
-        publisher = (node or self.node).create_publisher(self.type_of(topic), topic, self.qos_of(topic))
+        publisher = self.node.create_publisher(self.type_of(topic), topic, self.qos_of(topic))
         wanted = 1 + len(self.interface.subscribers(topic)) if topic != EVENTS else 1
         self.wait(lambda: publisher.get_subscription_count() >= wanted, 1.0)
         return publisher

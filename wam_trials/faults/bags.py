@@ -7,10 +7,10 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from wam_bag.bag import read
-from wam_cli.faults.watched_stack import WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.bag_faults import PATIENCE, limits, mutated, values, verdict
 from wam_experiments.faults.trials import FaultTrial
+from wam_trials.faults.watched_stack import WatchedStack
 
 ALLOWED = ("same", "refused", "metadata")  # MCAP has no checksum of metadata records
 

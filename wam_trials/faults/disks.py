@@ -10,9 +10,9 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from wam_bag.bag import BagError, read
-from wam_cli.faults.watched_stack import NodeEndedError, WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.trials import FaultTrial
+from wam_trials.faults.watched_stack import NodeEndedError, WatchedStack
 
 REPORTED: Final = 10.0  # s of wall time, on a busy machine
 ROOM: Final = (0, 3_000, 100_000)  # bytes that a full disk still takes

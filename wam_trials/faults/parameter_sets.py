@@ -9,7 +9,6 @@ import numpy as np
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 
-from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
@@ -24,6 +23,7 @@ from wam_experiments.faults.parameter_faults import (
     parameter_set,
 )
 from wam_experiments.faults.trials import FaultTrial
+from wam_trials.faults.watched_stack import StackSource, WatchedStack
 
 FIELDS: Final = {
     BOOL: "bool_value", INTEGER: "integer_value", DOUBLE: "double_value", STRING: "string_value",

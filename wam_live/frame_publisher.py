@@ -32,7 +32,7 @@ class FramesNode(Node):
     prefix : put before every frame, as 'left/'.
     """
 
-    def __init__(self, context: Any, namespace: str, shared: Shared, prefix: str = "") -> None:
+    def __init__(self, context: Any, namespace: str, shared: Shared, prefix: str) -> None:
         super().__init__("frames", context=context, namespace=namespace)
         self._frames, self._names = ArmFrames(shared.arm, prefix), list(shared.arm.joints.names)
         self._period = shared.timing.outer_period_ns * shared.timing.display_divisor

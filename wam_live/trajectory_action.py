@@ -17,12 +17,12 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from wam_cli.stack_client import run_next_to
 from wam_control.motion import Moving
 from wam_control.trajectory_goal import GoalCode, GoalEnd, JointTolerance, TrajectoryGoal
 from wam_description.arm import Shared
 from wam_description.signals import State
 from wam_description.topics import BY_NAME, STATUS
+from wam_live.stack_client import run_next_to
 from wam_ros.messages import Refused, message_type, read_status, read_trajectory
 from wam_ros.qos import qos
 

@@ -12,12 +12,12 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import Int64, String
 
 from wam_bag.bag import raw
-from wam_cli.faults.watched_stack import StackSource, WatchedStack
 from wam_description.configuration import Configuration
 from wam_experiments.faults.message_faults import EFFECTIVE, SECOND, made_effective, set_stamp
 from wam_experiments.faults.trials import FaultTrial
 from wam_ros.run import NAMESPACE
 from wam_ros.wire import LITTLE_ENDIAN, stamp_of
+from wam_trials.faults.watched_stack import StackSource, WatchedStack
 
 STREAMED: Final = 0.15  # s of the arm's time with two publishers
 AFTER: Final = 0.05  # s of the arm's time that is watched afterwards

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from random import Random
 from typing import Final
 
-from wam_cli.faults.node_processes import ANSWERS, NodeProcesses
 from wam_description.configuration import Configuration
 from wam_experiments.faults.trials import FORCE, MOTION, ZERO_CURRENT, FaultTrial
+from wam_trials.faults.node_processes import ANSWERS, NodeProcesses
 
 WAYS: Final = (signal.SIGSTOP, signal.SIGKILL, signal.SIGTERM)
 NOTICED: Final = 5.0  # s of wall time, in which a loss must be reported on a busy machine

@@ -1,0 +1,65 @@
+"""A push of the simulated arm from outside the stack, as by hand."""
+
+from collections.abc import Mapping
+from functools import partial
+
+from wam_description.arm import Shared
+from wam_description.signals import BASE, NodeStatus, Wrench
+from wam_description.status import PAUSED
+from wam_live.hold import HeldTopic
+from wam_ros.call import SILENCE, CalledStack
+from wam_ros.header import stamp_of
+
+NO_PUSH = Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def push(stack: CalledStack, shared: Shared, wrench: Wrench, seconds: float) -> float:
+    """Push for some seconds of the arm's time; returns for how long it was, s.
+
+    Parameters
+    ----------
+    stack : with the arm.
+    shared : shared parameters of the driver.
+    wrench : force and torque in the frame of a cover.
+
+    Raises
+    ------
+    ValueError
+        where the arm does not move, or another program pushes it, with what to do.
+    """
+    statuses = stack.statuses()
+    hold = HeldTopic(stack.node, "sim/disturbance", shared)
+    begin = stamp = 0
+    try:
+        paused = partial(_raise_if_paused, statuses)
+        for message in stack.messages("joint_states", SILENCE, paused):
+            driver = statuses["driver"]
+            if driver.mode != "enabled":
+                stated = f"the push ended after {(stamp - begin) / 1e9:.2f} s" if begin else "not pushed"
+                raise ValueError(f"{stated}: the arm is {_state(driver)}")
+            stamp = stamp_of(message)
+            begin = begin or stamp
+            if stamp - begin > seconds * 1e9:
+                break
+            if refusal := hold.send(stamp, wrench):
+                raise ValueError(f"not pushed: {refusal}")
+    except TimeoutError as error:
+        stated = "the push ended" if begin else "not pushed"
+        raise ValueError(f"{stated}: {error}; wam call resume") from error
+    finally:
+        if hold.is_on:
+            hold.send(stamp, NO_PUSH)
+            hold.end()
+    return (stamp - begin) / 1e9
+
+
+def _raise_if_paused(statuses: Mapping[str, NodeStatus]) -> None:
+    if PAUSED in statuses["driver"].facts:
+        raise TimeoutError("the arm is paused")
+
+
+def _state(driver: NodeStatus) -> str:
+    """Why the arm does not move, and what to do."""
+    if driver.fault:
+        return f"in fault ({driver.fault}); wam call reset_fault, then wam call enable"
+    return f"{driver.mode}; wam call enable"
