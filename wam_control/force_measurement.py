@@ -29,7 +29,7 @@ class ForceMeasurement:
         self._n = len(body.arm.joints.names)
         self._tare, self._zero = np.zeros(self._n), np.zeros(self._n)
         self._steady = LowPass()
-        self.acceleration = self._velocity = np.zeros(self._n)
+        self.acceleration = self._velocity = [0.0] * self._n
         self.external = np.zeros(self._n)
 
     def tare(self) -> None:
@@ -40,7 +40,7 @@ class ForceMeasurement:
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
         steady = self._steady.value
-        return self.external if steady is None else steady - self._tare - self._zero
+        return self.external if steady is None else np.array(steady) - self._tare - self._zero
 
     def payload(self, q: Sequence[float], torques: Array, torque_sd: float) -> tuple[float, float]:
         """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
@@ -58,10 +58,12 @@ class ForceMeasurement:
 
     def zero(self, limit: float) -> bool:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
-        steady = self._steady.value
-        if steady is None or float(np.abs(steady - self._tare).max()) > limit:
+        if self._steady.value is None:
             return False
-        self._zero = steady - self._tare
+        zero = np.array(self._steady.value) - self._tare
+        if float(np.abs(zero).max()) > limit:
+            return False
+        self._zero = zero
         return True
 
     def step(
@@ -82,10 +84,10 @@ class ForceMeasurement:
         dt : outer period, s.
         """
         torque = self._torque(parameters, sensors, estimated)
-        velocity = np.zeros(self._n) if sensors is None else np.array(sensors.velocity)
-        self.acceleration = (velocity - self._velocity) / dt
+        velocity = [0.0] * self._n if sensors is None else sensors.velocity
+        self.acceleration = [(b - a) / dt for a, b in zip(self._velocity, velocity, strict=True)]
         self._velocity = velocity
-        self._steady.step(torque, STEADY, dt)
+        self._steady.step(torque.tolist(), STEADY, dt)
         self.external = torque - self._tare - self._zero
 
     def _torque(
@@ -113,10 +115,14 @@ class LowPass:
 
     def reset(self) -> None:
         """Forget all inputs."""
-        self.value: Array | None = None
+        self.value: list[float] | None = None
 
-    def step(self, value: Array, time_constant: float, dt: float) -> tuple[Array, Array]:
+    def step(self, value: list[float], time_constant: float, dt: float) -> tuple[list[float], list[float]]:
         """Filtered values now and one period before; `time_constant` and `dt` in s."""
-        before = value if self.value is None else self.value
-        self.value = value if self.value is None else before + (value - before) * dt / (dt + time_constant)
+        before = self.value
+        if before is None:
+            self.value = value
+            return value, value
+        time = dt + time_constant
+        self.value = [old + (new - old) * dt / time for old, new in zip(before, value, strict=True)]
         return self.value, before
