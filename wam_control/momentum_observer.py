@@ -111,6 +111,7 @@ class MomentumObserver:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
         prior = model_prior(arm, parameters, payload_sd, model)
         self._sensors, self._at_rest = np.diag(np.full(n, parameters.joint_torque_sd**2)), np.zeros(n)
+        self._sensors_sd = np.sqrt(self._sensors)
         noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
         self.reset()
@@ -208,15 +209,15 @@ class MomentumObserver:
         momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)] if friction else bias
         before, span, n = self._momentum, dt + self._gap, self._n
-        external, model = [], []
         if before is None:
             external, model = [0.0] * n, [-torque for torque in bias]
         else:
-            pairs = zip(momentum, before, bias, self._bias, known, self._known, tau, strict=True)
-            for p, p_before, b, b_before, k, k_before, torque in pairs:
-                rate = (p - p_before) / span
-                model.append(rate - 0.5 * (b + b_before))
-                external.append(rate - 0.5 * (k + k_before) - torque)
+            rates = [(p - p_before) / span for p, p_before in zip(momentum, before, strict=True)]
+            model = [rate - 0.5 * (b + o) for rate, b, o in zip(rates, bias, self._bias, strict=True)]
+            left = model
+            if friction:
+                left = [rate - 0.5 * (k + o) for rate, k, o in zip(rates, known, self._known, strict=True)]
+            external = [rate - torque for rate, torque in zip(left, tau, strict=True)]
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
@@ -266,16 +267,16 @@ class MomentumObserver:
         effects.flat[:: self._n + 1] = sizes
         if load is not None:
             residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
-            sized = np.array(load.torque) * load.sd
-            covariance = covariance + np.outer(sized, sized)
-            effects = np.column_stack((effects, sized))
+            sized = (np.array(load.torque) * load.sd)[:, None]
+            covariance = covariance + sized * sized.T
+            effects = np.concatenate((effects, sized), axis=1)
         self.seen = Observation(
             np.array(residual),
             effects,
             self._sensors,
             self._at_rest,
             self._filtered[0, 2 * self._n :].copy(),
-            np.sqrt(self._sensors),
+            self._sensors_sd,
         )
         return residual, covariance
 
