@@ -199,7 +199,7 @@ class ContactEstimator:
         observer, parameters = self._observer, self._parameters
         residual, covariance = observer.torques()
         torques = tuple(residual)
-        sd = tuple(math.sqrt(variance) for variance in covariance.diagonal().tolist())
+        sd = tuple(map(math.sqrt, covariance.diagonal().tolist()))
         if not observer.is_ready:
             self._in_contact = self._is_above = False
             self._ended = -math.inf

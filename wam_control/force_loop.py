@@ -290,7 +290,7 @@ class ForceLoop:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
         elif not self.reaction.holds and limited.joint_end:
             self._react(ForceReaction.JOINT_END, limited.joint_end)
-        return out._replace(velocity=limited.velocity)
+        return ForceOutput(limited.velocity, *out[1:])
 
     def _whole(self, out: ForceOutput) -> WholeForce | None:
         """The force that presses on something, and how it is known in all; None where none does."""

@@ -260,8 +260,8 @@ class MomentumObserver:
             torques, covariance = self._errors.corrected(self.seen)
             return torques.tolist(), self._errors.size * covariance
         uncertainty, load = self._parameters.mass_uncertainty, self._load
-        residual, model = self._filtered[0, : 2 * self._n].reshape(2, -1).tolist()
-        sizes = [uncertainty * torque for torque in model]
+        filtered: list[float] = self._filtered[0].tolist()
+        residual, sizes = filtered[: self._n], [uncertainty * torque for torque in filtered[self._n : 2 * self._n]]
         covariance, effects = np.zeros((self._n, self._n)), np.zeros((self._n, self._n))
         covariance.flat[:: self._n + 1] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
         effects.flat[:: self._n + 1] = sizes
@@ -275,7 +275,7 @@ class MomentumObserver:
             effects,
             self._sensors,
             self._at_rest,
-            self._filtered[0, 2 * self._n :].copy(),
+            np.array(filtered[2 * self._n :]),
             self._sensors_sd,
         )
         return residual, covariance

@@ -341,18 +341,18 @@ class Synchroniser:
         """
         inputs = Inputs()
         origins: list[Origin] = []
+        for group in self._groups:  # before the others: most often it is one of these that is not there yet
+            if stamp >= group.until and not group.find(stamp):
+                self._lacks = group, group.cause(stamp), min(each.cause(stamp) for each in self._groups)
+                return None
+            inputs.update(group.found)
+            origins.append(group.origin)
         for topic, newest in self._newest.items():
             if (found := newest.taken(stamp)) is None:
                 inputs[topic] = None
             else:
                 inputs[topic] = found[1]
                 origins.append((found[0], (topic,)))
-        for group in self._groups:
-            if stamp >= group.until and not group.find(stamp):
-                self._lacks = group, group.cause(stamp), min(each.cause(stamp) for each in self._groups)
-                return None
-            inputs.update(group.found)
-            origins.append(group.origin)
         inputs[self._trigger] = value
         before, self._last_done = self._last_done, stamp
         is_next = not before or stamp - before == self._period
