@@ -273,8 +273,8 @@ class ForceLoop:
         self.reaction, self.reason = ForceReaction.NONE, ""
         self._measurement.step(own, sensors, external, dt)
         is_touched = not own.is_estimated or bool(contact.cover) or self._hold.is_touching
-        present = self._measurement.external if is_touched else np.zeros(self._n)
-        now, before = self._filter.step(present.tolist(), own.force_filter, dt)
+        present = self._measurement.external if is_touched else [0.0] * self._n
+        now, before = self._filter.step(present, own.force_filter, dt)
         self._external = np.array(now), np.array(before)
         self._acceleration, _ = self._inertia.step(self._measurement.acceleration, own.force_filter, dt)
         if task is not None:
@@ -625,7 +625,7 @@ class ForceLoop:
             self._begin(axes)
         if torque is None:
             return ForceOutput([0.0] * self._n, [0.0] * self._n)
-        measured = (-self._measurement.external).tolist()
+        measured = [-torque for torque in self._measurement.external]
         before, self._torque_before = self._torque_before or measured, measured
         errors, errors_before = ([a - b for a, b in zip(torque, values, strict=True)] for values in (measured, before))
         velocity = self._supervision.torque_law.velocities(errors, errors_before, dt)

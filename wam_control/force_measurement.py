@@ -27,20 +27,23 @@ class ForceMeasurement:
     def __init__(self, body: RigidBody) -> None:
         self._body = body
         self._n = len(body.arm.joints.names)
-        self._tare, self._zero = np.zeros(self._n), np.zeros(self._n)
+        self._tare = self._zero = [0.0] * self._n
         self._steady = LowPass()
         self.acceleration = self._velocity = [0.0] * self._n
-        self.external = np.zeros(self._n)
+        self.external = [0.0] * self._n
 
     def tare(self) -> None:
         """Take the present external torques as zero."""
-        self._tare = self._tare + self.external
+        self._tare = [tare + torque for tare, torque in zip(self._tare, self.external, strict=True)]
 
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
         steady = self._steady.value
-        return self.external if steady is None else np.array(steady) - self._tare - self._zero
+        return np.array(self.external if steady is None else self._beyond_zero(steady))
+
+    def _beyond_zero(self, torques: Sequence[float]) -> list[float]:
+        return [torque - tare - zero for torque, tare, zero in zip(torques, self._tare, self._zero, strict=True)]
 
     def payload(self, q: Sequence[float], torques: Array, torque_sd: float) -> tuple[float, float]:
         """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
@@ -60,8 +63,8 @@ class ForceMeasurement:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
         if self._steady.value is None:
             return False
-        zero = np.array(self._steady.value) - self._tare
-        if float(np.abs(zero).max()) > limit:
+        zero = [steady - tare for steady, tare in zip(self._steady.value, self._tare, strict=True)]
+        if max(map(abs, zero)) > limit:
             return False
         self._zero = zero
         return True
@@ -87,19 +90,21 @@ class ForceMeasurement:
         velocity = [0.0] * self._n if sensors is None else sensors.velocity
         self.acceleration = [(b - a) / dt for a, b in zip(self._velocity, velocity, strict=True)]
         self._velocity = velocity
-        self._steady.step(torque.tolist(), STEADY, dt)
-        self.external = torque - self._tare - self._zero
+        self._steady.step(torque, STEADY, dt)
+        self.external = self._beyond_zero(torque)
 
     def _torque(
         self, parameters: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None
-    ) -> Array:
+    ) -> list[float]:
         if parameters.is_estimated:
-            return np.zeros(self._n) if estimated is None else np.array(estimated)
+            return [0.0] * self._n if estimated is None else list(estimated)
         if sensors is None:
-            return np.zeros(self._n)
+            return [0.0] * self._n
         if parameters.feedback == "joint_position":
-            return np.array(parameters.spring_stiffness) * (np.array(parameters.spring_rest) - sensors.position)
-        return self._body.gravity_torque(sensors.position) - np.array(sensors.effort)
+            springs = zip(parameters.spring_stiffness, parameters.spring_rest, sensors.position, strict=True)
+            return [stiffness * (rest - angle) for stiffness, rest, angle in springs]
+        gravity = self._body.gravity_torque(sensors.position).tolist()
+        return [carried - strain for carried, strain in zip(gravity, sensors.effort, strict=True)]
 
 
 class LowPass:
