@@ -221,7 +221,7 @@ class MomentumObserver:
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        filtered, present = self._filtered, np.array([external + model + q + signals])
+        filtered, present = self._filtered, np.array(external + model + q + signals)
         if span != self._decay.span:
             self._decay = _Decay.over(span, self._times, present.size)
         if before is None:
