@@ -41,7 +41,8 @@ class ArmPush(NamedTuple):
         if not size:
             return 0.0
         jacobian = self.jacobian(body, q)
-        if above and size <= above * float(np.linalg.norm(jacobian)) / math.sqrt(3.0):
+        flat = jacobian.ravel(order="K")
+        if above and size <= above * math.sqrt(flat.dot(flat)) / math.sqrt(3.0):
             return 0.0
         return size / self._lever(jacobian)
 

@@ -112,6 +112,7 @@ class MomentumObserver:
         prior = model_prior(arm, parameters, payload_sd, model)
         self._sensors, self._at_rest = np.diag(np.full(n, parameters.joint_torque_sd**2)), np.zeros(n)
         self._sensors_sd = np.sqrt(self._sensors)
+        self._independent = np.eye(2 * n + (self._load is not None))  # covariance of effects of one sd
         noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
         self.reset()
@@ -288,7 +289,7 @@ class MomentumObserver:
         if not self._link_side:
             return Torques(self.age, self.corrected(seen), *self._errors.parts(seen), seen.pose)
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
-        return Torques(self.age, seen.residual, effects, np.eye(effects.shape[1]), seen.rest, seen.pose)
+        return Torques(self.age, seen.residual, effects, self._independent, seen.rest, seen.pose)
 
     def change(self, then: Observation) -> tuple[Array, Array]:
         """Change of the external torques, (n,), N m, since a mean of what was `seen`, and its covariance, (n, n)."""

@@ -70,7 +70,7 @@ class CoverLoads:
         """Push on a cover, see `Plant.push`."""
         if cover not in self._origin:
             raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._origin)}")
-        if np.any(force) or np.any(torque):
+        if any(force) or any(torque):
             self.pushes[cover] = (np.array(force, float), np.array(torque, float))
         else:
             self.pushes.pop(cover, None)
