@@ -286,9 +286,9 @@ class ForceLoop:
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
         push = self._push(joints.position, _known_place(out.point, task))
         limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
-        if not self.reaction.holds and limited.contact_force:
+        if limited.contact_force and not self.reaction.holds:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
-        elif not self.reaction.holds and limited.joint_end:
+        elif limited.joint_end and not self.reaction.holds:
             self._react(ForceReaction.JOINT_END, limited.joint_end)
         return ForceOutput(limited.velocity, *out[1:])
 

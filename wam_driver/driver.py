@@ -135,7 +135,7 @@ class Driver:
         The command is ignored unless the driver is enabled.  It is also ignored if its state is older than the
         state that was last answered or than the release of the brakes, or lies in the future.
         """
-        tick = stamp // self._timing.period_ns
+        tick = stamp // self._period_ns
         if self.safety.mode is Mode.ENABLED and self._command_tick <= tick <= self._tick:
             self._command = list(currents)
             self._command_tick = tick
