@@ -49,6 +49,7 @@ ROWS = {
     ],
     "contact.py": ["observe", "infer", "estimate", "update"],
     "messages.py": ["taken by all", "taken by nobody"],
+    "small_matrices.py": ["without the checks", "numpy.linalg"],
     "parts.py": [
         "whole",
         "driver",

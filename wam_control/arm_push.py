@@ -37,8 +37,12 @@ class ArmPush(NamedTuple):
         One that is certainly not `above` this, N, is returned as 0: the singular values, squared, of the Jacobian have
         their mean below the largest.
         """
-        size, jacobian = self._size, self.jacobian(body, q)
-        if above and size <= above * float(np.linalg.norm(jacobian)) / math.sqrt(3.0):
+        size = self._size
+        if not size:
+            return 0.0
+        jacobian = self.jacobian(body, q)
+        flat = jacobian.ravel(order="K")
+        if above and size <= above * math.sqrt(flat.dot(flat)) / math.sqrt(3.0):
             return 0.0
         return size / self._lever(jacobian)
 
@@ -68,7 +72,8 @@ class ArmPush(NamedTuple):
     @property
     def _size(self) -> float:
         """Size of the torques, N m, less what is uncertain of them."""
-        return max(float(np.linalg.norm(self.torques)) - CERTAIN * float(np.linalg.norm(self.torque_sd)), 0.0)
+        size, sd = math.sqrt(self.torques.dot(self.torques)), math.sqrt(self.torque_sd.dot(self.torque_sd))
+        return max(size - CERTAIN * sd, 0.0)
 
     def _lever(self, jacobian: Array) -> float:
         """Largest torque per force, m."""

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from wam_control.contact_fusion import ContactFusion
 from wam_control.contact_inference import (
     CERTAIN_SECOND,
@@ -26,6 +24,7 @@ from wam_description.model import ArmModel
 from wam_description.parameters import parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
+from wam_description.small_matrices import inverse
 
 
 @dataclass(frozen=True)
@@ -199,18 +198,18 @@ class ContactEstimator:
         observer, parameters = self._observer, self._parameters
         residual, covariance = observer.torques()
         torques = tuple(residual)
-        sd = tuple(math.sqrt(variance) for variance in covariance.diagonal().tolist())
+        sd = tuple(map(math.sqrt, covariance.diagonal().tolist()))
         if not observer.is_ready:
             self._in_contact = self._is_above = False
             self._ended = -math.inf
             self._end_contact()
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
-        precision = np.asarray(np.linalg.inv(covariance), np.float64)
+        precision = inverse(covariance)
         statistic = detection_statistic(torques, precision)
         is_calm = self._in_contact or observer.age - self._ended > SHAKING
         fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
         if fast is not None:
-            quick = detection_statistic(fast[0], np.asarray(np.linalg.inv(fast[1]), np.float64))
+            quick = detection_statistic(fast[0], inverse(fast[1]))
             statistic = max(statistic, quick / SUDDEN)
         was_in_contact, self._in_contact = self._in_contact, self._is_detected(statistic, is_calm)
         if was_in_contact and not self._in_contact:

@@ -13,6 +13,7 @@ _COLUMN = {name: i for i, name in enumerate(HYPOTHESIS_COLUMNS)}
 _LINK, _PROBABILITY, _PLACE, _SD = (_COLUMN[name] for name in ("link", "probability", "position", "position_sd"))
 _FORCE, _DIRECTION_SD, _REASONS = (_COLUMN[name] for name in ("force_x", "direction_sd", "reasons"))
 _LOW, _HIGH = _COLUMN["low"], _COLUMN["high"]
+CERTAINLY_TWO = 2 ** REASONS.index(CERTAIN_SECOND)
 
 
 def hypothesis_table(hypotheses: Sequence[Hypothesis], covers: Sequence[str]) -> Table:
@@ -45,7 +46,7 @@ def contact_of(table: Table | None, covers: Sequence[str]) -> Contact:
         return NO_CONTACT
     row = table.rows[0]
     x, y, z = row[_FORCE : _FORCE + 3]
-    is_single = CERTAIN_SECOND not in reasons_of(row)
+    is_single = not int(row[_REASONS]) & CERTAINLY_TWO
     cover = covers[int(row[_LINK])]
     return Contact(cover, row[_PLACE], (x, y, z), row[_SD], row[_PROBABILITY], row[_DIRECTION_SD], is_single)
 

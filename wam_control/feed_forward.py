@@ -48,11 +48,11 @@ class FeedForward:
         """
         if parameters.friction_feedforward and not parameters.is_estimated:
             friction, _ = self._countered.step(self._friction(velocity), COUNTERED, dt)
-            force = force + parameters.friction_feedforward * friction
+            force = force + parameters.friction_feedforward * np.array(friction)
         result: list[float] = force.tolist()
         return result
 
-    def _friction(self, velocity: Sequence[float]) -> Array:
+    def _friction(self, velocity: Sequence[float]) -> list[float]:
         """Dry friction of motors and joints, N m at the joints (n,), in a motion of the joints (n,), rad/s.
 
         Less than all of it moves nothing.  Where the force is off to the other side, the velocity loops need not wind
@@ -62,4 +62,4 @@ class FeedForward:
         turning = zip(motors, self._map.motor_velocities(velocity), strict=True)
         turned = self._map.joint_torques([friction * math.tanh(speed / SLOW_MOTOR) for friction, speed in turning])
         moved = zip(joints, velocity, turned, strict=True)
-        return np.array([torque + friction * math.tanh(speed / SLOW_JOINT) for friction, speed, torque in moved])
+        return [torque + friction * math.tanh(speed / SLOW_JOINT) for friction, speed, torque in moved]

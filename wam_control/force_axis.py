@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from wam_description.arm import Arm
 from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
+from wam_description.small_matrices import inverse, solution
 from wam_description.transmission_map import TransmissionMap
 
 Array = NDArray[np.float64]
@@ -149,7 +150,7 @@ class ForceAxis(NamedTuple):
 
     def turned(self, change: Array) -> float:
         """chi^2 of a change of the torques (n,), N m, which the force does not explain, at the same position."""
-        precision = np.asarray(np.linalg.inv(self.covariance_there), np.float64)
+        precision = inverse(self.covariance_there)
         weighted = precision @ change
         force = float(self.press @ weighted)
         return float(change @ weighted) - force * force / float(self.press @ precision @ self.press)
@@ -228,9 +229,9 @@ class ForceAxes:
         spread = np.diag(own.torque_sd**2 + (own.torque_fraction * torques) ** 2) + np.outer(shift, shift)
         weighted = np.linalg.solve(spread, jacobian.T)
         precision = jacobian @ weighted + np.eye(3) / max(force, SMALLEST_FORCE) ** 2
-        found = np.linalg.solve(precision, torques @ weighted)
+        found = solution(precision, torques @ weighted)
         size = float(np.linalg.norm(found))
-        sd = math.sqrt(float(found @ np.linalg.solve(precision, found))) / max(size, SMALLEST_FORCE)
+        sd = math.sqrt(float(found @ solution(precision, found))) / max(size, SMALLEST_FORCE)
         return size - CERTAIN * sd
 
     def _jacobian(self, q: Sequence[float], cover: str, position: float, normal: Array) -> tuple[Array, Array]:
@@ -297,8 +298,8 @@ class ForceAxes:
         spread += tangential.T @ tangential
         for torque in others:
             spread += np.outer(torque, torque)
-        inverse = np.asarray(np.linalg.inv(spread + position_sd**2 * moved), np.float64)
-        weighted = inverse @ press
+        weight = inverse(spread + position_sd**2 * moved)
+        weighted = weight @ press
         precision = float(press @ weighted)
         sense: Array = weighted / precision
         inertia = self.inertia(q)
@@ -312,7 +313,7 @@ class ForceAxes:
         if position_sd and not is_side:
             other = (aside - direction) @ jacobian * size  # the side or the end: the same torques do not show it
             anywhere += np.outer(other, other)
-        sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ np.linalg.solve(anywhere, press))))
+        sd, free_sd = (1.0 / math.sqrt(p) for p in (precision, float(press @ solution(anywhere, press))))
         yielding = float(lever @ self._compliance @ lever)
         return ForceAxis(
             lever,
@@ -326,7 +327,7 @@ class ForceAxes:
             impact,
             square / damped,
             yielding,
-            inverse,
+            weight,
             spread,
         )
 

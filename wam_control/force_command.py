@@ -79,7 +79,7 @@ class CommandAdmission:
         refusals = {}
         pressed = self._force is not None and any(self._force.force)
         commanded = _size(force)
-        if force is not None and commanded < NOTHING:
+        if force is not None and commanded < NOTHING and force.force != ZERO:
             force = force._replace(force=ZERO)
         if commanded > parameters.force_limit:
             refusals["force_command"] = _refusal(commanded, "force_limit", parameters.force_limit, "N")
@@ -148,11 +148,10 @@ class CommandAdmission:
         if wanted is None:
             self._present = NO_FORCE
             return None
-        present = self._present.force if self._present.frame == wanted.frame else (0.0, 0.0, 0.0)
-        change = [a - b for a, b in zip(wanted.force, present, strict=True)]
-        size = math.hypot(*change)
+        present = self._present.force if self._present.frame == wanted.frame else ZERO
+        size = math.dist(wanted.force, present)
         if size > most:
-            x, y, z = (b + most / size * step for b, step in zip(present, change, strict=True))
+            x, y, z = (b + most / size * (a - b) for a, b in zip(wanted.force, present, strict=True))
             pinned = pinned_position(wanted)
             torque = torque_of_position((x, y, z), pinned[1]) if pinned else ZERO
             wanted = ForceCommand(wanted.frame, (x, y, z), torque)

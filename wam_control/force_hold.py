@@ -470,8 +470,8 @@ class ForceHold:
         if not self.is_touching:
             return ""
         if self._settled is None:
-            pattern, _ = self._pattern.step(external / measured, STEADY, dt)
-            self._settled = pattern if self._within >= LEFT * parameters.limits.settling_time else None
+            pattern, _ = self._pattern.step((external / measured).tolist(), STEADY, dt)
+            self._settled = np.array(pattern) if self._within >= LEFT * parameters.limits.settling_time else None
             return ""
         change = axis.turned(external - measured * self._settled)
         lasts = change > (BACK_AGAIN if self._turned > CONFLICT else TURNED)

@@ -177,7 +177,9 @@ class ForceLoop:
         require_fit(parameters, self._arm)
         self._supervision = Supervision(self._arm, servo, self._timing, parameters, self._joints)
         self._servo, self.parameters = servo, parameters
-        self._force_axes = ForceAxes(self._arm, self._body, sensing_of(parameters))
+        sensing = sensing_of(parameters)
+        self._torque_sd = np.full(self._n, sensing.torque_sd)
+        self._force_axes = ForceAxes(self._arm, self._body, sensing)
         self._limits = MotionLimits(self._arm, self._body, parameters.limits, parameters.joint_speed_limit)
         self._tasks = TaskControl(self._arm, self._body, self._force_axes, parameters, self._supervision)
         self._transfer.restart()
@@ -207,7 +209,7 @@ class ForceLoop:
     def _speed(self) -> float:
         """Mean speed of the fastest joint, rad/s; infinite where it is not known yet."""
         speed = self._motion.value
-        return math.inf if speed is None else float(np.abs(speed).max())
+        return math.inf if speed is None else max(map(abs, speed))
 
     @property
     def _has_left(self) -> bool:
@@ -258,20 +260,22 @@ class ForceLoop:
             if own.mode != "open_loop":
                 command = torque = None  # a force that is not measured would grow without bounds
         self._is_free = contact is not None and not contact.cover
-        self._motion.step(np.array(joints.velocity), STEADY, dt)
+        self._motion.step(joints.velocity, STEADY, dt)
         self._rested = self._rested + dt if self._is_at_rest else 0.0
         contact = contact or NO_CONTACT
         if task is None and self._axes == TASK:
             self._reset(joints.position)
         commands = self._admission.step(own, joints.position, command, posture, torque, dt)
         self._rate = posture_rate if posture_rate and commands.posture == posture else None
-        self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
+        if commands.refusals:
+            self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
         self.refusals, self.fallback = commands.refusals, ""
         self.reaction, self.reason = ForceReaction.NONE, ""
         self._measurement.step(own, sensors, external, dt)
         is_touched = not own.is_estimated or bool(contact.cover) or self._hold.is_touching
-        present = self._measurement.external if is_touched else np.zeros(self._n)
-        self._external = self._filter.step(present, own.force_filter, dt)
+        present = self._measurement.external if is_touched else [0.0] * self._n
+        now, before = self._filter.step(present, own.force_filter, dt)
+        self._external = np.array(now), np.array(before)
         self._acceleration, _ = self._inertia.step(self._measurement.acceleration, own.force_filter, dt)
         if task is not None:
             out = self._task(joints.position, contact, task, commands.posture, dt)
@@ -282,11 +286,11 @@ class ForceLoop:
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
         push = self._push(joints.position, _known_position(out.point, task))
         limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
-        if not self.reaction.holds and limited.contact_force:
+        if limited.contact_force and not self.reaction.holds:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
-        elif not self.reaction.holds and limited.joint_end:
+        elif limited.joint_end and not self.reaction.holds:
             self._react(ForceReaction.JOINT_END, limited.joint_end)
-        return out._replace(velocity=limited.velocity)
+        return ForceOutput(limited.velocity, *out[1:])
 
     def _whole(self, out: ForceOutput) -> WholeForce | None:
         """The force that presses on something, and how it is known in all; None where none does."""
@@ -514,8 +518,8 @@ class ForceLoop:
         own = self.parameters
         torques = self._external[0] - self._unknown[0]
         if own.feedback == "joint_sensors":
-            torques = torques + self._force_axes.inertia(q) @ self._acceleration
-        sd = np.array(self._external_sd or [sensing_of(own).torque_sd] * self._n)
+            torques = torques + self._force_axes.inertia(q).dot(self._acceleration)
+        sd = np.array(self._external_sd) if self._external_sd else self._torque_sd
         gain = self._supervision.present * max(own.force_gain)
         return ArmPush(torques, sd, where, own.limits.contact_force, gain)
 
@@ -621,7 +625,7 @@ class ForceLoop:
             self._begin(axes)
         if torque is None:
             return ForceOutput([0.0] * self._n, [0.0] * self._n)
-        measured = (-self._measurement.external).tolist()
+        measured = [-torque for torque in self._measurement.external]
         before, self._torque_before = self._torque_before or measured, measured
         errors, errors_before = ([a - b for a, b in zip(torque, values, strict=True)] for values in (measured, before))
         velocity = self._supervision.torque_law.velocities(errors, errors_before, dt)

@@ -135,7 +135,8 @@ class ForceLoopNode:
     def _status(self) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
         report, reaction = self._loop.report, self._loop.reaction
-        refused = {topic: why for topic, why in self.refusals.items() if topic != "contact/hypotheses"}
+        refused = self.refusals
+        refused.pop("contact/hypotheses", None)
         present = report, reaction, self._loop.is_pushed, tuple(refused), self._refusal or self._player.refusal
         if present == self._reported:
             return {}
@@ -149,8 +150,12 @@ class ForceLoopNode:
     @property
     def refusals(self) -> dict[str, str]:
         """Why a present command or contact is not used, by topic."""
-        own = {"task_command": self._refusal, "joint_trajectory": self._player.refusal}
-        return {**self._loop.refusals, **{topic: reason for topic, reason in own.items() if reason}}
+        refusals = self._loop.refusals.copy()
+        if self._refusal:
+            refusals["task_command"] = self._refusal
+        if self._player.refusal:
+            refusals["joint_trajectory"] = self._player.refusal
+        return refusals
 
     @property
     def reason(self) -> str:

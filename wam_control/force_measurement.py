@@ -27,20 +27,23 @@ class ForceMeasurement:
     def __init__(self, body: RigidBody) -> None:
         self._body = body
         self._n = len(body.arm.joints.names)
-        self._tare, self._zero = np.zeros(self._n), np.zeros(self._n)
+        self._tare = self._zero = [0.0] * self._n
         self._steady = LowPass()
-        self.acceleration = self._velocity = np.zeros(self._n)
-        self.external = np.zeros(self._n)
+        self.acceleration = self._velocity = [0.0] * self._n
+        self.external = [0.0] * self._n
 
     def tare(self) -> None:
         """Take the present external torques as zero."""
-        self._tare = self._tare + self.external
+        self._tare = [tare + torque for tare, torque in zip(self._tare, self.external, strict=True)]
 
     @property
     def resting(self) -> Array:
         """Steady torques of the world on the joints (n,), N m, less the tare and the zero."""
         steady = self._steady.value
-        return self.external if steady is None else steady - self._tare - self._zero
+        return np.array(self.external if steady is None else self._beyond_zero(steady))
+
+    def _beyond_zero(self, torques: Sequence[float]) -> list[float]:
+        return [torque - tare - zero for torque, tare, zero in zip(torques, self._tare, self._zero, strict=True)]
 
     def payload(self, q: Sequence[float], torques: Array, torque_sd: float) -> tuple[float, float]:
         """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
@@ -58,10 +61,12 @@ class ForceMeasurement:
 
     def zero(self, limit: float) -> bool:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
-        steady = self._steady.value
-        if steady is None or float(np.abs(steady - self._tare).max()) > limit:
+        if self._steady.value is None:
             return False
-        self._zero = steady - self._tare
+        zero = [steady - tare for steady, tare in zip(self._steady.value, self._tare, strict=True)]
+        if max(map(abs, zero)) > limit:
+            return False
+        self._zero = zero
         return True
 
     def step(
@@ -82,22 +87,24 @@ class ForceMeasurement:
         dt : outer period, s.
         """
         torque = self._torque(parameters, sensors, estimated)
-        velocity = np.zeros(self._n) if sensors is None else np.array(sensors.velocity)
-        self.acceleration = (velocity - self._velocity) / dt
+        velocity = [0.0] * self._n if sensors is None else sensors.velocity
+        self.acceleration = [(b - a) / dt for a, b in zip(self._velocity, velocity, strict=True)]
         self._velocity = velocity
         self._steady.step(torque, STEADY, dt)
-        self.external = torque - self._tare - self._zero
+        self.external = self._beyond_zero(torque)
 
     def _torque(
         self, parameters: ForceLoopParameters, sensors: State | None, estimated: Sequence[float] | None
-    ) -> Array:
+    ) -> list[float]:
         if parameters.is_estimated:
-            return np.zeros(self._n) if estimated is None else np.array(estimated)
+            return [0.0] * self._n if estimated is None else list(estimated)
         if sensors is None:
-            return np.zeros(self._n)
+            return [0.0] * self._n
         if parameters.feedback == "joint_position":
-            return np.array(parameters.spring_stiffness) * (np.array(parameters.spring_rest) - sensors.position)
-        return self._body.gravity_torque(sensors.position) - np.array(sensors.effort)
+            springs = zip(parameters.spring_stiffness, parameters.spring_rest, sensors.position, strict=True)
+            return [stiffness * (rest - angle) for stiffness, rest, angle in springs]
+        gravity = self._body.gravity_torque(sensors.position).tolist()
+        return [carried - strain for carried, strain in zip(gravity, sensors.effort, strict=True)]
 
 
 class LowPass:
@@ -113,10 +120,14 @@ class LowPass:
 
     def reset(self) -> None:
         """Forget all inputs."""
-        self.value: Array | None = None
+        self.value: list[float] | None = None
 
-    def step(self, value: Array, time_constant: float, dt: float) -> tuple[Array, Array]:
+    def step(self, value: list[float], time_constant: float, dt: float) -> tuple[list[float], list[float]]:
         """Filtered values now and one period before; `time_constant` and `dt` in s."""
-        before = value if self.value is None else self.value
-        self.value = value if self.value is None else before + (value - before) * dt / (dt + time_constant)
+        before = self.value
+        if before is None:
+            self.value = value
+            return value, value
+        time = dt + time_constant
+        self.value = [old + (new - old) * dt / time for old, new in zip(before, value, strict=True)]
         return self.value, before

@@ -111,6 +111,8 @@ class MomentumObserver:
             payload_sd = self._load.sd if self._is_payload_declared else parameters.payload_uncertainty
         prior = model_prior(arm, parameters, payload_sd, model)
         self._sensors, self._at_rest = np.diag(np.full(n, parameters.joint_torque_sd**2)), np.zeros(n)
+        self._sensors_sd = np.sqrt(self._sensors)
+        self._independent = np.eye(2 * n + (self._load is not None))  # covariance of effects of one sd
         noise = (parameters.motor_noise * np.array(self._motors.dynamic)) ** 2
         self._errors = ModelErrors(prior, parameters.drift, inverse.T, noise)
         self.reset()
@@ -208,19 +210,19 @@ class MomentumObserver:
         momentum, bias = inertia.dot(speed).tolist(), body.momentum_bias(at, speed).tolist()
         known = [b - f for b, f in zip(bias, friction, strict=True)] if friction else bias
         before, span, n = self._momentum, dt + self._gap, self._n
-        external, model = [], []
         if before is None:
             external, model = [0.0] * n, [-torque for torque in bias]
         else:
-            pairs = zip(momentum, before, bias, self._bias, known, self._known, tau, strict=True)
-            for p, p_before, b, b_before, k, k_before, torque in pairs:
-                rate = (p - p_before) / span
-                model.append(rate - 0.5 * (b + b_before))
-                external.append(rate - 0.5 * (k + k_before) - torque)
+            rates = [(p - p_before) / span for p, p_before in zip(momentum, before, strict=True)]
+            model = [rate - 0.5 * (b + o) for rate, b, o in zip(rates, bias, self._bias, strict=True)]
+            left = model
+            if friction:
+                left = [rate - 0.5 * (k + o) for rate, k, o in zip(rates, known, self._known, strict=True)]
+            external = [rate - torque for rate, torque in zip(left, tau, strict=True)]
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        filtered, present = self._filtered, np.array([external + model + q + signals])
+        filtered, present = self._filtered, np.array(external + model + q + signals)
         if span != self._decay.span:
             self._decay = _Decay.over(span, self._times, present.size)
         if before is None:
@@ -259,23 +261,23 @@ class MomentumObserver:
             torques, covariance = self._errors.corrected(self.seen)
             return torques.tolist(), self._errors.size * covariance
         uncertainty, load = self._parameters.mass_uncertainty, self._load
-        residual, model = self._filtered[0, : 2 * self._n].reshape(2, -1).tolist()
-        sizes = [uncertainty * torque for torque in model]
+        filtered: list[float] = self._filtered[0].tolist()
+        residual, sizes = filtered[: self._n], [uncertainty * torque for torque in filtered[self._n : 2 * self._n]]
         covariance, effects = np.zeros((self._n, self._n)), np.zeros((self._n, self._n))
         covariance.flat[:: self._n + 1] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
         effects.flat[:: self._n + 1] = sizes
         if load is not None:
             residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
-            sized = np.array(load.torque) * load.sd
-            covariance = covariance + np.outer(sized, sized)
-            effects = np.column_stack((effects, sized))
+            sized = (np.array(load.torque) * load.sd)[:, None]
+            covariance = covariance + sized * sized.T
+            effects = np.concatenate((effects, sized), axis=1)
         self.seen = Observation(
             np.array(residual),
             effects,
             self._sensors,
             self._at_rest,
-            self._filtered[0, 2 * self._n :].copy(),
-            np.sqrt(self._sensors),
+            np.array(filtered[2 * self._n :]),
+            self._sensors_sd,
         )
         return residual, covariance
 
@@ -287,7 +289,7 @@ class MomentumObserver:
         if not self._link_side:
             return Torques(self.age, self.corrected(seen), *self._errors.parts(seen), seen.pose)
         effects = np.concatenate((seen.effects, seen.lasting), axis=1)
-        return Torques(self.age, seen.residual, effects, np.eye(effects.shape[1]), seen.rest, seen.pose)
+        return Torques(self.age, seen.residual, effects, self._independent, seen.rest, seen.pose)
 
     def change(self, then: Observation) -> tuple[Array, Array]:
         """Change of the external torques, (n,), N m, since a mean of what was `seen`, and its covariance, (n, n)."""

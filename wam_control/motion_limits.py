@@ -145,7 +145,7 @@ class MotionLimits:
         self, velocity: list[float], q: Sequence[float], push: ArmPush, dt: float, whole: WholeForce | None
     ) -> tuple[list[float], str]:
         """Against a force that has come near the largest one no faster than the force law towards that one."""
-        force, allowed, limit = self._push(q, push, whole)
+        force, allowed = self._push(q, push, whole)
         if not self._pushed and force <= BEGIN * allowed:
             return velocity, ""
         has_room = self._given < self._parameters.free_travel
@@ -161,24 +161,29 @@ class MotionLimits:
             self._given += float(np.linalg.norm(push.jacobian(self._body, q) @ limited)) * dt
         if not is_bound:
             return limited, ""
+        limit = self._in_words(allowed, whole)
         return limited, (
             f"the world pushes with at least {self._pushed:.2g} N in all; allowed: {limit}; the arm does not move "
             "against it, and gives way by limits.free_travel at most: command a direction or a posture away from it, "
             "or less force"
         )
 
-    def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float, str]:
-        """Force, N, the largest one allowed, and its name: of those that count here the one that is nearest to it."""
+    def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float]:
+        """Force, N, and the largest one allowed: of those that count here the one that is nearest to it."""
         own = self._parameters
         most, allowed = own.contact_force, own.whole_force * whole.desired if whole else math.inf
         least = push.least(self._body, q, BEGIN * min(most, allowed))
-        found = least, most, f"limits.contact_force, {most:g} N"
         if whole and allowed < most:
             force = whole.measured() if whole.measured else least
             if force * most >= least * allowed:
-                words = f"limits.whole_force, {own.whole_force:g} times the commanded {whole.desired:.3g} N"
-                found = force, allowed, words
-        return found
+                return force, allowed
+        return least, most
+
+    def _in_words(self, allowed: float, whole: WholeForce | None) -> str:
+        own = self._parameters
+        if whole is None or allowed == own.contact_force:
+            return f"limits.contact_force, {own.contact_force:g} N"
+        return f"limits.whole_force, {own.whole_force:g} times the commanded {whole.desired:.3g} N"
 
     def _before_the_ends(self, velocity: list[float], q: Sequence[float]) -> tuple[list[float], str]:
         gain, margin = self._parameters.joint_gain, self._parameters.joint_margin
@@ -187,6 +192,9 @@ class MotionLimits:
         joints, reason, limited = self._joints, "", []
         for name, low, angle, high, speed in zip(joints.names, joints.lower, q, joints.upper, velocity, strict=True):
             slowest, fastest = -_approach(angle - low, gain, margin), _approach(high - angle, gain, margin)
+            if slowest <= speed <= fastest:
+                limited.append(speed)
+                continue
             limited.append(min(max(speed, slowest), fastest))
             end = low if speed < slowest else high
             if limited[-1] != speed and abs(angle - end) <= margin + PUSH_BACK / gain:

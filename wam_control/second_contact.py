@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from wam_control.contact_inference import ContactInference, Hypothesis
 from wam_control.model_errors import Observation
 from wam_control.momentum_observer import MomentumObserver
+from wam_description.small_matrices import solution
 
 Array = NDArray[np.float64]
 
@@ -142,7 +143,7 @@ class SecondContact:
         count = len(self._steady)
         then = Observation(*(total / count for total in self._sums))
         change, covariance = observer.change(then)
-        if change.dot(np.linalg.solve(covariance, change)) < RELEASED * self._threshold:
+        if change.dot(solution(covariance, change)) < RELEASED * self._threshold:
             return None
         first = self._steady[count // 2]
         best = first.hypotheses[0]
@@ -168,10 +169,10 @@ class SecondContact:
     def _statistic(self, change: _Change, turned: float) -> float:
         """chi^2 of a change that the first contact does not explain; `turned` of its force may change across it."""
         torques, covariance = change.torques, change.covariance
-        explained = np.linalg.solve(covariance, torques)
+        explained = solution(covariance, torques)
         statistic = float(torques.dot(explained))
         if statistic < RELEASED * self._threshold:
             return statistic
         grown = GROWTH * GROWTH * abs(float(change.own.dot(explained)))
         across = (FRICTION * grown + turned) * change.force * change.sides
-        return float(torques.dot(np.linalg.solve(covariance + across.T.dot(across), torques)))
+        return float(torques.dot(solution(covariance + across.T.dot(across), torques)))

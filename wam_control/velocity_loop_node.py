@@ -32,17 +32,20 @@ class VelocityLoopNode:
         self._fastest = TransmissionMap.of(shared.arm).largest_motor_velocities(shared.arm.joints.speed_limit)
         self.refusals: dict[str, str] = {}
         self._at_rest, self._no_effort = State([], zero, []), State([], [], zero)
+        self._command, self._velocity = self._at_rest, zero  # and within the limits, rad/s
 
     @SERVO_REACTION
     def step(self, inputs: Inputs) -> Outputs:
         """Currents that answer a motor state, A."""
         motors = inputs["motor_states"]
-        velocity = inputs["motor_velocity_command"] or self._at_rest
+        command = inputs["motor_velocity_command"] or self._at_rest
+        if command is not self._command:  # the same in every inner period of an outer one
+            self._command, self._velocity = command, self._limited(command.velocity)
         effort = inputs["motor_effort_command"] or self._no_effort
         currents = self._loop.step(
             motors.velocity,
             motors.effort,
-            self._limited(velocity.velocity),
+            self._velocity,
             self._dither.added(inputs.stamp, effort.effort),
             inputs.dt,
         )

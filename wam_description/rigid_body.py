@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from wam_description.arm import Arm
 
 Array = NDArray[np.float64]
+FLOAT = np.dtype(float)
 SMALL = 1e-9  # m, lever arms that are zero apart from rounding
 
 
@@ -201,6 +202,8 @@ def _columns(jacobian: Array) -> Array:
 
 
 def _vector(values: ArrayLike) -> Array:
+    if type(values) is np.ndarray and values.dtype is FLOAT:  # most are: a fifth of the time of asarray
+        return values
     return np.asarray(values, dtype=float)
 
 

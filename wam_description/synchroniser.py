@@ -216,7 +216,13 @@ class Synchroniser:
                 self.strays += 1
             else:
                 slot[topic] = value
-            return self._complete(stamp) if triggers else ()
+            if not triggers:
+                return ()
+            if (lacks := self._lacks) is not None:
+                lacking, cause, earliest = lacks
+                if stamp <= earliest and len(lacking.kept.get(cause, ())) < lacking.count:
+                    return ()  # nothing that the first step waits for, or shows that it waits in vain
+            return self._complete()
 
         return take
 
@@ -231,7 +237,7 @@ class Synchroniser:
             self._require_present(stamp, newest.limit_ns)
             if not newest.put(stamp, value, self._last):
                 self.strays += 1
-            return self._complete(stamp) if self._triggers else ()
+            return self._complete() if self._triggers else ()
 
         return take
 
@@ -256,12 +262,8 @@ class Synchroniser:
         self._triggers.append((stamp, value))
         return ()
 
-    def _complete(self, newest: int) -> Sequence[Inputs]:
-        """The inputs of each step that is complete with an input of this stamp, ns, in the order of their stamps."""
-        if self._lacks is not None:
-            group, cause, earliest = self._lacks
-            if newest <= earliest and not group.has(cause):
-                return ()  # nothing that the first step waits for, or shows that it waits in vain
+    def _complete(self) -> Sequence[Inputs]:
+        """The inputs of each step that is complete, in the order of their stamps."""
         complete: list[Inputs] = []
         while self._triggers:
             stamp, value = self._triggers[0]
@@ -341,18 +343,18 @@ class Synchroniser:
         """
         inputs = Inputs()
         origins: list[Origin] = []
+        for group in self._groups:  # before the others: most often it is one of these that is not there yet
+            if stamp >= group.until and not group.find(stamp):
+                self._lacks = group, group.cause(stamp), min(each.cause(stamp) for each in self._groups)
+                return None
+            inputs.update(group.found)
+            origins.append(group.origin)
         for topic, newest in self._newest.items():
             if (found := newest.taken(stamp)) is None:
                 inputs[topic] = None
             else:
                 inputs[topic] = found[1]
                 origins.append((found[0], (topic,)))
-        for group in self._groups:
-            if stamp >= group.until and not group.find(stamp):
-                self._lacks = group, group.cause(stamp), min(each.cause(stamp) for each in self._groups)
-                return None
-            inputs.update(group.found)
-            origins.append(group.origin)
         inputs[self._trigger] = value
         before, self._last_done = self._last_done, stamp
         is_next = not before or stamp - before == self._period
@@ -417,6 +419,7 @@ class _Group:
 
     Attributes
     ----------
+    count : number of its topics.
     kept : the inputs by stamp and topic.
     found : those of the last step, by topic.
     origin : their stamp, ns, and their topics.
@@ -425,10 +428,10 @@ class _Group:
 
     __slots__ = (
         "_begin",
-        "_count",
         "_delay_ns",
         "_phase_ns",
         "_repeats_ns",
+        "count",
         "found",
         "kept",
         "origin",
@@ -438,7 +441,7 @@ class _Group:
 
     def __init__(self, delay_ns: int, repeats_ns: int, phase_ns: int, topics: tuple[str, ...]) -> None:
         self._delay_ns, self._repeats_ns, self._phase_ns, self.topics = delay_ns, repeats_ns, phase_ns, topics
-        self._count = len(topics)
+        self.count = len(topics)
         self.kept: dict[int, dict[str, Any]] = {}
         self.restart(0)
 
@@ -456,10 +459,6 @@ class _Group:
         cause -= (cause - self._phase_ns) % self._repeats_ns
         return cause if cause >= self._begin else 0
 
-    def has(self, cause: int) -> bool:
-        """Whether all inputs of this stamp, ns, are there."""
-        return len(self.kept.get(cause, ())) == self._count
-
     def has_missed(self, stamp: int) -> bool:
         """Whether an input of the step of this stamp, ns, is not there, and a later one of its topic is."""
         cause = self.cause(stamp)
@@ -476,7 +475,7 @@ class _Group:
             return True
         kept = self.kept
         slot = kept.get(cause)
-        if slot is None or len(slot) < self._count:
+        if slot is None or len(slot) < self.count:
             return False
         self.found, self.origin, self.until = slot, (cause, slot), cause + self._delay_ns + self._repeats_ns
         if len(kept) > 1:

@@ -1,7 +1,10 @@
 """Loads on the covers: pushes that are applied to them, and the sum of everything that acts on each."""
 
+import math
 from collections.abc import Iterator, Sequence
+from functools import reduce
 from itertools import chain
+from operator import add
 from typing import Any, NamedTuple
 
 import mujoco
@@ -67,7 +70,7 @@ class CoverLoads:
         """Push on a cover, see `Plant.push`."""
         if cover not in self._origin:
             raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._origin)}")
-        if np.any(force) or np.any(torque):
+        if any(force) or any(torque):
             self.pushes[cover] = (np.array(force, float), np.array(torque, float))
         else:
             self.pushes.pop(cover, None)
@@ -126,13 +129,12 @@ class CoverLoads:
 
 def _sum(cover: str, parts: Sequence[PartialLoad]) -> Load | None:
     """All forces on a cover as one load, at their mean position weighted by force; None if there is no force."""
-    weights = [float(np.linalg.norm(part.force)) for part in parts]
+    weights = [math.sqrt(part.force.dot(part.force)) for part in parts]
     whole = sum(weights, 0.0)
     if not whole > 0.0:
         return None
     place = sum((w * part.position for w, part in zip(weights, parts, strict=True)), 0.0) / whole
-    force = np.sum([part.force for part in parts], axis=0)
-    moment = np.sum([part.moment for part in parts], axis=0)
+    force, moment = reduce(add, (part.force for part in parts)), reduce(add, (part.moment for part in parts))
     return Load(cover, place, tuple(force.tolist()), tuple(moment.tolist()))
 
 
