@@ -18,8 +18,10 @@ from wam_bag.bag import read
 from wam_cli.main import COMMANDS, main
 from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import GROUPED
+from wam_description.topics import BY_NAME
 from wam_ros import bring_up
 from wam_ros.bring_up import Processes
+from wam_ros.qos import qos
 
 ROOT = Path(__file__).parents[1]
 NODES = 7  # six and the recorder
@@ -111,16 +113,24 @@ def statuses(folder: Path, node: str) -> list[str]:
 
 
 def enable(ros: Any, stack: Stack) -> None:
+    """Release the brakes, and wait until the driver's status has come: it is latched, and the next one replaces it."""
+    from diagnostic_msgs.msg import DiagnosticStatus
     from std_srvs.srv import SetBool
 
-    client = ros.node("asker").create_client(SetBool, "driver/enable")
+    node = ros.node("asker")
+    seen: list[str] = []
+    node.create_subscription(
+        DiagnosticStatus, "status", lambda message: seen.append(message.message), qos(BY_NAME["status"])
+    )
+    client = node.create_client(SetBool, "driver/enable")
     ros.wait(client.service_is_ready)
     while True:
         future = client.call_async(SetBool.Request(data=True))
         ros.wait(future.done, what=f"an answer; {stack.said()}")
         if future.result().success:
-            return
+            break
         assert "no motor_current_command comes in" in future.result().message
+    ros.wait(lambda: "enabled" in seen, what=f"the status 'enabled'; {stack.said()}")
 
 
 ASK_THE_COLLECTOR = """
