@@ -4,19 +4,16 @@ The driver and the steps of all nodes return what they returned in a run before,
 reference is the same without anybody who takes a message: the topics keep the numbers, and that is all.
 """
 
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
-import yaml
 from comparing import arguments, machine, quartiles, ratios, save, table
 from parts import NODES
-from speed import scenario
+from speed import scenario_steps
 
-from wam_control.scenario import ScenarioStep, load
+from wam_control.scenario import ScenarioStep
 from wam_description.configuration import Configuration, packaged
 from wam_description.interface import declared
 from wam_description.synchroniser import Inputs
@@ -93,10 +90,7 @@ def main() -> None:
     """Measure in turns, print the table."""
     given = arguments(__doc__, rounds=20, quick_rounds=2)
     configuration = Configuration.load(packaged("wam"))
-    with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
-        script = Path(folder) / "script.yaml"
-        script.write_text(yaml.safe_dump(scenario(1.0)), encoding="utf-8")
-        steps = load(script, configuration.shared.arm)
+    steps = scenario_steps(1.0, configuration.shared.arm)
     states, answers = recorded(configuration, steps)
 
     def answering(name: str, reaction: Reaction, _: Any) -> Any:

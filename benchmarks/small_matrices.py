@@ -1,18 +1,14 @@
 """The direct run with `wam_description.small_matrices`, and with numpy.linalg in its place: equal bits, or it fails."""
 
-import tempfile
 import time
 from itertools import pairwise
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import yaml
 from comparing import arguments, machine, quartiles, ratios, save, table
-from speed import scenario
+from speed import scenario_steps
 
-from wam_control.scenario import load
 from wam_description import small_matrices
 from wam_description.configuration import Configuration, packaged
 from wam_sim.simulation import Simulation
@@ -37,10 +33,7 @@ def main() -> None:
     """Measure in turns, print the table."""
     given = arguments(__doc__, rounds=15, quick_rounds=1)
     configuration = Configuration.load(packaged("wam"))
-    with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
-        script = Path(folder) / "script.yaml"
-        script.write_text(yaml.safe_dump(scenario(1.0 if given.quick else 4.0)), encoding="utf-8")
-        steps = load(script, configuration.shared.arm)
+    steps = scenario_steps(1.0 if given.quick else 4.0, configuration.shared.arm)
     found: dict[str, list[list[float]]] = {name: [] for name in WAYS}
     for _ in range(given.rounds):
         rows = []

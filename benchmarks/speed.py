@@ -14,7 +14,8 @@ from comparing.clock import Readings, watched_clock
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from wam_control.scenario import load
+from wam_control.scenario import ScenarioStep, load
+from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import EACH, GROUPED
 from wam_ros.bring_up import Composition, Processes
@@ -48,6 +49,14 @@ def scenario(seconds: float) -> dict[str, Any]:
             {"name": "brake", "seconds": 0.1 * seconds, "request": "disable"},
         ]
     }
+
+
+def scenario_steps(seconds: float, arm: Arm) -> list[ScenarioStep]:
+    """The steps of `scenario`, as the scenario node has them."""
+    with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
+        script = Path(folder) / "script.yaml"
+        script.write_text(yaml.safe_dump(scenario(seconds)), encoding="utf-8")
+        return load(script, arm)
 
 
 def direct(configuration: Configuration, script: Path) -> float:

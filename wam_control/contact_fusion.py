@@ -28,6 +28,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_control.contact_fit import LARGEST_EXPONENT
+from wam_description.small_matrices import inverse, solution
+
 Array = NDArray[np.float64]
 
 EVERY = 0.0299  # s, between moments: one and a half time constants of the observer, within which errors are alike
@@ -45,7 +48,6 @@ UNMEASURED = 2e-5 * np.eye(3)  # m^2: a force of 30 N in a direction without a l
 LIKE, GROWN = 0.25, 4.0  # least and largest torques of the same contact, of those of its last moment
 BELIEF = 10.0  # degrees of freedom
 UNKNOWN = 3  # of a contact: its position and the force across the link
-LARGEST_EXPONENT = 500.0
 DIFFERENT = 4.0  # chi^2 per degree of freedom above which moments are not of the same contact
 
 
@@ -145,7 +147,7 @@ class ContactFusion:
         scale = np.full(7, 1.0 / grown)
         scale[0] = 1.0
         rest = rows - (effects @ (past.predicts * scale)).transpose(0, 2, 1)
-        precision = np.linalg.inv(covariance - effects.dot(past.explains).dot(effects.T))
+        precision = inverse(covariance - effects.dot(past.explains).dot(effects.T))
         self.count = 1 + past.moments
         return (past.gram * np.outer(scale, scale) + rest @ precision @ rest.transpose(0, 2, 1)) / self._widening
 
@@ -185,13 +187,13 @@ class ContactFusion:
         found, count = len(guess), len(moments)
         rows = np.stack([moment.rows for moment in moments], axis=2)  # (links, 7, moments, n)
         chances = np.sqrt([each.probability for each in guess])
-        sides, slopes = _sides(rows[:found], guess)
-        present = sides[:, :, -1]
+        sides, slopes = _sides(rows[:found, :, -1:], guess)
+        present = sides[:, :, 0]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED
         forces = np.linalg.solve(levers, present @ last.residual[:, None])[:, :, 0]  # (links, 3), N
         moved = np.array([SLIPS * np.abs(moment.torques.pose - now.pose).max() for moment in moments])
         elapsed = np.array([now.time + LATE - moment.torques.time for moment in moments])
-        slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, -1]).sum(axis=1)
+        slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, 0]).sum(axis=1)
         certain = common[-n:, -n:] + last.own
         ways = (moved + self._speed * elapsed).tolist()
         sizes = [
@@ -227,13 +229,13 @@ class ContactFusion:
         slips = (per_metre * far[:, :, None]).reshape(found, -1)
         covariance += slips.T @ slips
         rows = rows.reshape(len(rows), 7, count * n)
-        inverse = np.linalg.inv(covariance)
-        weighted_rows = inverse @ rows.transpose(0, 2, 1)
+        precision = inverse(covariance)
+        weighted_rows = precision @ rows.transpose(0, 2, 1)
         return _Past(
             gram=rows @ weighted_rows,
             predicts=shared.T @ weighted_rows,
-            explains=shared.T @ inverse @ shared,
-            expected=float((inverse * common).sum()),
+            explains=shared.T @ precision @ shared,
+            expected=float((precision * common).sum()),
             last=last,
             slope=slope,
             moments=count,
@@ -250,7 +252,7 @@ def _sides(rows: Array, guess: Sequence[Guess]) -> tuple[Array, Array]:
 
 def _grown(torques: Array, before: Array, covariance: Array, slips: Array) -> float:
     """How much larger torques are than those before, (n,), apart from a slip, (links, n), N m."""
-    weighted = np.linalg.solve(covariance + slips.T @ slips, before)
+    weighted = solution(covariance + slips.T @ slips, before)
     return float(torques.dot(weighted)) / float(before.dot(weighted))
 
 
@@ -263,7 +265,7 @@ def probability_of_slide(torques: Array, covariance: Array, slide: Array) -> flo
     covariance : (m, m), N^2 m^2, if it does not slide, whatever its force and position.
     slide : (m,), N m, torques of the standard deviation of its speed.
     """
-    weighted = np.linalg.solve(covariance, slide)
+    weighted = solution(covariance, slide)
     gain = float(slide.dot(weighted))
     evidence = 0.5 * (float(torques.dot(weighted)) ** 2 / (1.0 + gain) - math.log1p(gain))
     odds = SLIDES / (1.0 - SLIDES) * math.exp(min(evidence, LARGEST_EXPONENT))

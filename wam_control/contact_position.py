@@ -3,6 +3,10 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from wam_control.force_axis import PressedForce
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_description.arm import Covers
 from wam_description.signals import BASE, Contact, ForceCommand, Triple
@@ -35,6 +39,10 @@ class ForcePoint(NamedTuple):
     rejection: str
     conflict: str
     is_single: bool = True
+
+    def pressed(self, direction: NDArray[np.float64], force: float) -> PressedForce:
+        """A force there, N, along a direction (3,), base frame."""
+        return PressedForce(self.cover, self.position, self.position_sd, direction, force)
 
 
 class ContactPosition:

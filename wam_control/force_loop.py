@@ -360,7 +360,7 @@ class ForceLoop:
         direction = rotation @ (np.array(command.force) / desired)
         axis = (rotation.T @ direction).tolist()
         point = self._point(contact, command, direction)
-        force_axis = self._force_axes.axis(q, PressedForce(*point[:3], direction, desired))
+        force_axis = self._force_axes.axis(q, point.pressed(direction, desired))
         measured, before, free = self._measured(force_axis)
         scalar = law.along(axis)
         error, is_touching = desired - measured, self._hold.is_touching
@@ -375,7 +375,7 @@ class ForceLoop:
             point,
             own.sensing.sd_limit(desired, point.is_pinned),
             desired=desired if is_touching or contact.cover else 0.0,
-            pressed=PressedForce(*point[:3], direction, desired) if is_touching and point.is_certain else None,
+            pressed=point.pressed(direction, desired) if is_touching and point.is_certain else None,
         )
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
@@ -476,7 +476,7 @@ class ForceLoop:
 
         Otherwise they are an error of the force.  What a mass at the tool explains may always be one.
         """
-        pressed = PressedForce(*point[:3], direction, 0.0)
+        pressed = point.pressed(direction, 0.0)
         force = -float(self._force_axes.axis(q, pressed).sense @ resting)
         axis = self._force_axes.axis(q, pressed._replace(force=abs(force)))
         carried = self._carried(q, resting)

@@ -105,7 +105,6 @@ class Driver:
         self.warnings: list[str]
         self.stale_advice: Callable[[], str] = lambda: "check that velocity_loop runs"
         self._arm, self._timing, self._parameters = arm, timing, parameters
-        self._period_ns, self._divisor = timing.period_ns, timing.outer_divisor
         self._watch = LimitWatch(arm, parameters.cover_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
@@ -126,8 +125,8 @@ class Driver:
 
     def _begin_period(self, tick: int) -> None:
         self._tick = tick
-        self.stamp = tick * self._period_ns
-        self.is_outer = (tick - 1) % self._divisor == 0
+        self.stamp = tick * self._timing.period_ns
+        self.is_outer = self._timing.is_outer(self.stamp)
 
     def command(self, stamp: int, currents: list[float]) -> None:
         """Take the currents, A (n,), that answer the state of time `stamp`, ns.
@@ -135,7 +134,7 @@ class Driver:
         The command is ignored unless the driver is enabled.  It is also ignored if its state is older than the
         state that was last answered or than the release of the brakes, or lies in the future.
         """
-        tick = stamp // self._period_ns
+        tick = stamp // self._timing.period_ns
         if self.safety.mode is Mode.ENABLED and self._command_tick <= tick <= self._tick:
             self._command = list(currents)
             self._command_tick = tick
