@@ -128,6 +128,7 @@ def test_force_comes_with_the_time_constant_of_equation_5_2(stiffness: float) ->
     assert world.force == pytest.approx(8.0 - 7.0 * math.exp(-3.0), rel=0.005)
 
 
+@pytest.mark.slow
 def test_force_converges_to_the_commanded_one() -> None:
     loop, world = force_loop(ARM, replace(OWN, force_filter=0.02)), World(400.0)
     for newtons in (5.0, 10.0, 5.0):
@@ -174,6 +175,7 @@ def test_posture_moves_nothing_along_the_force() -> None:
         assert along @ out.velocity == pytest.approx(GAIN * 6.0, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_posture_is_reached_in_the_complement_of_the_force() -> None:
     posture = [0.35, -1.15, 0.25, 1.1]
     loop, world = force_loop(ARM, OWN), World(400.0)
@@ -281,6 +283,7 @@ def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -
     assert out.velocity == pytest.approx([gain * limit, -gain * limit, gain, 0.0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_stale_force_command_is_dropped_and_the_arm_holds_its_position() -> None:
     loop, world = force_loop(ARM, OWN), World(400.0)
     for _ in range(1500):

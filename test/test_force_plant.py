@@ -39,6 +39,7 @@ def free_arm(q: tuple[float, ...], step: ScenarioStep, **changes: Any) -> Simula
     return Simulation(CONFIGURATION.with_values(given), [ScenarioStep("release", RELEASE, request="enable"), step])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("q", "newtons"),
     [
@@ -65,6 +66,7 @@ def test_in_free_space_a_force_moves_the_arm_without_chatter(q: tuple[float, ...
     assert max(np.count_nonzero(np.diff(sign[sign != 0.0])) for sign in signs) <= 2, "turns at more than 0.3 rad/s"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("q", "place", "newtons"),
     [
@@ -89,6 +91,7 @@ def test_ahead_of_a_nearly_straight_arm_its_own_inertia_is_no_force(
     assert max(np.count_nonzero(np.diff(sign[sign != 0.0])) for sign in signs) <= 1, "turns at more than 0.3 rad/s"
 
 
+@pytest.mark.slow
 def test_the_deadband_of_an_amplifier_does_not_freeze_the_force() -> None:
     """0.2 A: the integral of the velocity loop was lost where the current was 0, and 6.6 N stayed of 5."""
     x, y, z = (-BODY.cover_pose(POSE, OUTER).rotation[:, 1]).tolist()
@@ -112,6 +115,7 @@ def test_the_guard_counts_a_payload() -> None:
     assert abs(scales[1] / scales[0] - 1.0) > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("newtons", "least", "most"), [(1.0, 50.0, 200.0), (0.4, 0.0, 3.0)])
 def test_a_hand_leads_the_arm_from_its_motors_with_the_dither(newtons: float, least: float, most: float) -> None:
     """Down to what friction allows: without the dither 3 N move it by 0.8 mm."""

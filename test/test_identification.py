@@ -103,6 +103,7 @@ def clean() -> tuple[Planted, Identification]:
     return planted, planted.identify()
 
 
+@pytest.mark.slow
 def test_planted_friction_is_found_in_each_direction(clean: tuple[Planted, Identification]) -> None:
     planted, found = clean
     error, _ = planted.coulomb_errors(found)
@@ -114,6 +115,7 @@ def test_planted_friction_is_found_in_each_direction(clean: tuple[Planted, Ident
     assert found.values[found.unknowns.places("joints.coulomb")] == pytest.approx([0.5, 0.4], rel=0.02)
 
 
+@pytest.mark.slow
 def test_planted_masses_and_payload_give_the_gravity_torque(clean: tuple[Planted, Identification]) -> None:
     planted, found = clean
     shared = overlaid(found).shared
@@ -144,6 +146,7 @@ def test_white_residuals_would_state_far_too_small_errors() -> None:
     assert np.median(sd) > 3.0 * np.median(found.alone[found.unknowns.places("motors.coulomb_positive")])
 
 
+@pytest.mark.slow
 def test_what_the_motion_does_not_show_stays_as_it_was_and_is_reported_so(
     clean: tuple[Planted, Identification],
 ) -> None:
@@ -192,6 +195,7 @@ def overlaid(found: Identification) -> Configuration:
     return CONFIGURATION.with_values(model_values(SHARED, found, "bag"))
 
 
+@pytest.mark.slow
 def test_the_overlay_is_a_configuration_that_the_nodes_use(
     clean: tuple[Planted, Identification], tmp_path: Path
 ) -> None:
@@ -214,6 +218,7 @@ def test_the_overlay_is_a_configuration_that_the_nodes_use(
     assert effort.effort == pytest.approx(RigidBody(planted.arm).gravity_torque(q), abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_covariance_in_the_overlay_is_that_of_the_torques_in_the_motion(
     clean: tuple[Planted, Identification],
 ) -> None:
@@ -330,6 +335,7 @@ def test_friction_of_a_plant_of_every_kind_at_once_is_found_to_four_per_cent() -
     assert result.gravity < 0.5 * result.gravity_before
 
 
+@pytest.mark.slow
 def test_a_torque_offset_is_named_as_not_identifiable_with_its_value_if_friction_were_alike(
     clean: tuple[Planted, Identification],
 ) -> None:
@@ -380,6 +386,7 @@ def test_an_offset_and_friction_that_differs_by_direction_move_the_plant_alike_i
     assert np.abs(same - apart).max() < 2e-3
 
 
+@pytest.mark.slow
 def test_torque_constants_that_differ_between_motors_of_the_same_joints_are_found_and_friction_as_reported() -> None:
     planted, scale = Planted(40.0, 3), np.array([1.0, 1.02, 0.98, 1.0])
     planted.torque = planted.torque / scale
@@ -411,6 +418,7 @@ def test_load_friction_of_a_joint_that_differs_by_direction_is_in_the_standard_e
     assert blind_rms > 1.6
 
 
+@pytest.mark.slow
 def test_friction_of_a_joint_that_its_motor_has_too_widens_the_standard_error_by_its_load_friction(
     clean: tuple[Planted, Identification],
 ) -> None:

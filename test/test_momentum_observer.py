@@ -138,6 +138,7 @@ def test_torques_that_come_late_are_no_external_ones() -> None:
     assert np.all(sds["with"][:2] > sds["without"][:2])
 
 
+@pytest.mark.slow
 def test_rotor_inertia_is_part_of_the_momentum() -> None:
     without = dataclasses.replace(ARM, motors=dataclasses.replace(ARM.motors, inertia=(1e-9,) * 4))
     worst = {}

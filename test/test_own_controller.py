@@ -233,6 +233,7 @@ def test_a_reaction_sees_the_arrays_that_it_takes_and_no_others(configured: Conf
     assert [len(array) for array in seen[0]] == [4, 0, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["wam", "barrett-wam4", "testbed", "torque-loop", "position-loop"])
 def test_the_nodes_of_the_stack_read_no_array_that_they_do_not_declare(
     name: str, monkeypatch: pytest.MonkeyPatch

@@ -75,6 +75,7 @@ def test_a_force_is_refused_by_the_mass_that_nobody_knows_of(mass: float, side: 
     assert found.peak < 0.1 * force
 
 
+@pytest.mark.slow
 def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded() -> None:
     """0.05 kg are 0.6 N."""
     direction = triple(-RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
@@ -95,6 +96,7 @@ def test_an_error_of_less_than_a_tenth_is_reported_where_less_force_is_commanded
     assert "the force is known to +-0.5" in reasons[-500]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("about", [0.0, 120.0])
 def test_a_press_that_starts_in_contact_goes_on(about: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(surfaces, "GAP", -1e-3)
@@ -140,6 +142,7 @@ def test_a_mass_picked_up_in_motion_is_carried_as_if_the_arm_had_it_and_reset_se
     assert bare.model.body("link4").mass[0] == pytest.approx(WAM.links.mass[3])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mass", "expected"), [(0.0, ""), (0.1, "kg at the tool")])
 def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at_rest(
     mass: float, expected: str

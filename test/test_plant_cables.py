@@ -499,6 +499,7 @@ def test_rotor_breaks_away_at_a_friction_in_proportion_to_both_tensions(
     assert excess == pytest.approx(expected, rel=THOUSANDTH)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pretension", "torque", "slack"), TENSIONS)
 def test_turning_rotor_loses_momentum_to_a_friction_in_proportion_to_both_tensions(
     pretension: float, torque: float, slack: bool
@@ -519,6 +520,7 @@ def test_turning_rotor_loses_momentum_to_a_friction_in_proportion_to_both_tensio
     assert lost / 0.1 == pytest.approx(friction, rel=THOUSANDTH)
 
 
+@pytest.mark.slow
 def test_friction_of_a_slack_cable_goes_when_the_cable_is_tight_again() -> None:
     """Under 5 N m the rotor holds more; without, 0.02 N m and 40 N x 5e-5 m, 0.1 % as above."""
     plant = gripping(20.0)
@@ -537,6 +539,7 @@ def test_friction_of_a_slack_cable_goes_when_the_cable_is_tight_again() -> None:
     assert excess == pytest.approx(expected, rel=THOUSANDTH)
 
 
+@pytest.mark.slow
 def test_parallel_circuits_of_the_first_stage_share_its_tension() -> None:
     """2 N m on 10 mm are 200 N for one cable, 100 N each for two; slack from 2 x 300 N x 10 mm x 2 on."""
     for circuits, difference in ((1.0, 200.0), (2.0, 100.0)):
@@ -591,6 +594,7 @@ def test_cables_tightened_to_a_share_are_those_of_an_arm_with_that_pretension(sh
         assert min(found[0][3::4]) == 0.0
 
 
+@pytest.mark.slow
 def test_active_pretension_lowers_the_least_force_and_a_large_one_needs_it_back() -> None:
     """6.5: a delicate task with a fifth of the pretension, a strong one with all of it, on one plant."""
     arm = damped(one_joint())
@@ -640,6 +644,7 @@ def story(plant: Plant) -> list[float]:
     return values
 
 
+@pytest.mark.slow
 def test_plants_with_every_effect_are_equal_bit_for_bit_and_reset_undoes_creep() -> None:
     arm = changed(WAM, cables={"pretension": (20.0,) * 4})
     first = Plant(arm, World(NOWHERE, NO_SPRINGS), EVERYTHING, STEP)
@@ -652,6 +657,7 @@ def test_plants_with_every_effect_are_equal_bit_for_bit_and_reset_undoes_creep()
     assert first_story != story(first)
 
 
+@pytest.mark.slow
 def test_rotors_in_slack_cables_are_gripped_from_the_first_step_on_after_every_reset() -> None:
     arm = changed(WAM, cables={"pretension": (5.0,) * 4}, joints={"start": (0.0, -1.5, 0.0, 0.5)})
     plant = plant_of(arm, slack=True, tension_friction=(1e-3,) * 4)
@@ -674,6 +680,7 @@ def test_rotors_in_slack_cables_are_gripped_from_the_first_step_on_after_every_r
     assert slower == pytest.approx(1e-3 * tight, rel=THOUSANDTH)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [field.name for field in dataclasses.fields(Effects)])
 def test_each_effect_makes_a_difference(effect: str) -> None:
     arm = changed(WAM, cables={"pretension": (20.0,) * 4})

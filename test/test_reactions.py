@@ -59,6 +59,7 @@ def press(summary: DemoSummary, name: str) -> SteadyPress:
     return one
 
 
+@pytest.mark.slow
 def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[DemoSummary, Analysis]) -> None:
     summary, analysis = found
     begins = {step.name: step.begin / 1e9 for step in summary.steps}
@@ -70,6 +71,7 @@ def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[D
     assert "press across" not in said
 
 
+@pytest.mark.slow
 def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: tuple[DemoSummary, Analysis]) -> None:
     _, analysis = found
     sections = {section.key: section for section in analysis.sections}
@@ -80,6 +82,7 @@ def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: 
     assert not any("MISSED" in line for line in sections["verdict"].sentences)
 
 
+@pytest.mark.slow
 def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[DemoSummary, Analysis]) -> None:
     told = text(found[0])
     assert "force within 10 %: NO (4 of 6 refused or held)" in told
@@ -91,6 +94,7 @@ def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[DemoSum
         assert f"  {name}: {kind if kind == 'refused' else f'held ({kind})'} from" in told
 
 
+@pytest.mark.slow
 def test_a_force_of_a_task_is_assessed_as_one_of_force_command(found: tuple[DemoSummary, Analysis]) -> None:
     summary, analysis = found
     one, other = press(summary, "press across"), press(summary, "press across by a task")

@@ -235,6 +235,7 @@ def test_the_guard_considers_one_force_of_a_task_as_a_force_alone() -> None:
     assert min(guard.scales(task, [forces])) == pytest.approx(min(guard.scales(task, forces.contacts)), rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_guard_considers_the_forces_of_a_task_together() -> None:
     """Its linear law is that of the task: joint velocities per torque of the world and per joint angle."""
     stiff = TaskAxis(AxisKind.IMPEDANCE, -1, COVER, PLACE, X, None, 0.0, 400.0, 100.0)

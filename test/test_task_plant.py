@@ -43,6 +43,7 @@ class Played:
         self.reason, self.q = traces[0].reason, run.driver.plant.q
 
 
+@pytest.mark.slow
 def test_a_force_of_a_task_on_a_stiff_surface_does_not_jump_at_the_touch() -> None:
     """Its torque fed forward to the free arm threw it at the surface: 27 N of 16 at 40 000 N/m."""
     q = (0.3, -1.2, 0.2, 1.0)
@@ -53,6 +54,7 @@ def test_a_force_of_a_task_on_a_stiff_surface_does_not_jump_at_the_touch() -> No
     assert played.forces[-200:].mean() == pytest.approx(16.0, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.03, -0.03])
 def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_it(speed: float) -> None:
     """What is touched stays where it is, so that it is touched elsewhere on the link: a friction of 0.3 is not all."""
@@ -67,6 +69,7 @@ def test_a_force_across_the_line_of_a_link_is_right_while_the_link_slides_along_
     assert played.forces[1000:, 0] == pytest.approx(np.full(1500, 5.0), rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_task", [True, False])
 def test_a_force_stays_right_when_the_link_slides_back_under_other_axes(is_task: bool) -> None:
     """The way back counted from zero: 5.8 N of 5.  What a task presses was taken for 0.5 kg at the tool."""
@@ -87,6 +90,7 @@ def test_a_force_stays_right_when_the_link_slides_back_under_other_axes(is_task:
     assert not played.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["warn", "refuse"])
 def test_two_forces_that_are_stable_alone_do_not_swing_together(mode: str) -> None:
     """Each alone has a margin of 7 and more at this gain; the two of them have one of 0.6."""
@@ -103,6 +107,7 @@ def test_two_forces_that_are_stable_alone_do_not_swing_together(mode: str) -> No
         assert played.forces[-500:].mean(axis=0) == pytest.approx((8.65, 16.8), rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stiffness", "is_held"), [(4e4, True), (400.0, False)])
 def test_two_forces_between_which_a_link_turns_are_held_however_little_friction_is_declared(
     stiffness: float, is_held: bool
@@ -118,6 +123,7 @@ def test_two_forces_between_which_a_link_turns_are_held_however_little_friction_
     assert (np.abs(played.forces[-200:] - 8.0).max() < 0.8) is not is_held
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("place", "newtons"), [(0.35, 6.5), (0.2, 20.0)])
 def test_a_posture_pulls_the_link_back_no_faster_than_its_force_follows(place: float, newtons: float) -> None:
     """After a motion along the link, by 6 cm: it went back at its full speed, and pressed with up to 25 N of 6.5."""

@@ -182,6 +182,7 @@ def test_the_example_presses_slides_moves_straight_and_is_led() -> None:
     assert moved > 3e-3, "0.7 N lead the arm"
 
 
+@pytest.mark.slow
 def test_a_scenario_keeps_the_outer_link_on_a_line_while_it_slides(tmp_path: Path) -> None:
     """The line through the link at the start; what it does not hold lets the link slide along it."""
     level, body = (-0.031, -1.083, -1.826, -0.482), RigidBody(ARM)
