@@ -12,9 +12,16 @@ from contact_truth import torques as torques_by_hand
 from wam_control.contact_estimator import ContactEstimatorParameters
 from wam_control.scenario import load as load_script
 from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
 from wam_description.signals import NO_LOAD, Load
 from wam_experiments.contact_benchmark.contacts import EvaluatedContact, credibility, evaluate_contacts, spans
-from wam_experiments.contact_benchmark.evaluation import BenchmarkExtent, BenchmarkResult, evaluate, scenarios
+from wam_experiments.contact_benchmark.evaluation import (
+    BenchmarkExtent,
+    BenchmarkResult,
+    ScenarioTask,
+    evaluate,
+    scenarios,
+)
 from wam_experiments.contact_benchmark.figure import figure
 from wam_experiments.contact_benchmark.free_motion import ContactFreeTime, contact_free_time, torque_errors
 from wam_experiments.contact_benchmark.over_topics import script
@@ -39,6 +46,7 @@ from wam_experiments.contact_benchmark.simulation import EstimatedHypothesis, Lo
 from wam_experiments.contact_benchmark.statistics import FEW, Interval, counted, events, quantile, rms, share
 from wam_experiments.contact_robustness.requirements import RequiredRow, required_table
 from wam_sim.batch import processes
+from wam_sim.simulation import Simulation
 
 CONFIGURATION = Configuration.load(packaged("wam"))
 ARM = CONFIGURATION.shared.arm
@@ -441,3 +449,15 @@ def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
     for name, value in mine._asdict().items():
         got = getattr(theirs, name)
         assert got == (pytest.approx(value, rel=1e-4, abs=1e-4, nan_ok=True) if isinstance(value, float) else value)
+
+
+def test_an_arm_that_is_drawn_too_stiff_for_the_configured_step_is_played_with_a_shorter_one() -> None:
+    barrett = Configuration.load(packaged("barrett-wam7"))
+    steps = tuple(ScenarioGenerator(barrett, 1).free(1)[0].steps[:1])
+    stiff = BenchmarkScenario("stiff", "free", {"driver:mismatch.stiffness": [1.15] * 7}, steps, ())
+    with pytest.raises(ParameterError, match=r"multiply timing\.substeps by 2"):
+        Simulation(barrett.with_values(stiff.values), steps)
+    played = play(barrett, stiff)
+    assert not played.failure
+    assert played.records[-1].stamp == pytest.approx(1e9 * sum(step.seconds for step in steps), abs=5e6)
+    assert str(ScenarioTask(barrett, stiff)) == "stiff"

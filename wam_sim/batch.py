@@ -93,7 +93,7 @@ def _result(future: Future[Output], given: Any) -> Output:
     try:
         return future.result()
     except Exception as error:
-        raise PieceError(f"{given!r}: {type(error).__name__}: {error}") from error
+        raise PieceError(f"{given}: {type(error).__name__}: {error}") from error
 
 
 # executors

@@ -64,6 +64,9 @@ class ScenarioTask(NamedTuple):
     configuration: Configuration
     scenario: BenchmarkScenario
 
+    def __str__(self) -> str:
+        return self.scenario.name
+
 
 def evaluate_scenario(task: ScenarioTask) -> ScenarioScore:
     """Simulate a scenario without ROS and score it."""

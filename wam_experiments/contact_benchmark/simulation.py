@@ -11,6 +11,7 @@ from wam_description.arm import Arm
 from wam_description.configuration import Configuration
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
+from wam_description.parameters import ParameterError
 from wam_description.signals import Load
 from wam_description.world import NO_SPRINGS, Obstacles, World
 from wam_driver.safety import Mode
@@ -112,7 +113,11 @@ def hypothesis(cover: str, facts: Mapping[str, Any]) -> EstimatedHypothesis:
 def play(configuration: Configuration, scenario: BenchmarkScenario) -> Played:
     """Play a scenario without ROS."""
     configured = configuration.with_values(scenario.values)
-    run = Simulation(configured, scenario.steps)
+    try:
+        run = Simulation(configured, scenario.steps)
+    except ParameterError:  # the drawn arm is stiffer than the configured one; do what the refusal advises
+        finer = {"timing.substeps": 2 * configured.shared.timing.substeps}
+        run = Simulation(configured.with_values(finer), scenario.steps)
     load_torques = LoadTorques(configured.shared.arm)
     records: list[Record] = []
     done = False
