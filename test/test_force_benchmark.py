@@ -340,7 +340,7 @@ def trials() -> list[ForceTrial]:
     found[3] = found[3]._replace(result=evaluated(DRAWN[3], held(2.0 * DRAWN[3].force)))
     above = trace([4.0 * DRAWN[4].force] + [DRAWN[4].force] * 3000, impact=0.0)
     found[4] = found[4]._replace(result=evaluated(DRAWN[4], above))
-    blind = held(0.0, reason="sd of 3.7 N; bend the arm", is_stopped=True, travel=0.0)
+    blind = held(0.0, reason="force known to +-3.7 N; bend the arm", is_stopped=True, travel=0.0)
     found[5] = found[5]._replace(result=evaluated(DRAWN[5], blind))
     return found
 
@@ -354,7 +354,7 @@ def test_the_page_counts_what_went_in_and_lists_each_failure() -> None:
     assert "`0123abcd`" in text
     assert "| all | 200 | 99% | 0% | 0% | 0% | 0% | 2 | 0 |" in text
     assert "`wam evaluate force --seed 7 --only 3`" in text
-    assert "| sd of # N | 1 |" in text
+    assert "| force known to +-# N | 1 |" in text
     assert "Unreported cycles" not in text
     lines = report(7, "0123abcd", found)
     assert "    wam evaluate force --seed 7 --only 4" in lines

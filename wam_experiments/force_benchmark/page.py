@@ -51,7 +51,7 @@ UNKNOWNS = ("masses, friction, cables, constants", "a payload, too", "the law of
 COURSES = ("one force", "another force first", "small force for long")
 STEADY = 1e-6  # m/s along the force, of a surface that moves across it
 LISTED = 40  # failures of one kind
-NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+NUMBER = re.compile(r"(?:(?<!\+)[-+])?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 HEAD = ("", "tasks", "within 10 %", "refused", "given up", "ended", "silent", "above the limit", "cycles unreported")
 
 
