@@ -1,4 +1,4 @@
-"""Priority: what is reported is what the system has granted, to every thread."""
+"""Priority: what is reported is what the system has granted, to every thread but the one that sends later."""
 
 import os
 import subprocess
@@ -19,10 +19,19 @@ if not permitted:
         ctypes.CDLL(None).prctl(4, 1)  # PR_SET_DUMPABLE, as after exec
 begin = lambda: threading.Thread(target=threading.Event().wait, daemon=True).start()
 begin()
+named = threading.Event()
+def sends_later():
+    ctypes.CDLL(None).prctl(15, b"dds.asyn.0.0")  # PR_SET_NAME, as the middleware does
+    named.set()
+    threading.Event().wait()
+later = threading.Thread(target=sends_later, daemon=True)
+later.start()
+named.wait()
 print(raise_priority(fifo, nice))
 begin()  # as the executor does
 threads = [int(thread) for thread in os.listdir("/proc/self/task")]
-print({os.sched_getscheduler(thread) == os.SCHED_FIFO for thread in threads})
+assert os.sched_getscheduler(later.native_id) == os.SCHED_OTHER
+print({os.sched_getscheduler(thread) == os.SCHED_FIFO for thread in threads if thread != later.native_id})
 print({os.getpriority(os.PRIO_PROCESS, thread) for thread in threads})
 print(SESSION.read_text().split()[-1] if SESSION.exists() else 0)
 """

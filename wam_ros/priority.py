@@ -3,6 +3,10 @@
 On Linux priority belongs to the thread, and the middleware has threads of its own.  The niceness of threads counts only
 within their session where the kernel shares processors between sessions first (autogroup), and bring-up gives each
 process a session of its own: there the session needs the niceness, too.
+
+One thread of the middleware is left as it is: the one that sends later, `dds.asyn`, asks again and again for what
+another thread holds.  Ahead of all others, on the one processor that a container may have, it would never let that
+thread go on.
 """
 
 import os
@@ -11,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 SESSION: Final = Path("/proc/self/autogroup")
+SENDS_LATER: Final = "dds.asyn"  # how the name of that thread begins
 PRIORITY: Final = "priority"  # key of what was granted, in the diagnostics
 
 
@@ -27,21 +32,28 @@ def raise_priority(fifo: int, niceness: int) -> str:
     What was granted, for people.
     """
     level = os.sched_param(fifo)  # inherited by threads that begin later: the executor has one for its timers
-    if fifo and _granted(lambda thread: os.sched_setscheduler(thread, os.SCHED_FIFO, level)):
+    if fifo and _granted(lambda thread: os.sched_setscheduler(thread, os.SCHED_FIFO, level), SENDS_LATER):
         return f"SCHED_FIFO {fifo}"
     if niceness and _granted(lambda thread: os.setpriority(os.PRIO_PROCESS, thread, niceness)):
         return f"nice {niceness}{' with its session' if _session_granted(niceness) else ''}"
     return "usual"
 
 
-def _granted(ask: Callable[[int], None]) -> bool:
-    """Ask for something for all threads; whether the system has granted it to each that has not ended meanwhile."""
+def _granted(ask: Callable[[int], None], but: str = " ") -> bool:
+    """Ask for something for all threads; whether the system has granted it to each that has not ended meanwhile.
+
+    Parameters
+    ----------
+    ask : makes the request for a thread.
+    but : how the names of threads begin for which it is not made.
+    """
     for thread in Path("/proc/self/task").iterdir():
         try:
-            ask(int(thread.name))
+            if not (thread / "comm").read_text(encoding="utf-8").startswith(but):
+                ask(int(thread.name))
         except PermissionError:
             return False
-        except ProcessLookupError:
+        except (ProcessLookupError, FileNotFoundError):
             pass
     return True
 
