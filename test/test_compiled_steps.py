@@ -73,6 +73,7 @@ def history(made: Plant) -> bytes:
         made.step([0.4 * (1.0 if k % 200 < 90 else -1.0) * (k % 150 < 120)] * n, 1 + k % 3)
         rows += [made.theta, made.thetad, made.q, made.qd, made.strain_torque, made.cable_pull]
         rows.append(made.data.plastic.tolist())
+        rows.append([made.data.ncon])
     return repr(rows).encode()
 
 
@@ -80,6 +81,17 @@ CASES: dict[str, dict[str, Any]] = {
     "as configured": {},
     "no friction by tension": {"effects.tension_friction": (0.0,) * 4},
     "strands that go slack": {"effects.tension_friction": (1e-5,) * 4, "effects.pretension_share": (0.02,)},
+    "two surfaces, one of them hardening": {
+        "world.obstacles.names": ("bench", "foam"),
+        "world.obstacles.shapes": ("box", "cylinder"),
+        "world.obstacles.positions": (0.45, 0.0, 0.35, 0.45, 0.25, 0.6),
+        "world.obstacles.rotations": (0.0,) * 6,
+        "world.obstacles.sizes": (0.4, 0.4, 0.1, 0.1, 0.2, 0.0),
+        "world.obstacles.stiffness": (4000.0, 900.0),
+        "world.obstacles.damping": (20.0, 3.0),
+        "world.obstacles.hardening": (0.0, 60.0),
+        "world.obstacles.friction": (0.3, 0.8),
+    },
     "no creep": {"effects.creep": False, "effects.tension_friction": (0.0,) * 4},
 }
 
@@ -92,7 +104,9 @@ def test_the_steps_have_the_bits_of_plain_python(case: str, with_c: pytest.Monke
     plain = plant(**CASES[case])
     assert fast._advance is not None
     assert plain._advance is None
-    assert history(fast) == history(plain)
+    found = history(fast)
+    assert found == history(plain)
+    assert ("surfaces" in case) == (b"[2], " in found), "two contacts at once"
 
 
 @pytest.mark.parametrize("values", [{"friction.law": "stribeck"}])

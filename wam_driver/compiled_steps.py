@@ -8,15 +8,19 @@ from typing import Any
 
 import mujoco
 
+from wam_driver.surfaces import SHARPNESS, SMALLEST_DEPTH, SurfaceLaw
+
 Advance = Callable[..., list[float]]  # see the docstring of `advance` in fast_steps.c, without its first argument
 
 
-def compiled_steps(model: Any, data: Any) -> Advance | None:
+def compiled_steps(model: Any, data: Any, laws: list[SurfaceLaw], step: float) -> Advance | None:
     """What advances a plant in C; None where it has not been built, or for another MuJoCo.
 
     Parameters
     ----------
     model, data : of MuJoCo; they have to live as long as what is returned.
+    laws : of `Surfaces`.
+    step : of the plant, s.
     """
     try:
         built: Any = importlib.import_module("wam_driver.fast_steps")
@@ -27,6 +31,7 @@ def compiled_steps(model: Any, data: Any) -> Advance | None:
     if mujoco.mj_version() != built.MUJOCO:
         return None
     addresses = [ctypes.cast(function, ctypes.c_void_p).value for function in functions]
-    fixed = (model._address, data._address, *addresses, mujoco.FatalError)
+    constants = (step, SMALLEST_DEPTH, float(SHARPNESS))
+    fixed = (model._address, data._address, *addresses, mujoco.FatalError, laws, *constants)
     advance: Advance = partial(built.advance, fixed)
     return advance

@@ -1,5 +1,5 @@
 /* Plant.step of wam_driver/plant.py in C, for a build with WAM_COMPILE; same order, same bits.  What is rare stays in
- * Python: a shaft that begins or ends to stick, a slack strand, pushes, contacts.  MuJoCo is that of its Python package, already loaded;
+ * Python: a shaft that begins or ends to stick, a slack strand, pushes.  MuJoCo is that of its Python package, already loaded;
  * its functions come as addresses, and its errors become exceptions as in its own binding. */
 
 #include <Python.h>
@@ -49,11 +49,10 @@ static int may_leave(PyObject *low, PyObject *high, const mjtNum *velocity, Py_s
 }
 
 PyDoc_STRVAR(advance_doc,
-             "advance(fixed, count, is_set, low, high, direction, circuits, each, set_friction, apply_pushes,\n"
-             "    apply_surfaces)\n\n"
+             "advance(fixed, count, is_set, low, high, direction, circuits, each, set_friction, apply_pushes)\n\n"
              "Advance by `count` steps; the velocities of rotors and joints at the start of the last one, rad/s.\n"
              "`fixed`: addresses of model, data, mj_step1, mj_step2 and of what sets a handler of messages; the class of\n"
-             "the exception.  `is_set`: whether MuJoCo has the levels of friction.  `low`, `high`, `direction`: of\n"
+             "the exception; `laws` of Surfaces, the step of the plant, s, and two constants of Surfaces.  `is_set`: whether MuJoCo has the levels of friction.  `low`, `high`, `direction`: of\n"
              "DryFriction.  `each`: of CableCircuits, empty where nothing follows the torque.  `apply_pushes`: None\n"
              "without pushes.");
 
@@ -78,21 +77,69 @@ static int follow(PyObject *circuits, PyObject *each, PyObject *direction, mjDat
   return same ? 0 : PyObject_SetAttrString(circuits, "is_slack", found ? Py_True : Py_False);
 }
 
+static double value(PyObject *law, int place) { return PyFloat_AS_DOUBLE(PyTuple_GET_ITEM(law, place)); }
+
+/* The law of a contact; NULL with an exception where its geoms have none. */
+static PyObject *law_of(PyObject *laws, const mjContact *contact) {
+  for (Py_ssize_t i = PyList_GET_SIZE(laws) - 1; i >= 0; i--) {
+    PyObject *law = PyList_GET_ITEM(laws, i);
+    const long first = PyLong_AsLong(PyTuple_GET_ITEM(law, 0)), second = PyLong_AsLong(PyTuple_GET_ITEM(law, 1));
+    if ((first == contact->geom[0] && second == contact->geom[1]) ||
+        (first == contact->geom[1] && second == contact->geom[0]))
+      return law;
+  }
+  PyErr_Format(PyExc_KeyError, "geoms %d and %d touch without a law", contact->geom[0], contact->geom[1]);
+  return NULL;
+}
+
+/* _fractions of wam_driver/surfaces.py for one contact. */
+static double fraction(PyObject *const *law, const mjData *data, int i, double smallest, double sharpness) {
+  double deepest = smallest, total = 0.0;
+  for (int j = 0; j < data->ncon; j++)
+    if (law[j] == law[i]) deepest = fmax(deepest, -data->contact[j].dist);
+  for (int j = 0; j < data->ncon; j++)
+    if (law[j] == law[i]) total += pow(fmax(-data->contact[j].dist, 0.0) / deepest, sharpness);
+  return total ? pow(fmax(-data->contact[i].dist, 0.0) / deepest, sharpness) / total : 0.0;
+}
+
+/* Surfaces.apply without movers; -1 with an exception where a contact has no law. */
+static int apply_surfaces(PyObject *laws, mjData *data, double step, double smallest, double sharpness) {
+  PyObject *law[data->ncon];
+  for (int i = 0; i < data->ncon; i++)
+    if (!(law[i] = law_of(laws, data->contact + i))) return -1;
+  for (int i = 0; i < data->ncon; i++) {
+    const double distance = data->contact[i].dist, hardening = value(law[i], 4);
+    const int row = data->contact[i].efc_address, end = row + (int)PyLong_AsLong(PyTuple_GET_ITEM(law[i], 5));
+    if (row < 0) continue;
+    const int is_shared = data->ncon > 1 && PyObject_IsTrue(PyTuple_GET_ITEM(law[i], 6));
+    double stiffness = value(law[i], 2);
+    if (hardening && distance < 0.0) stiffness *= 1.0 - hardening * distance;
+    const double force = -(stiffness * distance + value(law[i], 3) * data->efc_vel[row]) *
+                         (is_shared ? fraction(law, data, i, smallest, sharpness) : 1.0);
+    data->efc_aref[row] = force * data->efc_R[row];
+    for (int k = row + 1; k < end; k++) data->efc_aref[k] = -data->efc_vel[k] / step;
+  }
+  return 0;
+}
+
 static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ssize_t given) {
   Py_ssize_t a_model, a_data, a_first, a_second, a_set;
-  PyObject *error;
-  if (given != 11 || !PyTuple_Check(args[0]) || !PyList_Check(args[3]) || !PyList_Check(args[4]) ||
+  PyObject *error, *laws;
+  double length, smallest, sharpness;
+  if (given != 10 || !PyTuple_Check(args[0]) || !PyList_Check(args[3]) || !PyList_Check(args[4]) ||
       !PyList_Check(args[5]) || !PyList_Check(args[7])) {
     PyErr_SetString(PyExc_TypeError, "advance does not take these arguments; see its docstring");
     return NULL;
   }
-  if (!PyArg_ParseTuple(args[0], "nnnnnO", &a_model, &a_data, &a_first, &a_second, &a_set, &error)) return NULL;
+  if (!PyArg_ParseTuple(args[0], "nnnnnOO!ddd", &a_model, &a_data, &a_first, &a_second, &a_set, &error, &PyList_Type,
+                        &laws, &length, &smallest, &sharpness))
+    return NULL;
   const mjModel *model = (const mjModel *)a_model;
   mjData *data = (mjData *)a_data;
   const Step first = (Step)a_first, second = (Step)a_second;
   const SetHandler set = (SetHandler)a_set;
   PyObject *low = args[3], *high = args[4], *direction = args[5], *circuits = args[6], *each = args[7];
-  PyObject *set_friction = args[8], *pushes = args[9] == Py_None ? NULL : args[9], *surfaces = args[10];
+  PyObject *set_friction = args[8], *pushes = args[9] == Py_None ? NULL : args[9];
   const long count = PyLong_AsLong(args[1]);
   const Py_ssize_t shafts = PyList_GET_SIZE(low);
   if (PyList_GET_SIZE(high) != shafts || PyList_GET_SIZE(direction) != shafts || PyList_GET_SIZE(each) > shafts ||
@@ -116,7 +163,7 @@ static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ss
     }
     if (half_step(first, set, error, model, data)) goto failed;
     if (pushes && call(pushes)) goto failed;
-    if (data->ncon && call(surfaces)) goto failed;
+    if (data->ncon && apply_surfaces(laws, data, length, smallest, sharpness)) goto failed;
     if (half_step(second, set, error, model, data)) goto failed;
     if (pushes) memset(data->qfrc_applied, 0, model->nv * sizeof(mjtNum));
     if (PyList_GET_SIZE(each) && follow(circuits, each, direction, data, &slack)) goto failed;

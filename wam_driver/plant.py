@@ -116,7 +116,7 @@ class Plant:
         self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
         is_plain = self._friction.is_steady and not self._movers  # what the steps in C do
-        self._advance = compiled_steps(model, data) if is_plain else None
+        self._advance = compiled_steps(model, data, self._surfaces.laws, step) if is_plain else None
         self._rest()
         self._kept = self._position.tolist(), self._plastic.tolist()
         if set(effects.pretension_share) != {1.0}:
@@ -248,7 +248,6 @@ class Plant:
                 circuits.each if circuits.depends_on_torque else [],
                 self._set_friction,
                 self._loads.apply_pushes if pushes else None,
-                self._surfaces.apply,
             )
             return
         for _ in range(count):

@@ -12,6 +12,7 @@ from wam_description.world import World
 
 Array = NDArray[np.float64]
 
+SurfaceLaw = tuple[int, int, float, float, float, int, bool]  # see `Surfaces.laws`
 SHARPNESS = (
     32  # of the sharing between the ends of a tube: energy is conserved to 0.2 %, and depths within 2 % count as equal
 )
@@ -38,6 +39,11 @@ class Surfaces:
     arm, world : the covers and what they may touch.
     movers : pushers and moving obstacles.
     step : of the plant, s.
+
+    Attributes
+    ----------
+    laws : of each pair its geoms, the stiffness, N/m, damping, N s/m, and hardening, 1/m, of the contact, the number of
+        its rows, and whether several contacts share the stiffness.
     """
 
     def __init__(self, model: Any, data: Any, arm: Arm, world: World, movers: Sequence[Mover], step: float) -> None:
@@ -48,10 +54,11 @@ class Surfaces:
         self._mover = {model.geom(mover.name).id: mover for mover in movers}
         given = {one.name: one for one in contact_pairs(arm, world)}
         laws = [given[model.pair(i).name] for i in range(model.npair)]
-        self._law = [
-            (law.stiffness, law.damping, law.hardening, size, law.is_shared)
-            for law, size in zip(laws, model.pair_dim.tolist(), strict=True)
+        self.laws: list[SurfaceLaw] = [
+            (*pair, float(law.stiffness), float(law.damping), float(law.hardening), size, law.is_shared)
+            for pair, law, size in zip(pairs, laws, model.pair_dim.tolist(), strict=True)
         ]
+        self._law = [law[2:] for law in self.laws]
 
     def apply(self) -> None:
         """Make each contact's force k_c depth + b_c speed, and let it stick within its friction cone.
