@@ -5,9 +5,9 @@ import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from wam_analysis.contact_list import NO_LINK, ListedContact
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import (
-    NO_LINK,
     NOT_RECORDED,
     STEADY,
     DemoSummary,
@@ -88,6 +88,7 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
         *_positions(summary.presses),
         *_reactions(summary),
         "",
+        *_contacts(summary.contacts),
         *_touches(summary.touches, summary.period),
     ]
     lines += _wrapped(_false_contacts(summary))
@@ -115,7 +116,7 @@ def _link_verdict(summary: DemoSummary) -> str:
     def wrong(touch: StepContact) -> float:
         if NOT_RECORDED in (touch.link_true, touch.link_estimated):
             return math.nan
-        return float(touch.link_true == NO_LINK or touch.link_true != touch.link_estimated)
+        return float(touch.link_true != touch.link_estimated)
 
     least = min((touch.right for touch in summary.touches if not math.isnan(touch.right)), default=0.0)
     return _answer(
@@ -128,7 +129,7 @@ def _link_verdict(summary: DemoSummary) -> str:
 
 def _position_verdict(summary: DemoSummary) -> str:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
-    touches = summary.touches
+    touches = [touch for touch in summary.touches if touch.link_true != NO_LINK]
     errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.reason]
     question = f"position within {100.0 * POSITION_TOLERANCE:g} cm"
     unknown = len(touches) - len(errors)
@@ -216,35 +217,63 @@ def _reactions(summary: DemoSummary) -> list[str]:
     return ["", *lines, *(line for one in stated for line in _wrapped(f"  {one}", "    "))] if stated else []
 
 
+def _contacts(contacts: Sequence[ListedContact]) -> list[str]:
+    """All that was estimated, from the estimate alone."""
+    title = "Estimated contacts, medians over each"
+    if not contacts:
+        return [title, "  none"]
+    first = ["", "time", "[s]", "link", "", "position", "[cm]", "force", "[N]", "second"]
+    head = ["step", "from", "to", "", "[%]", "", "+-", "", "+-", "[%]"]
+    rows = [
+        [
+            *(one.step, _number(one.begin, 2), _number(one.end, 2), one.link, _number(100.0 * one.probability, 0)),
+            "?*" if math.isnan(one.position) and one.reasons else _number(100.0 * one.position, 1),
+            _number(100.0 * one.position_sd, 1),
+            ">=" * one.is_lower_bound + _number(one.force, 2),
+            *(_number(one.force_sd, 2), _number(100.0 * one.second, 0)),
+        ]
+        for one in contacts
+    ]
+    lines = [title, *_table(rows, first, head)]
+    unknown = (reason for one in contacts if math.isnan(one.position) for reason in one.reasons)
+    for reason in dict.fromkeys(unknown):
+        lines += _wrapped(f"  * {reason}", "    ")
+    link = "link [%]: its probability; +-: standard deviation"
+    second = "second: of the time in which a second contact was suspected"
+    return [*lines, *_wrapped(f"  {link}; {second}", "    ")]
+
+
 def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
-    title = "Contacts, medians over their duration"
-    if not touches:
-        return [title, "  no pushing or pressing step was recorded"]
+    """What was estimated in each step, compared with the true contact as far as that was recorded."""
+    compared = [touch for touch in touches if touch.link_true != NOT_RECORDED]
+    if not compared:
+        return []
     first = ["", "link", "", "right", "position", "[cm]", "force", "[N]", ""]
     head = ["step", "true", "estimated", "[%]", "true", "est.", "true", "est.", "latency"]
     rows = [
         [
             *(touch.step, touch.link_true, touch.link_estimated, _number(100.0 * touch.right, 0)),
             _number(100.0 * touch.position_true, 1),
-            "?*" if touch.reason else _number(100.0 * touch.position_estimated, 1),
+            "?" if touch.reason else _number(100.0 * touch.position_estimated, 1),
             _number(touch.force_true, 2),
             f">={_number(touch.force_estimated, 2)}" if touch.reason else _number(touch.force_estimated, 2),
-            _latency(touch.latency, period),
+            "-" if touch.link_true == NO_LINK else _latency(touch.latency, period),
         ]
-        for touch in touches
+        for touch in compared
     ]
-    lines = [title, *_table(rows, first, head)]
-    for reason in dict.fromkeys(touch.reason for touch in touches if touch.reason):
-        lines += _wrapped(f"  * {reason}", "    ")
     right = "right: fraction of the contact's time in which the estimated link was the true one"
     latency = f"latency: of the detection; the simulator's contact is recorded every {1e3 * period:.0f} ms"
     force = "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world"
-    return [*lines, *_wrapped(f"  {right}; {force}; {latency}", "    ")]
+    return [
+        *("", "The same compared with the true contact, by step that pushes or presses"),
+        *_table(rows, first, head),
+        *_wrapped(f"  {right}; {force}; {latency}", "    "),
+    ]
 
 
 def _false_contacts(summary: DemoSummary) -> str:
     if not summary.free:
-        return "  false detections: not recorded"
+        return "  false detections: not known, the true contact was not recorded"
     longest = f", longest {1e3 * summary.longest_false_contact:.0f} ms" if summary.false_contact else ""
     return f"  false detections: {1e3 * summary.false_contact:.0f} ms{longest}, in {summary.free:.1f} s without contact"
 

@@ -10,7 +10,7 @@ from wam_analysis.task_forces import TaskForce, arm_of
 from wam_bag.bag import TableColumns
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
-from wam_sim.recording import RecordedRun
+from wam_sim.recording import RecordedRun, RecordedStep
 
 Numbers = NDArray[np.float64]
 Names = NDArray[np.str_]
@@ -100,6 +100,8 @@ class Traces(NamedTuple):
 def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
     """All signals at the stamps of the simulator's contact force, or of the next best topic that was recorded.
 
+    That is the estimated one, which has a message in every outer period; a program need not command a force in all.
+
     Parameters
     ----------
     run : the run.
@@ -110,17 +112,17 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
         forces, points = run.wrench(wrench), run.points(point)
         if forces is None:
             return ForceSignal(np.full(len(base), ""), np.full((len(base), 3), NAN), np.full(len(base), NAN))
-        row, known = _held(forces.stamp_ns, base)
+        row, known = held_rows(forces.stamp_ns, base)
         force = np.where(known[:, np.newaxis], forces.force[row], NAN)
         position = np.full(len(base), NAN)
         if points is not None:
-            at, is_there = _held(points.stamp_ns, base)
+            at, is_there = held_rows(points.stamp_ns, base)
             same = is_there & known & (points.stamp_ns[at] == forces.stamp_ns[row])
             position[same] = points.point[at[same], 0]
         return ForceSignal(np.array(forces.frames, np.str_)[row], force, position)
 
     base = np.empty(0, np.int64)
-    for name in ("sim/contact/wrench", "force_command", "contact/wrench"):
+    for name in ("sim/contact/wrench", "contact/wrench", "force_command"):
         if (columns := run.wrench(name)) is not None:
             base = columns.stamp_ns
             break
@@ -137,12 +139,19 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
     return Traces(base, commanded, measured, true, estimated, signal("sim/disturbance"))
 
 
+def start_of(traces: Traces, steps: Sequence[RecordedStep]) -> int:
+    """From which times are counted, ns: the start of the scenario, or of the recording where none was played."""
+    if steps:
+        return steps[0].begin
+    return int(traces.stamp[0]) if len(traces.stamp) else 0
+
+
 def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:
     """The cover on which the force loop controls the force at each instant, (k,); where unknown, what is touched."""
     columns = run.bag.topics.get(f"{run.namespace}/force_axis")
     if not isinstance(columns, TableColumns) or not len(columns.stamp_ns):
         return np.asarray(touched.astype(object))
-    row, known = _held(columns.stamp_ns, base)
+    row, known = held_rows(columns.stamp_ns, base)
     frames = np.array(columns.frames, object)[row]
     return np.asarray(np.where(known & (frames != BASE), frames, touched), object)
 
@@ -170,7 +179,7 @@ def _on_links(
     return found[0], found[1]
 
 
-def _held(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
+def held_rows(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
     """Row of the last message at or before each instant, and whether there is one and it is still held."""
     row = np.searchsorted(stamps, base, side="right") - 1
     known = row >= 0
