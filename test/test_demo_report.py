@@ -291,7 +291,7 @@ def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
     script.write_text(json.dumps({"steps": steps}))
     configuration = Configuration.load(packaged("wam"))
     assert "no contact" in record(configuration, load_steps(script, configuration.shared.arm), bag)
-    assert _report(bag, True, task)
+    assert _report(bag, True, task).is_there
     assert (bag / "demo.png").is_file()
     out, err = capsys.readouterr()
     assert "no report of task follow-surface" in err
@@ -590,9 +590,9 @@ def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
                 writer.write(connection, stamp, store.serialize_cdr(message, kind))
     before = sorted((tmp_path / "bag").iterdir())
     first = "Demonstration of /wam: 1 steps, 1.0 s, unknown, done"
-    assert first in report(tmp_path / "bag")
+    assert first in report(tmp_path / "bag").text
     assert sorted((tmp_path / "bag").iterdir()) == before
-    assert str(tmp_path / "drawn.png") in report(tmp_path / "bag", tmp_path / "drawn.png")
+    assert str(tmp_path / "drawn.png") in report(tmp_path / "bag", tmp_path / "drawn.png").text
     assert (tmp_path / "drawn.png").is_file()
     assert list(read(tmp_path / "bag", TOPICS_READ, may_lack=True).topics) == ["/wam/status"]
 

@@ -4,6 +4,7 @@ import math
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from wam_analysis.contact_list import NO_LINK, ListedContact
 from wam_analysis.demo_figure import save
@@ -26,21 +27,24 @@ from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
 POSITION_TOLERANCE = 0.04  # m
+NO = ": NO ("  # begins what an answer of the verdict has against it
 WIDTH, STEP = 100, 24  # columns of the report, and of the name of a step
 
 
-def report(bag: Path, picture: Path | None = None) -> str:
+class DemoReport(NamedTuple):
+    """The report as text, at most 100 columns wide, and those answers of the verdict that are no."""
+
+    text: str
+    unmet: tuple[str, ...]
+
+
+def report(bag: Path, picture: Path | None = None) -> DemoReport:
     """Evaluate a recorded demonstration, and draw it.
 
     Parameters
     ----------
     bag : directory of the bag, or its .mcap file.
     picture : PNG file to write, None for no picture.
-
-    Returns
-    -------
-    str
-        verdict and tables, at most 100 columns wide.
 
     Raises
     ------
@@ -62,7 +66,8 @@ def report(bag: Path, picture: Path | None = None) -> str:
         except OSError as error:
             notes = (f"the picture was not written: {error}",)
     files = [f"bag      {bag}", *([f"picture  {picture}"] if picture is not None and picture.is_file() else [])]
-    return "\n".join([text(summary, notes), "", *files])
+    unmet = tuple(answer for answer in verdict(summary) if NO in answer)
+    return DemoReport("\n".join([text(summary, notes), "", *files]), unmet)
 
 
 def reaction_report(bag: Path) -> str:
@@ -108,7 +113,7 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> str:
     done = [press for press in presses if not press.is_refused]
     errors = [abs(press.error(press.true)) + 100.0 * press.ripple / abs(press.commanded) for press in done]
     if len(done) < len(presses):
-        return f"{question}: NO ({len(presses) - len(done)} of {len(presses)} refused or held)"
+        return f"{question}{NO}{len(presses) - len(done)} of {len(presses)} refused)"
     return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, lambda worst: f"{worst:.1f} %")
 
 
@@ -142,7 +147,7 @@ def _answer(
 ) -> str:
     known = [value for value in values if not math.isnan(value)]
     if known and not all(good(value) for value in known):
-        return f"{question}: NO ({worst(max(known))})"
+        return f"{question}{NO}{worst(max(known))})"
     if not known or len(known) < len(values):
         return f"{question}: NOT SHOWN"
     return f"{question}: YES ({worst(max(known))})"
@@ -176,7 +181,7 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
         *_table(rows, head),
         "  true: of all that acts on the link (simulator), the part along the commanded force; +-: half of",
         "    its range; measured: force loop; estimated: contact estimator",
-        *["  held: the force was refused or the arm held its position, see below"][
+        *["  refused: the arm did not follow the command, see below"][
             : any(p.is_refused for p in presses)
         ],
     ]
@@ -213,7 +218,7 @@ def _reactions(summary: DemoSummary) -> list[str]:
     stated = [
         line for step in summary.steps for line in sentences(step.name, within(summary.reactions, step.begin, step.end))
     ]
-    lines = ["Commands that were refused, held or doubted"] if stated else []
+    lines = ["Commands that were refused, and what was reported of others"] if stated else []
     return ["", *lines, *(line for one in stated for line in _wrapped(f"  {one}", "    "))] if stated else []
 
 
@@ -262,7 +267,7 @@ def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
         for touch in compared
     ]
     right = "right: fraction of the contact's time in which the estimated link was the true one"
-    latency = f"latency: of the detection; the simulator's contact is recorded every {1e3 * period:.0f} ms"
+    latency = f"latency: of the detection where the contact began; the true one is recorded every {1e3 * period:.0f} ms"
     force = "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world"
     return [
         *("", "The same compared with the true contact, by step that pushes or presses"),
@@ -308,13 +313,13 @@ def _number(value: float, digits: int) -> str:
 def _per_cent(press: SteadyPress, force: float) -> str:
     error = press.error(force)
     if press.is_refused:
-        return "held"
+        return "refused"
     return "-" if math.isnan(error) else f"{error:+.1f} %"
 
 
 def _latency(latency: float | None, period: float) -> str:
     if latency is None:
-        return "held"
+        return "goes on"
     if math.isnan(latency):
         return "missed"
     return "before" if latency < 0.0 else f"<{1e3 * (latency + period):.0f} ms"

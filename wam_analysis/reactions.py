@@ -44,7 +44,7 @@ def sentences(name: str, reactions: Sequence[RecordedReaction]) -> list[str]:
     stated = []
     for kind in dict.fromkeys(one.name for one in reactions):
         first, *others = [one for one in reactions if one.name == kind]
-        verb = kind if kind == REFUSAL else f"{'held' if first.holds else 'reported'} ({kind})"
+        verb = kind if kind == REFUSAL else f"{REFUSAL if first.holds else 'reported'} ({kind})"
         again = f" and {len(others)} times more" if others else ""
         stated.append(f"{name}: {verb} from {first.begin / 1e9:.2f} to {first.end / 1e9:.2f} s{again}: {first.reason}")
     return stated

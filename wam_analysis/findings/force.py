@@ -54,9 +54,9 @@ def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction
 
 
 def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]]) -> list[str]:
-    """What was refused or held, and what was doubted, in a sentence each."""
+    """What was refused, and what was reported of others, in a sentence each."""
     verdict = []
-    for holds, what in ((True, "REFUSED or held"), (False, "Reported while pressing")):
+    for holds, what in ((True, "REFUSED"), (False, "Reported while pressing")):
         named = [
             f"{name} ({one.name} at {one.begin / 1e9:.2f} s)"
             for name, reactions in found.items()
@@ -154,7 +154,7 @@ def _touched(one: HeldForce) -> str:
 def _press_findings(one: HeldForce) -> list[Finding]:
     name, response = one.hold.name, one.response
     seconds = sum(reaction.end - reaction.begin for reaction in one.hold.reactions if reaction.holds) / 1e9
-    found = [Finding(f"{name}: refused or held for", "s", seconds)] if seconds else []
+    found = [Finding(f"{name}: refused for", "s", seconds)] if seconds else []
     if one.hold.is_refused:
         return found
     if one.predicted is not None:
