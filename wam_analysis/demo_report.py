@@ -181,9 +181,7 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
         *_table(rows, head),
         "  true: of all that acts on the link (simulator), the part along the commanded force; +-: half of",
         "    its range; measured: force loop; estimated: contact estimator",
-        *["  refused: the arm did not follow the command, see below"][
-            : any(p.is_refused for p in presses)
-        ],
+        *["  refused: the arm did not follow the command, see below"][: any(p.is_refused for p in presses)],
     ]
 
 
