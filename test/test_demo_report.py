@@ -229,7 +229,7 @@ def test_a_force_that_swings_is_not_right_because_its_mean_is():
     recording.set(recording.true, 8.5, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
     press = recording.summary().presses[1]
     assert (press.commanded, press.true) == (4.0, pytest.approx(4.0))
-    assert "force within 10 %: NO (12.5 %)" in verdict(recording.summary())
+    assert "force within 10 %: NO (12.5 %, 12.5 % of it ripple)" in verdict(recording.summary())
 
 
 def test_lost_contact_while_pressing_counts_as_no_force():

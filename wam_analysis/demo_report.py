@@ -111,10 +111,16 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> str:
     question = f"force within {FORCE_TOLERANCE:g} %"
     # not the mean alone: a force that swings or is lost is not the commanded one
     done = [press for press in presses if not press.is_refused]
-    errors = [abs(press.error(press.true)) + 100.0 * press.ripple / abs(press.commanded) for press in done]
+    ripples = [100.0 * press.ripple / abs(press.commanded) for press in done]
+    errors = [abs(press.error(press.true)) + ripple for press, ripple in zip(done, ripples, strict=True)]
     if len(done) < len(presses):
         return f"{question}{NO}{len(presses) - len(done)} of {len(presses)} refused)"
-    return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, lambda worst: f"{worst:.1f} %")
+
+    def of(worst: float) -> str:
+        ripple = f"{ripples[errors.index(worst)]:.1f}"
+        return f"{worst:.1f} %" + (f", {ripple} % of it ripple" if float(ripple) else "")
+
+    return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, of)
 
 
 def _link_verdict(summary: DemoSummary) -> str:
