@@ -676,7 +676,7 @@ def test_what_the_estimated_position_gains_is_the_force_of_the_same_torques_at_e
     assert found.true.force == pytest.approx(8.4, rel=1e-6)
     assert found.configured.force < found.estimated.force < found.true.force - 0.1
     lines = text(summary).splitlines()
-    table = next(i for i, line in enumerate(lines) if line.startswith("What the estimated contact position gains"))
+    table = next(i for i, line in enumerate(lines) if line.startswith("The force that the same torques are at three contact positions"))
     (row,) = [line for line in lines[table : table + 8] if line.strip().startswith("press 8 N")]
     assert "25.0  8.40" in row
     assert "  used by the force loop, +- its standard deviation [cm]: 28.0 +- 5.0, 28.0 +- 5.0" in lines

@@ -210,7 +210,7 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
         return []
     first = ["", "", "configured", "[cm]", "", "estimated", "[cm]", "", "true", "[cm]", ""]
     head = ["step", "true", "at", "[N]", "error", "at", "[N]", "error", "at", "[N]", "error"]
-    title = "What the estimated contact position gains: the same torques, measured as a force there"
+    title = "The force that the same torques are at three contact positions"
     error = "  error: to the true force; at the true position, the error of the torques alone"
     places = _wrapped(f"  used by the force loop, +- its standard deviation [cm]: {', '.join(used)}", "    ")
     other = "  measured above: by all positions that this leaves open, so by none of these three"
