@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import NAN, Mask, Names, Numbers, Times, Traces, held_rows, start_of
+from wam_analysis.demo_traces import NAN, Mask, Names, Numbers, Times, Traces, held_rows
 from wam_analysis.measures.runs import runs
 from wam_bag.bag import TableColumns
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
@@ -26,7 +26,7 @@ class ListedContact(NamedTuple):
     Attributes
     ----------
     step : name of the step, '' outside of a scenario.
-    begin, end : s from the start of the scenario, or of the recording without one.
+    begin, end : s of the arm's time; from the start of the recording where that is a system's clock.
     link : estimated most of the time.
     lasting : fraction of the time in which that link was estimated.
     probability : of that link.
@@ -175,8 +175,7 @@ def _time(traces: Traces, steps: Sequence[RecordedStep], begin: int, end: int) -
     """The step in which most of some rows is, and both ends, s."""
     first, last = int(traces.stamp[begin]), int(traces.stamp[end - 1])
     name = next((step.name for step in steps if step.begin <= (first + last) // 2 < step.end), "")
-    zero = start_of(traces, steps)
-    return name, (first - zero) / 1e9, (last - zero) / 1e9
+    return name, (first - traces.zero) / 1e9, (last - traces.zero) / 1e9
 
 
 def _certainty(run: RecordedRun, traces: Traces) -> _Certainty:

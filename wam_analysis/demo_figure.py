@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
 from wam_analysis.demo_summary import DemoSummary, StepContact
-from wam_analysis.demo_traces import ForceSignal, Mask, Numbers, Traces, start_of
+from wam_analysis.demo_traces import ForceSignal, Mask, Numbers, Traces
 from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, STYLE, TRUE
 from wam_analysis.recorded import RecordedArm
 from wam_description.arm import Arm
@@ -164,13 +164,20 @@ def _contact(signal: ForceSignal, row: int) -> Contact:
 # time
 
 
+def _zero(summary: DemoSummary) -> int:
+    """Start of the scenario, or of the recording, ns."""
+    if summary.steps:
+        return summary.steps[0].begin
+    return int(summary.traces.stamp[0]) if len(summary.traces.stamp) else 0
+
+
 def seconds_at(summary: DemoSummary, stamp: int) -> float:
     """Time axis of the pictures, s, of a stamp, ns."""
-    return (stamp - start_of(summary.traces, summary.steps)) / 1e9
+    return (stamp - _zero(summary)) / 1e9
 
 
 def _seconds(summary: DemoSummary) -> Numbers:
-    seconds: Numbers = (summary.traces.stamp - start_of(summary.traces, summary.steps)) / 1e9
+    seconds: Numbers = (summary.traces.stamp - _zero(summary)) / 1e9
     return seconds
 
 
@@ -261,7 +268,7 @@ def _thinned(summary: DemoSummary, most: int) -> DemoSummary:
 
 
 def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
-    zero = start_of(summary.traces, summary.steps)
+    zero = _zero(summary)
     if summary.steps:
         first = int(summary.traces.stamp[0]) if len(summary.traces.stamp) else zero
         begin = max(first - zero, 0) / 1e9  # a recording may begin later than its scenario
@@ -277,7 +284,7 @@ def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
 
 
 def _middle(summary: DemoSummary, step: RecordedStep | StepContact) -> float:
-    return ((step.begin + step.end) / 2.0 - start_of(summary.traces, summary.steps)) / 1e9
+    return ((step.begin + step.end) / 2.0 - _zero(summary)) / 1e9
 
 
 def _name_steps(axes: Axes, summary: DemoSummary, letters: int) -> None:

@@ -220,7 +220,9 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
 def _reactions(summary: DemoSummary) -> list[str]:
     """Commands that were not simply obeyed, by step."""
     stated = [
-        line for step in summary.steps for line in sentences(step.name, within(summary.reactions, step.begin, step.end))
+        line
+        for step in summary.steps
+        for line in sentences(step.name, within(summary.reactions, step.begin, step.end), summary.traces.zero)
     ]
     lines = ["Commands that were refused, and what was reported of others"] if stated else []
     return ["", *lines, *(line for one in stated for line in _wrapped(f"  {one}", "    "))] if stated else []

@@ -209,7 +209,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         gone=lost.gone,
         lost=tuple(lost.sentences(bag.first_ns)),
         moment=_moment(run, traces, presses),
-        notes=(*notes, *run.parameters.notes, *driver_faults(run)),
+        notes=(*notes, *run.parameters.notes, *driver_faults(run, traces.zero)),
     )
 
 
@@ -382,9 +382,9 @@ def _counts(recording: dict[str, str]) -> tuple[int, int]:
     return received, dropped
 
 
-def driver_faults(run: RecordedRun) -> list[str]:
-    """What the driver stopped for, a sentence each."""
-    texts = [f"driver fault at {fault.stamp / 1e9:.2f} s: {fault.reason}" for fault in run.faults]
+def driver_faults(run: RecordedRun, zero: int) -> list[str]:
+    """What the driver stopped for, a sentence each; times from `zero` on, ns."""
+    texts = [f"driver fault at {(fault.stamp - zero) / 1e9:.2f} s: {fault.reason}" for fault in run.faults]
     return list(dict.fromkeys(texts))
 
 

@@ -10,7 +10,7 @@ from wam_analysis.task_forces import TaskForce, arm_of
 from wam_bag.bag import TableColumns
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
-from wam_sim.recording import RecordedRun, RecordedStep
+from wam_sim.recording import RecordedRun
 
 Numbers = NDArray[np.float64]
 Names = NDArray[np.str_]
@@ -19,6 +19,7 @@ Mask = NDArray[np.bool_]
 
 NAN = float("nan")
 HELD = 100_000_000  # ns for which a message is held; after that the signal is unknown
+CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
 RECORDED = (
     "force_command", "force_measured", "contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point",
@@ -92,6 +93,11 @@ class Traces(NamedTuple):
         component[signal.acts & (signal.frame != self.commanded.frame)] = NAN
         return component
 
+    @property
+    def zero(self) -> int:
+        """From which times are counted, ns: 0, as the arm's time begins with the run, unless it is a system's clock."""
+        return int(self.stamp[0]) if len(self.stamp) and self.stamp[0] > CLOCK else 0
+
     def during(self, begin: int, end: int) -> Mask:
         """The instants from begin up to end, ns."""
         return (self.stamp >= begin) & (self.stamp < end)
@@ -137,13 +143,6 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
         commanded = commanded._replace(frame=frames.astype(np.str_), force=forces)
     commanded, measured = _on_links(run, base, (commanded, measured), covers)
     return Traces(base, commanded, measured, true, estimated, signal("sim/disturbance"))
-
-
-def start_of(traces: Traces, steps: Sequence[RecordedStep]) -> int:
-    """From which times are counted, ns: the start of the scenario, or of the recording where none was played."""
-    if steps:
-        return steps[0].begin
-    return int(traces.stamp[0]) if len(traces.stamp) else 0
 
 
 def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:

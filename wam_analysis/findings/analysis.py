@@ -148,7 +148,7 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
         forces = ", ".join(f"{hold.commanded:.3g} N" for hold in recording.holds)
         sentences.append(f"The arm was commanded to press {times(len(recording.holds))} ({forces}).")
     sentences += _touched(summary.traces)
-    faults = driver_faults(recording.run)
+    faults = driver_faults(recording.run, summary.traces.zero)
     sentences += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
