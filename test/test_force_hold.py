@@ -128,7 +128,7 @@ def test_the_advice_where_a_force_is_not_sensed_is_followed_and_the_force_is_sen
         assert loop.reaction is ForceReaction.NOT_SENSED
         more, turned = (re.search(text, loop.reason) for text in (r"command ([\d.]+) N,", r"to ([\d.]+) rad"))
         assert bool(more) is helps
-        assert ("more force, up to 5 times, would not be known" in loop.reason) is not helps
+        assert ("no allowed force up to 5 times as large" in loop.reason) is not helps
         if more:
             enough = force_loop(ARM, PINNED)
             press(enough, q, direction, float(more[1]))
@@ -137,9 +137,12 @@ def test_the_advice_where_a_force_is_not_sensed_is_followed_and_the_force_is_sen
         other = force_loop(ARM, PINNED)
         press(other, (*q[:3], float(turned[1])), direction, force)
         assert other.reaction is not ForceReaction.NOT_SENSED
+    limited = force_loop(ARM, replace(PINNED, force_limit=25.0))
+    press(limited, bent(0.2), radial(bent(0.2)), 10.0)
+    assert "command 30 N" not in limited.reason
     unknown = force_loop(ARM, QUIET)
     press(unknown, bent(0.2), radial(bent(0.2)), 5.0)
-    assert "its position: command another direction or position (more force, up to 5 times," in unknown.reason
+    assert "its position: command another direction or position (no allowed force" in unknown.reason
 
 
 @pytest.mark.parametrize(

@@ -346,7 +346,8 @@ class ForceHold:
             return "bend the arm, or command more force, another direction or position"
 
         def is_sensed(axis: ForceAxis, force: float) -> bool:
-            return axis.force_sd <= RESUME * parameters.sensing.sd_limit(force, point.is_pinned)
+            sd_limit = parameters.sensing.sd_limit(force, point.is_pinned)
+            return force <= parameters.force_limit and axis.force_sd <= RESUME * sd_limit
 
         self._advice = self._advice or advice(others(), desired, is_sensed)
         return self._advice

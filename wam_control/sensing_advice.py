@@ -4,13 +4,14 @@ More force helps where the errors of the torques are most of the uncertainty.  A
 surface grow with the force; then another pose helps, if any does.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from wam_control.force_axis import ForceAxis
 
 MORE = (1.25, 1.6, 2.0, 3.0, 5.0)  # times the commanded force, tried in this order
-GRID, FARTHEST = 0.1, 1.6  # rad: angles that are tried, and how far from the present one
+GRID, FARTHEST = 0.2, 1.6  # rad: angles that are tried, and how far from the present one; finer took a period
 
 
 class OtherAxes(NamedTuple):
@@ -47,18 +48,23 @@ def advice(others: OtherAxes, force: float, is_sensed: Callable[[ForceAxis, floa
     enough = next((each for each in larger if is_sensed(others.at(others.q, each), each)), None)
     ways += [f"command {enough:g} N"] if enough else []
     rest = "command another direction or position"
-    more = "" if enough else f" (more force, up to {MORE[-1]:g} times, would not be known well enough)"
+    more = "" if enough else f" (no allowed force up to {MORE[-1]:g} times as large is known well enough)"
     return f"{', or '.join([*ways, rest])}{more}"
 
 
 def _angle(others: OtherAxes, force: float, is_sensed: Callable[[ForceAxis, float], bool]) -> float | None:
-    """The nearest angle of the joint, rad, at which the force is sensed well enough, None without one."""
+    """The nearest angle of the joint, rad, at which the force is sensed well enough, to half of the grid; or None."""
     present = others.q[others.joint]
+
+    def is_good(angle: float) -> bool:
+        pose = [*others.q[: others.joint], angle, *others.q[others.joint + 1 :]]
+        return others.lower <= angle <= others.upper and is_sensed(others.at(pose, force), force)
+
     count = round(FARTHEST / GRID)
     middle = round(present / GRID)
     grid = [GRID * (middle + i) for i in range(-count, count + 1)]
-    for angle in sorted(grid, key=lambda each: abs(each - present)):
-        pose = [*others.q[: others.joint], angle, *others.q[others.joint + 1 :]]
-        if others.lower <= angle <= others.upper and is_sensed(others.at(pose, force), force):
-            return angle
-    return None
+    found = next(filter(is_good, sorted(grid, key=lambda each: abs(each - present))), None)
+    if found is None:
+        return None
+    nearer = found + math.copysign(0.5 * GRID, present - found)
+    return nearer if is_good(nearer) else found
