@@ -30,6 +30,7 @@ class ForceStep(Node):
         super().__init__("force_step", namespace="wam")
         self.q: list[float] = []
         self.touch = self.measured = 0.0
+        self.refusal = ""
         self.posture = self.create_publisher(JointState, "joint_posture_command", 10)
         self.force = self.create_publisher(WrenchStamped, "force_command", 10)
         self.enable = self.create_client(SetBool, "driver/enable")
@@ -49,6 +50,8 @@ class ForceStep(Node):
 
     def take_status(self, message: DiagnosticStatus) -> None:
         facts = {item.key: item.value for item in message.values}
+        if message.name == "force_loop":  # where it does not obey a command, its message is the reason
+            self.refusal = message.message if "force_command" in facts.get("refused", "").split(", ") else ""
         if message.name != "driver":
             return
         if facts.get("mode") == "enabled":
@@ -85,11 +88,11 @@ class ForceStep(Node):
             sys.exit("no contact was detected; is the box at its position of config/wam.yaml?")
         for newtons in (5.0, 10.0):
             self.newtons, sum_of_all = newtons, 0.0
-            for _ in range(300):
+            for period in range(500):
                 yield
-            for _ in range(200):
-                sum_of_all += self.measured / 200
-                yield
+                if self.refusal:
+                    sys.exit(f"{newtons:g} N were refused: {self.refusal}")
+                sum_of_all += self.measured / 200 if period >= 300 else 0.0
             print(f"commanded {newtons:5.2f} N, measured {sum_of_all:5.2f} N", flush=True)
         self.newtons, self.wanted = 0.0, list(self.q)
         yield from self.move(ABOVE, 2.0)

@@ -141,6 +141,19 @@ def test_an_arm_that_cannot_be_pushed_is_told_with_what_to_do(stack: None) -> No
     assert [called(word)[0] for word in ("reset_fault", "reset", "enable")] == [0, 0, 0]
 
 
+def test_a_topic_that_is_silent_is_named_and_ends_the_command_in_time(stack: None) -> None:
+    code, out, err = called("echo", "status", "--count", "200", "--timeout", "3")
+    assert code == 1
+    count = out.count("---\n")
+    assert count > 3
+    waits = f"waits for message {count + 1} of 200 of status"
+    assert err.splitlines() == [
+        f"{waits}, which is published only when it changes; Ctrl-C ends, --timeout S after S seconds",
+        f"wam call: {waits}; none for 3 s (--timeout)",
+    ]
+    assert "--timeout is -1" in called("echo", "status", "--timeout", "-1")[2]
+
+
 def test_messages_are_printed_and_the_time_is_stopped(stack: None) -> None:
     code, out, _ = called("echo", "joint_states", "--count", "1")
     assert code == 0

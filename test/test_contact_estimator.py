@@ -222,6 +222,16 @@ def test_a_second_contact_is_certain_where_friction_of_the_first_could_not_be_it
         assert len(certain) > share * len(found) if share else not certain
 
 
+def test_where_friction_of_the_only_contact_turns_the_reason_names_that_too() -> None:
+    """As where a stuck joint lets go while the arm presses: the same change as by a light second contact."""
+    turned = after_steady_contact("outer_link", 0.3, (0.0, 6.0, 8.0), SENSORS.second)  # in place of the first force
+    suspected = [estimate for estimate in turned if estimate.contacts == 2]
+    assert suspected
+    for estimate in suspected:
+        assert CERTAIN_SECOND not in estimate.reason
+        assert "or friction of this one has turned" in estimate.reason
+
+
 def test_a_contact_that_presses_harder_is_no_second_one() -> None:
     """`push` replaces the force on a cover: at the same place there is one contact, elsewhere another torque."""
     harder = after_steady_contact("outer_link", 0.3, (0.0, 0.0, 20.0), SENSORS.second)

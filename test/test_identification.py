@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 from arms import CONFIGURATION, NOWHERE, WAM, changed
 from numpy.typing import NDArray
+from rosbags.rosbag2 import StoragePlugin, Writer
+from test_bag import STORE, joint_state
 
 from wam_analysis.identification.base_set import gravity_base_set
 from wam_analysis.identification.fit import Identification, identify
@@ -291,6 +294,26 @@ def test_states_that_are_missing_or_braked_are_not_used() -> None:
     samples = motion(evenly(planted.time[kept], planted.theta[kept], torque[kept]))
     assert samples.time.min() > 5.0
     assert not ((samples.time > 8.95) & (samples.time < 9.55)).any()
+
+
+def test_a_recording_with_a_contact_gives_no_model_that_no_configuration_could_have(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Who pushes motor1 along its motion, by more than its friction, takes the friction below zero."""
+    planted = Planted(14.0, 5)
+    pushed = planted.torque - [0.3, 0.0, 0.0, 0.0] * np.sign(np.gradient(planted.theta, axis=0))
+    bag, model, names = tmp_path / "bag", tmp_path / "model.yaml", [f"motor{i}" for i in (1, 2, 3, 4)]
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection("/wam/motor_states", "sensor_msgs/msg/JointState", typestore=STORE)
+        for time, theta, torque in zip(planted.time, planted.theta.tolist(), pushed.tolist(), strict=True):
+            stamp = round(1e9 * time)
+            writer.write(topic, stamp, joint_state(stamp, names, theta, [0.0] * 4, torque))
+    with pytest.raises(SystemExit) as ended:
+        main(["identify", str(bag), "--write", str(model)])
+    assert ended.value.code == 1
+    assert not model.exists()
+    reason = capsys.readouterr().err
+    assert re.search(r"'model\.motors\.coulomb_\w+' is -0\.\d+ N m; allowed: 0 to 100\. .*without contact", reason)
 
 
 @pytest.mark.parametrize(

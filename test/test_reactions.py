@@ -1,4 +1,4 @@
-"""Forces and tasks that were refused, held or doubted are seen in analysis and report, with reason and time."""
+"""Forces and tasks that were refused or doubted are seen in analysis and report, with reason and time."""
 
 from pathlib import Path
 
@@ -64,7 +64,7 @@ def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[D
     summary, analysis = found
     begins = {step.name: step.begin / 1e9 for step in summary.steps}
     sections = {section.key: section for section in analysis.sections}
-    (said,) = (line for line in sections["verdict"].sentences if line.startswith("REFUSED or held"))
+    (said,) = (line for line in sections["verdict"].sentences if line.startswith("REFUSED"))
     for name, (kind, reason) in REFUSED.items():
         assert any(line.startswith(name) and reason in line for line in sections["force"].sentences), name
         assert f"({kind} at {begins[name]:.2f} s)" in said or f"({kind} at {begins[name] + 0.005:.2f} s)" in said
@@ -77,7 +77,7 @@ def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: 
     sections = {section.key: section for section in analysis.sections}
     measured = {one.name for key in ("force", "stability") for one in sections[key].findings}
     for name in REFUSED:
-        assert {one.partition(": ")[2] for one in measured if one.startswith(name)} == {"refused or held for"}
+        assert {one.partition(": ")[2] for one in measured if one.startswith(name)} == {"refused for"}
     assert "press across: overshoot" in measured
     assert not any("MISSED" in line for line in sections["verdict"].sentences)
 
@@ -85,13 +85,13 @@ def test_of_a_refused_force_nothing_is_measured_and_no_contact_is_missed(found: 
 @pytest.mark.slow
 def test_the_table_of_the_demonstration_shows_what_was_held(found: tuple[DemoSummary, Analysis]) -> None:
     told = text(found[0])
-    assert "force within 10 %: NO (4 of 6 refused or held)" in told
-    rows = {line.strip().split("  ")[0]: line for line in told.split("Contacts, ")[0].splitlines()}
+    assert "force within 10 %: NO (4 of 6 refused)" in told
+    rows = {line.strip().split("  ")[0]: line for line in told.split("Estimated contacts, ")[0].splitlines()}
     for name in ("along the arm", "above the limit", "one place twice, axis 1"):
-        assert "held" in rows[name]
+        assert "refused" in rows[name]
         assert "%" not in rows[name]
     for name, (kind, _) in REFUSED.items():
-        assert f"  {name}: {kind if kind == 'refused' else f'held ({kind})'} from" in told
+        assert f"  {name}: {kind if kind == 'refused' else f'refused ({kind})'} from" in told
 
 
 @pytest.mark.slow
@@ -122,4 +122,4 @@ def test_what_lasts_a_moment_into_a_step_belongs_to_the_one_before() -> None:
     assert within([late], 1_000_000_000, 2_000_000_000) == ()
     assert len(within([late], 0, 1_000_000_000)) == 1
     again = [late, late._replace(begin=2_000_000_000, end=3_000_000_000)]
-    assert sentences("press", again) == ["press: reported (not_reached) from 0.00 to 1.00 s and 1 times more: why"]
+    assert sentences("press", again, 0) == ["press: reported (not_reached) from 0.00 to 1.00 s and 1 times more: why"]

@@ -14,7 +14,7 @@ from wam_bag.bag import BagError, raw, read
 from wam_bag.bag_writer import BagWriter
 from wam_bag.metadata import INFINITE
 from wam_cli import main as cli
-from wam_cli.commands.replay import reasons, stated
+from wam_cli.commands.replay import other_values, reasons, stated
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.status import CHANGES
@@ -183,6 +183,19 @@ def test_the_pushed_arm_says_something(bag: Path) -> None:
     assert np.abs(wrench.force).max() > 1.0, "a replay of zeros would show nothing"
 
 
+def test_a_configuration_that_differs_from_the_recording_is_reported_with_the_values(bag: Path) -> None:
+    """Who replays with a configuration means one value of it; the others change the result, too."""
+    other = {"contact_estimator:use_joint_sensors": False, "arm.gravity": [0.0, 0.0, -9.7]}
+    configuration = Configuration.load(packaged("wam")).with_values(other)
+    done = replay(bag, "contact_estimator", configuration)
+    assert {one.name for one in done.changed} >= {"contact_estimator:use_joint_sensors", "arm.gravity"}
+    (line,) = other_values(done)
+    assert line.startswith("--config differs from the recording in contact_estimator:use_joint_sensors=false, ")
+    assert line.endswith("to keep one: --set contact_estimator:use_joint_sensors=true")
+    assert "arm.gravity" in line
+    assert replay(bag, "contact_estimator").changed == ()
+
+
 @pytest.mark.parametrize(
     ("node", "value", "topic"),
     [
@@ -310,6 +323,7 @@ def test_the_command_prints_each_topic_and_says_by_its_code(bag: Path, capsys: p
     with pytest.raises(SystemExit) as ended:
         cli.main(["replay", str(bag), "gravity", "--config", "wam"])
     assert ended.value.code == 0
+    assert "differs from the recording" not in capsys.readouterr().out
     for config in ([], ["--config", "wam"]):
         with pytest.raises(SystemExit) as ended:
             cli.main(["replay", str(bag), "gravity", "--set", "arm.gravity=[0.0, 0.0, -9.7]", *config])

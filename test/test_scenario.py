@@ -303,6 +303,10 @@ def test_a_file_that_is_no_scenario_is_refused_by_name(tree: Any, text: str, tmp
 
 
 def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"scenario text is not a file; give the path of a YAML file"):
+        load("text", ARM)
+    with pytest.raises(ParameterError, match=r"given as a text of several lines; write it to a file"):
+        load("steps:\n  - {name: a, seconds: 1.0}\n", ARM)
     with pytest.raises(ParameterError, match=rf"scenario {tmp_path}/none\.yaml is not a file"):
         load(tmp_path / "none.yaml", ARM)
     path = tmp_path / "binary.yaml"

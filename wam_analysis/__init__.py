@@ -6,6 +6,7 @@ findings        the analysis behind `wam analyse`: sections of sentences and num
 foreign         recordings of other robots: any bag with joints, wrenches or mapped topics
 identification  from a recording of free motion to the controllers' model, behind `wam identify`
 demo_traces     forces and contacts of a run on one time base
+contact_list    the estimated contacts one by one, each compared with the true one
 task_forces     forces that tasks command, and what was measured of each
 reactions       what the force loop did instead of what was commanded, when and why
 demo_summary    the demonstration in numbers

@@ -4,10 +4,11 @@ import math
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+from wam_analysis.contact_list import NO_LINK, ListedContact
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import (
-    NO_LINK,
     NOT_RECORDED,
     STEADY,
     DemoSummary,
@@ -26,21 +27,24 @@ from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
 POSITION_TOLERANCE = 0.04  # m
+NO = ": NO ("  # begins what an answer of the verdict has against it
 WIDTH, STEP = 100, 24  # columns of the report, and of the name of a step
 
 
-def report(bag: Path, picture: Path | None = None) -> str:
+class DemoReport(NamedTuple):
+    """The report as text, at most 100 columns wide, and those answers of the verdict that are no."""
+
+    text: str
+    unmet: tuple[str, ...]
+
+
+def report(bag: Path, picture: Path | None = None) -> DemoReport:
     """Evaluate a recorded demonstration, and draw it.
 
     Parameters
     ----------
     bag : directory of the bag, or its .mcap file.
     picture : PNG file to write, None for no picture.
-
-    Returns
-    -------
-    str
-        verdict and tables, at most 100 columns wide.
 
     Raises
     ------
@@ -62,7 +66,8 @@ def report(bag: Path, picture: Path | None = None) -> str:
         except OSError as error:
             notes = (f"the picture was not written: {error}",)
     files = [f"bag      {bag}", *([f"picture  {picture}"] if picture is not None and picture.is_file() else [])]
-    return "\n".join([text(summary, notes), "", *files])
+    unmet = tuple(answer for answer in verdict(summary) if NO in answer)
+    return DemoReport("\n".join([text(summary, notes), "", *files]), unmet)
 
 
 def reaction_report(bag: Path) -> str:
@@ -88,6 +93,7 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
         *_positions(summary.presses),
         *_reactions(summary),
         "",
+        *_contacts(summary.contacts),
         *_touches(summary.touches, summary.period),
     ]
     lines += _wrapped(_false_contacts(summary))
@@ -105,17 +111,23 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> str:
     question = f"force within {FORCE_TOLERANCE:g} %"
     # not the mean alone: a force that swings or is lost is not the commanded one
     done = [press for press in presses if not press.is_refused]
-    errors = [abs(press.error(press.true)) + 100.0 * press.ripple / abs(press.commanded) for press in done]
+    ripples = [100.0 * press.ripple / abs(press.commanded) for press in done]
+    errors = [abs(press.error(press.true)) + ripple for press, ripple in zip(done, ripples, strict=True)]
     if len(done) < len(presses):
-        return f"{question}: NO ({len(presses) - len(done)} of {len(presses)} refused or held)"
-    return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, lambda worst: f"{worst:.1f} %")
+        return f"{question}{NO}{len(presses) - len(done)} of {len(presses)} refused)"
+
+    def of(worst: float) -> str:
+        ripple = f"{ripples[errors.index(worst)]:.1f}"
+        return f"{worst:.1f} %" + (f", {ripple} % of it ripple" if float(ripple) else "")
+
+    return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, of)
 
 
 def _link_verdict(summary: DemoSummary) -> str:
     def wrong(touch: StepContact) -> float:
         if NOT_RECORDED in (touch.link_true, touch.link_estimated):
             return math.nan
-        return float(touch.link_true == NO_LINK or touch.link_true != touch.link_estimated)
+        return float(touch.link_true != touch.link_estimated)
 
     least = min((touch.right for touch in summary.touches if not math.isnan(touch.right)), default=0.0)
     return _answer(
@@ -128,7 +140,7 @@ def _link_verdict(summary: DemoSummary) -> str:
 
 def _position_verdict(summary: DemoSummary) -> str:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
-    touches = summary.touches
+    touches = [touch for touch in summary.touches if touch.link_true != NO_LINK]
     errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.reason]
     question = f"position within {100.0 * POSITION_TOLERANCE:g} cm"
     unknown = len(touches) - len(errors)
@@ -141,7 +153,7 @@ def _answer(
 ) -> str:
     known = [value for value in values if not math.isnan(value)]
     if known and not all(good(value) for value in known):
-        return f"{question}: NO ({worst(max(known))})"
+        return f"{question}{NO}{worst(max(known))})"
     if not known or len(known) < len(values):
         return f"{question}: NOT SHOWN"
     return f"{question}: YES ({worst(max(known))})"
@@ -175,9 +187,7 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
         *_table(rows, head),
         "  true: of all that acts on the link (simulator), the part along the commanded force; +-: half of",
         "    its range; measured: force loop; estimated: contact estimator",
-        *["  held: the force was refused or the arm held its position, see below"][
-            : any(p.is_refused for p in presses)
-        ],
+        *["  refused: the arm did not follow the command, see below"][: any(p.is_refused for p in presses)],
     ]
 
 
@@ -200,7 +210,7 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
         return []
     first = ["", "", "configured", "[cm]", "", "estimated", "[cm]", "", "true", "[cm]", ""]
     head = ["step", "true", "at", "[N]", "error", "at", "[N]", "error", "at", "[N]", "error"]
-    title = "What the estimated contact position gains: the same torques, measured as a force there"
+    title = "The force that the same torques are at three contact positions"
     error = "  error: to the true force; at the true position, the error of the torques alone"
     places = _wrapped(f"  used by the force loop, +- its standard deviation [cm]: {', '.join(used)}", "    ")
     other = "  measured above: by all positions that this leaves open, so by none of these three"
@@ -210,41 +220,71 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
 def _reactions(summary: DemoSummary) -> list[str]:
     """Commands that were not simply obeyed, by step."""
     stated = [
-        line for step in summary.steps for line in sentences(step.name, within(summary.reactions, step.begin, step.end))
+        line
+        for step in summary.steps
+        for line in sentences(step.name, within(summary.reactions, step.begin, step.end), summary.traces.zero)
     ]
-    lines = ["Commands that were refused, held or doubted"] if stated else []
+    lines = ["Commands that were refused, and what was reported of others"] if stated else []
     return ["", *lines, *(line for one in stated for line in _wrapped(f"  {one}", "    "))] if stated else []
 
 
+def _contacts(contacts: Sequence[ListedContact]) -> list[str]:
+    """All that was estimated, from the estimate alone."""
+    title = "Estimated contacts, medians over each"
+    if not contacts:
+        return [title, "  none"]
+    first = ["", "time", "[s]", "link", "", "position", "[cm]", "force", "[N]", "second"]
+    head = ["step", "from", "to", "", "[%]", "", "+-", "", "+-", "[%]"]
+    rows = [
+        [
+            *(one.step, _number(one.begin, 2), _number(one.end, 2), one.link, _number(100.0 * one.probability, 0)),
+            "?*" if math.isnan(one.position) and one.reasons else _number(100.0 * one.position, 1),
+            _number(100.0 * one.position_sd, 1),
+            ">=" * one.is_lower_bound + _number(one.force, 2),
+            *(_number(one.force_sd, 2), _number(100.0 * one.second, 0)),
+        ]
+        for one in contacts
+    ]
+    lines = [title, *_table(rows, first, head)]
+    unknown = (reason for one in contacts if math.isnan(one.position) for reason in one.reasons)
+    for reason in dict.fromkeys(unknown):
+        lines += _wrapped(f"  * {reason}", "    ")
+    link = "link [%]: its probability; +-: standard deviation"
+    second = "second: of the time in which a second contact was suspected"
+    return [*lines, *_wrapped(f"  {link}; {second}", "    ")]
+
+
 def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
-    title = "Contacts, medians over their duration"
-    if not touches:
-        return [title, "  no pushing or pressing step was recorded"]
+    """What was estimated in each step, compared with the true contact as far as that was recorded."""
+    compared = [touch for touch in touches if touch.link_true != NOT_RECORDED]
+    if not compared:
+        return []
     first = ["", "link", "", "right", "position", "[cm]", "force", "[N]", ""]
     head = ["step", "true", "estimated", "[%]", "true", "est.", "true", "est.", "latency"]
     rows = [
         [
             *(touch.step, touch.link_true, touch.link_estimated, _number(100.0 * touch.right, 0)),
             _number(100.0 * touch.position_true, 1),
-            "?*" if touch.reason else _number(100.0 * touch.position_estimated, 1),
+            "?" if touch.reason else _number(100.0 * touch.position_estimated, 1),
             _number(touch.force_true, 2),
             f">={_number(touch.force_estimated, 2)}" if touch.reason else _number(touch.force_estimated, 2),
-            _latency(touch.latency, period),
+            "-" if touch.link_true == NO_LINK else _latency(touch.latency, period),
         ]
-        for touch in touches
+        for touch in compared
     ]
-    lines = [title, *_table(rows, first, head)]
-    for reason in dict.fromkeys(touch.reason for touch in touches if touch.reason):
-        lines += _wrapped(f"  * {reason}", "    ")
     right = "right: fraction of the contact's time in which the estimated link was the true one"
-    latency = f"latency: of the detection; the simulator's contact is recorded every {1e3 * period:.0f} ms"
+    latency = f"latency: of the detection where the contact began; the true one is recorded every {1e3 * period:.0f} ms"
     force = "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world"
-    return [*lines, *_wrapped(f"  {right}; {force}; {latency}", "    ")]
+    return [
+        *("", "The same compared with the true contact, by step that pushes or presses"),
+        *_table(rows, first, head),
+        *_wrapped(f"  {right}; {force}; {latency}", "    "),
+    ]
 
 
 def _false_contacts(summary: DemoSummary) -> str:
     if not summary.free:
-        return "  false detections: not recorded"
+        return "  false detections: not known, the true contact was not recorded"
     longest = f", longest {1e3 * summary.longest_false_contact:.0f} ms" if summary.false_contact else ""
     return f"  false detections: {1e3 * summary.false_contact:.0f} ms{longest}, in {summary.free:.1f} s without contact"
 
@@ -279,13 +319,13 @@ def _number(value: float, digits: int) -> str:
 def _per_cent(press: SteadyPress, force: float) -> str:
     error = press.error(force)
     if press.is_refused:
-        return "held"
+        return "refused"
     return "-" if math.isnan(error) else f"{error:+.1f} %"
 
 
 def _latency(latency: float | None, period: float) -> str:
     if latency is None:
-        return "held"
+        return "goes on"
     if math.isnan(latency):
         return "missed"
     return "before" if latency < 0.0 else f"<{1e3 * (latency + period):.0f} ms"

@@ -6,7 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.demo_traces import NAN, RECORDED, Mask, Names, Numbers, Traces, traces_of
+from wam_analysis.contact_list import (
+    NO_LINK,
+    ListedContact,
+    MissedContact,
+    contact_rows,
+    listed_contacts,
+    median,
+    missed_contacts,
+    most,
+)
+from wam_analysis.demo_traces import NAN, RECORDED, Mask, Numbers, Traces, traces_of
 from wam_analysis.measures.runs import runs
 from wam_analysis.press_positions import NOWHERE, PressPositions, press_positions
 from wam_analysis.reactions import RecordedReaction, reactions_of, within
@@ -18,11 +28,9 @@ from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS, diagnosed_na
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 from wam_sim.replay import tables
 
-NO_LINK = "none"
 NOT_RECORDED = "not recorded"
 UNFINISHED = "not finished: the recording ends before the scenario does"
 STEADY = 1.0  # s at the end of a step, taken as its steady state
-BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact
 
 
 class SteadyPress(NamedTuple):
@@ -119,6 +127,8 @@ class DemoSummary(NamedTuple):
     namespace : of the arm, '/wam'.
     period : time between two instants of the traces, s.
     tasks : forces that tasks command.
+    contacts : all that were estimated.
+    missed : true contacts that were not.
     reactions : of the force loop to what was commanded, and faults of the driver.
     outcome : DONE, why the scenario failed, or that the recording ended before.
     false_contact, longest_false_contact : time of false detections and the longest of them, s.
@@ -137,6 +147,8 @@ class DemoSummary(NamedTuple):
     tasks: tuple[TaskForce, ...]
     presses: tuple[SteadyPress, ...]
     touches: tuple[StepContact, ...]
+    contacts: tuple[ListedContact, ...]
+    missed: tuple[MissedContact, ...]
     reactions: tuple[RecordedReaction, ...]
     false_contact: float
     longest_false_contact: float
@@ -185,6 +197,8 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         tasks=tuple(tasks),
         presses=presses,
         touches=_touches(run, traces, steps, {press.step for press in presses if press.is_refused}),
+        contacts=listed_contacts(run, traces, steps),
+        missed=missed_contacts(traces, steps),
         reactions=reactions,
         false_contact=int(np.sum(false)) * period,
         longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * period,
@@ -195,7 +209,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         gone=lost.gone,
         lost=tuple(lost.sentences(bag.first_ns)),
         moment=_moment(run, traces, presses),
-        notes=(*notes, *run.parameters.notes, *driver_faults(run)),
+        notes=(*notes, *run.parameters.notes, *driver_faults(run, traces.zero)),
     )
 
 
@@ -256,22 +270,6 @@ def _mean(values: Numbers) -> float:
     return float(np.mean(known)) if 2 * len(known) >= len(values) > 0 else NAN
 
 
-def _median(values: Numbers) -> float:
-    known = values[~np.isnan(values)]
-    return float(np.median(known)) if len(known) else NAN
-
-
-def _contacts(traces: Traces) -> list[tuple[int, int]]:
-    """Rows [begin, end) of each true contact; bounces do not end it."""
-    contacts: list[tuple[int, int]] = []
-    for begin, end in runs(traces.true.acts).tolist():
-        if contacts and traces.stamp[begin] - traces.stamp[contacts[-1][1] - 1] <= BOUNCE:
-            contacts[-1] = (contacts[-1][0], end)
-        else:
-            contacts.append((begin, end))
-    return contacts
-
-
 def _touches(
     run: RecordedRun, traces: Traces, steps: tuple[RecordedStep, ...], refused: Collection[str]
 ) -> tuple[StepContact, ...]:
@@ -279,8 +277,9 @@ def _touches(
     seen: set[int] = set()
     for step in steps:
         rows = traces.during(step.begin, step.end)
-        if step.name in refused and not np.any(rows & (traces.true.acts | traces.estimated.acts)):
-            continue  # nothing was to be touched
+        is_known = step.name in refused or np.any(rows & traces.true.is_known)
+        if is_known and not np.any(rows & (traces.true.acts | traces.estimated.acts)):
+            continue  # nothing was touched
         if np.any(rows & (traces.push.acts | traces.commanded.acts)):
             touches.append(_touch(traces, step, rows, seen, _reasons(run, step)))
     return tuple(touches)
@@ -291,13 +290,15 @@ def _touch(
 ) -> StepContact:
     true, estimated = traces.true, traces.estimated
     touching = rows & true.acts
-    link_true = _most(true.frame[touching])
-    if link_true == NO_LINK and not np.any(rows & true.is_known):
-        link_true, touching = NOT_RECORDED, rows & estimated.acts
+    link_true = most(true.frame[touching])
+    if link_true == NO_LINK:
+        touching = rows & estimated.acts
     both = touching & estimated.acts
-    link_estimated = _most(estimated.frame[both]) if np.any(estimated.is_known) else NOT_RECORDED
+    link_estimated = most(estimated.frame[both]) if np.any(estimated.is_known) else NOT_RECORDED
     right = both & (estimated.frame == true.frame)
-    position_estimated = _median(estimated.position[right])
+    if not np.any(rows & true.is_known):
+        link_true, right = NOT_RECORDED, both & (estimated.frame == link_estimated)
+    position_estimated = median(estimated.position[right])
     known = [reason for (link, reason), _ in reasons.most_common() if link == link_estimated and reason]
     return StepContact(
         step=step.name,
@@ -306,21 +307,17 @@ def _touch(
         link_true=link_true,
         link_estimated=link_estimated,
         right=float(np.mean(right[touching])) if np.any(touching & true.acts) else NAN,
-        position_true=_median(true.position[touching & (true.frame == link_true)]),
+        position_true=median(true.position[touching & (true.frame == link_true)]),
         position_estimated=position_estimated,
-        force_true=_median(true.size[touching & true.acts]),
-        force_estimated=_median(estimated.size[both]),
+        force_true=median(true.size[touching & true.acts]),
+        force_estimated=median(estimated.size[both]),
         latency=_latency(traces, rows, seen),
         reason=known[0] if known and np.isnan(position_estimated) else "",
     )
 
 
-def _most(names: Names) -> str:
-    return Counter(names.tolist()).most_common(1)[0][0] if len(names) else NO_LINK
-
-
 def _latency(traces: Traces, rows: Mask, seen: set[int]) -> float | None:
-    for begin, end in _contacts(traces):
+    for begin, end in contact_rows(traces.stamp, traces.true.acts):
         if not np.any(rows[begin:end]):
             continue
         if begin in seen:
@@ -372,7 +369,7 @@ def _loop(run: RecordedRun) -> LoopReport:
     worst = float(np.nanmax(p99)) if not np.all(np.isnan(p99)) else NAN
     last = timed[-1]
     missed, periods = (int(last.get(key, -1)) for key in ("missed periods", "periods"))
-    return LoopReport(mode, float(last["rate [Hz]"]), _median(p50), _median(p99), worst, missed, periods)
+    return LoopReport(mode, float(last["rate [Hz]"]), median(p50), median(p99), worst, missed, periods)
 
 
 def _counts(recording: dict[str, str]) -> tuple[int, int]:
@@ -385,9 +382,9 @@ def _counts(recording: dict[str, str]) -> tuple[int, int]:
     return received, dropped
 
 
-def driver_faults(run: RecordedRun) -> list[str]:
-    """What the driver stopped for, a sentence each."""
-    texts = [f"driver fault at {fault.stamp / 1e9:.2f} s: {fault.reason}" for fault in run.faults]
+def driver_faults(run: RecordedRun, zero: int) -> list[str]:
+    """What the driver stopped for, a sentence each; times from `zero` on, ns."""
+    texts = [f"driver fault at {(fault.stamp - zero) / 1e9:.2f} s: {fault.reason}" for fault in run.faults]
     return list(dict.fromkeys(texts))
 
 
@@ -397,7 +394,7 @@ def _moment(run: RecordedRun, traces: Traces, presses: tuple[SteadyPress, ...]) 
     joints = next((columns for columns in found if columns.position.size), None)
     if joints is None or not len(traces.stamp):
         return None
-    contacts = _contacts(traces)
+    contacts = contact_rows(traces.stamp, traces.true.acts) or contact_rows(traces.stamp, traces.estimated.acts)
     stamp = int(traces.stamp[-1])
     if presses:
         hardest = max(presses, key=lambda press: press.commanded)

@@ -19,6 +19,7 @@ Mask = NDArray[np.bool_]
 
 NAN = float("nan")
 HELD = 100_000_000  # ns for which a message is held; after that the signal is unknown
+CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
 RECORDED = (
     "force_command", "force_measured", "contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point",
@@ -92,6 +93,11 @@ class Traces(NamedTuple):
         component[signal.acts & (signal.frame != self.commanded.frame)] = NAN
         return component
 
+    @property
+    def zero(self) -> int:
+        """From which times are counted, ns: 0, as the arm's time begins with the run, unless it is a system's clock."""
+        return int(self.stamp[0]) if len(self.stamp) and self.stamp[0] > CLOCK else 0
+
     def during(self, begin: int, end: int) -> Mask:
         """The instants from begin up to end, ns."""
         return (self.stamp >= begin) & (self.stamp < end)
@@ -99,6 +105,8 @@ class Traces(NamedTuple):
 
 def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
     """All signals at the stamps of the simulator's contact force, or of the next best topic that was recorded.
+
+    That is the estimated one, which has a message in every outer period; a program need not command a force in all.
 
     Parameters
     ----------
@@ -110,17 +118,17 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
         forces, points = run.wrench(wrench), run.points(point)
         if forces is None:
             return ForceSignal(np.full(len(base), ""), np.full((len(base), 3), NAN), np.full(len(base), NAN))
-        row, known = _held(forces.stamp_ns, base)
+        row, known = held_rows(forces.stamp_ns, base)
         force = np.where(known[:, np.newaxis], forces.force[row], NAN)
         position = np.full(len(base), NAN)
         if points is not None:
-            at, is_there = _held(points.stamp_ns, base)
+            at, is_there = held_rows(points.stamp_ns, base)
             same = is_there & known & (points.stamp_ns[at] == forces.stamp_ns[row])
             position[same] = points.point[at[same], 0]
         return ForceSignal(np.array(forces.frames, np.str_)[row], force, position)
 
     base = np.empty(0, np.int64)
-    for name in ("sim/contact/wrench", "force_command", "contact/wrench"):
+    for name in ("sim/contact/wrench", "contact/wrench", "force_command"):
         if (columns := run.wrench(name)) is not None:
             base = columns.stamp_ns
             break
@@ -142,7 +150,7 @@ def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:
     columns = run.bag.topics.get(f"{run.namespace}/force_axis")
     if not isinstance(columns, TableColumns) or not len(columns.stamp_ns):
         return np.asarray(touched.astype(object))
-    row, known = _held(columns.stamp_ns, base)
+    row, known = held_rows(columns.stamp_ns, base)
     frames = np.array(columns.frames, object)[row]
     return np.asarray(np.where(known & (frames != BASE), frames, touched), object)
 
@@ -170,7 +178,7 @@ def _on_links(
     return found[0], found[1]
 
 
-def _held(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
+def held_rows(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
     """Row of the last message at or before each instant, and whether there is one and it is still held."""
     row = np.searchsorted(stamps, base, side="right") - 1
     known = row >= 0

@@ -39,14 +39,15 @@ def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple
     return tuple(one for one in parts if one.end - one.begin > BRIEF or (one.begin < one.end == end))
 
 
-def sentences(name: str, reactions: Sequence[RecordedReaction]) -> list[str]:
-    """One for each kind of reaction to a command of this name: when, how often and why."""
+def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[str]:
+    """One for each kind of reaction to a command of this name: when, from `zero` on, ns, how often and why."""
     stated = []
     for kind in dict.fromkeys(one.name for one in reactions):
         first, *others = [one for one in reactions if one.name == kind]
-        verb = kind if kind == REFUSAL else f"{'held' if first.holds else 'reported'} ({kind})"
+        verb = kind if kind == REFUSAL else f"{REFUSAL if first.holds else 'reported'} ({kind})"
         again = f" and {len(others)} times more" if others else ""
-        stated.append(f"{name}: {verb} from {first.begin / 1e9:.2f} to {first.end / 1e9:.2f} s{again}: {first.reason}")
+        begin, end = ((stamp - zero) / 1e9 for stamp in (first.begin, first.end))
+        stated.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {first.reason}")
     return stated
 
 

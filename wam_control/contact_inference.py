@@ -38,7 +38,10 @@ STRAIGHT_LINK = "elbow straight and force out of plane: the links cannot be dist
 LINKS = "the torques do not identify the link"
 MORE = "one contact does not explain the torques"
 ALONG = "a force along the tube and one at its start cannot be distinguished"
-SECOND = "a second contact is suspected: position and force are those of both together"
+SECOND = (
+    "a second contact is suspected, or friction of this one has turned: if there is a second one, position and force "
+    "are those of both together"
+)
 CERTAIN_SECOND = "a second contact is nearly certain: position and force are those of both together"
 PAYLOAD = "a payload that was picked up may explain the torques; its probability is what those of the links lack to 1"
 REASONS = (  # as bits

@@ -1,6 +1,7 @@
 """When the force loop holds its position instead of controlling the commanded force, and why."""
 
 import math
+from collections.abc import Callable
 from enum import IntEnum
 
 import numpy as np
@@ -11,6 +12,8 @@ from wam_control.force_axis import ForceAxis
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.force_measurement import STEADY, LowPass
 from wam_control.force_swing import Reversals, Shake
+from wam_control.sensing_advice import OtherAxes, advice
+from wam_description.number_text import brief
 
 Array = NDArray[np.float64]
 TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
@@ -39,6 +42,7 @@ SLOWED = 0.5  # of the speed along the force, from then on
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
+SOFTER = ", or, where no surface is as stiff, lower guard.contact_stiffness"
 NOT_SLOWED = 0.95  # of the speed along the force
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
@@ -99,7 +103,7 @@ class ForceHold:
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
             self._has_settled
         ) = self._has_begun = False
-        self._is_slow, self._other = False, ""
+        self._is_slow, self._other, self._advice = False, "", ""
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = self._reached = self._identified = self._desired = self._turned = 0.0
         self._settled: Array | None = None  # torques per force, 1/m, once it has settled
@@ -200,11 +204,10 @@ class ForceHold:
         if force <= parameters.limits.shake_force * desired:
             return ""
         return (
-            f"the arm shakes by {self._shaking:.2g} m along the force (dither): on "
+            f"the arm shakes by {brief(self._shaking)} m along the force (dither): on "
             f"{parameters.guard.contact_stiffness:g} N/m the force would swing by {force:.3g} N; allowed: "
             f"limits.shake_force, {parameters.limits.shake_force:g} times the commanded {desired:.3g} N; the arm holds "
-            "its position: use joint sensors, command more force, or declare a softer surface "
-            "(guard.contact_stiffness)"
+            f"its position: use joint sensors, command more force{SOFTER}"
         )
 
     def step(
@@ -221,6 +224,7 @@ class ForceHold:
         torque_error: float = 0.0,
         pushed: float | None = None,
         unknown: tuple[float, str] = (0.0, ""),
+        others: Callable[[], OtherAxes] | None = None,
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
@@ -237,9 +241,10 @@ class ForceHold:
         torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
         pushed : force, N, without the inertia of the arm, by which something is touched; None: the measured one.
         unknown : force, N, of torques at rest before, which no touched surface gives, and what they mean.
+        others : the same axis in other poses and for other forces, for the advice where the force is not sensed here.
         """
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
-        blind = self._not_sensed(axis, point, desired, torque_error, parameters)
+        blind = self._not_sensed(axis, point, desired, torque_error, parameters, others)
         is_loaded = not self._has_begun and abs(unknown[0]) > TOLERANCE * desired
         pushed = measured if pushed is None else pushed
         self.is_touching = pushed >= TOUCH * desired and not is_loaded
@@ -301,6 +306,7 @@ class ForceHold:
         desired: float,
         torque_error: float,
         parameters: ForceLoopParameters,
+        others: Callable[[], OtherAxes] | None,
     ) -> str:
         """Why the force is not measured well enough, '' where it is.
 
@@ -312,6 +318,7 @@ class ForceHold:
         is_known = self._is_sensed or not torque_error or stated <= sensing.stated_fraction * desired
         self._is_sensed = is_known and axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
         if self._is_sensed:
+            self._advice = ""
             return ""
         if not is_known:
             return (
@@ -323,10 +330,27 @@ class ForceHold:
         return (
             f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
             f"of {point.cover}; allowed to begin: {RESUME * limit:.3g} N, {RESUME:g} of the limit "
-            "(sensing.force_sd_limit, force_sd_fraction); the arm holds its position: bend the arm, or command more "
-            "force, another direction or position"
-            f"{'' if point.is_pinned else ', or pin the position'}"
+            f"(sensing.force_sd_limit, force_sd_fraction); the arm holds its position: "
+            f"{self._advised(point, desired, parameters, others)}{'' if point.is_pinned else ', or pin the position'}"
         )
+
+    def _advised(
+        self,
+        point: ForcePoint,
+        desired: float,
+        parameters: ForceLoopParameters,
+        others: Callable[[], OtherAxes] | None,
+    ) -> str:
+        """What to do where the force is not sensed well enough, computed once as it is refused."""
+        if others is None:
+            return "bend the arm, or command more force, another direction or position"
+
+        def is_sensed(axis: ForceAxis, force: float) -> bool:
+            sd_limit = parameters.sensing.sd_limit(force, point.is_pinned)
+            return force <= parameters.force_limit and axis.force_sd <= RESUME * sd_limit
+
+        self._advice = self._advice or advice(others(), desired, is_sensed)
+        return self._advice
 
     def _too_weak(
         self, point: ForcePoint, desired: float, signal: float, elsewhere: float, parameters: ForceLoopParameters
@@ -343,17 +367,17 @@ class ForceHold:
             return ""
         if is_weak:
             return (
-                f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {signal:.2g} times the "
-                f"standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, and above, "
-                "or the force is detected late or on the wrong link; the arm holds its position: command more force, "
-                "another direction or position, or use joint sensors"
+                f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {brief(signal)} times "
+                f"the standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, "
+                "and above, or the force is detected late or on the wrong link; the arm holds its position: command "
+                "more force, another direction or position, or use joint sensors"
                 f"{'' if point.is_pinned else ', or pin the position'}"
             )
         return (
-            f"the torques of {desired:.3g} N on another link than {point.cover} are {elsewhere:.2g} times the standard "
-            f"deviation with which the motors show them; allowed: sensing.least_signal, {sensing.least_signal:g}, and "
-            "above, or that link is pressed harder than commanded before it is detected; the arm holds its position: "
-            "pin the position, command more force, or use joint sensors"
+            f"the torques of {desired:.3g} N on another link than {point.cover} are {brief(elsewhere)} times the "
+            "standard deviation with which the motors show them; allowed: sensing.least_signal, "
+            f"{sensing.least_signal:g}, and above, or that link is pressed harder than commanded before it is "
+            "detected; the arm holds its position: pin the position, command more force, or use joint sensors"
         )
 
     def _against(self, point: ForcePoint, is_strange: bool) -> float:
@@ -385,9 +409,9 @@ class ForceHold:
             )
         if not self.has_touched and self._missed > CREPT * parameters.limits.settling_time and self._travel < LITTLE:
             return ForceReaction.NOTHING_TOUCHED, (
-                f"nothing was touched {self._missed:.2g} s after the command: the arm creeps, and has moved "
-                f"{1e3 * self._travel:.2g} mm; it holds its position: go nearer, declare a softer surface "
-                "(guard.contact_stiffness), or pin the position; command no force, then again"
+                f"nothing was touched {brief(self._missed)} s after the command: the arm creeps, and has moved "
+                f"{brief(1e3 * self._travel)} mm; it holds its position: go nearer, or pin the "
+                f"position{SOFTER}; command no force, then again"
             )
         if shaken := self._shaken(axis, desired, parameters):
             return ForceReaction.SHAKEN, shaken
@@ -398,14 +422,14 @@ class ForceHold:
         self._is_slow = pace * parameters.limits.settling_time < SETTLED / (RESUME if self._is_slow else 1.0)
         if self._is_slow:
             return ForceReaction.TOO_SLOW, (
-                f"the force would settle with a time constant of {1.0 / pace:.2g} s{_slowed(axis)}; allowed: "
+                f"the force would settle with a time constant of {brief(1.0 / pace)} s{_slowed(axis)}; allowed: "
                 f"1/{SETTLED:g} of limits.settling_time; the arm holds its position: bend the arm, or command another "
                 "direction or position"
             )
         way = desired / parameters.guard.contact_stiffness
         if parameters.is_estimated and not point.is_pinned and way < COARSE:
             return ForceReaction.TOO_SLOW, (
-                f"the whole force is {1e3 * way:.2g} mm on a surface of {parameters.guard.contact_stiffness:g} N/m "
+                f"the whole force is {brief(1e3 * way)} mm on a surface of {parameters.guard.contact_stiffness:g} N/m "
                 f"(guard.contact_stiffness); from the motors at an estimated position {1e3 * COARSE:g} mm is the "
                 "least, as the velocity loops wind up through friction for longer than limits.settling_time; the arm "
                 "holds its position: pin the position, command more force, or use joint sensors"
@@ -416,9 +440,9 @@ class ForceHold:
         if speed * parameters.limits.settling_time < CREEP:
             return ForceReaction.TOO_SLOW, (
                 f"a surface of {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness) may be approached "
-                f"with {1e3 * speed:.2g} mm/s for {desired:.3g} N (limits.impact), less than {1e3 * CREEP:g} mm within "
-                "limits.settling_time, in which friction moves the arm in jerks; it holds its position: command more "
-                "force, or declare a softer surface"
+                f"with {brief(1e3 * speed)} mm/s for {desired:.3g} N (limits.impact), less than {1e3 * CREEP:g} mm "
+                "within limits.settling_time, in which friction moves the arm in jerks; it holds its position: "
+                f"command more force{SOFTER}"
             )
         return ForceReaction.NONE, ""
 
@@ -443,7 +467,7 @@ class ForceHold:
             return ForceReaction.POSITION_ASSUMED, _position_assumed(axis, point)
         if self._uncertain > lasting:
             return ForceReaction.UNCERTAIN, (
-                f"the force is known to +-{force_sd:.2g} N, {force_sd / desired:.0%} of the commanded "
+                f"the force is known to +-{brief(force_sd)} N, {force_sd / desired:.0%} of the commanded "
                 f"{desired:.3g} N; sensing.reported_fraction, {parameters.sensing.reported_fraction:.0%}, is to be "
                 "known, less where it is measured off: tare in free space, command more force, or another direction "
                 "or pose"
@@ -513,21 +537,20 @@ class ForceHold:
         self._strayed = 0.0 if has_rested else self._strayed + dt * is_off
         if not self.has_touched and abs(self._missed) > lasting:
             return (
-                f"nothing is touched yet, {abs(self._missed):.2g} s after the command: the arm has moved "
-                f"{1e3 * self._travel:.2g} mm towards it; go nearer, declare a softer surface "
-                "(guard.contact_stiffness), or pin the position"
+                f"nothing is touched yet, {brief(abs(self._missed))} s after the command: the arm has moved "
+                f"{brief(1e3 * self._travel)} mm towards it; go nearer, or pin the position{SOFTER}"
             )
         is_late = self._missed > 0.0 and not self._has_settled
         if abs(self._missed) > (lasting if is_late else LEFT * lasting):
             return (
                 f"{measured:.3g} N are measured and {desired:.3g} N commanded; the force has been too "
-                f"{'small' if error > 0.0 else 'large'} for {abs(self._missed):.2g} s{_slowed(axis)}: command what can "
-                "be reached, another direction, or bend the arm"
+                f"{'small' if error > 0.0 else 'large'} for {brief(abs(self._missed))} s{_slowed(axis)}: command what "
+                "can be reached, another direction, or bend the arm"
             )
         if self._strayed > LEFT * lasting:
             return (
                 f"the force was reached, and leaves {desired:.3g} N again and again by more than "
-                f"{tolerance(desired, parameters):.2g} N: the surface moves, something else pushes, friction turns, "
+                f"{brief(tolerance(desired, parameters))} N: the surface moves, something else pushes, friction turns, "
                 "the position is unknown, or it is a limit cycle; free the arm of what else touches it, pin the "
                 "position, or, for a cycle, lower force_gain"
             )
@@ -571,24 +594,24 @@ def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameter
     if lag > most:
         return (
             f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) would keep the force "
-            f"{lag:.2g} N off; allowed: {most:.2g} N (sensing.reported_fraction); the arm holds its position: command "
-            "more force, a larger force_gain, or let the surface move more slowly"
+            f"{brief(lag)} N off; allowed: {brief(most)} N (sensing.reported_fraction); the arm holds its position: "
+            "command more force, a larger force_gain, or let the surface move more slowly"
         )
     fastest = desired * yielding / (BY_MOTORS if parameters.is_estimated else LATE)
     if limits.impact and limits.surface_speed > fastest:
         return (
             f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) goes faster than the arm "
             f"follows for {desired:.3g} N on {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness), "
-            f"{fastest:.2g} m/s; the arm holds its position: command more force, or let the surface move more slowly"
+            f"{brief(fastest)} m/s; the arm holds its position: command more force, or let the surface move more slowly"
         )
     nearer = TURNING * SLOPE * limits.slide_speed
     off = nearer / yielding
     if off > tolerance(desired, parameters):
         return (
             f"a surface that moves across the force with {limits.slide_speed:g} m/s (limits.slide_speed) comes nearer "
-            f"by {1e6 * nearer:.2g} um while the friction of the arm turns round, which is {off:.2g} N on "
+            f"by {brief(1e6 * nearer)} um while the friction of the arm turns round, which is {brief(off)} N on "
             f"{parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness); allowed: "
-            f"{tolerance(desired, parameters):.2g} N; the arm holds its position: command more force, or let the "
+            f"{brief(tolerance(desired, parameters))} N; the arm holds its position: command more force, or let the "
             "surface move more slowly"
         )
     return ""
@@ -605,15 +628,15 @@ def _loaded(force: float, meaning: str, desired: float) -> str:
 def _cycle(turns: Reversals, desired: float, parameters: ForceLoopParameters) -> str:
     swing, period = turns.cycle
     return (
-        f"the measured force is in a limit cycle of {swing:.2g} N peak to peak and {period:.2g} s about {desired:.3g} "
-        f"N; allowed: limits.cycle_force, {parameters.limits.cycle_force:g} of the commanded; friction or the surface "
-        "keeps it up: lower force_gain, or use joint sensors"
+        f"the measured force is in a limit cycle of {brief(swing)} N peak to peak and {brief(period)} s about "
+        f"{desired:.3g} N; allowed: limits.cycle_force, {parameters.limits.cycle_force:g} of the commanded; friction "
+        "or the surface keeps it up: lower force_gain, or use joint sensors"
     )
 
 
 def _position_assumed(axis: ForceAxis, point: ForcePoint) -> str:
     known = (
-        f"where it is known from the torques alone, so that the force is known to {axis.free_sd:.2g} N"
+        f"where it is known from the torques alone, so that the force is known to {brief(axis.free_sd)} N"
         if point.is_identified
         else "it is not known where"
     )

@@ -30,10 +30,12 @@ from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits, WholeForce
 from wam_control.pressed_pose import has_left
+from wam_control.sensing_advice import OtherAxes
 from wam_control.stability_guard import GuardAssessment
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_control import AxisRow, TaskControl
 from wam_description.arm import Arm, Servo, Timing
+from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, NO_CONTACT, Contact, ForceCommand, State, Triple
 
@@ -380,7 +382,7 @@ class ForceLoop:
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
-        reaction, reason = self._reaction(q, force_axis, point, direction, (measured, free), desired, dt)
+        reaction, reason = self._reaction(q, force_axis, point, direction, (measured, free), desired, dt, command.frame)
         self._react(reaction, reason)
         self._remember(q, moved, contact, point, force_axis)
         if reaction.holds:
@@ -443,6 +445,7 @@ class ForceLoop:
         measured: tuple[float, float],
         desired: float,
         dt: float,
+        frame: str,
     ) -> tuple[ForceReaction, str]:
         """What the loop does instead of the command, and why; forces in N, the measured one without inertia, too."""
         if self._is_fast:
@@ -465,6 +468,26 @@ class ForceLoop:
             torque_error=self._torque_error(axis),
             pushed=measured[1],
             unknown=(-float(axis.sense @ self._unknown[0]), self._unknown[1]),
+            others=lambda: self._other_axes(q, point, direction, frame),
+        )
+
+    def _other_axes(self, q: Sequence[float], point: ForcePoint, direction: Array, frame: str) -> OtherAxes:
+        """The axis of a force along the same direction of its frame in other poses and for other forces."""
+        body, joints = self._body, self._arm.joints
+
+        def turn(pose: Sequence[float]) -> Array:
+            return np.eye(3) if frame == BASE else body.cover_pose(pose, frame).rotation
+
+        along = turn(q).T @ direction
+        moving = np.flatnonzero(np.any(body.cover_jacobian(q, point.cover) != 0.0, axis=0))
+        joint = int(moving[-1]) if len(moving) else 0
+        return OtherAxes(
+            q,
+            joint,
+            joints.names[joint],
+            joints.lower[joint],
+            joints.upper[joint],
+            lambda pose, force: self._force_axes.axis(pose, point.pressed(turn(pose) @ along, force)),
         )
 
     def _torque_error(self, axis: ForceAxis) -> float:
@@ -489,7 +512,7 @@ class ForceLoop:
         """What a mass at the tool would be called that explains torques at rest (n,), N m; '' where none does."""
         sd = math.hypot(sensing_of(self.parameters).torque_sd, ALIKE * float(np.abs(resting).max()))
         mass, left = self._measurement.payload(q, resting, sd)
-        return f"as with {mass:.2g} kg at the tool" if mass > 0.0 and left <= UNEXPLAINED else ""
+        return f"as with {brief(mass)} kg at the tool" if mass > 0.0 and left <= UNEXPLAINED else ""
 
     def _hold_still(
         self,

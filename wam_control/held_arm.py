@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from wam_control.arm_push import ArmPush
 from wam_control.force_axis import ForceAxis
 from wam_control.hybrid_velocity import posture_velocity
+from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
 
 Array = NDArray[np.float64]
@@ -54,8 +55,8 @@ class HeldArm:
         if not self._pushed:
             return ""
         return (
-            f"; something touches the arm since, and has pushed with up to {self._pushed:.2g} N: the arm gives way, by "
-            "limits.free_travel at most"
+            f"; something touches the arm since, and has pushed with up to {brief(self._pushed)} N: the arm gives way, "
+            "by limits.free_travel at most"
         )
 
     def hold(self, at: Sequence[float], way: float) -> None:

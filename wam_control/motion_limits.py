@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from wam_control.arm_push import ArmPush
 from wam_description.arm import Arm
+from wam_description.number_text import brief
 from wam_description.parameters import tunable
 from wam_description.rigid_body import RigidBody
 
@@ -163,7 +164,7 @@ class MotionLimits:
             return limited, ""
         limit = self._in_words(allowed, whole)
         return limited, (
-            f"the world pushes with at least {self._pushed:.2g} N in all; allowed: {limit}; the arm does not move "
+            f"the world pushes with at least {brief(self._pushed)} N in all; allowed: {limit}; the arm does not move "
             "against it, and gives way by limits.free_travel at most: command a direction or a posture away from it, "
             "or less force"
         )

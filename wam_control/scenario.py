@@ -274,14 +274,22 @@ def script_file(script: str) -> Path:
     return Path(script) if script.endswith(".yaml") else packaged(script, "scenario")
 
 
-def load(path: Path, arm: Arm) -> list[ScenarioStep]:
+def load(path: str | Path, arm: Arm) -> list[ScenarioStep]:
     """Read the steps of a scenario.
+
+    Parameters
+    ----------
+    path : of a YAML file; not its text.
+    arm : whose joints and links the steps may name.
 
     Raises
     ------
     ParameterError
         names the file, the step and the value that is not allowed.
     """
+    if "\n" in str(path):
+        raise ParameterError("the scenario is given as a text of several lines; write it to a file and give its path")
+    path = Path(path)
     if not path.is_file():
         raise ParameterError(f"scenario {path} is not a file; give the path of a YAML file with 'steps'")
     try:

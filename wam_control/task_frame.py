@@ -20,6 +20,7 @@ from wam_control.force_law import ForceLaw
 from wam_control.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.task_parameters import TaskParameters
 from wam_description.arm import Arm
+from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE
 
@@ -151,7 +152,7 @@ class TaskFrame:
             lever = float(np.linalg.norm(state.row))
             if lever < SHORT:
                 return (
-                    f"{state.axis.name}: its lever on the joints is {lever:.2g} m; allowed: {SHORT:g} m and above; "
+                    f"{state.axis.name}: its lever on the joints is {brief(lever)} m; allowed: {SHORT:g} m and above; "
                     "bend the arm, or command another axis"
                 )
         forces = [state.axis for state in states if state.sensed and state.axis.kind is AxisKind.FORCE]

@@ -1,7 +1,7 @@
 """The arm as data: constants, parameters, kinematics and models, and the topics that the nodes share.
 
 - constants: every number of the arm and the testbed, as printed or assumed
-- units: conversion to SI
+- units: conversion to SI; number_text: numbers as messages write them
 - parameters: parameter classes with unit, range and meaning, and their checks
 - parameter_history: what parameters were in earlier versions, for old recordings
 - configuration, yaml_text: parameter files, which may build on one another

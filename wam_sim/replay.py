@@ -23,6 +23,7 @@ from wam_description.configuration import Configuration
 from wam_description.interface import Interface, declared
 from wam_description.nodes import NODES
 from wam_description.parameters import ParameterError, build_part
+from wam_description.parameters import values as values_of
 from wam_description.signals import PathPoint, Point, PosturePath, State, Table, Wrench
 from wam_description.synchroniser import OutOfTime
 from wam_description.topics import BY_NAME, POINT, STATUS, TABLE, TRAJECTORY, WRENCH, Topic
@@ -84,14 +85,26 @@ class Gap(NamedTuple):
     missing: int
 
 
+class ChangedValue(NamedTuple):
+    """A parameter, as --set names it, that the replay has with another value than the recording."""
+
+    name: str
+    recorded: Any
+    used: Any
+
+
 class Replay(NamedTuple):
-    """A replay: mode of the recording, how each topic of the node came out, gaps in its inputs, what the bag lacks."""
+    """A replay: mode of the recording, how each topic of the node came out, gaps in its inputs, what the bag lacks.
+
+    `changed` are the parameters of the node that a configuration has otherwise than the recording, its own first.
+    """
 
     node: str
     mode: str
     topics: tuple[Compared, ...]
     gaps: tuple[Gap, ...]
     lost: tuple[str, ...]
+    changed: tuple[ChangedValue, ...] = ()
 
     @property
     def is_same(self) -> bool:
@@ -99,6 +112,7 @@ class Replay(NamedTuple):
         return all(topic.is_same for topic in self.topics)
 
 
+OF_THE_RUN = ("nodes", "timing.real_time_factor", "timing.timeout")  # no node computes with them
 REPLAYED = tuple(name for name in NODES if name not in ("driver", "scenario", "recorder"))
 
 
@@ -162,7 +176,8 @@ def replay(
     mode = shared.timing.mode if run.mode == "unknown" else run.mode
     gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(bag.first_ns)
-    return Replay(declaration.name, mode, tuple(compared), gaps, (*lost, *lost_changes))
+    changed = _changed_values(run, declaration, shared, own) if configuration else ()
+    return Replay(declaration.name, mode, tuple(compared), gaps, (*lost, *lost_changes), changed)
 
 
 def _require_types(bag: Bag, namespace: str, topics: Sequence[Topic]) -> None:
@@ -198,6 +213,20 @@ def _parameters(run: RecordedRun, declaration: Declaration, configuration: Confi
         return run.parameters.shared, run.parameters.part(node, kind)
     except BagError as error:
         raise BagError(f"{error}; give a configuration with --config") from None
+
+
+def _changed_values(run: RecordedRun, declaration: Declaration, shared: Shared, own: Any) -> tuple[ChangedValue, ...]:
+    """What a configuration changes, as far as the bag has parameters of the node."""
+    if declaration.name not in run.parameters.nodes:
+        return ()
+    was_shared, was = _parameters(run, declaration, None)
+    both = ((f"{declaration.name}:", was, own), ("", was_shared, shared))
+    return tuple(
+        ChangedValue(prefix + name, before, after)
+        for prefix, old, new in both
+        for (name, before), after in zip(values_of(old).items(), values_of(new).values(), strict=True)
+        if before != after and name not in OF_THE_RUN
+    )
 
 
 def _changes(

@@ -1,10 +1,14 @@
 """The analysis of a bag: sections of sentences and numbers, measured and predicted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
+from wam_analysis.contact_list import contact_rows
 from wam_analysis.demo_summary import driver_faults
+from wam_analysis.demo_traces import Traces
 from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
 from wam_analysis.findings.contact import contact_section
 from wam_analysis.findings.finding import Section, shown, times
@@ -140,13 +144,11 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     if summary.steps:
         ended = " to its end" if summary.outcome == DONE else f"; {summary.outcome}"
         sentences.append(f"A scenario of {_count(len(summary.steps), 'step')} was played{ended}.")
-    touches = [touch for touch in summary.touches if touch.link_true]
     if recording.holds:
         forces = ", ".join(f"{hold.commanded:.3g} N" for hold in recording.holds)
         sentences.append(f"The arm was commanded to press {times(len(recording.holds))} ({forces}).")
-    if touches:
-        sentences.append(f"It touched something in {_count(len(touches), 'step')}.")
-    faults = driver_faults(recording.run)
+    sentences += _touched(summary.traces)
+    faults = driver_faults(recording.run, summary.traces.zero)
     sentences += [f"{fault[0].upper()}{fault[1:]}." for fault in faults]
     if recording.parameters.note:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
@@ -157,6 +159,14 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     if summary.steps and summary.outcome != DONE and not faults:
         verdict.append(f"Of the scenario: {summary.outcome}.")
     return Section("happened", "What happened", tuple(sentences), (), lacking, tuple(verdict))
+
+
+def _touched(traces: Traces) -> Iterator[str]:
+    """How often something touched the arm, as far as that was recorded."""
+    for signal, touched in ((traces.true, "Something touched the arm"), (traces.estimated, "A contact was estimated")):
+        if np.any(signal.is_known):
+            yield f"{touched} {times(len(contact_rows(traces.stamp, signal.acts)))}."
+            return
 
 
 def _brief(note: str) -> str:

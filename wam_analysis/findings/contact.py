@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wam_analysis.demo_summary import NO_LINK, NOT_RECORDED
+from wam_analysis.contact_list import NO_LINK, ListedContact
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
@@ -13,27 +13,24 @@ from wam_analysis.task_forces import arm_of
 from wam_bag.bag import TableColumns
 from wam_description.topics import FRICTION_COLUMNS
 
+STEADY_LINK = 0.9  # of the time of a contact, below which it is reported that the estimated link changed
+
 
 def contact_section(recording: AnalysedRun) -> Section:
     """Estimated contacts, compared with the true ones."""
     summary = recording.summary
     traces = summary.traces
     lacking = recording.lacking("contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point")
-    sentences, findings, verdict = [], [], []
-    for touch in summary.touches:
-        if NOT_RECORDED in (touch.link_true, touch.link_estimated):
-            continue
-        missed = touch.link_estimated in ("base", NO_LINK, "")
-        text = f"{touch.step}: contact of {touch.link_true} with {shown(touch.force_true, 'N')}"
-        verdict += [f"{touch.step}: the contact of {touch.link_true} was MISSED."] * missed
-        text += ", missed" if missed else f"; estimated on {touch.link_estimated}"
-        if math.isfinite(touch.force_estimated):
-            text += f" with {shown(touch.force_estimated, 'N')}"
-        if touch.reason:
-            text += f" ({touch.reason})"
-        elif math.isfinite(touch.position_estimated):
-            text += f", position error {100.0 * abs(touch.position_estimated - touch.position_true):.1f} cm"
-        sentences.append(text + ".")
+    sentences: list[str] = []
+    findings: list[Finding] = []
+    verdict: list[str] = []
+    for number, contact in enumerate(summary.contacts, 1):
+        sentences += _doubts(f"{number} {contact.link}", contact)
+        findings += _numbers(f"{number} {contact.link}", contact)
+    for missed in summary.missed:
+        where = f"{f'{missed.step}: ' * bool(missed.step)}the contact of {missed.link}"
+        verdict.append(f"{where} with {shown(missed.force, 'N')} at {shown(missed.begin, 's')} was MISSED.")
+    sentences += verdict
     true, sensed = traces.true, traces.estimated
     known = true.is_known & sensed.is_known
     touching = known & true.acts
@@ -61,12 +58,40 @@ def contact_section(recording: AnalysedRun) -> Section:
         if count:
             sentences.append(f"False detections: {count}, {shown(seconds, 's')} in all.")
             verdict.insert(0, sentences[-1])
-    elif np.any(sensed.is_known):
-        sentences.append(f"Contact was detected {times(len(runs(sensed.acts)))}; the true contact is not in this bag.")
-    if not sentences:
+    elif summary.contacts:
+        sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
+        verdict.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
+    if not sentences and not findings:
         sentences.append("No contact was recorded.")
     findings += _tracked_friction(recording)
     return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(verdict))
+
+
+def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
+    """A contact in numbers, those that are compared with the true ones last."""
+    cm = 100.0
+    note = f"in step '{contact.step}'" if contact.step else ""
+    yield Finding(f"{name}: from", "s", contact.begin, note=note)
+    yield Finding(f"{name}: to", "s", contact.end)
+    yield Finding(f"{name}: probability of the link", "%", 100.0 * contact.probability)
+    yield Finding(f"{name}: position along the link", "cm", cm * contact.position, error=cm * contact.position_sd)
+    yield Finding(f"{name}: its standard deviation", "cm", cm * contact.position_sd)
+    least = "the least force that explains the torques" * contact.is_lower_bound
+    yield Finding(f"{name}: force", "N", contact.force, note=least, error=contact.force_sd)
+    yield Finding(f"{name}: standard deviation of the force", "N", contact.force_sd)
+    yield Finding(f"{name}: second contact suspected", "%", 100.0 * contact.second, note="of the time")
+    yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
+    yield Finding(f"{name}: error of the size of the force", "N", contact.force_error)
+
+
+def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
+    """What is not to be trusted of a contact, and whether it was another one."""
+    if contact.lasting < STEADY_LINK:
+        yield f"{name}: this link was estimated for {contact.lasting:.0%} of the time, others for the rest."
+    if contact.reasons:
+        yield f"{name}: {'; '.join(contact.reasons)}."
+    if contact.true not in ("", contact.link):
+        yield f"{name}: {'nothing was' if contact.true == NO_LINK else f'{contact.true} was'} touched."
 
 
 def _tracked_friction(recording: AnalysedRun) -> Iterator[Finding]:

@@ -28,17 +28,18 @@ SEEN = 0.02  # of the force; a smaller cycle is not reported
 def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     """Each commanded force, how it was reached and held, and the dynamic range (3.2.1)."""
     lacking = recording.lacking("force_command", "force_measured", "sim/contact/wrench")
-    sentences, findings = [], []
+    sentences, findings, zero = [], [], recording.summary.traces.zero
     for one in held:
         sentences.append(_press_sentence(one))
-        sentences += [f"{text}." for text in reaction_sentences(one.hold.name, one.hold.reactions)]
+        sentences += [f"{text}." for text in reaction_sentences(one.hold.name, one.hold.reactions, zero)]
         findings += _press_findings(one)
     if not held:
         sentences.append("No constant force was commanded.")
     other = _other_reactions(recording)
-    sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found)]
+    sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
     range_stated, range_findings = _dynamic_range(held)
-    verdict = (*_reaction_verdict({one.hold.name: one.hold.reactions for one in held} | other), *_forces_verdict(held))
+    reactions = {one.hold.name: one.hold.reactions for one in held} | other
+    verdict = (*_reaction_verdict(reactions, zero), *_forces_verdict(held))
     flagged = [f"{text} {UNLIKE}" for text in deviations(tuple(findings))]
     every = (*findings, *range_findings)
     return Section("force", "Force", (*sentences, *flagged, *range_stated), every, lacking, verdict)
@@ -53,12 +54,12 @@ def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction
     return {name: found for name, found in (steps or {"force loop": tuple(rest)}).items() if found}
 
 
-def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]]) -> list[str]:
-    """What was refused or held, and what was doubted, in a sentence each."""
+def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int) -> list[str]:
+    """What was refused, and what was reported of others, in a sentence each."""
     verdict = []
-    for holds, what in ((True, "REFUSED or held"), (False, "Reported while pressing")):
+    for holds, what in ((True, "REFUSED"), (False, "Reported while pressing")):
         named = [
-            f"{name} ({one.name} at {one.begin / 1e9:.2f} s)"
+            f"{name} ({one.name} at {(one.begin - zero) / 1e9:.2f} s)"
             for name, reactions in found.items()
             for one in {one.name: one for one in reversed(reactions) if one.holds is holds}.values()
         ]
@@ -154,7 +155,7 @@ def _touched(one: HeldForce) -> str:
 def _press_findings(one: HeldForce) -> list[Finding]:
     name, response = one.hold.name, one.response
     seconds = sum(reaction.end - reaction.begin for reaction in one.hold.reactions if reaction.holds) / 1e9
-    found = [Finding(f"{name}: refused or held for", "s", seconds)] if seconds else []
+    found = [Finding(f"{name}: refused for", "s", seconds)] if seconds else []
     if one.hold.is_refused:
         return found
     if one.predicted is not None:

@@ -12,6 +12,7 @@ from wam_analysis.identification.fit import Identification
 from wam_analysis.identification.parameters import AXES, DIRECTIONS, Unknowns
 from wam_description.arm import Shared
 from wam_description.configuration import PARAMETERS, SHARED, Configuration
+from wam_description.parameters import ParameterError
 
 Array = NDArray[np.float64]
 
@@ -79,6 +80,30 @@ def estimator_values(configuration: Configuration) -> dict[str, Any]:
         f"contact_estimator:{name}": [1.0] * len(value) if isinstance(value, list) else 1.0
         for name, value in neutral.items()
     }
+
+
+def require_possible(configuration: Configuration, values: Mapping[str, Any], source: str) -> None:
+    """Refuse an identified model that no configuration could have.
+
+    Parameters
+    ----------
+    values : by dotted name, as of `model_values`.
+    source : the recording.
+
+    Raises
+    ------
+    ParameterError
+        which names the value and what is allowed.
+    """
+    try:
+        _ = configuration.with_values(values).shared
+    except ParameterError as error:
+        reason = str(error).removeprefix(f"{configuration.path}, section '{SHARED}': ")
+        raise ParameterError(
+            f"the model identified from {source} is not possible, so it is not written: {reason}. Either something "
+            "touched the arm, or it moved too little: identify from a recording without contact, as of wam identify "
+            "--excite"
+        ) from error
 
 
 def _by_group(result: Identified) -> dict[str, Array]:

@@ -5,6 +5,7 @@ import difflib
 import math
 import re
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from itertools import islice
 from typing import Any, Final
@@ -16,9 +17,10 @@ from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part, fields
 from wam_description.signals import Wrench
+from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_live.push import push
-from wam_ros.call import CalledStack, Reply
+from wam_ros.call import SILENCE, CalledStack, Reply
 from wam_ros.message_text import plain
 
 SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
@@ -54,6 +56,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     heard = requests.add_parser("echo", parents=[where], help="print messages of a topic")
     heard.add_argument("topic", help="as in docs/topics.md, for example force_measured")
     heard.add_argument("--count", type=int, metavar="N", help="end after so many; default: Ctrl-C")
+    heard.add_argument(
+        "--timeout",
+        type=float,
+        metavar="S",
+        help="end with exit code 1 after S seconds without a message; default: wait",
+    )
     pushed = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
     pushed._negative_number_matcher = NEGATIVE  # that of argparse takes -1e1 and -inf for options, up to Python 3.13
     pushed.add_argument("cover", help="link that is pushed, for example outer_link")
@@ -137,10 +145,49 @@ def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
 
 
 def _echo(given: argparse.Namespace, stack: CalledStack) -> int:
-    for message in islice(stack.messages(given.topic), given.count):
-        print(yaml.safe_dump(plain(message, given.topic), sort_keys=False, default_flow_style=None), end="---\n")
-        sys.stdout.flush()
+    silence = math.inf if given.timeout is None else given.timeout
+    at_least("--timeout", silence, 0.0)
+    waiting = Waiting(given.topic, given.count)
+    try:
+        for message in islice(stack.messages(given.topic, silence, waiting.check), given.count):
+            waiting.take()
+            print(yaml.safe_dump(plain(message, given.topic), sort_keys=False, default_flow_style=None), end="---\n")
+            sys.stdout.flush()
+    except TimeoutError:
+        print(f"wam call: {waiting.text}; none for {silence:g} s (--timeout)", file=sys.stderr)
+        return 1
     return 0
+
+
+class Waiting:
+    """Reports once that no message comes, and for which one it waits.
+
+    Attributes
+    ----------
+    text : what is waited for.
+    """
+
+    def __init__(self, topic: str, count: int | None) -> None:
+        self._topic, self._count = topic, count
+        self._taken, self._since, self._is_reported = 0, time.monotonic(), False
+
+    @property
+    def text(self) -> str:
+        """What is waited for."""
+        of = f" of {self._count}" if self._count is not None else ""
+        return f"waits for message {self._taken + 1}{of} of {self._topic}"
+
+    def take(self) -> None:
+        """A message has come."""
+        self._taken, self._since, self._is_reported = self._taken + 1, time.monotonic(), False
+
+    def check(self) -> None:
+        """No message has come in a while."""
+        if not self._is_reported and time.monotonic() - self._since > SILENCE:
+            self._is_reported = True
+            row = BY_NAME.get(self._topic)
+            seldom = ", which is published only when it changes" * bool(row and row.latched)
+            print(f"{self.text}{seldom}; Ctrl-C ends, --timeout S after S seconds", file=sys.stderr, flush=True)
 
 
 def _push(given: argparse.Namespace, stack: CalledStack) -> int:

@@ -5,6 +5,7 @@ import math
 import sys
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 from wam_bag.bag import read
 from wam_bag.errors import BagError
@@ -26,9 +27,22 @@ from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
 from wam_ros.program import end_at_once_on_signals
 from wam_sim.recording import recorded_run
 
+EXIT_CODES = (
+    "Exit code: 0 if it was played to its end and no result is wrong; 1 if a result is NO, as for a force that was "
+    "refused, a quantity of a task is MISSED, or it failed; 130 if it was stopped."
+)
+
+
+class PrintedReport(NamedTuple):
+    """Whether there is a report, and what in it is not as it should be."""
+
+    is_there: bool
+    unmet: tuple[str, ...] = ()
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
+    parser.epilog = EXIT_CODES
     take_time(parser)
     played = parser.add_mutually_exclusive_group()
     played.add_argument(
@@ -64,14 +78,16 @@ def run(given: argparse.Namespace) -> int:
     end_at_once_on_signals()  # the bag is closed
     stated = _report(bag, bool(failures), task)
     if failures:
-        stream = sys.stdout if stated else sys.stderr  # that of the report
+        stream = sys.stdout if stated.is_there else sys.stderr  # that of the report
         print(f"\nthe demonstration failed: {_cause(bag) or ', '.join(failures)}", file=stream)
-        for command in _next(configuration.shared.timing.mode, bag if stated else None):
+        for command in _next(configuration.shared.timing.mode, bag if stated.is_there else None):
             print(f"next: {command}", file=stream)
         return 1
     print(f"next     wam view {bag}       # the recording in the browser, to play and to scrub")
     print(f"         wam analyse {bag}    # measured and compared with theory")
-    return 0
+    if stated.unmet:
+        print(f"\nnot as it should be: {'; '.join(stated.unmet)}")
+    return 1 if stated.unmet else 0
 
 
 def report_task(configuration: Configuration, bag: Path, task: str = "") -> list[ScenarioStep]:
@@ -102,25 +118,26 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     return list(steps)
 
 
-def _report(bag: Path, failed: bool, task: Experiment | None) -> bool:
+def _report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
     """Print the report; of a demonstration that failed, as far as there is one."""
     try:
-        print(_report_of_task(task, bag) if task else _report_of_demonstration(bag), flush=True)
+        text, unmet = _report_of_task(task, bag) if task else _report_of_demonstration(bag)
+        print(text, flush=True)
     except (BagError, OSError) as error:
         if not failed:
             raise
         print(f"no report{f' of task {task.name}' if task else ''}: {error}", file=sys.stderr)
-        return task is not None and _report(bag, failed, None)  # how far it came, with a picture
-    return True
+        return _report(bag, failed, None) if task else PrintedReport(False)  # how far it came, with a picture
+    return PrintedReport(True, unmet)
 
 
-def _report_of_demonstration(bag: Path) -> str:
+def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:
     from wam_analysis.demo_report import report  # imports matplotlib: not before the nodes
 
     return report(bag, bag / "demo.png")
 
 
-def _report_of_task(task: Experiment, bag: Path) -> str:
+def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:
     from wam_analysis.demo_report import reaction_report  # for the same reason
     from wam_experiments.tasks.pictures import save
     from wam_experiments.thesis.evaluation import evaluate, text
@@ -128,7 +145,8 @@ def _report_of_task(task: Experiment, bag: Path) -> str:
     result = evaluate(task, bag)
     save(task, bag, result, bag / "task.png")
     stated = "\n".join(filter(None, (text(task, result), reaction_report(bag))))
-    return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}"
+    missed = tuple(f"{row.quantity}: MISSED" for row in result.rows if not row.agrees)
+    return f"{stated}\n\nbag      {bag}\npicture  {bag / 'task.png'}", missed
 
 
 def _cause(bag: Path) -> str:

@@ -11,7 +11,7 @@ import yaml
 
 from wam_analysis.identification.fit import identify
 from wam_analysis.identification.motion import recorded_motion
-from wam_analysis.identification.overlay import estimator_values, model_values, write_overlay
+from wam_analysis.identification.overlay import estimator_values, model_values, require_possible, write_overlay
 from wam_analysis.identification.report import report
 from wam_bag.bag import read
 from wam_cli.commands import at_least, configuration_of, take_configuration, writable_directory, writable_file
@@ -65,9 +65,10 @@ def run(given: argparse.Namespace) -> int:
     print(report(shared, found, str(bag)))
     if run_in_bag.parameters.nodes.get("driver", {}).get("timing.dither_cycle", 0):
         print("warning: recorded with the dither, which falsifies all of it; record with timing.dither_cycle 0")
+    values = model_values(shared, found, bag.name) | estimator_values(configuration)
+    require_possible(configuration, values, str(bag))
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
-        values = model_values(shared, found, bag.name) | estimator_values(configuration)
         write_overlay(given.write, _base(given), values, command)
         print(f"written: {given.write}; use it with --config {given.write}, or as base: of a configuration of yours")
     return 0

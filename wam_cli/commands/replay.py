@@ -7,7 +7,7 @@ from wam_description.configuration import option_values
 from wam_sim.replay import REPLAYED, Compared, Replay, replay
 
 EXIT_CODES = "Exit code: 0 if every topic is the same bit for bit, 1 if one is not or the bag cannot be used."
-_MOST_GAPS = 5  # named one by one
+_MOST_GAPS, _MOST_VALUES = 5, 8  # named one by one
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,12 +27,28 @@ def run(given: argparse.Namespace) -> int:
     done = replay(given.bag, given.node, configuration, {} if given.config else option_values(given.values))
     for line in (
         *(f"INCOMPLETE: {line}" for line in done.lost),
+        *other_values(done),
         *map(stated, done.topics),
         *reasons(done),
         *without_effect(given.values, done),
     ):
         print(line)
     return 0 if done.is_same else 1
+
+
+def other_values(done: Replay) -> list[str]:
+    """The parameters that --config has otherwise than the recording, which one might not have meant to change."""
+    named = [one.name + f"={_brief(one.used)}" * (not isinstance(one.used, tuple)) for one in done.changed]
+    if not named:
+        return []
+    scalar = next((one for one in done.changed if not isinstance(one.recorded, tuple)), None)
+    keep = f"; to keep one: --set {scalar.name}={_brief(scalar.recorded)}" if scalar else ""
+    more = f" and {len(named) - _MOST_VALUES} more" if len(named) > _MOST_VALUES else ""
+    return [f"--config differs from the recording in {', '.join(named[:_MOST_VALUES])}{more}{keep}"]
+
+
+def _brief(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value}"
 
 
 def without_effect(values: list[str], done: Replay) -> list[str]:

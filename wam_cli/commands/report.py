@@ -17,5 +17,5 @@ def run(given: argparse.Namespace) -> int:
     """Print the report; nothing is written into the directory of the bag."""
     if given.picture:
         writable_picture("--picture", given.picture)
-    print(report(given.bag, given.picture))
+    print(report(given.bag, given.picture).text)
     return 0
