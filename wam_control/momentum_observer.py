@@ -278,8 +278,9 @@ class MomentumObserver:
         filtered = self._of_links
         residual, sizes = filtered[: self._n], [uncertainty * torque for torque in filtered[self._n : 2 * self._n]]
         covariance, effects = np.zeros((self._n, self._n)), np.zeros((self._n, self._n))
-        covariance.flat[:: self._n + 1] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
-        effects.flat[:: self._n + 1] = sizes
+        diagonal = slice(None, None, self._n + 1)
+        covariance.ravel()[diagonal] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
+        effects.ravel()[diagonal] = sizes
         if load is not None:
             residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
             sized = (np.array(load.torque) * load.sd)[:, None]

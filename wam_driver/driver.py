@@ -183,15 +183,14 @@ class Driver:
     def _watch_limits(self) -> None:
         """Trip on the first quantity above its limit; warn of those near it."""
         tensions = self._largest_tensions()
-        watched = self._watch.watched(self.plant.theta, self.plant.thetad, self.currents, tensions)
+        watched = self._watch.watched(*self._turned, self.currents, tensions)
         self.warnings = [limit.warning for limit in watched]
         self.warnings += [
             f"{name} is hot: {heat:.0%} of its thermal (I2t) limit"
             for name, heat in zip(self._arm.motors.names, self.amplifier.heat, strict=True)
             if heat > WARNING
         ]
-        fault = next(filter(None, (limit.fault for limit in watched)), "")
-        if fault:
+        if watched and (fault := next(filter(None, (limit.fault for limit in watched)), "")):
             self._trip(fault)
 
     def _watch_braking(self) -> None:
