@@ -211,7 +211,7 @@ class ContactFusion:
             side = turned[:, :, j].reshape(-1, n)
             covariance[of, of] += side.T @ side
         per_metre = (forces[:, :2, None, None] * slopes).sum(axis=1)  # (links, moments, n), N m per m
-        link = int(np.argmax(chances))
+        link = int(chances.argmax())
         unknown = np.concatenate(
             (
                 ANY_FORCE * np.sqrt(forces[link].dot(forces[link])) * sides[link].reshape(3, -1),

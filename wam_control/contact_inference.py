@@ -185,7 +185,7 @@ class ContactInference:
         tuple of Hypothesis
             one per cover, the most probable first; what their probabilities lack to 1 is that of a payload.
         """
-        if (size := precision.trace()) > (10.0 * SMALLEST_SD) ** -2:
+        if (size := sum(precision.diagonal().tolist())) > (10.0 * SMALLEST_SD) ** -2:
             fusion = None  # together they would be as exact
         if size > SMALLEST_SD**-2:
             precision = np.asarray(
