@@ -5,6 +5,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
+from operator import add, sub
 from typing import NamedTuple
 
 import numpy as np
@@ -214,12 +215,12 @@ class MomentumObserver:
         if before is None:
             external, model = [0.0] * n, [-torque for torque in bias]
         else:
-            rates = [(p - p_before) / span for p, p_before in zip(momentum, before, strict=True)]
-            model = [rate - 0.5 * (b + o) for rate, b, o in zip(rates, bias, self._bias, strict=True)]
-            left = model
+            # map and a plain zip: strict=True takes as long as the work on four numbers
+            rates = [change / span for change in map(sub, momentum, before)]
+            left = model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, self._bias))]  # noqa: B905
             if friction:
-                left = [rate - 0.5 * (k + o) for rate, k, o in zip(rates, known, self._known, strict=True)]
-            external = [rate - torque for rate, torque in zip(left, tau, strict=True)]
+                left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, self._known))]  # noqa: B905
+            external = list(map(sub, left, tau))
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
@@ -251,7 +252,7 @@ class MomentumObserver:
                 self._of_links = torques
             elif not is_gap:
                 take = 1.0 - keep
-                self._of_links = [keep * old + take * new for old, new in zip(self._of_links, torques, strict=True)]
+                self._of_links = [keep * old + take * new for old, new in zip(self._of_links, torques)]  # noqa: B905
             return
         present = np.array(torques + signals)
         if is_first:

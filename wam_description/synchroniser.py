@@ -213,8 +213,7 @@ class Synchroniser:
             slot = kept.get(stamp)
             if slot is None:
                 kept[stamp] = {topic: value}
-                if stamp > group.newest:
-                    group.newest = stamp
+                group.newest = max(group.newest, stamp)
             elif topic in slot:
                 self.strays += 1
             else:
