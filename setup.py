@@ -18,9 +18,11 @@ PROGRAMS = ("node", *NODES)  # `node` starts a node of the user's own
 # The inner loop, which mypyc makes into C where WAM_COMPILE is set: same source, same bits (benchmarks/compiled.py).
 # The substeps of the plant are C then, too: wam_driver/fast_steps.c.
 COMPILED = (
+    "wam_control/arm_push.py",
     "wam_control/bumpless_transfer.py",
     "wam_control/contact_estimator.py",
     "wam_control/contact_fit.py",
+    "wam_control/contact_fusion.py",
     "wam_control/contact_inference.py",
     "wam_control/contact_table.py",
     "wam_control/force_axis.py",
@@ -39,6 +41,7 @@ COMPILED = (
     "wam_control/velocity_loop.py",
     "wam_description/rigid_body.py",
     "wam_description/signals.py",
+    "wam_description/small_matrices.py",
     "wam_description/synchroniser.py",
     "wam_description/transmission_map.py",
     "wam_driver/amplifier.py",

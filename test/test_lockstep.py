@@ -246,3 +246,24 @@ def test_an_outer_step_takes_states_of_outer_periods_only() -> None:
         synchroniser.put("sensors", tick * 1_000_000, tick)
         steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.put("state", tick * 1_000_000, tick)]
         assert steps == ([(tick * 1_000_000, tick)] if tick in (1, 6, 11) else [])
+
+
+def test_an_outer_step_takes_a_delayed_input_of_the_inner_rate_from_the_outer_period_before() -> None:
+    synchroniser = Synchroniser(TIMING, "state", {"sensors": InputSpec(outer=False, delay=1)}, outer=True, thinned=True)
+    for tick in range(1, 12):
+        synchroniser.put("sensors", tick * 1_000_000, tick)
+        steps = [(inputs.stamp, inputs["sensors"]) for inputs in synchroniser.put("state", tick * 1_000_000, tick)]
+        assert steps == ([(tick * 1_000_000, {1: None, 6: 1, 11: 6}[tick])] if tick in (1, 6, 11) else [])
+
+
+def test_an_outer_step_waits_for_its_inputs_of_both_rates_and_leaves_out_what_one_of_them_has_missed() -> None:
+    specs = {"sensors": InputSpec(outer=False), "estimate": InputSpec(outer=True)}
+    synchroniser = Synchroniser(TIMING, "state", specs, outer=True)
+    ms = 1_000_000
+    assert list(synchroniser.put("state", 1 * ms, "s1")) == []
+    for tick in range(1, 7):
+        assert list(synchroniser.put("sensors", tick * ms, tick)) == []
+    assert synchroniser.missing(1 * ms) == ["estimate"]
+    assert list(synchroniser.put("state", 6 * ms, "s6")) == []
+    (inputs,) = synchroniser.put("estimate", 6 * ms, "e6")  # that of the first one can no longer come
+    assert (inputs["state"], inputs["sensors"], inputs["estimate"]) == ("s6", 6, "e6")

@@ -259,15 +259,16 @@ def test_lost_samples_are_bridged() -> None:
     assert np.abs(observer.torques()[0]).max() < 0.1
 
 
-def test_nothing_is_taken_from_a_gap_longer_than_the_time_constant() -> None:
+@pytest.mark.parametrize("sensors", [False, True])
+def test_nothing_is_taken_from_a_gap_longer_than_the_time_constant(sensors: bool) -> None:
     """Nobody knows what acted in it; it would look like a push."""
-    plant, observer = RigidArm(ARM, POSE, friction=0.0), MomentumObserver(ARM, FREE, use_joint_sensors=False)
-    swing(observer, plant, 0.3)
+    plant, observer = RigidArm(ARM, POSE, friction=0.0), MomentumObserver(ARM, FREE, use_joint_sensors=sensors)
+    swing(observer, plant, 0.3, sensors=sensors)
     before = list(observer.torques()[0])
-    theta, thetad, tau = plant.motors(np.full(4, 0.1))
-    assert observer.observe(State(theta, [speed + 20.0 for speed in thetad], tau), 2.0 * FREE.time_constant)
+    angle, speed, tau = plant.sensors() if sensors else plant.motors(np.full(4, 0.1))
+    assert observer.observe(State(angle, [each + 20.0 for each in speed], tau), 2.0 * FREE.time_constant)
     assert observer.torques()[0] == before
-    assert observer.observe(State(theta, thetad, tau), 0.5 * FREE.time_constant)
+    assert observer.observe(State(angle, speed, tau), 0.5 * FREE.time_constant)
     assert np.abs(np.subtract(observer.torques()[0], before)).max() > 1.0, "a short one is bridged"
 
 

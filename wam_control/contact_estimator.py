@@ -216,7 +216,8 @@ class ContactEstimator:
             self._ended = observer.age
         observer.follow(statistic, self._is_touched(is_pressing))
         if not self._in_contact:
-            self._end_contact()
+            if was_in_contact:
+                self._end_contact()
             return _nothing(torques, sd, statistic, "no contact", observer.warning)
         load = None if is_pressing else observer.load_torques  # what is pressed on is no payload
         now = observer.moment() if parameters.inference.fusion_time else None

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact_fit import LARGEST_EXPONENT
-from wam_description.small_matrices import inverse, solution
+from wam_description.small_matrices import inverse, solution, solutions
 
 Array = NDArray[np.float64]
 
@@ -144,12 +144,11 @@ class ContactFusion:
         if not LIKE < grown < GROWN:
             self.reset()
             return None
-        scale = np.full(7, 1.0 / grown)
-        scale[0] = 1.0
+        scale = np.array([1.0, *[1.0 / grown] * 6])
         rest = rows - (effects @ (past.predicts * scale)).transpose(0, 2, 1)
         precision = inverse(covariance - effects.dot(past.explains).dot(effects.T))
         self.count = 1 + past.moments
-        return (past.gram * np.outer(scale, scale) + rest @ precision @ rest.transpose(0, 2, 1)) / self._widening
+        return (past.gram * (scale[:, None] * scale) + rest @ precision @ rest.transpose(0, 2, 1)) / self._widening
 
     def remember(self, rows: Array, now: Torques, guess: Sequence[Guess], residual: float) -> None:
         """Take the present moment, with what was fitted to it.
@@ -165,9 +164,8 @@ class ContactFusion:
             if self._widening > DIFFERENT:
                 self.reset()
         moments, last = self._moments, self._last
-        is_exact = now.own.diagonal().min() < FINEST**2
         is_early = last is not None and now.time - last.torques.time < EVERY
-        if is_exact or is_early or not self._duration:
+        if is_early or not self._duration or now.own.diagonal().min() < FINEST**2:
             return
         has_moved = last is None or np.abs(now.pose - last.torques.pose).max() > MOVED
         if has_moved:
@@ -185,13 +183,15 @@ class ContactFusion:
         shared = effects @ last.covariance
         common = shared @ effects.T
         found, count = len(guess), len(moments)
-        rows = np.stack([moment.rows for moment in moments], axis=2)  # (links, 7, moments, n)
+        rows = np.empty((*moments[0].rows.shape[:2], count, n))  # (links, 7, moments, n)
+        for j, moment in enumerate(moments):
+            rows[:, :, j] = moment.rows
         chances = np.sqrt([each.probability for each in guess])
         sides, slopes = _sides(rows[:found, :, -1:], guess)
         present = sides[:, :, 0]
         levers = present @ present.transpose(0, 2, 1) + UNMEASURED
-        forces = np.linalg.solve(levers, present @ last.residual[:, None])[:, :, 0]  # (links, 3), N
-        moved = np.array([SLIPS * np.abs(moment.torques.pose - now.pose).max() for moment in moments])
+        forces = solutions(levers, present @ last.residual)  # (links, 3), N
+        moved = SLIPS * np.abs(np.array([moment.torques.pose for moment in moments]) - now.pose).max(axis=1)
         elapsed = np.array([now.time + LATE - moment.torques.time for moment in moments])
         slope = chances[:, None] * (forces[:, :2, None] * slopes[:, :, 0]).sum(axis=1)
         certain = common[-n:, -n:] + last.own
@@ -200,7 +200,7 @@ class ContactFusion:
             _grown(moment.torques.residual, last.residual, certain, way * slope)
             for moment, way in zip(moments, ways, strict=True)
         ]
-        rows = rows * np.concatenate((np.ones((1, count)), np.tile(sizes, (6, 1))))[None, :, :, None]
+        rows[:, 1:] *= np.array(sizes)[:, None]
         sides, slopes = _sides(rows[:found], guess)
         for j, moment in enumerate(moments):
             common[n * j : n * j + n, n * j : n * j + n] += moment.torques.own
@@ -211,7 +211,7 @@ class ContactFusion:
             side = turned[:, :, j].reshape(-1, n)
             covariance[of, of] += side.T @ side
         per_metre = (forces[:, :2, None, None] * slopes).sum(axis=1)  # (links, moments, n), N m per m
-        link = int(np.argmax(chances))
+        link = int(chances.argmax())
         unknown = np.concatenate(
             (
                 ANY_FORCE * np.sqrt(forces[link].dot(forces[link])) * sides[link].reshape(3, -1),

@@ -188,12 +188,12 @@ class ContactInference:
         tuple of Hypothesis
             one per cover, the most probable first; what their probabilities lack to 1 is that of a payload.
         """
-        if precision.trace() > SMALLEST_SD**-2:
+        if (size := sum(precision.diagonal().tolist())) > (10.0 * SMALLEST_SD) ** -2:
+            fusion = None  # together they would be as exact
+        if size > SMALLEST_SD**-2:
             precision = np.asarray(
                 np.linalg.inv(np.linalg.inv(precision) + SMALLEST_SD**2 * np.eye(len(torques))), np.float64
             )
-        if precision.trace() > (10.0 * SMALLEST_SD) ** -2:
-            fusion = None  # together they would be as exact
         at, links = np.array(q), len(self._covers)
         self.jacobians = np.array([self._body.cover_jacobian(at, cover.name) for cover in self._covers])
         rows = np.zeros((links + 1, 7, len(torques)))  # the last are those of a payload
@@ -230,16 +230,24 @@ class ContactInference:
         jacobian, (_, y, z) = self.jacobians[self._index[hypothesis.cover]], force
         return y * jacobian[5] - z * jacobian[4]
 
-    def sides(self, hypotheses: Sequence[Hypothesis], jacobians: Array) -> Array:
-        """Joint torques, (hypotheses, 3, n), m, of a force where each has it or at the far end, in a pose."""
+    def sides(self, hypotheses: Sequence[Hypothesis], poses: Sequence[Array]) -> list[Array]:
+        """Joint torques, (hypotheses, 3, n), m, of a force where each has it or at the far end, in each pose.
+
+        Parameters
+        ----------
+        poses : the `jacobians` of each.
+        """
         index = [self._index[h.cover] for h in hypotheses]
         ends = [self._covers[i].end[0] for i in index]
         places = [end if math.isnan(h.position) else h.position for end, h in zip(ends, hypotheses, strict=True)]
-        place, chosen = np.array(places)[:, None], jacobians[index]
-        sides = chosen[:, :3]
-        sides[:, 1] += place * chosen[:, 5]
-        sides[:, 2] -= place * chosen[:, 4]
-        return sides
+        place, found = np.array(places)[:, None], []
+        for jacobians in poses:
+            chosen = jacobians.take(index, axis=0)
+            sides = chosen[:, :3]
+            sides[:, 1] += place * chosen[:, 5]
+            sides[:, 2] -= place * chosen[:, 4]
+            found.append(sides)
+        return found
 
     def _hypothesis(
         self, q: Sequence[float], cover: _Cover, fit: Fit, ambiguity: str, is_payload: bool, moments: int

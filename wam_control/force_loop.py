@@ -8,6 +8,7 @@ joint_torque.  Forces are those of the arm on the world.
 
 import math
 from collections.abc import Sequence
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
@@ -354,7 +355,7 @@ class ForceLoop:
         axes = command.frame if command is not None and desired else ""
         if axes != self._axes or (self._is_fast and self._rested > RESTED):
             self._begin(axes)
-        goal = [a + b for a, b in zip(posture, self._approached, strict=True)]
+        goal = list(map(add, posture, self._approached))
         held = posture_velocity(goal, q, own.posture_gain, own.joint_speed_limit, self._rate)
         if command is None or not desired:
             return ForceOutput([] if is_open else held, [0.0] * self._n, frame=command.frame if command else BASE)

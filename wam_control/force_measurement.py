@@ -1,6 +1,7 @@
 """The torques behind the measured force F_c, from the feedback that the parameters choose."""
 
 from collections.abc import Sequence
+from operator import add, sub
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class ForceMeasurement:
 
     def tare(self) -> None:
         """Take the present external torques as zero."""
-        self._tare = [tare + torque for tare, torque in zip(self._tare, self.external, strict=True)]
+        self._tare = list(map(add, self._tare, self.external))
 
     @property
     def resting(self) -> Array:
@@ -43,7 +44,7 @@ class ForceMeasurement:
         return np.array(self.external if steady is None else self._beyond_zero(steady))
 
     def _beyond_zero(self, torques: Sequence[float]) -> list[float]:
-        return [torque - tare - zero for torque, tare, zero in zip(torques, self._tare, self._zero, strict=True)]
+        return list(map(sub, map(sub, torques, self._tare), self._zero))
 
     def payload(self, q: Sequence[float], torques: Array, torque_sd: float) -> tuple[float, float]:
         """Mass at the tool, kg, that explains torques of the world on the joints best, and chi^2 of what is left.
@@ -63,7 +64,7 @@ class ForceMeasurement:
         """Take the steady torques of a free arm as zero, unless one of them is above a limit, N m; whether it did."""
         if self._steady.value is None:
             return False
-        zero = [steady - tare for steady, tare in zip(self._steady.value, self._tare, strict=True)]
+        zero = list(map(sub, self._steady.value, self._tare))
         if max(map(abs, zero)) > limit:
             return False
         self._zero = zero
@@ -88,7 +89,7 @@ class ForceMeasurement:
         """
         torque = self._torque(parameters, sensors, estimated)
         velocity = [0.0] * self._n if sensors is None else sensors.velocity
-        self.acceleration = [(b - a) / dt for a, b in zip(self._velocity, velocity, strict=True)]
+        self.acceleration = [change / dt for change in map(sub, velocity, self._velocity)]
         self._velocity = velocity
         self._steady.step(torque, STEADY, dt)
         self.external = self._beyond_zero(torque)
@@ -104,7 +105,7 @@ class ForceMeasurement:
             springs = zip(parameters.spring_stiffness, parameters.spring_rest, sensors.position, strict=True)
             return [stiffness * (rest - angle) for stiffness, rest, angle in springs]
         gravity = self._body.gravity_torque(sensors.position).tolist()
-        return [carried - strain for carried, strain in zip(gravity, sensors.effort, strict=True)]
+        return list(map(sub, gravity, sensors.effort))
 
 
 class LowPass:

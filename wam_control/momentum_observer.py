@@ -5,6 +5,7 @@ De Luca & Mattone (2005), eq. 14-19; Haddadin, De Luca & Albu-Schaeffer (2017), 
 
 import math
 from collections.abc import Sequence
+from operator import add, sub
 from typing import NamedTuple
 
 import numpy as np
@@ -122,10 +123,11 @@ class MomentumObserver:
         n = self._n
         self.q: list[float] = [0.0] * n
         # of each filter the residual and the torque of the model, (2 n,), N m, the pose, (n,), rad, then the signals of
-        # the shafts, (10 n,), and the rate of the motors' torques, (n,), N m/s; strain gauges lie behind the friction:
-        # no signals
-        self._filtered = np.zeros((len(self._times), 3 * n if self._link_side else 14 * n))
-        self._decay = _Decay.over(math.inf, self._times, self._filtered.shape[1])
+        # the shafts, (10 n,), and the rate of the motors' torques, (n,), N m/s
+        self._filtered = np.zeros((len(self._times), 14 * n))
+        # strain gauges lie behind the friction: no signals, and so few numbers that a list takes a third of the time
+        self._of_links = [0.0] * (3 * n)
+        self._decay = _Decay.over(math.inf, self._times, 14 * n)
         self._ring = np.zeros((max(1, self._cycle), 13 * n))
         self._filled = 0
         if self._load is not None:
@@ -213,26 +215,18 @@ class MomentumObserver:
         if before is None:
             external, model = [0.0] * n, [-torque for torque in bias]
         else:
-            rates = [(p - p_before) / span for p, p_before in zip(momentum, before, strict=True)]
-            model = [rate - 0.5 * (b + o) for rate, b, o in zip(rates, bias, self._bias, strict=True)]
-            left = model
+            # map and a plain zip: strict=True takes as long as the work on four numbers
+            rates = [change / span for change in map(sub, momentum, before)]
+            left = model = [rate - 0.5 * both for rate, both in zip(rates, map(add, bias, self._bias))]  # noqa: B905
             if friction:
-                left = [rate - 0.5 * (k + o) for rate, k, o in zip(rates, known, self._known, strict=True)]
-            external = [rate - torque for rate, torque in zip(left, tau, strict=True)]
+                left = [rate - 0.5 * both for rate, both in zip(rates, map(add, known, self._known))]  # noqa: B905
+            external = list(map(sub, left, tau))
         if not math.isfinite(sum(momentum, 0.0) + sum(known, 0.0) + sum(external, 0.0) + sum(model, 0.0)):
             self._gap += dt
             return False
-        filtered, present = self._filtered, np.array(external + model + q + signals)
         if span != self._decay.span:
-            self._decay = _Decay.over(span, self._times, present.size)
-        if before is None:
-            filtered[:] = present
-        else:
-            before_gap = filtered[:, : 3 * n].copy() if span > self._parameters.time_constant else None
-            filtered *= self._decay.keeps
-            filtered += self._decay.takes * present
-            if before_gap is not None:  # the torques in so long a gap are unknown: continue from here
-                filtered[:, : 3 * n] = before_gap
+            self._decay = _Decay.over(span, self._times, 14 * n)
+        self._filter(external + model + q, signals, before is None)
         if self._load is not None:
             keep = 0.0 if before is None else self._decay.keep
             self._load.observe(q, qd, span, keep)
@@ -249,6 +243,27 @@ class MomentumObserver:
         self.is_ready = self.is_ready or (before is not None and settled)
         return True
 
+    def _filter(self, torques: list[float], signals: list[float], is_first: bool) -> None:
+        """Take torques and pose, (3 n,), and signals of the shafts into the filters."""
+        (span, keep, keeps, takes), filtered, n = self._decay, self._filtered, self._n
+        is_gap = span > self._parameters.time_constant and not is_first  # torques in so long a gap are unknown
+        if self._link_side:
+            if is_first:
+                self._of_links = torques
+            elif not is_gap:
+                take = 1.0 - keep
+                self._of_links = [keep * old + take * new for old, new in zip(self._of_links, torques)]  # noqa: B905
+            return
+        present = np.array(torques + signals)
+        if is_first:
+            filtered[:] = present
+            return
+        before_gap = filtered[:, : 3 * n].copy() if is_gap else None
+        filtered *= keeps
+        filtered += takes * present
+        if before_gap is not None:  # continue from here
+            filtered[:, : 3 * n] = before_gap
+
     def torques(self) -> tuple[list[float], Array]:
         """External torques, (n,), N m, and their covariance, (n, n), N^2 m^2.
 
@@ -261,11 +276,12 @@ class MomentumObserver:
             torques, covariance = self._errors.corrected(self.seen)
             return torques.tolist(), self._errors.size * covariance
         uncertainty, load = self._parameters.mass_uncertainty, self._load
-        filtered: list[float] = self._filtered[0].tolist()
+        filtered = self._of_links
         residual, sizes = filtered[: self._n], [uncertainty * torque for torque in filtered[self._n : 2 * self._n]]
         covariance, effects = np.zeros((self._n, self._n)), np.zeros((self._n, self._n))
-        covariance.flat[:: self._n + 1] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
-        effects.flat[:: self._n + 1] = sizes
+        diagonal = slice(None, None, self._n + 1)
+        covariance.ravel()[diagonal] = [self._parameters.joint_torque_sd**2 + size**2 for size in sizes]
+        effects.ravel()[diagonal] = sizes
         if load is not None:
             residual = [torque - load.mass * unit for torque, unit in zip(residual, load.torque, strict=True)]
             sized = (np.array(load.torque) * load.sd)[:, None]

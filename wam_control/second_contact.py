@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wam_control.contact_inference import ContactInference, Hypothesis
 from wam_control.model_errors import Observation
 from wam_control.momentum_observer import MomentumObserver
-from wam_description.small_matrices import solution
+from wam_description.small_matrices import solution, solutions
 
 Array = NDArray[np.float64]
 
@@ -147,9 +147,9 @@ class SecondContact:
             return None
         first = self._steady[count // 2]
         best = first.hypotheses[0]
-        then_sides, sides = (inference.sides(first.hypotheses, pose) for pose in (first.jacobians, inference.jacobians))
+        then_sides, sides = inference.sides(first.hypotheses, (first.jacobians, inference.jacobians))
         levers = then_sides @ then_sides.transpose(0, 2, 1) + UNMEASURED
-        forces = np.linalg.solve(levers, (then_sides @ observer.corrected(then))[:, :, None]).transpose(0, 2, 1)
+        forces = solutions(levers, then_sides @ observer.corrected(then))[:, None]
         turned, force = sides - then_sides, forces[0, 0]
         turns = (forces @ turned)[:, 0]
         weight = np.array([max(h.probability, LEAST_PROBABILITY) for h in first.hypotheses])

@@ -59,6 +59,7 @@ class RigidBody:
         self._frame = {name: self._model.getFrameId(name) for name in self.covers}
         self._joint = {name: self._model.frames[frame].parentJoint for name, frame in self._frame.items()}
         self.moving = tuple(name for name in self.covers if self.moves(name, (0.0, 0.0, 0.0)))
+        self._starts_and_tool = [*(self._frame[name] for name in self.moving), self._tool]
 
     def cover_pose(self, q: ArrayLike, cover: str) -> Pose:
         """Frame of a cover in base coordinates."""
@@ -129,9 +130,8 @@ class RigidBody:
         """Speeds, m/s, of the origins of the covers in `moving`, then of the tool's, from one pass along the chain."""
         pin.forwardKinematics(self._model, self._data, _vector(q), _vector(qd))
         local = pin.ReferenceFrame.LOCAL  # the size is the same in every frame
-        frames = (*(self._frame[name] for name in self.moving), self._tool)
-        velocities = (pin.getFrameVelocity(self._model, self._data, frame, local).linear for frame in frames)
-        return [math.hypot(*velocity.tolist()) for velocity in velocities]
+        velocities = [pin.getFrameVelocity(self._model, self._data, frame, local) for frame in self._starts_and_tool]
+        return [math.hypot(*velocity.linear.tolist()) for velocity in velocities]
 
     def hand_jacobian(self, q: ArrayLike) -> Array:
         """Velocity of the tool's origin per joint velocity, (3, n), m/rad, in frame 5 (A.7 corrected)."""

@@ -41,3 +41,17 @@ def solution(matrix: Array, right: Array) -> Array:
     if math.isnan(found.item(0)):
         found = np.asarray(np.linalg.solve(matrix, right), np.float64)
     return found
+
+
+def solutions(matrices: Array, right: Array) -> Array:
+    """The vectors (k, n) of which matrices (k, n, n) make right sides (k, n).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        where a matrix is singular.
+    """
+    found: Array = LAPACK.solve1(matrices, right)
+    if math.isnan(found.sum()):
+        found = np.asarray(np.linalg.solve(matrices, right[:, :, None])[:, :, 0], np.float64)
+    return found

@@ -130,9 +130,10 @@ class Synchroniser:
         self._newest = {topic: _Newest(spec) for topic, spec in inputs.items() if topic not in waited}
         self._groups: list[_Group] = []
         self._inlets: dict[str, Inlet] = {trigger: self._start}
-        for outer_rate, delay in dict.fromkeys(spec[:2] for spec in waited.values()):
-            limits = {topic: spec.limit_ns for topic, spec in waited.items() if spec[:2] == (outer_rate, delay)}
-            repeats = timing.outer_period_ns if outer_rate else 1
+        rules = {topic: (outer or spec.outer, spec.delay) for topic, spec in waited.items()}
+        for is_outer, delay in dict.fromkeys(rules.values()):
+            limits = {topic: waited[topic].limit_ns for topic, rule in rules.items() if rule == (is_outer, delay)}
+            repeats = timing.outer_period_ns if is_outer else 1
             group = _Group(delay * timing.period_ns, repeats, self._outer_phase, tuple(limits))
             self._groups.append(group)
             self._inlets.update({topic: self._waited(topic, group, limit) for topic, limit in limits.items()})
@@ -212,6 +213,7 @@ class Synchroniser:
             slot = kept.get(stamp)
             if slot is None:
                 kept[stamp] = {topic: value}
+                group.newest = max(group.newest, stamp)
             elif topic in slot:
                 self.strays += 1
             else:
@@ -308,7 +310,10 @@ class Synchroniser:
 
     def _has_missed(self, stamp: int) -> bool:
         """Whether an input of this step can no longer come, as a later one is there: the node began too late for it."""
-        return any(group.has_missed(stamp) for group in self._groups)
+        for group in self._groups:  # noqa: SIM110 - a third of the time of any()
+            if group.has_missed(stamp):
+                return True
+        return False
 
     def missing(self, stamp: int) -> list[str]:
         """Topics whose message the step of this stamp still waits for."""
@@ -341,12 +346,13 @@ class Synchroniser:
         Where it waits, `_lacks` is the group that lacks one, its stamp, and the earliest stamp of all inputs of the
         step: no message that is not later can show that an input was missed.
         """
-        inputs = Inputs()
-        origins: list[Origin] = []
         for group in self._groups:  # before the others: most often it is one of these that is not there yet
             if stamp >= group.until and not group.find(stamp):
-                self._lacks = group, group.cause(stamp), min(each.cause(stamp) for each in self._groups)
+                self._lacks = group, group.cause(stamp), min([each.cause(stamp) for each in self._groups])
                 return None
+        inputs = Inputs()
+        origins: list[Origin] = []
+        for group in self._groups:
             inputs.update(group.found)
             origins.append(group.origin)
         for topic, newest in self._newest.items():
@@ -421,6 +427,7 @@ class _Group:
     ----------
     count : number of its topics.
     kept : the inputs by stamp and topic.
+    newest : largest stamp of those that came, ns.
     found : those of the last step, by topic.
     origin : their stamp, ns, and their topics.
     until : stamp from which a step needs others, ns.
@@ -434,6 +441,7 @@ class _Group:
         "count",
         "found",
         "kept",
+        "newest",
         "origin",
         "topics",
         "until",
@@ -448,6 +456,7 @@ class _Group:
     def restart(self, begin: int) -> None:
         """Forget all; nothing can come in answer to a state before this one, ns."""
         self.kept.clear()
+        self.newest = 0
         self._begin = max(begin, 1)
         self.found: dict[str, Any] = {}
         self.origin: Origin = (0, ())
@@ -462,7 +471,7 @@ class _Group:
     def has_missed(self, stamp: int) -> bool:
         """Whether an input of the step of this stamp, ns, is not there, and a later one of its topic is."""
         cause = self.cause(stamp)
-        if not cause or not self.kept or max(self.kept) <= cause:
+        if not cause or self.newest <= cause:
             return False
         here = self.kept.get(cause, {}).keys()
         return any(later > cause and not there.keys() <= here for later, there in self.kept.items())

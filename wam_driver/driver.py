@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -81,7 +81,6 @@ class Driver:
     motor_state : angle, velocity and torque of each motor, as measured.
     joint_sensors : joint-side encoder and strain torque, if they are mounted.
     currents : actual currents, A, (n,).
-    recent : the last periods, up to the last fault.
     warnings : quantities that are near their limit.
     stale_advice : what to do about a command that is too old; replace it where more is known.
     """
@@ -101,7 +100,7 @@ class Driver:
         )
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random, true.motors.torque_constant)
         self._sensors = Sensors(arm, parameters.sensors, random)
-        self.recent: deque[DriverSample] = deque(maxlen=parameters.post_mortem_samples)
+        self._recent: deque[tuple[Any, ...]] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str]
         self.stale_advice: Callable[[], str] = lambda: "check that velocity_loop runs"
         self._arm, self._timing, self._parameters = arm, timing, parameters
@@ -172,7 +171,7 @@ class Driver:
         self._measure()
         if self.safety.mode is not Mode.FAULT:  # the samples before a fault are kept until its reset
             theta, thetad = self._turned
-            self.recent.append(DriverSample(self.stamp, theta, thetad, self._command, self.currents))
+            self._recent.append((self.stamp, theta, thetad, self._command, self.currents))
         self._pulls.append(self.plant.cable_pull)
         if self.is_outer:
             if enabled:
@@ -183,15 +182,14 @@ class Driver:
     def _watch_limits(self) -> None:
         """Trip on the first quantity above its limit; warn of those near it."""
         tensions = self._largest_tensions()
-        watched = self._watch.watched(self.plant.theta, self.plant.thetad, self.currents, tensions)
+        watched = self._watch.watched(*self._turned, self.currents, tensions)
         self.warnings = [limit.warning for limit in watched]
         self.warnings += [
             f"{name} is hot: {heat:.0%} of its thermal (I2t) limit"
             for name, heat in zip(self._arm.motors.names, self.amplifier.heat, strict=True)
             if heat > WARNING
         ]
-        fault = next(filter(None, (limit.fault for limit in watched)), "")
-        if fault:
+        if watched and (fault := next(filter(None, (limit.fault for limit in watched)), "")):
             self._trip(fault)
 
     def _watch_braking(self) -> None:
@@ -308,6 +306,11 @@ class Driver:
         self.motor_state = self._sensors.motors(theta, thetad, torque, period)
         if self._arm.joint_sensors:
             self.joint_sensors = self._sensors.joints(plant.q, plant.qd, plant.strain_torque, period)
+
+    @property
+    def recent(self) -> list[DriverSample]:
+        """The last periods, up to the last fault."""
+        return list(map(DriverSample._make, self._recent))
 
     @property
     def true_joint_state(self) -> State:

@@ -357,8 +357,8 @@ class Plant:
         acceleration, velocity, dry = self._qdd.tolist(), self._velocity[n:], self._friction_torque()[n:]
         return [
             torque - damping * speed - armature * qdd + friction
-            for torque, damping, speed, armature, qdd, friction in zip(
-                self.cable_torque, self._joint_damping, velocity, self._armature, acceleration, dry, strict=True
+            for torque, damping, speed, armature, qdd, friction in zip(  # noqa: B905 - as long as the work
+                self.cable_torque, self._joint_damping, velocity, self._armature, acceleration, dry
             )
         ]
 
