@@ -1,5 +1,6 @@
 """Each benchmark runs and prints its ratios; how fast is for people to assess."""
 
+import importlib
 import os
 import re
 import subprocess
@@ -120,3 +121,25 @@ def test_benchmark_prints_a_ratio_in_every_row(script: str, domain_id: int) -> N
         # what is left of a whole is 0 where a loaded machine was slower in its parts
         assert float(found[1]) > 0.0 or row.startswith(LEFT_OVER), row
     assert (results.read_bytes() if results.exists() else None) == before, "a quick run must not be kept"
+
+
+SCRIPT = """
+import json, pathlib, sys
+assert sys.argv[1:] == ["--rounds", "1"]
+results = pathlib.Path(__file__).parent / "results"
+results.mkdir()
+rows = {"time": "now", "rounds": 1, "free": {"ratio": [1.25, 1.0, 2.0], "times": [7.0] * 3}, "map": [3.0, 2.0, 4.0]}
+(results / "subject.jsonl").write_text("{}\\n" + json.dumps(rows))
+"""
+
+
+def test_rows_of_another_checkout_are_those_of_its_own_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    editions = importlib.import_module("comparing.editions")
+    for folder in (".venv/bin", "benchmarks"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / ".venv/bin/python").symlink_to(sys.executable)
+    (tmp_path / "benchmarks/subject.py").write_text(SCRIPT, encoding="utf-8")
+    assert editions.measured(tmp_path, "subject") == {"free: ratio": 1.25, "free: times": 7.0, "map": 3.0}
+    with pytest.raises(SystemExit, match=r"nothing\.py --rounds 1 ended with 2:\n.*No such file"):
+        editions.measured(tmp_path, "nothing")
