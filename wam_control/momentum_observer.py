@@ -125,7 +125,7 @@ class MomentumObserver:
         # of each filter the residual and the torque of the model, (2 n,), N m, the pose, (n,), rad, then the signals of
         # the shafts, (10 n,), and the rate of the motors' torques, (n,), N m/s
         self._filtered = np.zeros((len(self._times), 14 * n))
-        # strain gauges lie behind the friction: no signals, and so few numbers that a list takes a third of the time
+        # strain gauges lie behind the friction: no signals, and so few numbers that a list takes half the time
         self._of_links = [0.0] * (3 * n)
         self._decay = _Decay.over(math.inf, self._times, 14 * n)
         self._ring = np.zeros((max(1, self._cycle), 13 * n))
