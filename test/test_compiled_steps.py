@@ -38,6 +38,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Any:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    sys.modules.pop(NAME, None)  # where Python has put it: other tests are those of the plain way
     return module
 
 

@@ -40,7 +40,7 @@ LOG_PERIOD = 1.0  # s between two refusals of a topic in the log
 NEWEST = 2  # messages; one alone would be lost when the next comes just as it is taken
 SECOND = 1_000_000_000
 CLAIM_PERIOD = 0.1  # s, between looks for second publishers of topics on which nothing comes
-LONGEST_ECHO = 0.1  # s, for the status before that of a new session, which replaces it; a frozen node takes nothing
+LONGEST_ECHO = 0.1  # s, for the status that the next one replaces; a frozen node takes nothing
 PUBLISHED, NODE, ENDED = "published ", "node", "ended"  # keys of the report, the first before a full topic name
 
 
@@ -249,7 +249,7 @@ class Ports:
         self.session = session
         self.claims.restart()
         if self.ready:
-            self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_ECHO))  # only the last one is kept
+            self._let_status_arrive()
             plain = self._plain._replace(connected=True)
             self.publish_status(plain._replace(facts={**plain.facts, **facts}))
             self._plain = plain
@@ -273,9 +273,15 @@ class Ports:
             status = status._replace(level=Level.ERROR, message=problem, fault=problem)
         status = status._replace(node=self._name, session=status.session or self.session)
         if status != self._status:
+            if self.shared.timing.mode == "lockstep":  # which waits for everybody; a recording lacks no status then
+                self._let_status_arrive()
             self._status = status
             self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
             self._inform()
+
+    def _let_status_arrive(self) -> None:
+        """Wait until everybody has the present status: only the last one is kept."""
+        self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_ECHO))
 
     def _inform(self) -> None:
         """Print on the console what the driver's state is and what to call next, where that has changed."""
