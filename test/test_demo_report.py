@@ -17,7 +17,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture, demo_report
-from wam_analysis.contact_list import NO_LINK, listed_contacts
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, listed_contacts
 from wam_analysis.demo_figure import draw_arm, draw_forces, save
 from wam_analysis.demo_report import report, text
 from wam_analysis.demo_summary import NOT_RECORDED, DemoSummary, summarize, summary_of
@@ -423,6 +423,41 @@ def test_what_is_estimated_in_a_press_on_nothing_is_wrong():
     assert (touch.link_true, touch.link_estimated) == (NO_LINK, "outer_link")
     assert "right link: NO" in verdict(recording.summary())
     assert recording.summary().contacts[-1].true == NO_LINK
+
+
+def test_a_contact_that_goes_over_to_another_link_is_two_and_a_moment_of_another_is_none():
+    recording = Recording()
+    recording.set(recording.estimated, 1.0, 1.55, "inner_link", (0.0, 25.0, 0.0))
+    recording.set(recording.estimated, 0.7, 0.75, "inner_link", (0.0, 5.0, 0.0))
+    outer, inner, *_ = recording.summary().contacts
+    assert [outer.link, inner.link] == ["outer_link", "inner_link"]
+    assert (outer.begin, outer.end, inner.begin) == pytest.approx((0.72, 1.195, 1.2))
+    assert (outer.force, inner.force) == pytest.approx((11.0, 25.0))
+
+
+def test_a_position_on_another_link_is_no_position_on_the_true_one():
+    recording = Recording()
+    for series in (recording.true, recording.estimated):
+        recording.set(series, 2.5, 2.9, "outer_link", (0.0, 12.0, 0.0), 0.26)
+    touch = recording.summary().touches[1]
+    assert touch.link_true == touch.link_estimated == "inner_link"
+    assert math.isnan(touch.position_estimated)
+
+
+def test_without_its_topic_it_is_reported_that_nothing_is_known_of_the_certainty():
+    recording = Recording()
+    assert NOT_CERTAIN not in demo_report.text(recording.summary()).replace("\n    ", " ")
+    recording.without = ("contact/hypotheses",)
+    assert NOT_CERTAIN in demo_report.text(recording.summary()).replace("\n    ", " ")
+    (section,) = (one for one in analyse_bag(recording.bag(), lambda doing: None).sections if one.key == "contact")
+    assert NOT_CERTAIN in section.sentences
+    assert any("contact/hypotheses" in line for line in section.lacking)
+
+
+def test_without_free_time_false_detections_are_not_known_for_that_reason():
+    recording = Recording()
+    recording.set(recording.true, 0.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.25)
+    assert "false detections: not known, the arm was in contact all the time" in demo_report.text(recording.summary())
 
 
 def test_without_truth_contacts_are_listed_where_no_force_was_commanded():

@@ -393,3 +393,15 @@ def test_conditions_of_a_task_are_drawn_within_the_declared_mismatch() -> None:
         factors = np.array([getattr(conditions, name) for conditions in every])
         assert 0.95 * width < float(np.abs(factors - 1.0).max()) <= width
     assert isinstance(every[0], TaskConditions)
+
+
+def test_a_value_that_every_task_sets_itself_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    results = ["--results", str(tmp_path / "results")]
+    given = ["evaluate", "force", "--tasks", "1", *results, "--set", "force_loop:contact_source=pinned"]
+    with pytest.raises(SystemExit, match="1"):
+        main(given)
+    assert "--set force_loop:contact_source has no effect here: each task sets it" in capsys.readouterr().err
+    given = ["evaluate", "contact", "--contacts", "1", "--set", "contact_estimator:use_joint_sensors=true"]
+    with pytest.raises(SystemExit, match="1"):
+        main(given)
+    assert "use_joint_sensors has no effect here: each scenario sets it" in capsys.readouterr().err

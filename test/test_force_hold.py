@@ -145,6 +145,19 @@ def test_the_advice_where_a_force_is_not_sensed_is_followed_and_the_force_is_sen
     assert "its position: command another direction or position (no allowed force" in unknown.reason
 
 
+def test_the_advice_is_that_for_the_present_force_and_stays_off_the_end_of_the_joint() -> None:
+    loop, q = force_loop(ARM, PINNED), bent(0.1)
+    press(loop, q, radial(q), 2.0)
+    assert "no allowed force up to 5 times" in loop.reason
+    press(loop, q, radial(q), 10.0)
+    fresh = force_loop(ARM, PINNED)
+    press(fresh, q, radial(q), 10.0)
+    assert loop.reason == fresh.reason
+    narrow = force_loop(ARM, replace(PINNED, limits=replace(PINNED.limits, joint_margin=2.1)))
+    press(narrow, q, radial(q), 10.0)
+    assert "turn " not in narrow.reason
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [(12.34, "12"), (123.4, "120"), (0.00456, "0.0046"), (4.0, "4"), (math.inf, "inf"), (98765.0, "99000")],

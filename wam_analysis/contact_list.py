@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,9 @@ from wam_sim.recording import RecordedRun, RecordedStep
 
 NO_LINK = "none"
 BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact, and no shorter part of one is listed
+NOT_CERTAIN = (
+    "Without contact/hypotheses it is not known how certain contacts are, nor whether a force is only the least one."
+)
 LASTING = 0.5  # of a contact, above which a reason belongs to it
 TWO = tuple(2 ** REASONS.index(reason) for reason in (SECOND, CERTAIN_SECOND))
 ESTIMATED = ("probability", "position_sd", "force_sd", "is_lower_bound")
@@ -85,9 +89,11 @@ class _Certainty(NamedTuple):
 
 
 def listed_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
-    """All estimated contacts, each cut where a step of the scenario ends."""
+    """All estimated contacts, each cut where another link is estimated and where a step of the scenario ends."""
     certainty = _certainty(run, traces)
-    rows = _cut(traces.stamp, contact_rows(traces.stamp, traces.estimated.acts), steps)
+    contacts = contact_rows(traces.stamp, traces.estimated.acts)
+    of_links = [part for begin, end in contacts for part in _links(traces, begin, end)]
+    rows = _cut(traces.stamp, of_links, steps)
     return tuple(_listed(traces, certainty, steps, begin, end) for begin, end in rows)
 
 
@@ -123,6 +129,21 @@ def median(values: Numbers) -> float:
     """Median of those that are known, NaN without any."""
     known = values[~np.isnan(values)]
     return float(np.median(known)) if len(known) else NAN
+
+
+def _links(traces: Traces, begin: int, end: int) -> list[tuple[int, int]]:
+    """Parts of a contact in each of which another link is estimated; a change shorter than `BOUNCE` is none."""
+    acting = begin + np.flatnonzero(traces.estimated.acts[begin:end])
+    names = traces.estimated.frame[acting]
+    changes = [0, *(1 + np.flatnonzero(names[1:] != names[:-1])).tolist()]
+    starts, link = [begin], ""
+    for first, after in pairwise([*changes, len(names)]):
+        if traces.stamp[acting[after - 1]] - traces.stamp[acting[first]] < BOUNCE:
+            continue
+        if link and names[first] != link:
+            starts.append(int(acting[first]))
+        link = names[first]
+    return list(pairwise([*starts, end]))
 
 
 def _cut(stamp: Times, contacts: Sequence[tuple[int, int]], steps: Sequence[RecordedStep]) -> list[tuple[int, int]]:

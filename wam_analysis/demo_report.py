@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from wam_analysis.contact_list import NO_LINK, ListedContact
+import numpy as np
+
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, ListedContact
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import (
     NOT_RECORDED,
@@ -249,6 +251,8 @@ def _contacts(contacts: Sequence[ListedContact]) -> list[str]:
     unknown = (reason for one in contacts if math.isnan(one.position) for reason in one.reasons)
     for reason in dict.fromkeys(unknown):
         lines += _wrapped(f"  * {reason}", "    ")
+    if any(math.isnan(one.probability) for one in contacts):
+        lines += _wrapped(f"  {NOT_CERTAIN}", "    ")
     link = "link [%]: its probability; +-: standard deviation"
     second = "second: of the time in which a second contact was suspected"
     return [*lines, *_wrapped(f"  {link}; {second}", "    ")]
@@ -284,7 +288,9 @@ def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
 
 def _false_contacts(summary: DemoSummary) -> str:
     if not summary.free:
-        return "  false detections: not known, the true contact was not recorded"
+        is_known = np.any(summary.traces.true.is_known)
+        why = "the arm was in contact all the time" if is_known else "the true contact was not recorded"
+        return f"  false detections: not known, {why}"
     longest = f", longest {1e3 * summary.longest_false_contact:.0f} ms" if summary.false_contact else ""
     return f"  false detections: {1e3 * summary.false_contact:.0f} ms{longest}, in {summary.free:.1f} s without contact"
 

@@ -298,7 +298,8 @@ def _touch(
     right = both & (estimated.frame == true.frame)
     if not np.any(rows & true.is_known):
         link_true, right = NOT_RECORDED, both & (estimated.frame == link_estimated)
-    position_estimated = median(estimated.position[right])
+    link = link_estimated if link_true == NOT_RECORDED else link_true
+    position_estimated = median(estimated.position[right & (estimated.frame == link)])
     known = [reason for (link, reason), _ in reasons.most_common() if link == link_estimated and reason]
     return StepContact(
         step=step.name,

@@ -103,7 +103,8 @@ class ForceHold:
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
             self._has_settled
         ) = self._has_begun = False
-        self._is_slow, self._other, self._advice = False, "", ""
+        self._is_slow, self._other = False, ""
+        self._advice, self._advised_for = "", 0.0
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = self._reached = self._identified = self._desired = self._turned = 0.0
         self._settled: Array | None = None  # torques per force, 1/m, once it has settled
@@ -341,7 +342,7 @@ class ForceHold:
         parameters: ForceLoopParameters,
         others: Callable[[], OtherAxes] | None,
     ) -> str:
-        """What to do where the force is not sensed well enough, computed once as it is refused."""
+        """What to do where the force is not sensed well enough, computed as it is refused and for another force."""
         if others is None:
             return "bend the arm, or command more force, another direction or position"
 
@@ -349,7 +350,8 @@ class ForceHold:
             sd_limit = parameters.sensing.sd_limit(force, point.is_pinned)
             return force <= parameters.force_limit and axis.force_sd <= RESUME * sd_limit
 
-        self._advice = self._advice or advice(others(), desired, is_sensed)
+        if not self._advice or abs(desired - self._advised_for) > TOLERANCE * desired:
+            self._advice, self._advised_for = advice(others(), desired, is_sensed), desired
         return self._advice
 
     def _too_weak(

@@ -481,13 +481,13 @@ class ForceLoop:
 
         along = turn(q).T @ direction
         moving = np.flatnonzero(np.any(body.cover_jacobian(q, point.cover) != 0.0, axis=0))
-        joint = int(moving[-1]) if len(moving) else 0
+        joint, margin = int(moving[-1]) if len(moving) else 0, self.parameters.limits.joint_margin
         return OtherAxes(
             q,
             joint,
             joints.names[joint],
-            joints.lower[joint],
-            joints.upper[joint],
+            joints.lower[joint] + margin,
+            joints.upper[joint] - margin,
             lambda pose, force: self._force_axes.axis(pose, point.pressed(turn(pose) @ along, force)),
         )
 

@@ -21,7 +21,7 @@ class OtherAxes(NamedTuple):
     ----------
     q : present joint angles (n,), rad.
     joint : index of the last joint that moves the link, which bends the arm there.
-    name, lower, upper : of that joint, rad.
+    name, lower, upper : of that joint, and between which angles it may be, rad.
     at : axis of a force, N, in a pose (n,), rad.
     """
 

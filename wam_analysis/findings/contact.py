@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, ListedContact
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, ListedContact
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
@@ -20,7 +20,8 @@ def contact_section(recording: AnalysedRun) -> Section:
     """Estimated contacts, compared with the true ones."""
     summary = recording.summary
     traces = summary.traces
-    lacking = recording.lacking("contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point")
+    estimated = ("contact/wrench", "contact/point", "contact/hypotheses")
+    lacking = recording.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
     verdict: list[str] = []
@@ -61,6 +62,8 @@ def contact_section(recording: AnalysedRun) -> Section:
     elif summary.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
         verdict.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
+    if any(math.isnan(contact.probability) for contact in summary.contacts):
+        sentences.append(NOT_CERTAIN)
     if not sentences and not findings:
         sentences.append("No contact was recorded.")
     findings += _tracked_friction(recording)

@@ -8,7 +8,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
@@ -99,6 +99,25 @@ def configuration_of(given: argparse.Namespace) -> Configuration:
     loaded = Configuration.load(Path(name) if name.endswith((".yaml", ".yml")) else packaged(name))
     values = getattr(given, "values", [])
     return loaded.with_values(option_values(values)) if values else loaded
+
+
+def refuse_overridden(given: argparse.Namespace, own: Collection[str], what: str) -> None:
+    """Refuse a value of --set that would have no effect.
+
+    Parameters
+    ----------
+    own : parameters, '[node:]parameter', that every evaluation sets itself.
+    what : what sets them.
+
+    Raises
+    ------
+    ValueError
+        names the parameter.
+    """
+    names = {*own, *(name.rpartition(":")[2] for name in own)}
+    for name in option_values(given.values):
+        if name in names:
+            raise ValueError(f"--set {name} has no effect here: {what} sets it; leave it out")
 
 
 def take_time(parser: argparse.ArgumentParser) -> None:

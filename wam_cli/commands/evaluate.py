@@ -9,6 +9,7 @@ from wam_cli.commands import (
     at_least,
     batch_of,
     evaluation_of,
+    refuse_overridden,
     take_evaluation,
 )
 from wam_cli.commands import evaluate_faults as faults
@@ -96,6 +97,7 @@ def _run_contact(given: argparse.Namespace) -> int:
     chosen = {seed: scenarios(configuration, seed, extent, given.joint_sensors, dither) for seed in given.seed}
     order = [(seed, scenario) for seed, own in chosen.items() for scenario in own]
     every_scenario = [scenario for _, scenario in order]
+    refuse_overridden(given, {name for one in every_scenario for name in one.values}, "each scenario")
     if given.mode == "direct":
         with batch_of(given) as batch:
             scored = evaluate(configuration, every_scenario, *batch)

@@ -7,6 +7,7 @@ from pathlib import Path
 from wam_cli.commands import (
     at_least,
     configuration_of,
+    refuse_overridden,
     take_configuration,
     take_executor,
     writable_directory,
@@ -16,7 +17,7 @@ from wam_experiments.force_benchmark.evaluation import ForceTrial, evaluate
 from wam_experiments.force_benchmark.figure import figure
 from wam_experiments.force_benchmark.page import details, page, report, required
 from wam_experiments.force_benchmark.results_file import key
-from wam_experiments.force_benchmark.tasks import SECONDS
+from wam_experiments.force_benchmark.tasks import SECONDS, draw, task_values
 from wam_sim.batch import executor
 from wam_sim.pieces import default_folder
 from wam_sim.progress import Progress
@@ -69,10 +70,13 @@ def run(given: argparse.Namespace) -> int:
 
 
 def _trials(given: argparse.Namespace) -> list[ForceTrial]:
-    numbers = given.only or range(given.tasks)
+    numbers, base = given.only or range(given.tasks), configuration_of(given)
+    if given.values:
+        drawn = [draw(base.shared.arm, given.seed, number) for number in numbers]
+        refuse_overridden(given, {name for task in drawn for name in task_values(base, task)}, "each task")
     with executor(given.workers, given.dask) as found:
         return evaluate(
-            configuration_of(given),
+            base,
             given.seed,
             numbers,
             given.seconds,

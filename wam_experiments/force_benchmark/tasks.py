@@ -256,6 +256,11 @@ def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
 
 def configured(base: Configuration, task: Task) -> Configuration:
     """The configuration of a task: its surface in the world, what a user declares of it, the true arm."""
+    return base.with_values(task_values(base, task))
+
+
+def task_values(base: Configuration, task: Task) -> dict[str, Any]:
+    """What `configured` sets, by parameter."""
     surface, conditions = task.surface, task.conditions
     n = len(task.q)
     values: dict[str, Any] = {
@@ -290,7 +295,7 @@ def configured(base: Configuration, task: Task) -> Configuration:
             "force_loop:feedback": "contact_estimate",
             "timing.dither_cycle": DITHER_CYCLE,
         }
-    return base.with_values(values)
+    return values
 
 
 def _mismatch(conditions: TaskConditions) -> dict[str, tuple[float, ...]]:
