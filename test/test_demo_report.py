@@ -435,6 +435,14 @@ def test_a_contact_that_goes_over_to_another_link_is_two_and_a_moment_of_another
     assert (outer.force, inner.force) == pytest.approx((11.0, 25.0))
 
 
+def test_without_a_scenario_each_commanded_force_has_a_contact_of_its_own():
+    recording = Recording()
+    recording.without = ("status",)
+    recording.set(recording.commanded, 7.0, 7.3, "outer_link", (0.0, -6.0, 0.0))  # a ramp of one step
+    forces = [one.force for one in listed_contacts(recorded_run(recording.bag()), recording.summary().traces, ())]
+    assert forces == pytest.approx([11.0, 10.0, 7.84, 3.92, 3.0], abs=0.01)  # the last one with none
+
+
 def test_a_position_on_another_link_is_no_position_on_the_true_one():
     recording = Recording()
     for series in (recording.true, recording.estimated):

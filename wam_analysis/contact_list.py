@@ -19,13 +19,14 @@ BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact, 
 NOT_CERTAIN = (
     "Without contact/hypotheses it is not known how certain contacts are, nor whether a force is only the least one."
 )
+HELD = 500_000_000  # ns, for which a commanded force is the same
 LASTING = 0.5  # of a contact, above which a reason belongs to it
 TWO = tuple(2 ** REASONS.index(reason) for reason in (SECOND, CERTAIN_SECOND))
 ESTIMATED = ("probability", "position_sd", "force_sd", "is_lower_bound")
 
 
 class ListedContact(NamedTuple):
-    """An estimated contact, or the part of it in one step of a scenario; medians, NaN where unknown.
+    """An estimated contact, or the part of it in one step of a scenario, or under one command; medians, NaN if unknown.
 
     Attributes
     ----------
@@ -89,11 +90,15 @@ class _Certainty(NamedTuple):
 
 
 def listed_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
-    """All estimated contacts, each cut where another link is estimated and where a step of the scenario ends."""
+    """All estimated contacts, each cut where another link is estimated and where a step of the scenario ends.
+
+    Without a scenario they are cut where another commanded force begins that lasts.
+    """
     certainty = _certainty(run, traces)
     contacts = contact_rows(traces.stamp, traces.estimated.acts)
     of_links = [part for begin, end in contacts for part in _links(traces, begin, end)]
-    rows = _cut(traces.stamp, of_links, steps)
+    bounds = [step.begin for step in steps] or _other_commands(traces)
+    rows = _cut(traces.stamp, of_links, bounds)
     return tuple(_listed(traces, certainty, steps, begin, end) for begin, end in rows)
 
 
@@ -146,9 +151,18 @@ def _links(traces: Traces, begin: int, end: int) -> list[tuple[int, int]]:
     return list(pairwise([*starts, end]))
 
 
-def _cut(stamp: Times, contacts: Sequence[tuple[int, int]], steps: Sequence[RecordedStep]) -> list[tuple[int, int]]:
-    """Rows of the parts of contacts in each step; no part is shorter than `BOUNCE`, if its contact is not."""
-    bounds = np.searchsorted(stamp, [step.begin for step in steps]).tolist()
+def _other_commands(traces: Traces) -> list[int]:
+    """Stamps from which on the commanded force stays what it is for `HELD`, ns; a ramp belongs to what is before it."""
+    force, stamp = np.nan_to_num(traces.commanded.force), traces.stamp
+    if not len(stamp):
+        return []
+    changes = [0, *(1 + np.flatnonzero(np.any(force[1:] != force[:-1], axis=1))).tolist(), len(stamp)]
+    return [int(stamp[first]) for first, after in pairwise(changes) if stamp[after - 1] - stamp[first] >= HELD]
+
+
+def _cut(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -> list[tuple[int, int]]:
+    """Rows of the parts of contacts between some stamps; none is shorter than `BOUNCE`, if its contact is not."""
+    bounds = np.searchsorted(stamp, at).tolist()
     parts: list[tuple[int, int]] = []
     for begin, end in contacts:
         start = begin

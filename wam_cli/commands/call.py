@@ -147,6 +147,8 @@ def _unknown(node: str, name: str, values: Mapping[str, Any]) -> str:
 def _echo(given: argparse.Namespace, stack: CalledStack) -> int:
     silence = math.inf if given.timeout is None else given.timeout
     at_least("--timeout", silence, 0.0)
+    if given.count is not None:
+        at_least("--count", given.count, 1)
     waiting = Waiting(given.topic, given.count)
     try:
         for message in islice(stack.messages(given.topic, silence, waiting.check), given.count):
