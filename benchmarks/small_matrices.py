@@ -14,16 +14,9 @@ from wam_description.configuration import Configuration, packaged
 from wam_sim.simulation import Simulation
 
 CHUNK = 10  # periods, of which each is counted at its fastest
-
-
-def solve1(matrices: Any, right: Any) -> Any:
-    """Vectors of which one matrix, or each of several, makes right sides, as numpy.linalg solves for them."""
-    return np.linalg.solve(matrices, right[..., None])[..., 0]
-
-
 WAYS: dict[str, Any] = {
     "without the checks": small_matrices.LAPACK,
-    "numpy.linalg": SimpleNamespace(inv=np.linalg.inv, solve1=solve1),
+    "numpy.linalg": SimpleNamespace(inv=np.linalg.inv, solve1=small_matrices.checked_solutions),
 }
 
 

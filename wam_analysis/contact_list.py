@@ -19,7 +19,7 @@ BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact, 
 NOT_CERTAIN = (
     "Without contact/hypotheses it is not known how certain contacts are, nor whether a force is only the least one."
 )
-HELD = 500_000_000  # ns, for which a commanded force is the same
+PLATEAU = 500_000_000  # ns, for which a commanded force is the same
 LASTING = 0.5  # of a contact, above which a reason belongs to it
 TWO = tuple(2 ** REASONS.index(reason) for reason in (SECOND, CERTAIN_SECOND))
 ESTIMATED = ("probability", "position_sd", "force_sd", "is_lower_bound")
@@ -152,12 +152,12 @@ def _links(traces: Traces, begin: int, end: int) -> list[tuple[int, int]]:
 
 
 def _other_commands(traces: Traces) -> list[int]:
-    """Stamps from which on the commanded force stays what it is for `HELD`, ns; a ramp belongs to what is before it."""
+    """Stamps from which on the commanded force stays as it is for `PLATEAU`, ns; a ramp belongs to what was before."""
     force, stamp = np.nan_to_num(traces.commanded.force), traces.stamp
     if not len(stamp):
         return []
     changes = [0, *(1 + np.flatnonzero(np.any(force[1:] != force[:-1], axis=1))).tolist(), len(stamp)]
-    return [int(stamp[first]) for first, after in pairwise(changes) if stamp[after - 1] - stamp[first] >= HELD]
+    return [int(stamp[first]) for first, after in pairwise(changes) if stamp[after - 1] - stamp[first] >= PLATEAU]
 
 
 def _cut(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -> list[tuple[int, int]]:

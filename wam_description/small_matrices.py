@@ -39,7 +39,7 @@ def solution(matrix: Array, right: Array) -> Array:
     """
     found: Array = LAPACK.solve1(matrix, right)
     if math.isnan(found.item(0)):
-        found = np.asarray(np.linalg.solve(matrix, right), np.float64)
+        found = checked_solutions(matrix, right)
     return found
 
 
@@ -53,5 +53,10 @@ def solutions(matrices: Array, right: Array) -> Array:
     """
     found: Array = LAPACK.solve1(matrices, right)
     if math.isnan(found.sum()):
-        found = np.asarray(np.linalg.solve(matrices, right[:, :, None])[:, :, 0], np.float64)
+        found = checked_solutions(matrices, right)
     return found
+
+
+def checked_solutions(matrices: Array, right: Array) -> Array:
+    """The same of one matrix or of several, as `numpy.linalg` solves them."""
+    return np.asarray(np.linalg.solve(matrices, right[..., None])[..., 0], np.float64)

@@ -52,9 +52,9 @@ PyDoc_STRVAR(advance_doc,
              "advance(fixed, count, is_set, low, high, direction, circuits, each, set_friction, apply_pushes)\n\n"
              "Advance by `count` steps; the velocities of rotors and joints at the start of the last one, rad/s.\n"
              "`fixed`: addresses of model, data, mj_step1, mj_step2 and of what sets a handler of messages; the class of\n"
-             "the exception; `laws` of Surfaces, the step of the plant, s, and two constants of Surfaces.  `is_set`: whether MuJoCo has the levels of friction.  `low`, `high`, `direction`: of\n"
-             "DryFriction.  `each`: of CableCircuits, empty where nothing follows the torque.  `apply_pushes`: None\n"
-             "without pushes.");
+             "the exception; `laws` of Surfaces, the step of the plant, s, and two constants of Surfaces.  `is_set`:\n"
+             "whether MuJoCo has the levels of friction.  `low`, `high`, `direction`: of DryFriction.  `each`: of\n"
+             "CableCircuits, empty where nothing follows the torque.  `apply_pushes`: None without pushes.");
 
 static PyObject *number(PyObject *circuit, int place) { return PyTuple_GET_ITEM(circuit, place); }
 
@@ -92,14 +92,18 @@ static PyObject *law_of(PyObject *laws, const mjContact *contact) {
   return NULL;
 }
 
+static double weight(const mjContact *contact, double deepest, double sharpness) {
+  return pow(fmax(-contact->dist, 0.0) / deepest, sharpness);
+}
+
 /* _fractions of wam_driver/surfaces.py for one contact. */
 static double fraction(PyObject *const *law, const mjData *data, int i, double smallest, double sharpness) {
   double deepest = smallest, total = 0.0;
   for (int j = 0; j < data->ncon; j++)
     if (law[j] == law[i]) deepest = fmax(deepest, -data->contact[j].dist);
   for (int j = 0; j < data->ncon; j++)
-    if (law[j] == law[i]) total += pow(fmax(-data->contact[j].dist, 0.0) / deepest, sharpness);
-  return total ? pow(fmax(-data->contact[i].dist, 0.0) / deepest, sharpness) / total : 0.0;
+    if (law[j] == law[i]) total += weight(data->contact + j, deepest, sharpness);
+  return total ? weight(data->contact + i, deepest, sharpness) / total : 0.0;
 }
 
 /* Surfaces.apply without movers; -1 with an exception where a contact has no law. */

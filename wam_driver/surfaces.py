@@ -58,7 +58,6 @@ class Surfaces:
             (*pair, float(law.stiffness), float(law.damping), float(law.hardening), size, law.is_shared)
             for pair, law, size in zip(pairs, laws, model.pair_dim.tolist(), strict=True)
         ]
-        self._law = [law[2:] for law in self.laws]
 
     def apply(self) -> None:
         """Make each contact's force k_c depth + b_c speed, and let it stick within its friction cone.
@@ -78,7 +77,7 @@ class Surfaces:
             self._subtract_movers(velocity, rows, pairs)
         for pair, row, distance, fraction in zip(pairs, rows, distances, fractions):  # noqa: B905 - one of each per contact
             if row >= 0:
-                stiffness, damping, hardening, size, is_shared = self._law[pair]
+                _, _, stiffness, damping, hardening, size, is_shared = self.laws[pair]
                 if hardening and distance < 0.0:
                     stiffness *= 1.0 - hardening * distance
                 force = -(stiffness * distance + damping * velocity[row]) * (fraction if is_shared else 1.0)
@@ -95,7 +94,7 @@ class Surfaces:
             if row >= 0 and mover is not None:
                 sign = 1.0 if second in self._mover else -1.0
                 along = (contact.frame[i].reshape(3, 3) @ mover.velocity).tolist()
-                for k in range(self._law[pair][3]):
+                for k in range(self.laws[pair][5]):
                     velocity[row + k] += sign * along[k]
 
 

@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from comparing import machine, options, ratios, table
 
 HERE = Path(__file__).resolve().parents[2]
+ROUNDS = 5
 
 
 def measured(checkout: Path, script: str) -> dict[str, float]:
@@ -42,13 +43,13 @@ def rows(tree: Any, name: str = "") -> Iterator[tuple[str, float]]:
 
 def main() -> None:
     """Measure in turns, print the table."""
-    parser = options(__doc__, rounds=5)
+    parser = options(__doc__, ROUNDS)
     parser.add_argument("checkout", type=Path, help="folder of the other checkout, with its .venv")
     parser.add_argument("scripts", nargs="+", help="names of benchmarks: speed, plant, round_trip")
     given = parser.parse_args()
     print(machine())
     for script in given.scripts:
-        turns = [(measured(given.checkout, script), measured(HERE, script)) for _ in range(given.rounds or 5)]
+        turns = [(measured(given.checkout, script), measured(HERE, script)) for _ in range(given.rounds or ROUNDS)]
         lines = []
         for row in turns[0][0].keys() & turns[0][1].keys():
             there, here = ([turn[i][row] for turn in turns] for i in (0, 1))
