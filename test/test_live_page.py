@@ -1,6 +1,7 @@
 """The live page: drawn where the simulator has the arm, harmless to the run, usable in a real browser."""
 
 import argparse
+import asyncio
 import base64
 import json
 import math
@@ -14,6 +15,7 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
@@ -62,7 +64,7 @@ from wam_live.panel import (  # noqa: E402
     status_page,
 )
 from wam_live.playback import BagSource  # noqa: E402
-from wam_live.scene import RELEASE, STRONGEST, Grip, LinkPush, Scene, band_push  # noqa: E402
+from wam_live.scene import STRONGEST, Grip, Scene, band_push  # noqa: E402
 from wam_live.snapshot import Snapshot  # noqa: E402
 from wam_live.stack_source import RunningStack  # noqa: E402
 from wam_ros.display import COPIED, PERIOD, DisplayCopy, copy_name  # noqa: E402
@@ -109,7 +111,7 @@ def turned(wxyz: Any, vector: Any) -> np.ndarray[Any, Any]:
 )
 def test_links_are_drawn_where_the_simulator_has_them(server: Any, name: str, pose: tuple[float, ...]) -> None:
     arm = Configuration.load(packaged(name)).shared.arm
-    scene = Scene(server, arm, OBSTACLES, None)
+    scene = Scene(server, arm, OBSTACLES, draggable=False)
     scene.show(Snapshot(stamp=1, q=pose))
     model = mujoco.MjModel.from_xml_string(mjcf(arm, 0.001, World(OBSTACLES, NO_SPRINGS), no_effects(arm)))
     data = mujoco.MjData(model)
@@ -129,7 +131,7 @@ def test_links_are_drawn_where_the_simulator_has_them(server: Any, name: str, po
 
 
 def test_contacts_are_drawn_as_arrows_along_the_force_and_vanish(server: Any) -> None:
-    scene = Scene(server, ARM, OBSTACLES, None)
+    scene = Scene(server, ARM, OBSTACLES, draggable=False)
     contact = Contact("outer_link", 0.2, (0.0, 0.0, 10.0), 0.01)
     scene.show(Snapshot(1, POSE, true=contact, likely=(LikelyRange("outer_link", 0.1, 0.3),)))
     arrow, band = (server.scene.get_handle_by_name(f"/contact/{name}") for name in ("true", "likely0"))
@@ -164,6 +166,33 @@ def test_a_drag_at_the_surface_pushes_at_the_axis_and_across_it_only() -> None:
     assert push.torque == pytest.approx((0.0, -0.2 * 12.0, 0.2 * 6.0))
     beyond = band_push(Grip("outer_link", np.array([0.52, 0.0, 0.02]), START, END), np.array([0.52, 0.1, 0.02]))
     assert beyond.torque[2] == pytest.approx(0.5 * 6.0)  # a grip at the round end acts at the end of the axis
+
+
+def mouse(scene: Scene, phase: str) -> None:
+    """Report a drag of the outer link as viser does, from a thread of its own."""
+    start = scene.point("outer_link", 0.2)
+    event = SimpleNamespace(phase=phase, start_position=start, end_position=start + np.array([0.0, 0.5, 0.25]))
+    reported = threading.Thread(target=lambda: asyncio.run(scene._dragged("outer_link", (START, END))(event)))
+    reported.start()
+    reported.join()
+
+
+def test_a_drag_that_ends_while_its_push_is_computed_is_over(server: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene(server, ARM, OBSTACLES, draggable=True)
+    scene.show(Snapshot(1, POSE))
+    assert scene.push() is None
+    mouse(scene, "start")
+    pose_of = scene._body.cover_pose
+
+    def slow(*of: Any) -> Any:
+        mouse(scene, "end")
+        return pose_of(*of)
+
+    monkeypatch.setattr(scene._body, "cover_pose", slow)
+    assert scene.push() is not None
+    assert scene.push() is None
+    scene.show(Snapshot(2, POSE))
+    assert not server.scene.get_handle_by_name("/hand").visible
 
 
 def test_the_status_escapes_what_comes_from_topics() -> None:
@@ -363,11 +392,12 @@ def test_buttons_reach_the_driver_and_a_push_moves_the_arm(domain_id: int) -> No
         panel.requests.put(Call("driver", "enable", True))
         shown.wait(lambda: mode_of(shown) == "enabled", spin)
         start = panel.snapshot.q
-        scene._push(LinkPush("outer_link", (0.0, 30.0, 0.0), (0.0, 0.0, 9.0)))
+        mouse(scene, "start")
         shown.wait(lambda: math.dist(panel.snapshot.q, start) > MOVED, spin)
         assert panel.snapshot.true.cover == "outer_link"
-        scene._push(RELEASE)
+        mouse(scene, "end")
         shown.wait(lambda: panel.snapshot.true.cover == "", spin)
+        shown.wait(lambda: composition.nodes["driver"].count_publishers("sim/disturbance") == 0, spin)
         panel.requests.put(SetParameters("force_loop", {"posture_gain": -1.0}))
         shown.wait(lambda: "posture_gain" in panel._shown.content and "refused" in panel._shown.content, spin)
         panel.requests.put(Call("driver", "estop"))
@@ -771,10 +801,6 @@ def until(holds: Callable[[], Any]) -> None:
     while not holds():
         assert time.monotonic() < end, "it never came"
         time.sleep(0.05)
-
-
-def test_frames_of_a_push_are_covers() -> None:
-    assert RELEASE.cover == BASE
 
 
 def test_objects_of_the_world_are_drawn_where_the_simulator_has_them(server: Any) -> None:

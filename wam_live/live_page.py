@@ -19,8 +19,9 @@ from wam_live.hold import HeldTopic
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import DITHER, NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, mode_of
+from wam_live.push import NO_PUSH
 from wam_live.scenario_player import ScenarioPlayer
-from wam_live.scene import RELEASE, LinkPush, Scene
+from wam_live.scene import Scene
 from wam_live.snapshot import size
 from wam_live.stack_source import RunningStack
 from wam_ros.messages import message_type
@@ -61,7 +62,6 @@ class LivePage:
         self._clients: dict[tuple[str, Any], Any] = {}  # by name and type
         self._server: Any = None
         self._press: Press | None = None
-        self._push: LinkPush | None = None
         self._holds: dict[str, HeldTopic] = {}
         self._states: Any = None  # subscription while somebody presses
         self._live: dict[tuple[str, str], Any] = {}
@@ -84,17 +84,18 @@ class LivePage:
             name_page(self._server, label, more)
             source = RunningStack(self._connection.context, self._namespace, shared)
             self._holds = {name: HeldTopic(self._asking, name, shared) for name in ("force_command", "sim/disturbance")}
-            self.scene = scene = Scene(self._server, shared.arm, at_rest(world), self._take_push)
+            self.scene = scene = Scene(self._server, shared.arm, at_rest(world), draggable=True)
             self.objects = objects = ObjectMeshes(self._server, world)
             sliders = [key for key in SLIDERS if key != DITHER or shared.timing.dither_cycle]
             self._live = {key: flat[key[0]][key[1]] for key in sliders if key[1] in flat.get(key[0], {})}
             self._bent = tuple(flat.get("force_loop", {}).get("guard.posture", ()))
             self.panel = panel = Controls(self._server, shared.arm, self._live, dither_text(shared.timing))
             self._player = ScenarioPlayer(shared, self._namespace)
-            self._server.on_client_disconnect(lambda _: self._let_go(scene, panel))
+            self._server.on_client_disconnect(lambda _: panel.requests.put(NO_PRESS))  # nobody sees the force
             self._notify(f"live page: {url(self._port)}  ({label}{more})")
             self._draw(source, scene, objects, panel, until)
-            self._release(source.stamp)
+            self._end_press()
+            self._send(source, panel, None)
         finally:
             self.close()
 
@@ -136,12 +137,13 @@ class LivePage:
             with self._server.atomic():
                 scene.show(snapshot)
                 objects.show(snapshot.objects)
-                pushing = scene.drag()
+                push = scene.push()
                 panel.take(snapshot)
                 if count % PANEL_EVERY == 0:
-                    panel.show(snapshot, pushing, size(self._press.force) if self._press else 0.0)
+                    pushing, pressing = (size(one.force) if one else 0.0 for one in (push, self._press))
+                    panel.show(snapshot, pushing, pressing)
             count += 1
-            self._send(source, panel)
+            self._send(source, panel, push)
             if self._player is not None and (ended := self._player.ended()):
                 panel.notify(ended)
                 self._ask(Call("driver", "pause", False), source, panel, ended)  # a scenario pauses the arm at its end
@@ -150,28 +152,17 @@ class LivePage:
 
     # requests of the page
 
-    def _take_push(self, push: LinkPush) -> None:
-        self._push = push
-
-    def _let_go(self, scene: Scene, panel: Controls) -> None:
-        """A browser is gone: nobody holds the link, and nobody sees the force."""
-        scene.let_go()
-        panel.requests.put(NO_PRESS)
-
-    def _send(self, source: RunningStack, panel: Controls) -> None:
-        """Stream the push until it is released; end a force whose arm has stopped."""
+    def _send(self, source: RunningStack, panel: Controls, push: Wrench | None) -> None:
+        """Stream the push of a drag until its end; end a force whose arm has stopped."""
         if self._press is not None and mode_of(source.statuses) != "enabled":
             self._end_press()
             panel.notify("letting go: the brakes are on")
-        push = self._push
-        if push is None:
-            return
         hold = self._holds["sim/disturbance"]
-        refusal = hold.send(source.stamp, Wrench(*push)) if push is not RELEASE or hold.is_on else ""
-        if refusal:
-            panel.notify(f"not pushed: {refusal}", refused=True)
-        if (push is RELEASE or refusal) and self._push is push:  # a newer one may have come from the browser meanwhile
-            self._push = None
+        if push is not None:
+            if refusal := hold.send(source.stamp, push):
+                panel.notify(f"not pushed: {refusal}", refused=True)
+        elif hold.is_on:
+            hold.send(source.stamp, NO_PUSH)
             hold.end()
 
     def _start_press(self, press: Press, source: RunningStack, panel: Controls) -> None:
@@ -201,13 +192,6 @@ class LivePage:
             self._asking.destroy_subscription(self._states)
             self._states = None
             self._holds["force_command"].end()
-
-    def _release(self, stamp: int) -> None:
-        """End what is held, before the page does."""
-        self._end_press()
-        if (hold := self._holds["sim/disturbance"]).is_on:
-            hold.send(stamp, Wrench(*RELEASE))
-            hold.end()
 
     def _play(self, script: str, panel: Controls) -> None:
         assert self._player is not None

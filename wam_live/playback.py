@@ -126,7 +126,7 @@ def play(
     source = BagSource(recording)
     server = serve(port)
     try:
-        scene = Scene(server, source.recorded.arm, at_rest(source.world), None)
+        scene = Scene(server, source.recorded.arm, at_rest(source.world), draggable=False)
         objects = ObjectMeshes(server, source.world)
         length = (source.end - source.begin) / 1e9
         name_page(server, recording.bag.path.name)

@@ -29,7 +29,7 @@ from wam_analysis.drawing import (
 )
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import BASE, Contact, LikelyRange, Triple
+from wam_description.signals import Contact, LikelyRange, Wrench
 from wam_description.world import Obstacles
 from wam_live.snapshot import Snapshot, size
 
@@ -43,14 +43,6 @@ STRONGEST = 40.0  # N, that a drag pushes with
 Array = NDArray[np.float64]
 
 
-class LinkPush(NamedTuple):
-    """A push on a cover: force at and torque about the origin of its frame, in that frame; zero force releases."""
-
-    cover: str
-    force: Triple  # N
-    torque: Triple  # N m
-
-
 class Grip(NamedTuple):
     """Where a drag holds a cover, m, in its frame: the point, and the ends of the axis of its tube, (3,) each."""
 
@@ -60,7 +52,11 @@ class Grip(NamedTuple):
     end: Array
 
 
-RELEASE = LinkPush(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+class Drag(NamedTuple):
+    """A drag as the browser reports it: what it holds, and where its pointer is in the base frame, (3,), m."""
+
+    grip: Grip
+    pointer: Array
 
 
 class Scene:
@@ -70,17 +66,14 @@ class Scene:
     ----------
     server : that shows it.
     arm, obstacles : as the driver's parameters have them.
-    push : called with each `LinkPush` of a dragged link, with `RELEASE` at the end; None where nothing can be pushed.
+    draggable : whether links can be dragged; in a recording they cannot.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, arm: Arm, obstacles: Obstacles, push: Callable[[LinkPush], None] | None
-    ) -> None:
-        self._scene, self._arm, self._push = server.scene, arm, push
+    def __init__(self, server: viser.ViserServer, arm: Arm, obstacles: Obstacles, draggable: bool) -> None:
+        self._scene, self._arm, self._draggable = server.scene, arm, draggable
         self._body = RigidBody(arm)
         self._q = list(arm.joints.start)
-        self._grabbed: Grip | None = None
-        self._pointer = np.zeros(3)
+        self._drag: Drag | None = None  # of the browser: its thread replaces it as one, the drawing reads it once
         self._scene.set_up_direction("+z")
         # shadows and the environment map take most of the time of a browser that draws by software
         self._scene.configure_default_lights(cast_shadow=False)
@@ -138,7 +131,7 @@ class Scene:
             wxyz=quaternion(turn_from_z(end - start)),
             cast_shadow=False,
         )
-        if self._push is not None:
+        if self._draggable:
             tube.on_drag("left")(self._dragged(name, (start, end)))
         return frame
 
@@ -203,47 +196,40 @@ class Scene:
 
     def _dragged(self, cover: str, axis: tuple[Array, Array]) -> Callable[[Any], Any]:
         async def take(event: Any) -> None:  # an async callback: others run in a pool, out of order
-            if event.phase == "end":
-                self._let_go()
+            if event.phase == "end":  # viser reports it where the browser is gone, too
+                self._drag = None
                 return
-            if self._grabbed is None:
+            if self._drag is None:
                 pose = self._body.cover_pose(self._q, cover)
                 point = pose.rotation.T @ (np.array(event.start_position) - pose.position)
-                self._grabbed = Grip(cover, point, *axis)
-            self._pointer = np.array(event.end_position)
+                grip = Grip(cover, point, *axis)
+            else:
+                grip = self._drag.grip
+            self._drag = Drag(grip, np.array(event.end_position))
 
         return take
 
-    def _let_go(self) -> None:
-        if self._grabbed is not None and self._push is not None:
-            self._grabbed = None
-            self._push(RELEASE)
-
-    def let_go(self) -> None:
-        """End a drag whose browser is gone."""
-        self._let_go()
-
-    def drag(self) -> float:
-        """Send the push of the present drag; returns its force, N.  Call it at every drawing."""
-        if self._grabbed is None or self._push is None:
-            return 0.0
-        pose = self._body.cover_pose(self._q, self._grabbed.cover)
-        push = band_push(self._grabbed, pose.rotation.T @ (self._pointer - pose.position))
-        self._push(push)
-        return size(push.force)
+    def push(self) -> Wrench | None:
+        """Return the push of the present drag, None where nobody drags."""
+        drag = self._drag
+        if drag is None:
+            return None
+        pose = self._body.cover_pose(self._q, drag.grip.cover)
+        return band_push(drag.grip, pose.rotation.T @ (drag.pointer - pose.position))
 
     def _show_hand(self) -> None:
-        self._band.visible = self._grabbed is not None
-        if self._grabbed is not None:
-            point = self._body.point(self._q, self._grabbed.cover, self._grabbed.point)
-            self._band.points = np.array([[point, self._pointer]], dtype=np.float32)
+        drag = self._drag
+        self._band.visible = drag is not None
+        if drag is not None:
+            point = self._body.point(self._q, drag.grip.cover, drag.grip.point)
+            self._band.points = np.array([[point, drag.pointer]], dtype=np.float32)
             # viser draws an arrow of its own in another colour at the pointer that drags; this one is around it
-            length = min(float(np.linalg.norm(self._pointer - point)), VISERS_LONGEST)
+            length = min(float(np.linalg.norm(drag.pointer - point)), VISERS_LONGEST)
             self._band.head_length, self._band.head_radius = 0.22 * length, 0.06 * length
 
 
-def band_push(grip: Grip, pointer: Array) -> LinkPush:
-    """LinkPush of a rubber band between where a cover is gripped and the pointer, (3,), m, in the cover's frame.
+def band_push(grip: Grip, pointer: Array) -> Wrench:
+    """Push of a rubber band between where a cover is gripped and the pointer, (3,), m, in the cover's frame.
 
     It acts at the cover's axis, at the position of the grip along it, and across the axis only, as contacts do that the
     estimator is made for: no torque about the axis, no force along it.
@@ -255,7 +241,7 @@ def band_push(grip: Grip, pointer: Array) -> LinkPush:
     force *= min(1.0, STRONGEST / max(float(np.linalg.norm(force)), 1e-9))
     fx, fy, fz = force.tolist()
     tx, ty, tz = np.cross(at, force).tolist()
-    return LinkPush(grip.cover, (fx, fy, fz), (tx, ty, tz))
+    return Wrench(grip.cover, (fx, fy, fz), (tx, ty, tz))
 
 
 def lit(colour: str) -> tuple[int, int, int]:
