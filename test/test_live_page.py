@@ -191,6 +191,8 @@ def test_a_drag_that_ends_while_its_push_is_computed_is_over(server: Any, monkey
     monkeypatch.setattr(scene._body, "cover_pose", slow)
     assert scene.push() is not None
     assert scene.push() is None
+    mouse(scene, "update")  # late
+    assert scene.push() is None
     scene.show(Snapshot(2, POSE))
     assert not server.scene.get_handle_by_name("/hand").visible
 

@@ -199,12 +199,14 @@ class Scene:
             if event.phase == "end":  # viser reports it where the browser is gone, too
                 self._drag = None
                 return
-            if self._drag is None:
+            if event.phase == "start":
                 pose = self._body.cover_pose(self._q, cover)
                 point = pose.rotation.T @ (np.array(event.start_position) - pose.position)
                 grip = Grip(cover, point, *axis)
-            else:
+            elif self._drag is not None:
                 grip = self._drag.grip
+            else:
+                return  # late, of a drag that is over
             self._drag = Drag(grip, np.array(event.end_position))
 
         return take
