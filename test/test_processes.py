@@ -223,6 +223,34 @@ def test_a_recorder_that_does_nothing_any_more_is_killed_and_named(
     assert (bag / "metadata.yaml").is_file()
 
 
+HELD_UP = """
+import rclpy.node
+
+def destroy_node(self):
+    while True:
+        pass
+
+rclpy.node.Node.destroy_node = destroy_node
+"""
+
+
+def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_its_work(
+    tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(HELD_UP)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{ROOT}")
+    monkeypatch.chdir(tmp_path)
+    processes = Processes(Configuration.load(packaged("wam")).with_values({"nodes": ["recorder"]}))
+    wait(lambda: list(tmp_path.glob("bags/*/*.mcap")), "a bag")
+    processes.stop()
+    assert processes.killed == []
+    assert processes.bag_failure == ""
+    assert processes._processes["recorder"].returncode == -signal.SIGVTALRM
+    assert processes.ended() == {"recorder": 0}
+    assert list(tmp_path.glob("bags/*/metadata.yaml"))
+    assert "WARN" not in capfd.readouterr().err
+
+
 def main_without_exit(*words: str) -> None:
     with pytest.raises(SystemExit) as ended:
         main(words)

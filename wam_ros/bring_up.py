@@ -18,6 +18,7 @@ from rclpy.node import Node
 from wam_description.configuration import Configuration
 from wam_description.interface import declared, process_groups
 from wam_description.nodes import EACH, ONE
+from wam_ros.leaving import HELD_UP
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node
@@ -128,7 +129,7 @@ class Processes:
     def ended(self) -> dict[str, int]:
         """Exit codes of the nodes that have ended, by name."""
         codes = {name: process.poll() for name, process in self._processes.items()}
-        return {name: code for name, code in codes.items() if code is not None}
+        return {name: 0 if code == -HELD_UP else code for name, code in codes.items() if code is not None}
 
     def wait(self, until: Callable[[dict[str, int]], bool]) -> dict[str, int]:
         """Wait until the exit codes seen so far satisfy a condition; returns them."""

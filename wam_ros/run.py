@@ -24,6 +24,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from wam_description.parameters import ParameterError
+from wam_ros.leaving import bound_leaving
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import limit_to_this_machine
 from wam_ros.program import Stop
@@ -165,6 +166,7 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
     except RuntimeError as error:
         reason = str(error).split(", at /")[0]
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
+    bound_leaving(connection.context)
     BUSES[connection.context] = LocalBus(connection.executor, makers)
     nodes: dict[str, Node] = {}
 

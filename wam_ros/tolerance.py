@@ -16,6 +16,7 @@ from rclpy.parameter import Parameter
 from wam_bag.printable import printable
 from wam_description.defects import UnusableOutput
 from wam_description.wiring import raised
+from wam_ros.leaving import leaving
 
 HELD: Final = 1.0  # s without a further exception, after which a fault is over
 LONGEST: Final = 300  # characters of an exception that are reported
@@ -41,7 +42,8 @@ class TolerantNode(Node):
     def destroy_node(self) -> None:
         """As that of rclpy; what the executor still has for this node is of no use any more."""
         self._has_ended = True
-        super().destroy_node()
+        with leaving(self.context):
+            super().destroy_node()
 
     def take_fault(self, reason: str) -> None:
         """Report a fault of this node; '' where it is over."""

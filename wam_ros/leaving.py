@@ -1,0 +1,38 @@
+"""The end of a process in the middleware, which may not take for ever.
+
+FastDDS 2.14 destroys its participant with a lock that a callback of discovery may be waiting for, and computes until
+that callback has returned (issue 6513 of eProsima/Fast-DDS): where the programs of a stack leave the network at the
+same moment, one of them may go on for ever.  It has done its work by then: brakes on, messages delivered, bag closed.
+"""
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+from weakref import WeakSet
+
+from rclpy.context import Context
+
+LONGEST: Final = 1.0  # s of computing, a hundred times what it takes
+HELD_UP: Final = signal.SIGVTALRM  # by which the system ends the process
+
+_BOUNDED: WeakSet[Context] = WeakSet()
+
+
+def bound_leaving(context: Context) -> None:
+    """Let the system end this process where leaving the network with a context takes too long; its nodes are all."""
+    _BOUNDED.add(context)
+
+
+@contextmanager
+def leaving(context: Context) -> Iterator[None]:
+    """What destroys a node, the last one with the participant; not its own work before."""
+    if context not in _BOUNDED:
+        yield
+        return
+    signal.signal(HELD_UP, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)  # of computing: a busy machine ends nobody
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
