@@ -12,7 +12,7 @@
 - parameters: declared, described, live; remote_parameters: those of other nodes
 - recorder, recorder_node, recorder_interface: every topic into a bag
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
-- leaving: the system ends a process that the middleware would hold up for ever at its end
+- leaving: the system ends a process that the middleware would hold up indefinitely at its end
 - program: ends a program quietly whose imports are interrupted
 - requests: requests to services and their answers; call: one request from a shell
 - conformance: a running driver tested against its contract; driver_probe: the node that does it
