@@ -220,10 +220,9 @@ def test_an_overlay_that_does_not_fit_its_base_is_refused(tmp_path: Path, text: 
         Configuration.load(path)
 
 
-@pytest.mark.slow
 def test_a_file_that_is_nested_without_end_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "deep.yaml").write_text("{" * 3_000)
-    with pytest.raises(ParameterError, match=r"deep.yaml is not YAML: its brackets or blocks are nested hundreds of"):
+    with pytest.raises(ParameterError, match=r"deep.yaml is not YAML: it is nested more than 50 levels deep$"):
         Configuration.load(tmp_path / "deep.yaml")
 
 

@@ -4,9 +4,9 @@ from typing import Any, Final
 
 import yaml
 
-DEEPEST: Final = 50  # nested maps and lists; the C loader recurses and would end the process at some thousands
+from wam_description.yaml_text import LOADER, events
+
 LONGEST: Final = 2**22  # bytes; the longest files of our own, of bags of a thousand files, have a tenth of it
-_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C, if it was built
 
 
 def load(text: str | bytes) -> Any:
@@ -22,14 +22,9 @@ def load(text: str | bytes) -> Any:
     if len(text) > LONGEST:
         raise yaml.YAMLError(f"it has {len(text)} bytes; at most {LONGEST} are read")
     text = text.decode() if isinstance(text, bytes) else text
-    depth = 0
-    for event in yaml.parse(text, Loader=_LOADER):
-        if isinstance(event, yaml.AliasEvent):
-            raise yaml.YAMLError("aliases are not read")
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST:
-            raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
-    return yaml.load(text, _LOADER)
+    if any(isinstance(event, yaml.AliasEvent) for event in events(text)):
+        raise yaml.YAMLError("aliases are not read")
+    return yaml.load(text, LOADER)
 
 
 class _Plain(yaml.SafeDumper):

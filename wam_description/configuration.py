@@ -30,14 +30,14 @@ class Configuration(NamedTuple):
     Attributes
     ----------
     path : of the file.
-    text : YAML with these values; the file's own text if nothing was replaced.
     sections : flat ``{dotted name: value}`` of every section; '/**' is shared, the others are
         named like their node.
+    written : the text of the file if nothing was replaced, '' otherwise.
     """
 
     path: Path
-    text: str
     sections: Mapping[str, Mapping[str, Any]]
+    written: str = ""
 
     @classmethod
     def load(cls, path: str | Path, _above: tuple[Path, ...] = ()) -> "Configuration":
@@ -62,7 +62,7 @@ class Configuration(NamedTuple):
             raise ParameterError(f"configuration {path} is not a text file: {error}") from error
         tree = _tree(path, text)
         if not isinstance(tree, dict) or BASE not in tree:
-            return cls(path, text, _sections(path, tree))
+            return cls(path, _sections(path, tree), text)
         base = cls.load(_base(path, tree.pop(BASE), _above), (*_above, path.resolve()))
         return base._overlaid(path, _sections(path, tree, whole=False))
 
@@ -70,6 +70,11 @@ class Configuration(NamedTuple):
         """Path and sections, not every value."""
         changed = "" if self.path.is_file() and self.path.read_text(encoding="utf-8") == self.text else ", changed"
         return f"Configuration({str(self.path)!r}, sections {', '.join(self.sections)}{changed})"
+
+    @property
+    def text(self) -> str:
+        """YAML with these values; the file's own text if nothing was replaced."""
+        return self.written or _text(self.sections)
 
     @property
     def sha256(self) -> str:
@@ -111,13 +116,13 @@ class Configuration(NamedTuple):
                     f"{meant}it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
                 )
             flat[parameter] = like(flat.get(parameter), value)
-        return Configuration(self.path, _text(sections), _frozen(sections))
+        return Configuration(self.path, _frozen(sections))
 
     def _overlaid(self, path: Path, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
         """The configuration of `path`: this one with changed values and further sections."""
         new = {name: dict(flat) for name, flat in changes.items() if name not in self.sections}
         sections = {**new, **{name: dict(flat) for name, flat in self.sections.items()}}
-        whole = Configuration(path, "", _frozen(sections))
+        whole = Configuration(path, _frozen(sections))
         listed = changes.get(SHARED, {}).get("nodes", self.sections[SHARED].get("nodes", []))
         for name in new:
             if not any(_may_be(str(entry), name) for entry in listed):
@@ -136,7 +141,7 @@ class Configuration(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle plain mappings: read-only ones cannot be pickled, and are made read-only again on the other side."""
-        return _thawed, (self.path, self.text, {name: dict(flat) for name, flat in self.sections.items()})
+        return _thawed, (self.path, {name: dict(flat) for name, flat in self.sections.items()}, self.written)
 
     def _section(self, node: str) -> str:
         if node == SHARED or node not in self.sections:
@@ -280,8 +285,8 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
     return _frozen(sections)
 
 
-def _thawed(path: Path, text: str, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
-    return Configuration(path, text, _frozen(sections))
+def _thawed(path: Path, sections: Mapping[str, Mapping[str, Any]], written: str) -> Configuration:
+    return Configuration(path, _frozen(sections), written)
 
 
 def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str, Any]]:

@@ -1,14 +1,17 @@
 """YAML read with duplicate keys refused, which YAML itself accepts silently; parameters written as ROS does."""
 
-from collections.abc import Hashable, Mapping
-from typing import Any
+from collections.abc import Hashable, Iterator, Mapping
+from typing import Any, Final
 
 import yaml
 
 from wam_description.parameters import nested
 
+DEEPEST: Final = 50  # nested maps and lists; the C loader recurses and would end the process at some thousands
+LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in C it takes a tenth of the time, if it was built
 
-class _Strict(yaml.SafeLoader):
+
+class _Strict(LOADER):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
@@ -17,7 +20,24 @@ class _Strict(yaml.SafeLoader):
                     None, None, f"'{key.value}' is given twice; remove one of the two", key.start_mark
                 )
             seen.add(key.value)
-        return super().construct_mapping(node, deep)
+        mapping: dict[Hashable, Any] = super().construct_mapping(node, deep)
+        return mapping
+
+
+def events(text: str) -> Iterator[yaml.Event]:
+    """What the parser finds in a YAML text.
+
+    Raises
+    ------
+    yaml.YAMLError
+        if it is not YAML, or nested more than `DEEPEST` levels deep.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=LOADER):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
+        yield event
 
 
 def parse(text: str) -> Any:
@@ -26,13 +46,12 @@ def parse(text: str) -> Any:
     Raises
     ------
     yaml.YAMLError
-        if it is not YAML, a key is given twice in one mapping, or blocks and brackets are nested too deeply for
-        Python; names the line where it is known.
+        if it is not YAML, a key is given twice in one mapping, or it is nested too deeply; names the line where it is
+        known.
     """
-    try:
-        return yaml.load(text, _Strict)  # a safe loader
-    except RecursionError:
-        raise yaml.YAMLError("its brackets or blocks are nested hundreds of levels deep; allowed: a few") from None
+    for _ in events(text):
+        pass
+    return yaml.load(text, _Strict)  # a safe loader
 
 
 def parameter_text(parameters: Mapping[str, Mapping[str, Any]]) -> str:

@@ -2,7 +2,7 @@
 
 FastDDS 2.14 destroys its participant with a lock that a callback of discovery may be waiting for, and computes until
 that callback has returned (issue 6513 of eProsima/Fast-DDS): where the programs of a stack leave the network at the
-same moment, one of them may do so indefinitely.  It has done its work by then: brakes on, messages delivered, bag closed.
+same moment, one of them may do so indefinitely.  Its work is done by then: brakes on, bag closed.
 """
 
 import signal
