@@ -249,7 +249,6 @@ class Ports:
         self.session = session
         self.claims.restart()
         if self.ready:
-            self._let_status_arrive()
             plain = self._plain._replace(connected=True)
             self.publish_status(plain._replace(facts={**plain.facts, **facts}))
             self._plain = plain
@@ -273,15 +272,12 @@ class Ports:
             status = status._replace(level=Level.ERROR, message=problem, fault=problem)
         status = status._replace(node=self._name, session=status.session or self.session)
         if status != self._status:
-            if self.shared.timing.mode == "lockstep":  # which waits for everybody; a recording lacks no status then
-                self._let_status_arrive()
+            if self.shared.timing.mode == "lockstep" or status.session != self._status.session:
+                # only the last status is kept: a recording, and a driver that is followed, lack none
+                self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_ECHO))
             self._status = status
             self._send(STATUS, diagnostic_status(status, self.shared.arm.name))
             self._inform()
-
-    def _let_status_arrive(self) -> None:
-        """Wait until everybody has the present status: only the last one is kept."""
-        self._publishers[STATUS].wait_for_all_acked(Duration(seconds=LONGEST_ECHO))
 
     def _inform(self) -> None:
         """Print on the console what the driver's state is and what to call next, where that has changed."""
