@@ -4,7 +4,7 @@ from typing import Any, Final
 
 import yaml
 
-from wam_description.yaml_text import LOADER, events
+from wam_description.yaml_text import DUMPER, LOADER, events
 
 LONGEST: Final = 2**22  # bytes; the longest files of our own, of bags of a thousand files, have a tenth of it
 
@@ -27,7 +27,7 @@ def load(text: str | bytes) -> Any:
     return yaml.load(text, LOADER)
 
 
-class _Plain(yaml.SafeDumper):
+class _Plain(DUMPER):
     """YAML without anchors, which rosbag2's reader and people read more easily."""
 
     def ignore_aliases(self, data: Any) -> bool:

@@ -297,4 +297,4 @@ def _text(sections: Mapping[str, Mapping[str, Any]]) -> str:
     tree = {
         (name if name == SHARED else f"{SHARED}/{name}"): {PARAMETERS: nested(flat)} for name, flat in sections.items()
     }
-    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+    return yaml_text.dump(tree)
