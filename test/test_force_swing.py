@@ -1,6 +1,7 @@
 """Limit cycles of the measured force, forces that are not known well enough, and an arm that a dither shakes."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -108,16 +109,33 @@ def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_c
             out = ask(loop, world, down(force), external=STILL)
         return out
 
-    out = press(3.0, 1e-4)
+    out = press(5.0, 1e-4)
     assert loop.reaction is ForceReaction.SHAKEN
     assert "where no surface is as stiff, lower guard.contact_stiffness" in loop.reason
     assert float(axis @ out.velocity) == pytest.approx(0.0, abs=2e-3)
-    assert float(axis @ press(30.0, 1e-4).velocity) > 0.01, "more force is commanded"
+    advised = re.search(r"command (\S+) N", loop.reason)
+    assert advised, loop.reason
+    assert float(axis @ press(float(advised[1]), 1e-4).velocity) > 0.005, "more force is commanded"
     ask(loop, world, None)
     press(3.0, 0.0)
     assert loop.reaction is ForceReaction.NONE
     press(3.0, 1e-4)
     assert loop.reaction is ForceReaction.NONE, "the motion that was there before counts"
+
+
+def test_what_is_advised_in_place_of_a_force_that_is_not_detected_does_not_shake_the_arm_too_much_either() -> None:
+    own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
+    sensing = replace(own.sensing, force_sd_limit=1e9, stated_fraction=1e9)
+    for amplitude, advised in ((1e-6, 8.0), (1e-4, 25.0)):
+        stiff = replace(own, sensing=sensing, guard=replace(own.guard, contact_stiffness=1e5))
+        timing = replace(CONFIGURATION.shared.timing, dither_cycle=40)
+        loop, world, axis = ForceLoop(ARM, CONFIGURATION.shared.servo, stiff, timing), World(1e-9), lever(POSE)
+        sd = 5.0 * float(np.linalg.norm(axis)) / 4.5
+        for k in range(60):
+            world.q = (POSE + amplitude * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
+            ask(loop, world, down(5.0), external=STILL, external_sd=[sd] * 4)
+        assert loop.reaction is ForceReaction.NOT_SENSED
+        assert f"command {advised:g} N" in loop.reason
 
 
 def test_an_arm_that_would_swing_on_the_surface_in_resonance_with_the_dither_holds() -> None:
