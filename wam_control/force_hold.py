@@ -118,7 +118,7 @@ class ForceHold:
         """Another force is commanded."""
         self._shake.reset()
         self.share, self.fed = 1.0, 0.0
-        self._way = self._watched = self._shaking = self._blocked = 0.0
+        self._frequency = self._watched = self._shaking = self._blocked = 0.0
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
             self._has_settled
         ) = self._has_begun = False
@@ -201,11 +201,16 @@ class ForceHold:
         """
         if self._watched >= WATCHED:
             return False
-        self._way += float(axis.lever @ moved)
+        self._shake.step(moved)
         self._watched += dt
-        self._shaking = self._shake.step(self._way)
-        self._blocked = axis.impact_mass * frequency * frequency * self._shaking
+        self._frequency = frequency
+        self._shaking, self._blocked = self._shaking_along(axis)
         return True
+
+    def _shaking_along(self, axis: ForceAxis) -> tuple[float, float]:
+        """How far the arm shakes along a force, m, and the force, N, that a hard surface takes from it."""
+        shaking = self._shake.along(axis.lever)
+        return shaking, axis.impact_mass * self._frequency * self._frequency * shaking
 
     def _shaken(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Refusal | None:
         """Why the arm shakes too much for the surface, None where it does not.
@@ -371,7 +376,7 @@ class ForceHold:
     def _admits(self, case: ForceCase, parameters: ForceLoopParameters) -> bool:
         """Whether another force would be accepted in place of the commanded one, with a reserve."""
         hold, still = ForceHold(), np.zeros(len(case.axis.lever))
-        hold._shaking, hold._blocked = self._shaking, self._blocked  # as far as is known without going there
+        hold._shaking, hold._blocked = self._shaking_along(case.axis)  # as if the joints shook there as they do here
         largest = min(parameters.force_limit, parameters.limits.contact_force)
         reaction, _ = hold.step(case.worse(RESERVE), still, 0.0, parameters, 0.0)
         return case.desired <= largest and not reaction.holds
