@@ -1,6 +1,7 @@
 """Limit cycles of the measured force, forces that are not known well enough, and an arm that a dither shakes."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -28,11 +29,16 @@ def test_a_cycle_is_found_with_its_size_and_period_and_noise_and_a_drift_are_non
 
 
 def test_a_shake_is_measured_about_the_course_of_the_motion() -> None:
-    shake = Shake(8)
-    straight = [shake.step(0.003 * k) for k in range(30)]
-    assert max(straight) == pytest.approx(0.0, abs=1e-12)
-    shaken = [shake.step(0.003 * k + 1e-4 * math.sin(2.0 * math.pi * k / 8.0)) for k in range(30, 60)]
-    assert min(shaken[9:]) > 1.7e-4
+    shake, straight, shaken = Shake(8), np.array([0.003, 0.001]), np.array([1e-4, 0.0])
+    along, across = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    for _ in range(30):
+        shake.step(straight)
+    assert shake.along(along) == pytest.approx(0.0, abs=1e-12)
+    for k in range(30):
+        turn = math.sin(2.0 * math.pi * (k + 1) / 8.0) - math.sin(2.0 * math.pi * k / 8.0)
+        shake.step(straight + turn * shaken)
+    assert shake.along(along) > 1.7e-4
+    assert shake.along(across) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_force_that_cycles_is_reported_by_name_with_its_size() -> None:
@@ -108,16 +114,53 @@ def test_an_arm_that_shakes_too_much_for_the_surface_holds_until_more_force_is_c
             out = ask(loop, world, down(force), external=STILL)
         return out
 
-    out = press(3.0, 1e-4)
+    out = press(5.0, 1e-4)
     assert loop.reaction is ForceReaction.SHAKEN
     assert "where no surface is as stiff, lower guard.contact_stiffness" in loop.reason
     assert float(axis @ out.velocity) == pytest.approx(0.0, abs=2e-3)
-    assert float(axis @ press(30.0, 1e-4).velocity) > 0.01, "more force is commanded"
+    advised = re.search(r"command (\S+) N", loop.reason)
+    assert advised, loop.reason
+    assert float(axis @ press(float(advised[1]), 1e-4).velocity) > 0.005, "more force is commanded"
     ask(loop, world, None)
     press(3.0, 0.0)
     assert loop.reaction is ForceReaction.NONE
     press(3.0, 1e-4)
     assert loop.reaction is ForceReaction.NONE, "the motion that was there before counts"
+
+
+def test_what_is_advised_in_place_of_a_force_that_is_not_detected_does_not_shake_the_arm_too_much_either() -> None:
+    own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
+    sensing = replace(own.sensing, force_sd_limit=1e9, stated_fraction=1e9)
+    for amplitude, advised in ((1e-6, 8.0), (1e-4, 25.0)):
+        stiff = replace(own, sensing=sensing, guard=replace(own.guard, contact_stiffness=1e5))
+        timing = replace(CONFIGURATION.shared.timing, dither_cycle=40)
+        loop, world, axis = ForceLoop(ARM, CONFIGURATION.shared.servo, stiff, timing), World(1e-9), lever(POSE)
+        sd = 5.0 * float(np.linalg.norm(axis)) / 4.5
+        for k in range(60):
+            world.q = (POSE + amplitude * math.sin(2.0 * math.pi * k / 8.0) * axis / float(axis @ axis)).tolist()
+            ask(loop, world, down(5.0), external=STILL, external_sd=[sd] * 4)
+        assert loop.reaction is ForceReaction.NOT_SENSED
+        assert f"command {advised:g} N" in loop.reason
+
+
+def test_where_the_arm_would_shake_less_in_another_pose_it_is_advised() -> None:
+    """The joints are taken to shake there as they do here."""
+    own = replace(OWN, feedback="contact_estimate", contact_source="pinned")
+    stiff = replace(own, guard=replace(own.guard, contact_stiffness=1e5))
+    timing = replace(CONFIGURATION.shared.timing, dither_cycle=40)
+
+    def shaken(pose: list[float]) -> ForceLoop:
+        loop, world = ForceLoop(ARM, CONFIGURATION.shared.servo, stiff, timing), World(1e-9)
+        for k in range(60):
+            world.q = [*pose[:3], pose[3] + 1.2e-4 * math.sin(2.0 * math.pi * k / 8.0)]
+            ask(loop, world, down(3.0), external=STILL)
+        return loop
+
+    loop = shaken(list(POSE))
+    assert loop.reaction is ForceReaction.SHAKEN
+    turned = re.search(r"turn joint4 from \S+ to (\S+) rad", loop.reason)
+    assert turned, loop.reason
+    assert shaken([*POSE[:3], float(turned[1])]).reaction is ForceReaction.NONE
 
 
 def test_an_arm_that_would_swing_on_the_surface_in_resonance_with_the_dither_holds() -> None:

@@ -18,7 +18,8 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``pressed_pose``                  - when the arm has left what it pressed on, for the contact estimator, too
 ``force_axis``                    - how a force along a direction is sensed, how the arm moves along it, how well
 ``force_hold``                    - when the arm holds its position instead, and why
-``sensing_advice``                - which joint to turn, or how much more force, so that it is sensed well enough
+``force_case``                    - a force as it is commanded, or might be, and how well it is known
+``sensing_advice``                - what to change so that a refused force would be accepted
 ``arm_push``                      - what pushes the arm, at least, and how fast it goes against it
 ``held_arm``                      - an arm that holds gives way to what presses it harder than commanded
 ``feed_forward``                  - torques of the forces and dry friction, fed forward

@@ -4,6 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wam_control.contact_fusion import ContactFusion
 from wam_control.contact_inference import (
     CERTAIN_SECOND,
@@ -25,6 +28,8 @@ from wam_description.parameters import parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import State
 from wam_description.small_matrices import inverse
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,7 @@ SHAKING = 0.3  # s after a contact, in which that vibration is strong: the faste
 SHAKEN = 2.0  # times the threshold in that time, and in two periods: the slower one swings, too
 ALONE = 2.0  # times the threshold: detected in one period; below that in two: cables swing within two after a reversal
 TOO_EARLY = "too few samples yet"
+SMALLEST = 1e-12  # of the statistic of the torques, for a division
 
 
 class ContactEstimator:
@@ -135,12 +141,16 @@ class ContactEstimator:
         self._observer = MomentumObserver(
             arm, parameters.observer, parameters.use_joint_sensors, timing.dither_cycle, model
         )
+        cycle = 0 if parameters.use_joint_sensors else timing.dither_cycle
+        self._delay = parameters.observer.time_constant + 0.5 * cycle * timing.period  # s, of the torques
         body = RigidBody(arm, parameters.observer.mass_scale)
         self._inference = ContactInference(arm, body, parameters.inference)
         self._fusion = ContactFusion(parameters.inference.fusion_time)
         self._second = SecondContact(parameters.second)
         self._in_contact = self._is_above = self._is_blind = False
         self._ended = -math.inf  # by the age of the observer, s
+        # of the estimate before: age of the observer, s, torques, N m, and by which fraction they were late
+        self._before: tuple[float, list[float], float] = 0.0, [], 0.0
         self._pressed_at: list[float] = []  # rad, where the arm presses or last pressed; empty once it has left
         self.refused = 0
 
@@ -155,6 +165,7 @@ class ContactEstimator:
     def reset(self) -> None:
         """Forget all samples."""
         self._observer.reset()
+        self._before = 0.0, [], 0.0
         self._end_contact()
         self._in_contact = self._is_above = False
         self._ended = -math.inf
@@ -205,6 +216,7 @@ class ContactEstimator:
             self._end_contact()
             return _nothing(torques, sd, 0.0, "brakes hold the motors" if self._is_blind else TOO_EARLY)
         precision = inverse(covariance)
+        late = self._late(residual, precision)
         statistic = detection_statistic(torques, precision)
         is_calm = self._in_contact or observer.age - self._ended > SHAKING
         fast = observer.fast_torques() if is_calm and statistic <= parameters.detect else None
@@ -227,6 +239,7 @@ class ContactEstimator:
             self._fusion.reset()
             why = CERTAIN_SECOND if self._second.is_certain else SECOND
             hypotheses = tuple(with_second(hypothesis, why) for hypothesis in hypotheses)
+        hypotheses = tuple(_late_by(hypothesis, late) for hypothesis in hypotheses)
         best = hypotheses[0]
         return ContactEstimate(
             external_torques=torques,
@@ -245,6 +258,18 @@ class ContactEstimator:
             reason=best.reason,
             warning=observer.warning,
         )
+
+    def _late(self, torques: list[float], precision: Array) -> float:
+        """By which fraction the torques grow or fall, along themselves, within the delay of the observer."""
+        then, before, late = self._before
+        passed = self._observer.age - then
+        if before and not passed:
+            return late
+        weighted = precision.dot(torques)
+        size, change = float(weighted.dot(torques)), float(weighted.dot(np.subtract(torques, before or torques)))
+        late = self._delay / passed * abs(change) / max(size, SMALLEST) if passed > 0.0 else 0.0
+        self._before = self._observer.age, torques, late
+        return late
 
     def _is_touched(self, is_pressing: bool) -> bool:
         """Whether something is detected, or was while the arm pressed on it, and the arm has not left it since."""
@@ -266,6 +291,13 @@ class ContactEstimator:
     def model_errors(self) -> dict[str, TrackedError]:
         """Errors of the model that are tracked between contacts, by name; of joint sensors none."""
         return self._observer.model_errors
+
+
+def _late_by(hypothesis: Hypothesis, late: float) -> Hypothesis:
+    """The same where the force has changed by a fraction that the torques do not show yet."""
+    if hypothesis.is_lower_bound:
+        return hypothesis
+    return hypothesis._replace(force_sd=math.hypot(hypothesis.force_sd, late * math.hypot(*hypothesis.force)))
 
 
 def _nothing(

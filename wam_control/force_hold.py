@@ -3,16 +3,18 @@
 import math
 from collections.abc import Callable
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.contact_position import ForcePoint
 from wam_control.force_axis import ForceAxis
+from wam_control.force_case import ForceCase
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.force_measurement import STEADY, LowPass
 from wam_control.force_swing import Reversals, Shake
-from wam_control.sensing_advice import OtherAxes, advice
+from wam_control.sensing_advice import Advice, OtherForces
 from wam_description.number_text import brief
 
 Array = NDArray[np.float64]
@@ -42,7 +44,9 @@ SLOWED = 0.5  # of the speed along the force, from then on
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
 WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
-SOFTER = ", or, where no surface is as stiff, lower guard.contact_stiffness"
+SOFTER = "where no surface is as stiff, lower guard.contact_stiffness"
+SENSORS = "use joint sensors"
+RESERVE = 1.2  # by how much worse another force may be known, and the arm slower, so that it still would be accepted
 NOT_SLOWED = 0.95  # of the speed along the force
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
@@ -80,6 +84,20 @@ class ForceReaction(IntEnum):
         )
 
 
+class Refusal(NamedTuple):
+    """Why a force is refused before the arm moves.
+
+    Attributes
+    ----------
+    reaction, why : what the loop reports.
+    besides : what else helps than is computed; '' for nothing.
+    """
+
+    reaction: ForceReaction
+    why: str
+    besides: str = ""
+
+
 class ForceHold:
     """Watches one commanded force.
 
@@ -93,18 +111,19 @@ class ForceHold:
 
     def __init__(self) -> None:
         self._turns, self._shake, self._pattern = Reversals(), Shake(SHAKE_SAMPLES), LowPass()
+        self._advice = Advice()
         self.reset()
 
     def reset(self) -> None:
         """Another force is commanded."""
         self._shake.reset()
         self.share, self.fed = 1.0, 0.0
-        self._way = self._watched = self._shaking = self._blocked = 0.0
+        self._frequency = self._watched = self._shaking = self._blocked = 0.0
         self._is_sensed = self._is_detectable = self._is_kept = self.is_touching = self.has_touched = (
             self._has_settled
         ) = self._has_begun = False
         self._is_slow, self._other = False, ""
-        self._advice, self._advised_for = "", 0.0
+        self._advice.reset()
         self._travel = self._conflict = self._double = self._assumed = self._strange = 0.0
         self._uncertain = self._missed = self._reached = self._identified = self._desired = self._turned = 0.0
         self._settled: Array | None = None  # torques per force, 1/m, once it has settled
@@ -182,14 +201,19 @@ class ForceHold:
         """
         if self._watched >= WATCHED:
             return False
-        self._way += float(axis.lever @ moved)
+        self._shake.step(moved)
         self._watched += dt
-        self._shaking = self._shake.step(self._way)
-        self._blocked = axis.impact_mass * frequency * frequency * self._shaking
+        self._frequency = frequency
+        self._shaking, self._blocked = self._shaking_along(axis)
         return True
 
-    def _shaken(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> str:
-        """Why the arm shakes too much for the surface, '' where it does not.
+    def _shaking_along(self, axis: ForceAxis) -> tuple[float, float]:
+        """How far the arm shakes along a force, m, and the force, N, that a hard surface takes from it."""
+        shaking = self._shake.along(axis.lever)
+        return shaking, axis.impact_mass * self._frequency * self._frequency * shaking
+
+    def _shaken(self, axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Refusal | None:
+        """Why the arm shakes too much for the surface, None where it does not.
 
         A soft surface, in series with the cables, follows the swing of the position, and the force swings by k times
         its size; a hard one stops the swing with the force that moved the mass of the arm.  Where the two are alike,
@@ -199,54 +223,45 @@ class ForceHold:
         yielding = 1.0 / parameters.guard.contact_stiffness + axis.compliance
         least = min(self._shaking / yielding, self._blocked)
         if self.is_touching or least <= 0.0:
-            return ""
+            return None
         apart = 1.0 / self._blocked - yielding / self._shaking
         force = 1.0 / math.hypot(apart, 1.0 / (RESONANCE * least))
         if force <= parameters.limits.shake_force * desired:
-            return ""
-        return (
+            return None
+        return Refusal(
+            ForceReaction.SHAKEN,
             f"the arm shakes by {brief(self._shaking)} m along the force (dither): on "
             f"{parameters.guard.contact_stiffness:g} N/m the force would swing by {force:.3g} N; allowed: "
-            f"limits.shake_force, {parameters.limits.shake_force:g} times the commanded {desired:.3g} N; the arm holds "
-            f"its position: use joint sensors, command more force{SOFTER}"
+            f"limits.shake_force, {parameters.limits.shake_force:g} times the commanded {desired:.3g} N",
+            f"{SENSORS}, or, {SOFTER}",
         )
 
     def step(
         self,
-        axis: ForceAxis,
-        point: ForcePoint,
+        case: ForceCase,
         external: Array,
         measured: float,
-        desired: float,
         parameters: ForceLoopParameters,
         dt: float,
-        signal: float = math.inf,
-        elsewhere: float = math.inf,
-        torque_error: float = 0.0,
         pushed: float | None = None,
-        unknown: tuple[float, str] = (0.0, ""),
-        others: Callable[[], OtherAxes] | None = None,
+        others: Callable[[], OtherForces] | None = None,
     ) -> tuple[ForceReaction, str]:
         """Whether to hold, and why.
 
         Parameters
         ----------
-        axis : of the commanded force.
-        point : where it acts.
+        case : the commanded force.
         external : torques of the world on the joints (n,), N m.
-        measured, desired : force along it, N.
+        measured : force along it, N.
         parameters : of the force loop.
         dt : outer period, s.
-        signal : torques of the commanded force per standard deviation of the estimated ones; infinite with sensors.
-        elsewhere : the same if another link is touched.
-        torque_error : standard deviation of the force by those of the estimated torques, N; 0 with sensors.
         pushed : force, N, without the inertia of the arm, by which something is touched; None: the measured one.
-        unknown : force, N, of torques at rest before, which no touched surface gives, and what they mean.
-        others : the same axis in other poses and for other forces, for the advice where the force is not sensed here.
+        others : the same force in other poses and of other sizes, for the advice where it is refused.
         """
+        axis, point, desired = case.axis, case.point, case.desired
         self._identified = self._identified + dt if self.is_touching and point.is_identified else 0.0
-        blind = self._not_sensed(axis, point, desired, torque_error, parameters, others)
-        is_loaded = not self._has_begun and abs(unknown[0]) > TOLERANCE * desired
+        blind = self._not_sensed(case, parameters)
+        is_loaded = not self._has_begun and abs(case.unknown) > TOLERANCE * desired
         pushed = measured if pushed is None else pushed
         self.is_touching = pushed >= TOUCH * desired and not is_loaded
         self._has_begun = self._has_begun or self.is_touching
@@ -262,12 +277,17 @@ class ForceHold:
         if self._conflict > CONFLICT and not self._other:
             touched = point.conflict or f"something is touched, and it is not known whether on {point.cover}"
             self._other = f"{touched}; the arm goes back to where it was free until the command ends"
-        weak = self._too_weak(point, desired, signal, elsewhere, parameters)
+        weak = self._too_weak(case, parameters)
         if is_loaded:
-            return ForceReaction.NOT_SENSED, _loaded(*unknown, desired)
-        held = self._held(axis, point, desired, blind or weak, parameters)
-        if held[0].holds:
-            return held
+            return ForceReaction.NOT_SENSED, _loaded(case.unknown, case.meaning, desired)
+        if ended := self._ended(parameters, is_blind=bool(blind or weak)):
+            return ended
+        if refusal := blind or weak or self._shaken(axis, desired, parameters) or self._too_slow(case, parameters):
+            return (
+                refusal.reaction,
+                f"{refusal.why}; the arm holds its position{self._advised(case, refusal, parameters, others)}",
+            )
+        self._advice.reset()
         is_double = not point.is_single and (is_strange or not point.is_pinned)
         self._double = self._double + dt if is_double else 0.0
         if self._double > CONFLICT:  # an impact looks like one for a moment, and a sudden hold is a jerk
@@ -281,7 +301,7 @@ class ForceHold:
         self._strange = self._strange + dt if is_touching and is_strange else 0.0
         is_vague = not point.is_pinned and (axis.free_sd > known or not point.is_identified)
         self._assumed = self._assumed + dt if is_touching and is_vague else 0.0
-        force_sd = math.hypot(_likely_sd(axis, torque_error, parameters), unknown[0])
+        force_sd = math.hypot(_likely_sd(axis, case.torque_error, parameters), case.unknown)
         is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
         swing = parameters.limits.cycle_force * desired
@@ -300,86 +320,92 @@ class ForceHold:
             return ForceReaction.NOT_EXPLAINED, turned
         return self._doubted(axis, point, force_sd, desired, unexplained, parameters)
 
-    def _not_sensed(
-        self,
-        axis: ForceAxis,
-        point: ForcePoint,
-        desired: float,
-        torque_error: float,
-        parameters: ForceLoopParameters,
-        others: Callable[[], OtherAxes] | None,
-    ) -> str:
-        """Why the force is not measured well enough, '' where it is.
+    def _not_sensed(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+        """Why the force is not measured well enough, None where it is.
 
         What the estimator states of its torques counts until the force is controlled: it states more while the arm
         moves and presses, which is reported.
         """
-        sensing = parameters.sensing
-        limit, stated = sensing.sd_limit(desired, point.is_pinned), math.hypot(axis.force_sd, torque_error)
-        is_known = self._is_sensed or not torque_error or stated <= sensing.stated_fraction * desired
+        axis, point, desired, sensing = case.axis, case.point, case.desired, parameters.sensing
+        limit, stated = sensing.sd_limit(desired, point.is_pinned), math.hypot(axis.force_sd, case.torque_error)
+        is_known = self._is_sensed or not case.torque_error or stated <= sensing.stated_fraction * desired
         self._is_sensed = is_known and axis.force_sd <= (limit if self._is_sensed else RESUME * limit)
         if self._is_sensed:
-            self._advice = ""
-            return ""
+            return None
         if not is_known:
-            return (
+            return Refusal(
+                ForceReaction.NOT_SENSED,
                 f"the force is known to +-{stated:.3g} N from the motors at {point.position:.3g} m of {point.cover}; "
                 f"allowed to begin: {sensing.stated_fraction * desired:.3g} N, {sensing.stated_fraction:.0%} of the "
-                "commanded (sensing.stated_fraction); the arm holds its position: command more force, another "
-                "direction or position, use joint sensors, or allow more where less accuracy will do"
+                "commanded (sensing.stated_fraction)",
+                f"{SENSORS}, or allow more where less accuracy will do",
             )
-        return (
+        return Refusal(
+            ForceReaction.NOT_SENSED,
             f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
             f"of {point.cover}; allowed to begin: {RESUME * limit:.3g} N, {RESUME:g} of the limit "
-            f"(sensing.force_sd_limit, force_sd_fraction); the arm holds its position: "
-            f"{self._advised(point, desired, parameters, others)}{'' if point.is_pinned else ', or pin the position'}"
+            "(sensing.force_sd_limit, force_sd_fraction)",
         )
 
     def _advised(
         self,
-        point: ForcePoint,
-        desired: float,
+        case: ForceCase,
+        refusal: Refusal,
         parameters: ForceLoopParameters,
-        others: Callable[[], OtherAxes] | None,
+        others: Callable[[], OtherForces] | None,
     ) -> str:
-        """What to do where the force is not sensed well enough, computed as it is refused and for another force."""
+        """What to do in place of a refused command, in words to follow the reason; '' while that is looked for."""
+        besides = f", or {refusal.besides}" if refusal.besides else ""
         if others is None:
-            return "bend the arm, or command more force, another direction or position"
+            return f": bend the arm, or command more force, another direction or position{besides}"
+        if 0.0 < self._watched < WATCHED:
+            return ""  # how the dither shakes the arm counts, too
+        self._advice.step(
+            case.desired, (refusal.reaction, parameters), others, lambda one: self._admits(one, parameters)
+        )
+        if not self._advice.is_complete:
+            return ""
+        if self._advice.ways:
+            return f": {', or '.join(self._advice.ways)}{besides}"
+        pinned = "" if case.point.is_pinned else ", with a pinned position or without"
+        return (
+            f"; neither up to 5 times the force nor another angle of one joint would be accepted{pinned}: command "
+            f"another direction or position{besides}"
+        )
 
-        def is_sensed(axis: ForceAxis, force: float) -> bool:
-            sd_limit = parameters.sensing.sd_limit(force, point.is_pinned)
-            return force <= parameters.force_limit and axis.force_sd <= RESUME * sd_limit
+    def _admits(self, case: ForceCase, parameters: ForceLoopParameters) -> bool:
+        """Whether another force would be accepted in place of the commanded one, with a reserve."""
+        hold, still = ForceHold(), np.zeros(len(case.axis.lever))
+        hold._shaking, hold._blocked = self._shaking_along(case.axis)  # as if the joints shook there as they do here
+        largest = min(parameters.force_limit, parameters.limits.contact_force)
+        reaction, _ = hold.step(case.worse(RESERVE), still, 0.0, parameters, 0.0)
+        return case.desired <= largest and not reaction.holds
 
-        if not self._advice or abs(desired - self._advised_for) > TOLERANCE * desired:
-            self._advice, self._advised_for = advice(others(), desired, is_sensed), desired
-        return self._advice
-
-    def _too_weak(
-        self, point: ForcePoint, desired: float, signal: float, elsewhere: float, parameters: ForceLoopParameters
-    ) -> str:
-        """Why the contact estimator would not detect the commanded force, '' where it would or something is touched."""
-        sensing = parameters.sensing
+    def _too_weak(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+        """Why the contact estimator would not detect the force, None where it would or something is touched."""
+        point, desired, sensing = case.point, case.desired, parameters.sensing
         name, least = ("least_signal", sensing.least_signal)
         if not point.is_pinned:
             name, least = "least_signal_unpinned", max(least, sensing.least_signal_unpinned)
         begins = RESUME if self._is_detectable else 1.0
-        is_weak, is_unseen = signal < begins * least, elsewhere < begins * sensing.least_signal
+        is_weak, is_unseen = case.signal < begins * least, case.elsewhere < begins * sensing.least_signal
         self._is_detectable = self.has_touched or not (is_weak or is_unseen)
         if self._is_detectable:
-            return ""
+            return None
         if is_weak:
-            return (
-                f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {brief(signal)} times "
-                f"the standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, "
-                "and above, or the force is detected late or on the wrong link; the arm holds its position: command "
-                "more force, another direction or position, or use joint sensors"
-                f"{'' if point.is_pinned else ', or pin the position'}"
+            return Refusal(
+                ForceReaction.NOT_SENSED,
+                f"the torques of {desired:.3g} N at {point.position:.3g} m of {point.cover} are {brief(case.signal)} "
+                f"times the standard deviation with which the motors show them; allowed: sensing.{name}, {least:g}, "
+                "and above, or the force is detected late or on the wrong link",
+                SENSORS,
             )
-        return (
-            f"the torques of {desired:.3g} N on another link than {point.cover} are {brief(elsewhere)} times the "
+        return Refusal(
+            ForceReaction.NOT_SENSED,
+            f"the torques of {desired:.3g} N on another link than {point.cover} are {brief(case.elsewhere)} times the "
             "standard deviation with which the motors show them; allowed: sensing.least_signal, "
-            f"{sensing.least_signal:g}, and above, or that link is pressed harder than commanded before it is "
-            "detected; the arm holds its position: pin the position, command more force, or use joint sensors"
+            f"{sensing.least_signal:g}, and above, or that link is pressed harder than commanded before it is detected",
+            SENSORS,
         )
 
     def _against(self, point: ForcePoint, is_strange: bool) -> float:
@@ -389,19 +415,12 @@ class ForceHold:
             return 1.0
         return CONFLICT / DOUBTED if point.is_doubtful else -FADING
 
-    def _held(
-        self,
-        axis: ForceAxis,
-        point: ForcePoint,
-        desired: float,
-        blind: str,
-        parameters: ForceLoopParameters,
-    ) -> tuple[ForceReaction, str]:
-        """Why the arm is held instead; `blind`: why the force is not sensed, or not detected."""
+    def _ended(self, parameters: ForceLoopParameters, is_blind: bool) -> tuple[ForceReaction, str] | None:
+        """Why the arm holds until the command ends, None where it does not; `is_blind`: the force is not sensed."""
         if self._other:
             return ForceReaction.OTHER_LINK, self._other
-        if blind:
-            return ForceReaction.NOT_SENSED, blind
+        if is_blind:
+            return None
         if self._travel > parameters.limits.free_travel:
             since = "since it last touched something" if self.has_touched else "and nothing was touched"
             return ForceReaction.NOTHING_TOUCHED, (
@@ -413,40 +432,45 @@ class ForceHold:
             return ForceReaction.NOTHING_TOUCHED, (
                 f"nothing was touched {brief(self._missed)} s after the command: the arm creeps, and has moved "
                 f"{brief(1e3 * self._travel)} mm; it holds its position: go nearer, or pin the "
-                f"position{SOFTER}; command no force, then again"
+                f"position, or, {SOFTER}; command no force, then again"
             )
-        if shaken := self._shaken(axis, desired, parameters):
-            return ForceReaction.SHAKEN, shaken
+        return None
+
+    def _too_slow(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
+        """Why the arm would be too slow on its way or on the surface, None where it is not or something is touched."""
+        axis, point, desired = case.axis, case.point, case.desired
         if self.is_touching:
-            return ForceReaction.NONE, ""
+            return None
         stiffness = 1.0 / (1.0 / parameters.guard.contact_stiffness + axis.compliance)
         pace = max(parameters.force_gain) * axis.speed_fraction * stiffness
         self._is_slow = pace * parameters.limits.settling_time < SETTLED / (RESUME if self._is_slow else 1.0)
         if self._is_slow:
-            return ForceReaction.TOO_SLOW, (
+            return Refusal(
+                ForceReaction.TOO_SLOW,
                 f"the force would settle with a time constant of {brief(1.0 / pace)} s{_slowed(axis)}; allowed: "
-                f"1/{SETTLED:g} of limits.settling_time; the arm holds its position: bend the arm, or command another "
-                "direction or position"
+                f"1/{SETTLED:g} of limits.settling_time",
             )
         way = desired / parameters.guard.contact_stiffness
         if parameters.is_estimated and not point.is_pinned and way < COARSE:
-            return ForceReaction.TOO_SLOW, (
+            return Refusal(
+                ForceReaction.TOO_SLOW,
                 f"the whole force is {brief(1e3 * way)} mm on a surface of {parameters.guard.contact_stiffness:g} N/m "
                 f"(guard.contact_stiffness); from the motors at an estimated position {1e3 * COARSE:g} mm is the "
-                "least, as the velocity loops wind up through friction for longer than limits.settling_time; the arm "
-                "holds its position: pin the position, command more force, or use joint sensors"
+                "least, as the velocity loops wind up through friction for longer than limits.settling_time",
+                SENSORS,
             )
         if moves := _left_behind(axis, desired, parameters):
-            return ForceReaction.TOO_SLOW, moves
+            return moves
         speed = self.approach_speed(axis, point, desired, parameters)
         if speed * parameters.limits.settling_time < CREEP:
-            return ForceReaction.TOO_SLOW, (
+            return Refusal(
+                ForceReaction.TOO_SLOW,
                 f"a surface of {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness) may be approached "
                 f"with {brief(1e3 * speed)} mm/s for {desired:.3g} N (limits.impact), less than {1e3 * CREEP:g} mm "
-                "within limits.settling_time, in which friction moves the arm in jerks; it holds its position: "
-                f"command more force{SOFTER}"
+                "within limits.settling_time, in which friction moves the arm in jerks",
+                SOFTER,
             )
-        return ForceReaction.NONE, ""
+        return None
 
     def _doubted(
         self,
@@ -540,7 +564,7 @@ class ForceHold:
         if not self.has_touched and abs(self._missed) > lasting:
             return (
                 f"nothing is touched yet, {brief(abs(self._missed))} s after the command: the arm has moved "
-                f"{brief(1e3 * self._travel)} mm towards it; go nearer, or pin the position{SOFTER}"
+                f"{brief(1e3 * self._travel)} mm towards it; go nearer, or pin the position, or, {SOFTER}"
             )
         is_late = self._missed > 0.0 and not self._has_settled
         if abs(self._missed) > (lasting if is_late else LEFT * lasting):
@@ -583,8 +607,8 @@ def _likely_sd(axis: ForceAxis, torque_error: float, parameters: ForceLoopParame
     return math.sqrt(max(whole * whole - (1.0 - LIKELY * LIKELY) * stated * stated, 0.0))
 
 
-def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> str:
-    """Why a surface that moves would keep the force off, '' where it would not.
+def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameters) -> Refusal | None:
+    """Why a surface that moves would keep the force off, None where it would not.
 
     Along the force the integral law is v/G_I behind, and the force rises in no less than `LATE`.  A surface that moves
     across it comes nearer by a slope that nobody knows, if it is stiff by more than the force allows before the
@@ -594,29 +618,33 @@ def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameter
     lag = limits.surface_speed / (max(parameters.force_gain) * axis.speed_fraction)
     most = parameters.sensing.reported_fraction * desired
     if lag > most:
-        return (
+        return Refusal(
+            ForceReaction.TOO_SLOW,
             f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) would keep the force "
-            f"{brief(lag)} N off; allowed: {brief(most)} N (sensing.reported_fraction); the arm holds its position: "
-            "command more force, a larger force_gain, or let the surface move more slowly"
+            f"{brief(lag)} N off; allowed: {brief(most)} N (sensing.reported_fraction)",
+            "set a larger force_gain, or let the surface move more slowly",
         )
     fastest = desired * yielding / (BY_MOTORS if parameters.is_estimated else LATE)
     if limits.impact and limits.surface_speed > fastest:
-        return (
+        return Refusal(
+            ForceReaction.TOO_SLOW,
             f"a surface that moves with {limits.surface_speed:g} m/s (limits.surface_speed) goes faster than the arm "
             f"follows for {desired:.3g} N on {parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness), "
-            f"{brief(fastest)} m/s; the arm holds its position: command more force, or let the surface move more slowly"
+            f"{brief(fastest)} m/s",
+            "let the surface move more slowly",
         )
     nearer = TURNING * SLOPE * limits.slide_speed
     off = nearer / yielding
     if off > tolerance(desired, parameters):
-        return (
+        return Refusal(
+            ForceReaction.TOO_SLOW,
             f"a surface that moves across the force with {limits.slide_speed:g} m/s (limits.slide_speed) comes nearer "
             f"by {brief(1e6 * nearer)} um while the friction of the arm turns round, which is {brief(off)} N on "
             f"{parameters.guard.contact_stiffness:g} N/m (guard.contact_stiffness); allowed: "
-            f"{brief(tolerance(desired, parameters))} N; the arm holds its position: command more force, or let the "
-            "surface move more slowly"
+            f"{brief(tolerance(desired, parameters))} N",
+            "let the surface move more slowly",
         )
-    return ""
+    return None
 
 
 def _loaded(force: float, meaning: str, desired: float) -> str:

@@ -19,6 +19,7 @@ from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce
+from wam_control.force_case import ForceCase
 from wam_control.force_command import CommandAdmission
 from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
@@ -31,7 +32,7 @@ from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits, WholeForce
 from wam_control.pressed_pose import has_left
-from wam_control.sensing_advice import OtherAxes
+from wam_control.sensing_advice import OtherForces, Turnable
 from wam_control.stability_guard import GuardAssessment
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_control import AxisRow, TaskControl
@@ -457,39 +458,49 @@ class ForceLoop:
         if self._resting is not None:
             self._judge(q, point, direction, self._resting)
         return self._hold.step(
-            axis,
-            point,
+            self._case(q, axis, point, direction, desired),
             self._external[0],
             measured[0],
-            desired,
             self.parameters,
             dt,
+            pushed=measured[1],
+            others=lambda: self._others(q, point, direction, frame),
+        )
+
+    def _case(
+        self, q: Sequence[float], axis: ForceAxis, point: ForcePoint, direction: Array, desired: float
+    ) -> ForceCase:
+        """A force in a pose, with what is known of the torques now."""
+        return ForceCase(
+            axis,
+            point,
+            desired,
             signal=axis.signal(desired, self._external_sd) if self._external_sd else math.inf,
             elsewhere=math.inf if point.is_pinned else self._signal_elsewhere(q, point, direction, desired),
             torque_error=self._torque_error(axis),
-            pushed=measured[1],
-            unknown=(-float(axis.sense @ self._unknown[0]), self._unknown[1]),
-            others=lambda: self._other_axes(q, point, direction, frame),
+            unknown=-float(axis.sense @ self._unknown[0]),
+            meaning=self._unknown[1],
         )
 
-    def _other_axes(self, q: Sequence[float], point: ForcePoint, direction: Array, frame: str) -> OtherAxes:
-        """The axis of a force along the same direction of its frame in other poses and for other forces."""
-        body, joints = self._body, self._arm.joints
+    def _others(self, q: Sequence[float], point: ForcePoint, direction: Array, frame: str) -> OtherForces:
+        """A force along the same direction of its frame in other poses, of other sizes, and at a pinned position."""
+        body, joints, margin = self._body, self._arm.joints, self.parameters.limits.joint_margin
+        known = point._replace(is_pinned=True, is_certain=True, is_identified=True, is_doubtful=False)
+        pinned = known._replace(position_sd=self.parameters.contact_position_sd)
 
         def turn(pose: Sequence[float]) -> Array:
             return np.eye(3) if frame == BASE else body.cover_pose(pose, frame).rotation
 
         along = turn(q).T @ direction
-        moving = np.flatnonzero(np.any(body.cover_jacobian(q, point.cover) != 0.0, axis=0))
-        joint, margin = int(moving[-1]) if len(moving) else 0, self.parameters.limits.joint_margin
-        return OtherAxes(
-            q,
-            joint,
-            joints.names[joint],
-            joints.lower[joint] + margin,
-            joints.upper[joint] - margin,
-            lambda pose, force: self._force_axes.axis(pose, point.pressed(turn(pose) @ along, force)),
-        )
+
+        def at(pose: Sequence[float], force: float, is_pinned: bool) -> ForceCase:
+            there, u = pinned if is_pinned else point, turn(pose) @ along
+            return self._case(pose, self._force_axes.axis(pose, there.pressed(u, force)), there, u, force)
+
+        moving = np.flatnonzero(np.any(body.cover_jacobian(q, point.cover) != 0.0, axis=0))[::-1].tolist()
+        turnable = [Turnable(i, joints.names[i], joints.lower[i] + margin, joints.upper[i] - margin) for i in moving]
+        where = "" if point.is_pinned else f"computed for {point.position:.3g} m of {point.cover}"
+        return OtherForces(q, turnable, where, at)
 
     def _torque_error(self, axis: ForceAxis) -> float:
         """Standard deviation of the force by those of the estimated torques, N; 0 with sensors."""

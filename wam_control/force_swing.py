@@ -2,6 +2,11 @@
 
 from collections import deque
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
 CYCLES = 2  # that have to be seen
 
 
@@ -50,21 +55,23 @@ class Reversals:
 
 
 class Shake:
-    """Peak to peak of a motion about its own course, over a window of whole cycles of a dither."""
+    """Motion of the joints about its own course, over a window of whole cycles of a dither."""
 
     def __init__(self, samples: int) -> None:
-        self._values: deque[float] = deque(maxlen=samples + 1)
+        self._poses: deque[Array] = deque(maxlen=samples + 1)
 
     def reset(self) -> None:
-        """Forget all values."""
-        self._values.clear()
+        """Forget all motion."""
+        self._poses.clear()
 
-    def step(self, value: float) -> float:
-        """Peak to peak less the straight course from the first to the last value; 0 until the window is full."""
-        values = self._values
-        values.append(value)
-        if len(values) < (values.maxlen or 0):
+    def step(self, moved: Array) -> None:
+        """Take the motion in a period (n,), rad."""
+        self._poses.append(self._poses[-1] + moved if self._poses else moved)
+
+    def along(self, lever: Array) -> float:
+        """Peak to peak of a way, m, per angle (n,), m, less its straight course; 0 until the window is full."""
+        if len(self._poses) < (self._poses.maxlen or 0):
             return 0.0
-        first, slope = values[0], (values[-1] - values[0]) / (len(values) - 1)
-        rest = [v - first - slope * i for i, v in enumerate(values)]
-        return max(rest) - min(rest)
+        way = np.array(self._poses) @ lever
+        rest = way - np.linspace(way[0], way[-1], len(way))
+        return float(rest.max() - rest.min())

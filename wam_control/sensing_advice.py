@@ -1,70 +1,124 @@
-"""What to change so that a force which is not sensed well enough is: a joint to turn, or more force, if either helps.
+"""What to change so that a refused force would be accepted: a joint to turn, another force, or a pinned position.
 
-More force helps where the errors of the torques are most of the uncertainty.  An uncertain position and friction on the
-surface grow with the force; then another pose helps, if any does.
+Each way is checked by all that refuses a command before the arm moves.  One takes a fifth of a millisecond, so that a
+few are tried in each period of the force loop.
 """
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import NamedTuple
 
-from wam_control.force_axis import ForceAxis
+from wam_control.force_case import ForceCase
 
 MORE = (1.25, 1.6, 2.0, 3.0, 5.0)  # times the commanded force, tried in this order
-GRID, FARTHEST = 0.2, 1.6  # rad: angles that are tried, and how far from the present one; finer took a period
+TURNS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.3, 1.6)  # rad, by which a joint is turned, to both sides
+SPARE = 0.1  # rad, from where a joint may be no further: the arm moves on as it presses
+EACH = 5  # ways that are tried in a period
+ANOTHER = 0.1  # of a force, by which another one differs that has an advice of its own
 
 
-class OtherAxes(NamedTuple):
-    """The axis of a force in other poses and for other forces.
+class Turnable(NamedTuple):
+    """A joint that moves the link: its index and name, and between which angles it may be, rad."""
 
-    Attributes
-    ----------
-    q : present joint angles (n,), rad.
-    joint : index of the last joint that moves the link, which bends the arm there.
-    name, lower, upper : of that joint, and between which angles it may be, rad.
-    at : axis of a force, N, in a pose (n,), rad.
-    """
-
-    q: Sequence[float]
     joint: int
     name: str
     lower: float
     upper: float
-    at: Callable[[Sequence[float], float], ForceAxis]
 
 
-def advice(others: OtherAxes, force: float, is_sensed: Callable[[ForceAxis, float], bool]) -> str:
-    """What to do in place of commanding a force, N, here; each way is checked.
+class OtherForces(NamedTuple):
+    """The same force in other poses, of another size, and at a pinned position.
 
-    Parameters
+    Attributes
     ----------
-    is_sensed : whether a force, N, along an axis is sensed well enough.
+    q : present joint angles (n,), rad.
+    turnable : joints that move the link, the last one first, which bends the arm there.
+    where : the position of the force in words; '' where it is pinned already.
+    at : a force, N, in a pose (n,), rad, as it would be commanded there; pinned, or as it is.
     """
-    ways = []
-    angle = _angle(others, force, is_sensed)
-    if angle is not None:
-        ways.append(f"turn {others.name} from {others.q[others.joint]:.2f} to {angle:.1f} rad")
-    larger = (float(f"{factor * force:.2g}") for factor in MORE)
-    enough = next((each for each in larger if is_sensed(others.at(others.q, each), each)), None)
-    ways += [f"command {enough:g} N"] if enough else []
-    rest = "command another direction or position"
-    more = "" if enough else f" (no allowed force up to {MORE[-1]:g} times as large is known well enough)"
-    return f"{', or '.join([*ways, rest])}{more}"
+
+    q: Sequence[float]
+    turnable: Sequence[Turnable]
+    where: str
+    at: Callable[[Sequence[float], float, bool], ForceCase]
 
 
-def _angle(others: OtherAxes, force: float, is_sensed: Callable[[ForceAxis, float], bool]) -> float | None:
-    """The nearest angle of the joint, rad, at which the force is sensed well enough, to half of the grid; or None."""
-    present = others.q[others.joint]
+class Advice:
+    """Looks for what would help, a little in each period.
 
-    def is_good(angle: float) -> bool:
-        pose = [*others.q[: others.joint], angle, *others.q[others.joint + 1 :]]
-        return others.lower <= angle <= others.upper and is_sensed(others.at(pose, force), force)
+    Attributes
+    ----------
+    ways : what was found.
+    is_complete : whether all was tried.
+    """
 
-    count = round(FARTHEST / GRID)
-    middle = round(present / GRID)
-    grid = [GRID * (middle + i) for i in range(-count, count + 1)]
-    found = next(filter(is_good, sorted(grid, key=lambda each: abs(each - present))), None)
-    if found is None:
-        return None
-    nearer = found + math.copysign(0.5 * GRID, present - found)
-    return nearer if is_good(nearer) else found
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Nothing is refused."""
+        self._refused: tuple[float, Hashable] | None = None
+        self._search: Iterator[str] = iter(())
+        self.ways: list[str] = []
+        self.is_complete = False
+
+    def step(
+        self,
+        force: float,
+        refused: Hashable,
+        others: Callable[[], OtherForces],
+        is_accepted: Callable[[ForceCase], bool],
+    ) -> None:
+        """Try some ways; from the beginning where another force, N, is refused, or for other reasons.
+
+        Parameters
+        ----------
+        refused : the reasons.
+        others : the force in other poses, as it is refused.
+        is_accepted : whether a force would be accepted.
+        """
+        before = self._refused
+        if before is None or before[1] != refused or abs(force - before[0]) > ANOTHER * force:
+            self.reset()
+            self._refused, self._search = (force, refused), _search(others(), force, is_accepted)
+        for _ in range(0 if self.is_complete else EACH):
+            way = next(self._search, None)
+            if way is None:
+                self.is_complete = True
+                return
+            self.ways += [way] if way else []
+
+
+def _search(others: OtherForces, force: float, is_accepted: Callable[[ForceCase], bool]) -> Iterator[str]:
+    """After each force that is tried: what to do where it would be accepted, else ''.
+
+    First one change alone, then a pinned position together with another one.
+    """
+    changes = [list(_turned(others, force)), [(others.q, size, f"command {size:g} N") for size in _larger(force)]]
+    pin, found = f"pin the position ({others.where})", 0
+    tries = [(changed, False, "") for changed in changes]
+    if others.where:
+        tries += [([(others.q, force, pin)], True, ""), *((changed, True, f"{pin} and ") for changed in changes)]
+    for changed, is_pinned, first in tries:
+        if first and found:
+            return
+        for q, size, way in changed:
+            is_good = is_accepted(others.at(q, size, is_pinned))
+            yield f"{first}{way}" if is_good else ""
+            if is_good:
+                found += 1
+                break
+
+
+def _larger(force: float) -> list[float]:
+    return [float(f"{factor * force:.2g}") for factor in MORE]
+
+
+def _turned(others: OtherForces, force: float) -> Iterator[tuple[Sequence[float], float, str]]:
+    """Poses in which one joint is turned, the force, and how to get there; the nearest first."""
+    q = others.q
+    for by in TURNS:
+        for joint, name, lower, upper in others.turnable:
+            for angle in (round(q[joint] + by, 1) + 0.0, round(q[joint] - by, 1) + 0.0):  # no -0
+                if lower + SPARE <= angle <= upper - SPARE:
+                    pose = [*q[:joint], angle, *q[joint + 1 :]]
+                    yield pose, force, f"turn {name} from {q[joint]:.2f} to {angle:.1f} rad"

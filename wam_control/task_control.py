@@ -11,6 +11,7 @@ from wam_control.arm_push import ArmPush
 from wam_control.contact_position import ForcePoint, position_is_certain, slid_position
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, PressedForce
+from wam_control.force_case import ForceCase
 from wam_control.force_hold import ForceHold, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
@@ -244,9 +245,9 @@ class TaskControl:
         for state, force, hold in zip(states, forces, self._holds, strict=True):
             desired = _desired(state)
             if state.sensed and state.point and desired:
-                error = -float(state.sensed.sense @ unknown[0]), unknown[1]
-                own, sensed = self._parameters, state.sensed
-                found.append(hold.step(sensed, state.point, external, force, desired, own, dt, unknown=error))
+                error = -float(state.sensed.sense @ unknown[0])
+                case = ForceCase(state.sensed, state.point, desired, unknown=error, meaning=unknown[1])
+                found.append(hold.step(case, external, force, self._parameters, dt))
         return max(found, key=lambda one: (one[0].holds, one[0] is not ForceReaction.NONE))
 
     def _points(self, task: TaskCommand, contact: Contact) -> list[ForcePoint]:
