@@ -134,7 +134,8 @@ def _report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
 def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:
     from wam_analysis.demo_report import report  # imports matplotlib: not before the nodes
 
-    return report(bag, bag / "demo.png")
+    made = report(bag, bag / "demo.png")
+    return made.text, tuple(map(str, made.unmet))
 
 
 def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:
