@@ -3,7 +3,10 @@
 import itertools
 import json
 import math
+import signal
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -298,6 +301,26 @@ def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
     out, err = capsys.readouterr()
     assert "no report of task follow-surface" in err
     assert "FAILED: step 'lower onto nothing'" in out
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_during_the_report_of_a_demo_leaves_where_the_recording_is_and_how_to_report_it(number):
+    """The signal comes where the report begins, as it imports its modules."""
+    bag = Path(__file__).parents[1] / "bags" / "sample" / "wam-touch"
+    program = f"""
+import os, sys
+from pathlib import Path
+from wam_cli.commands.demo import stoppable_report
+class Signalling:
+    def find_spec(self, name, *_):
+        if name == "wam_analysis.demo_report":
+            os.kill(os.getpid(), {number})
+sys.meta_path.insert(0, Signalling())
+stoppable_report(Path("{bag}"), False, None)
+"""
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (128 + number, "")
+    assert done.stderr.strip().endswith(f"the recording is in {bag}; to print the report: wam report {bag}")
 
 
 def test_bounce_does_not_end_a_contact():
