@@ -479,7 +479,7 @@ def test_a_contact_cut_by_the_recording_is_marked_and_has_no_latency():
     assert ["push", "outer", "<=0.20", "1.75"] in [row[:4] for row in rows]
     assert ["lift", "9.20", ">=10.20"] in [row[:3] for row in rows]
     assert any(row[:2] == ["push", "outer"] and row[-1] == "-" for row in rows)
-    assert "from <=: it began before the recording; to >=: it goes past its end" in shown
+    assert "from <=: it began before the recording\n  to >=: it goes past the end of the recording\n" in shown
     sentences = contact_section(recording).sentences
     assert "1 outer_link: it began before the recording." in sentences
     assert "5 outer_link: it goes past its end." in sentences
@@ -517,6 +517,8 @@ def test_a_touch_in_a_step_that_only_moves_is_compared_with_the_true_contact():
     first = recording.summary().touches[0]
     assert (first.step, first.link_true, first.link_estimated) == ("push outer", "outer_link", "outer_link")
     assert first.latency == pytest.approx(0.02)
+    recording.statuses.insert(1, ("rest", START + 700 * MS, 0))
+    assert recording.summary().touches[0].step == "push outer"  # in which it began
     recording.set(recording.estimated, 0.52, 1.5, "inner_link", (0.0, 11.0, 0.0))
     assert "right link: NO (another link)" in verdict(recording.summary())
     recording.set(recording.true, 0.55, 1.5, "base", (0.0, 0.0, 0.0))  # 50 ms are too short to be compared

@@ -280,8 +280,10 @@ def _contacts(summary: DemoSummary) -> list[str]:
         for one in contacts
     ]
     lines = [title, *_table(rows, first, head)]
-    if any(one.began_before or one.goes_past for one in contacts):
-        lines.append("  from <=: it began before the recording; to >=: it goes past its end")
+    if any(one.began_before for one in contacts):
+        lines.append("  from <=: it began before the recording")
+    if any(one.goes_past for one in contacts):
+        lines.append("  to >=: it goes past the end of the recording")
     if any(math.isnan(one.position) and not one.reasons for one in contacts):
         lines.append("  position -: known for less than half of the time of the contact")
     if any(one.is_lower_bound for one in contacts):

@@ -275,7 +275,7 @@ def _mean(values: Numbers) -> float:
 def _touches(
     run: RecordedRun, traces: Traces, steps: tuple[RecordedStep, ...], refused: Collection[str]
 ) -> tuple[StepContact, ...]:
-    """Of each step that pushes or presses, and of each true contact that touches none of these steps."""
+    """Of each step that pushes or presses, and of each other true contact with the step in which it began."""
     touches = []
     seen: set[int] = set()
     compared = np.zeros(len(traces.stamp), bool)
@@ -290,8 +290,7 @@ def _touches(
     for begin, end in contact_rows(traces.stamp, traces.true.acts):
         first, last = int(traces.stamp[begin]), int(traces.stamp[end - 1])
         if last - first >= BOUNCE and not np.any(compared[begin:end]):
-            middle = (first + last) // 2
-            step = next((one for one in steps if one.begin <= middle < one.end), RecordedStep("", first, last, {}))
+            step = next((one for one in steps if one.begin <= first < one.end), RecordedStep("", first, last, {}))
             rows = traces.during(first, last + 1)
             touches.append(_touch(traces, step, rows, seen, _reasons(run, step._replace(begin=first, end=last))))
     return tuple(sorted(touches, key=lambda touch: touch.begin))
