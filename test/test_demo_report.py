@@ -536,7 +536,7 @@ def test_without_contact_topics_the_estimate_is_not_recorded_and_not_none():
     assert {touch.latency for touch in summary.touches} == {None}
     assert all(math.isnan(touch.right) for touch in summary.touches)
     recording.without += without_truth(Recording()).without
-    assert "Contact: the estimated contact was not recorded." in contact_section(recording).sentences
+    assert "The estimated contact was not recorded." in contact_section(recording).sentences
     recording = Recording()
     recording.set(recording.estimated, 0.0, 10.0, "base", (0.0, 0.0, 0.0))
     shown = text(recording.summary()).splitlines()

@@ -63,7 +63,7 @@ def contact_section(recording: AnalysedRun) -> Section:
         sentences.append(NOT_CERTAIN)
     if not sentences and not findings:
         is_recorded = np.any(sensed.is_known)
-        sentences.append("No contact was estimated." if is_recorded else f"Contact: {NOT_ESTIMATED}.")
+        sentences.append("No contact was estimated." if is_recorded else f"{NOT_ESTIMATED.capitalize()}.")
     findings += _tracked_friction(recording)
     return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(verdict))
 
