@@ -32,6 +32,7 @@ from wam_analysis.findings.prediction import largest_force, node_at, predict
 from wam_analysis.findings.tabulated import MARK, tabulated
 from wam_analysis.findings.text import SCHEMA, document, json_text, text
 from wam_analysis.recorded import prediction_parameters
+from wam_analysis.table import bounded
 from wam_bag.bag import Bag, JointColumns, TableColumns, WrenchColumns, read
 from wam_cli.main import main
 from wam_control.force_loop import ForceLoop
@@ -204,8 +205,9 @@ def test_every_number_of_a_section_stands_in_its_tables_within_the_width(moving:
         found = [cell for table in tabulated(section.findings) for row in table.rows for cell in row[1:]]
         for finding in section.findings:
             if math.isfinite(finding.measured):
-                assert shown(finding.measured) + MARK * finding.deviates in found
-                assert any(shown(finding.measured) in line.split() for line in lines)
+                number = bounded(shown(finding.measured), finding.is_lower_bound)
+                assert number + MARK * finding.deviates in found
+                assert any(number in line.split() for line in lines)
             if math.isfinite(finding.predicted):
                 assert shown(finding.predicted) in found
 

@@ -154,6 +154,23 @@ def test_a_topic_that_is_silent_is_named_and_ends_the_command_in_time(stack: Non
     assert "--timeout is -1" in called("echo", "status", "--timeout", "-1")[2]
 
 
+def test_where_the_arm_is_paused_a_silent_topic_ends_with_what_continues_it(stack: None) -> None:
+    assert called("pause")[0] == 0
+    code, out, err = called("echo", "force_measured", "--count", "1", "--timeout", "1")
+    assert called("resume")[0] == 0
+    assert (code, out) == (1, "")
+    waits = "waits for message 1 of 1 of force_measured; none for 1 s (--timeout)"
+    assert err == f"wam call: {waits}; the arm is paused, and continues after 'wam call resume'\n"
+
+
+def test_the_timeout_holds_where_there_is_no_such_arm(stack: None) -> None:
+    """The search for the topic took 10 s, whatever the timeout."""
+    code, out, err = called("echo", "force_measured", "--timeout", "3", "--namespace", "nowhere")
+    assert (code, out) == (1, "")
+    waits = "waits for message 1 of force_measured; none for 3 s (--timeout)"
+    assert err.splitlines()[-1] == f"wam call: {waits}; no driver was found: start the stack with 'wam up'"
+
+
 def test_messages_are_printed_and_the_time_is_stopped(stack: None) -> None:
     code, out, _ = called("echo", "joint_states", "--count", "1")
     assert code == 0

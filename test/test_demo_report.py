@@ -3,7 +3,10 @@
 import itertools
 import json
 import math
+import signal
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,10 +22,11 @@ from rosbags.typesys import Stores, get_typestore
 from wam_analysis import arm_picture, demo_report
 from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, listed_contacts
 from wam_analysis.demo_figure import draw_arm, draw_forces, save
-from wam_analysis.demo_report import report, text
+from wam_analysis.demo_report import VerdictResult, report, text
 from wam_analysis.demo_summary import NOT_RECORDED, DemoSummary, summarize, summary_of
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
 from wam_analysis.findings.analysis import analyse_bag
+from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.reactions import RecordedReaction, sentences
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
@@ -115,7 +119,7 @@ class Recording:
 
 
 def verdict(summary):
-    return " | ".join(demo_report.verdict(summary))
+    return " | ".join(map(str, demo_report.verdict(summary)))
 
 
 def hypotheses(series: list[Any]) -> TableColumns:
@@ -299,6 +303,26 @@ def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
     assert "FAILED: step 'lower onto nothing'" in out
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_during_the_report_of_a_demo_leaves_where_the_recording_is_and_how_to_report_it(number):
+    """The signal comes where the report begins, as it imports its modules."""
+    bag = Path(__file__).parents[1] / "bags" / "sample" / "wam-touch"
+    program = f"""
+import os, sys
+from pathlib import Path
+from wam_cli.commands.demo import stoppable_report
+class Signalling:
+    def find_spec(self, name, *_):
+        if name == "wam_analysis.demo_report":
+            os.kill(os.getpid(), {number})
+sys.meta_path.insert(0, Signalling())
+stoppable_report(Path("{bag}"), False, None)
+"""
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (128 + number, "")
+    assert done.stderr.strip().endswith(f"the recording is in {bag}; to print the report: wam report {bag}")
+
+
 def test_bounce_does_not_end_a_contact():
     recording = Recording()
     recording.set(recording.true, 4.95, 4.99, "base", (0.0, 0.0, 0.0))
@@ -355,7 +379,7 @@ def test_contact_that_is_missed_is_reported_and_wrong():
 
 def test_each_contact_of_a_real_arm_has_its_time_link_position_and_force_with_their_uncertainty():
     recording = Recording()
-    recording.without = tuple(name for name in RECORDED if name.startswith("sim/"))
+    without_truth(recording)
     outer, inner, *pressed = recording.summary().contacts
     assert (outer.begin, outer.end, outer.link, outer.step) == pytest.approx((0.72, 1.745, "outer_link", "push outer"))
     assert (outer.probability, outer.position, outer.position_sd) == pytest.approx((0.97, 0.30, 0.03))
@@ -401,6 +425,131 @@ def test_a_second_contact_that_was_suspected_is_listed_with_the_contact():
     first, second, *_ = summarize(bag).contacts
     assert (first.second, second.second) == pytest.approx((0.5, 0.0))
     assert first.reasons == ()
+
+
+def without_truth(recording: Recording) -> Recording:
+    recording.without = tuple(name for name in RECORDED if name.startswith("sim/"))
+    return recording
+
+
+def contact_section(recording: Recording) -> Any:
+    (section,) = (one for one in analyse_bag(recording.bag(), lambda doing: None).sections if one.key == "contact")
+    return section
+
+
+def moved_only(recording: Recording) -> Recording:
+    """A box is touched from 0.5 to 1.5 s, in a step that neither pushes nor presses."""
+    recording.set(recording.push, 0.0, 2.0, "base", (0.0, 0.0, 0.0))
+    return recording
+
+
+def test_a_position_known_for_a_moment_is_not_that_of_the_whole_contact():
+    recording = Recording()
+    recording.set(recording.estimated, 0.52, 1.55, "outer_link", (0.0, 11.0, 0.0))
+    recording.set(recording.estimated, 0.52, 0.54, "outer_link", (0.0, 11.0, 0.0), 0.30)  # 2 % of it
+    summary = recording.summary()
+    assert math.isnan(summary.contacts[0].position)
+    assert math.isnan(summary.contacts[0].position_sd)
+    assert math.isnan(summary.touches[0].position_estimated)
+    assert "position -: known for less than half of the time of the contact" in text(summary)
+    assert "position within 4 cm: NOT SHOWN" in verdict(summary)
+    recording.set(recording.estimated, 0.52, 1.2, "outer_link", (0.0, 11.0, 0.0), 0.30)  # two thirds of it
+    assert recording.summary().contacts[0].position == pytest.approx(0.30)
+
+
+def test_the_least_force_is_marked_as_such_by_the_analysis_too():
+    recording = Recording()
+    shown = analysis_text(analyse_bag(recording.bag(), lambda doing: None), 100)
+    (row,) = [line.split() for line in shown.splitlines() if line.split()[:2] == ["force", "[N]"] and "11" in line]
+    assert row[2:5] == ["11", ">=10", "7.84"]
+
+
+def test_a_contact_cut_by_the_recording_is_marked_and_has_no_latency():
+    recording = Recording()
+    for series in (recording.true, recording.push, recording.estimated):
+        recording.set(series, 0.0, 1.5, "outer_link", (0.0, 12.0, 0.0), 0.28)
+    recording.set(recording.true, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.26)
+    summary = recording.summary()
+    cut = [(one.began_before, one.goes_past) for one in summary.contacts]
+    assert cut == [(True, False), (False, False), (False, False), (False, False), (False, True)]
+    assert summary.touches[0].latency is None
+    shown = text(summary)
+    rows = [line.split() for line in shown.splitlines()]
+    assert ["push", "outer", "<=0.20", "1.75"] in [row[:4] for row in rows]
+    assert ["lift", "9.20", ">=10.20"] in [row[:3] for row in rows]
+    assert any(row[:2] == ["push", "outer"] and row[-1] == "-" for row in rows)
+    assert "from <=: it began before the recording\n  to >=: it goes past the end of the recording\n" in shown
+    sentences = contact_section(recording).sentences
+    assert "1 outer_link: it began before the recording." in sentences
+    assert "5 outer_link: it goes past its end." in sentences
+
+
+def test_a_contact_is_cut_where_the_estimate_was_lost():
+    bag = Recording().bag()
+    kept = np.r_[0:1200, 1260:2000]  # from 6.0 to 6.3 s nothing came
+    estimated = bag.topics["/wam/contact/wrench"]
+    lost = WrenchColumns(
+        STAMPS[kept],
+        STAMPS[kept],
+        tuple(estimated.frames[i] for i in kept),
+        estimated.force[kept],
+        estimated.torque[kept],
+    )
+    summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": lost}))
+    pressed = [(one.began_before, one.goes_past) for one in summary.contacts if one.step == "press 8 N"]
+    assert pressed == [(False, True), (True, False)]
+
+
+def test_a_contact_that_is_missed_in_a_step_that_only_moves_is_reported_and_wrong():
+    recording = moved_only(Recording())
+    recording.set(recording.estimated, 0.0, 2.0, "base", (0.0, 0.0, 0.0))
+    summary = recording.summary()
+    assert "  push outer: MISSED: a contact of outer_link with 12 N, 0.70 to 1.70 s." in text(summary).splitlines()
+    assert "right link: NO (missed)" in verdict(summary)
+    assert (
+        "push outer: MISSED: a contact of outer_link with 12 N, 0.70 to 1.70 s." in contact_section(recording).verdict
+    )
+
+
+def test_a_touch_in_a_step_that_only_moves_is_compared_with_the_true_contact():
+    recording = moved_only(Recording())
+    first = recording.summary().touches[0]
+    assert (first.step, first.link_true, first.link_estimated) == ("push outer", "outer_link", "outer_link")
+    assert first.latency == pytest.approx(0.02)
+    recording.statuses.insert(1, ("rest", START + 700 * MS, 0))
+    assert recording.summary().touches[0].step == "push outer"  # in which it began
+    recording.set(recording.estimated, 0.52, 1.5, "inner_link", (0.0, 11.0, 0.0))
+    assert "right link: NO (another link)" in verdict(recording.summary())
+    recording.set(recording.true, 0.55, 1.5, "base", (0.0, 0.0, 0.0))  # 50 ms are too short to be compared
+    assert "push outer" not in [touch.step for touch in recording.summary().touches]
+
+
+def test_without_contact_topics_the_estimate_is_not_recorded_and_not_none():
+    recording = Recording()
+    recording.without = ("contact/wrench", "contact/point", "contact/hypotheses")
+    summary = recording.summary()
+    shown = text(summary).splitlines()
+    assert shown[shown.index("Estimated contacts, medians over each") + 1] == "  the estimated contact was not recorded"
+    assert "  false detections: not known, the estimated contact was not recorded" in shown
+    assert "missed" not in "\n".join(shown)
+    assert {touch.latency for touch in summary.touches} == {None}
+    assert all(math.isnan(touch.right) for touch in summary.touches)
+    recording.without += without_truth(Recording()).without
+    assert "The estimated contact was not recorded." in contact_section(recording).sentences
+    recording = Recording()
+    recording.set(recording.estimated, 0.0, 10.0, "base", (0.0, 0.0, 0.0))
+    shown = text(recording.summary()).splitlines()
+    assert shown[shown.index("Estimated contacts, medians over each") + 1] == "  none"
+
+
+def test_answers_that_are_no_are_those_and_not_a_text():
+    recording = Recording()
+    recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
+    force, link, position = demo_report.verdict(recording.summary())
+    assert (force.result, force.worst) == (VerdictResult.NO, "12.5 %")
+    assert (link.result, position.result) == (VerdictResult.YES, VerdictResult.YES)
+    assert position.remark == "unknown for 1 of 4 contacts"
 
 
 def test_a_press_on_nothing_is_neither_a_contact_nor_a_missed_one():
@@ -471,7 +620,7 @@ def test_without_free_time_false_detections_are_not_known_for_that_reason():
 def test_without_truth_contacts_are_listed_where_no_force_was_commanded():
     """A program need not command a force in all the time: what is estimated then is listed, too."""
     recording = Recording()
-    recording.without = tuple(name for name in RECORDED if name.startswith("sim/"))
+    without_truth(recording)
     bag = recording.bag()
     commands = bag.topics["/wam/force_command"]
     late = slice(1000, 1800)
@@ -732,10 +881,10 @@ def test_what_the_estimated_position_gains_is_the_force_of_the_same_torques_at_e
     assert found.true.force == pytest.approx(8.4, rel=1e-6)
     assert found.configured.force < found.estimated.force < found.true.force - 0.1
     lines = text(summary).splitlines()
-    title = "The force that the same torques are at three contact positions"
+    title = "Force from the same torques, for three assumed contact positions"
     table = lines.index(title)
     (row,) = [line for line in lines[table : table + 8] if line.strip().startswith("press 8 N")]
     assert "25.0  8.40" in row
-    assert "  used by the force loop, +- its standard deviation [cm]: 28.0 +- 5.0, 28.0 +- 5.0" in lines
+    assert "  position used by the force loop, +- its standard deviation [cm]: 28.0 +- 5.0, 28.0 +- 5.0" in lines
     assert all(len(line) <= 100 for line in lines)
     assert title not in text(Recording().summary()), "nothing is invented"

@@ -133,7 +133,7 @@ def test_a_force_that_cannot_be_sensed_is_refused_with_its_number_and_nothing_mo
     assert (out.velocity, out.effort) == (STILL, STILL)
     assert loop.reaction is ForceReaction.NOT_SENSED
     assert "standard deviation of 2." in loop.refusals["force_command"]
-    assert "allowed to begin: 1.2 N, 0.8 of the limit" in loop.reason
+    assert "to start, it must be below 1.2 N, 80% of the limit" in loop.reason
     assert "turn joint4 from 1.37 to 0.9 rad" in loop.reason
     assert out.axis.force_sd > out.sd_limit == 1.5
     exactly = press(force_loop(ARM, PINNED), bent(0.0), radial(bent(0.0)), 5.0)
@@ -762,7 +762,8 @@ def test_torques_of_a_force_elsewhere_than_at_the_pinned_position_are_reported(
         loop.step(State(q, STILL, DRIVEN), sensed, NO_CONTACT, None, command, None, None, DT)
     assert loop.reaction is expected
     if expected:
-        assert f"at {place:g} m of outer_link (chi^2 " in loop.reason
+        assert f"at {place:g} m of outer_link (off by " in loop.reason
+        assert " standard deviations; allowed: 4)" in loop.reason
         assert abs(size - 20.0) > 2.0, "the force is wrong by as much"
 
 

@@ -312,8 +312,12 @@ def test_a_recording_with_a_contact_gives_no_model_that_no_configuration_could_h
         main(["identify", str(bag), "--write", str(model)])
     assert ended.value.code == 1
     assert not model.exists()
-    reason = capsys.readouterr().err
-    assert re.search(r"'model\.motors\.coulomb_\w+' is -0\.\d+ N m; allowed: 0 to 100\. .*without contact", reason)
+    printed = capsys.readouterr()
+    impossible = r"'model\.motors\.coulomb_\w+' is -0\.\d+ N m; allowed: 0 to 100\. .*without contact"
+    assert re.search(impossible, printed.err)
+    first, *_ = printed.out.splitlines()  # before the report
+    assert first.startswith("NOT POSSIBLE: ")
+    assert re.search(impossible, first)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import NAN, Mask, Names, Numbers, Times, Traces, held_rows
+from wam_analysis.demo_traces import NAN, ForceSignal, Mask, Names, Numbers, Times, Traces, held_rows
 from wam_analysis.measures.runs import runs
 from wam_bag.bag import TableColumns
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
@@ -19,8 +19,9 @@ BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact, 
 NOT_CERTAIN = (
     "Without contact/hypotheses it is not known how certain contacts are, nor whether a force is only the least one."
 )
+NOT_ESTIMATED = "the estimated contact was not recorded"
 PLATEAU = 500_000_000  # ns, for which a commanded force is the same
-LASTING = 0.5  # of a contact, above which a reason belongs to it
+LASTING = 0.5  # of a contact, above which a reason belongs to it; a value known for less of it is unknown
 TWO = tuple(2 ** REASONS.index(reason) for reason in (SECOND, CERTAIN_SECOND))
 ESTIMATED = ("probability", "position_sd", "force_sd", "is_lower_bound")
 
@@ -32,6 +33,7 @@ class ListedContact(NamedTuple):
     ----------
     step : name of the step, '' outside of a scenario.
     begin, end : s of the arm's time; from the start of the recording where that is a system's clock.
+    began_before, goes_past : whether the contact was there when the recording of the estimate began, and when it ended.
     link : estimated most of the time.
     lasting : fraction of the time in which that link was estimated.
     probability : of that link.
@@ -47,6 +49,8 @@ class ListedContact(NamedTuple):
     step: str
     begin: float
     end: float
+    began_before: bool
+    goes_past: bool
     link: str
     lasting: float
     probability: float
@@ -80,6 +84,14 @@ class MissedContact(NamedTuple):
     end: float
     link: str
     force: float
+
+    @property
+    def sentence(self) -> str:
+        """What was missed, and when."""
+        during = f"{self.step}: " * bool(self.step)
+        return (
+            f"{during}MISSED: a contact of {self.link} with {self.force:.3g} N, {self.begin:.2f} to {self.end:.2f} s."
+        )
 
 
 class _Certainty(NamedTuple):
@@ -131,9 +143,18 @@ def most(names: Names) -> str:
 
 
 def median(values: Numbers) -> float:
-    """Median of those that are known, NaN without any."""
+    """Median of those that are known, NaN where fewer than `LASTING` of all are: they do not stand for the rest."""
     known = values[~np.isnan(values)]
-    return float(np.median(known)) if len(known) else NAN
+    return float(np.median(known)) if len(known) >= LASTING * len(values) > 0 else NAN
+
+
+def cut_ends(signal: ForceSignal, begin: int, end: int) -> tuple[bool, bool]:
+    """Whether a contact in the rows [begin, end) began before the recording of its signal, and whether it goes past it.
+
+    A part of a contact that is followed by another part of it is not cut there.
+    """
+    known = signal.is_known
+    return bool(begin == 0 or not known[begin - 1]), bool(end == len(known) or not known[end])
 
 
 def _links(traces: Traces, begin: int, end: int) -> list[tuple[int, int]]:
@@ -188,13 +209,15 @@ def _listed(
     bits = certainty.reasons[own][certainty.reasons[own] >= 0]
     lasting = {why: float(np.mean(bits >> i & 1)) for i, why in enumerate(REASONS)} if len(bits) else {}
     probability, position_sd, force_sd, lower = (median(certainty.numbers[name][own]) for name in ESTIMATED)
+    position = median(estimated.position[own])
     return ListedContact(
         *_time(traces, steps, begin, end),
+        *cut_ends(estimated, begin, end),
         link,
         len(own) / len(rows),
         probability,
-        median(estimated.position[own]),
-        position_sd,
+        position,
+        position_sd if not np.isnan(position) else NAN,
         median(estimated.size[own]),
         force_sd,
         lower > LASTING,

@@ -3,12 +3,13 @@
 import math
 import textwrap
 from collections.abc import Callable, Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, ListedContact
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import (
     NOT_RECORDED,
@@ -22,22 +23,51 @@ from wam_analysis.demo_summary import (
 from wam_analysis.demo_traces import TOPICS_READ
 from wam_analysis.reactions import sentences, within
 from wam_analysis.recorded import recorded_arm
-from wam_analysis.table import plain
+from wam_analysis.table import bounded, plain
 from wam_bag.bag import BagError, read
 from wam_description.status import DONE
 from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
 POSITION_TOLERANCE = 0.04  # m
-NO = ": NO ("  # begins what an answer of the verdict has against it
+MISSED = 2.0  # of an answer about the link: worse than another link, which is 1
 WIDTH, STEP = 100, 24  # columns of the report, and of the name of a step
+
+
+class VerdictResult(StrEnum):
+    """What a recording shows of a question of the verdict."""
+
+    YES = "YES"
+    NO = "NO"
+    NOTHING = "NOT SHOWN"
+
+
+class VerdictAnswer(NamedTuple):
+    """One of the verdict.
+
+    Attributes
+    ----------
+    question, result : as they are printed.
+    worst : the worst value, '' where nothing is shown.
+    remark : what was left out, '' if nothing.
+    """
+
+    question: str
+    result: VerdictResult
+    worst: str = ""
+    remark: str = ""
+
+    def __str__(self) -> str:
+        """As a line of the report."""
+        worst, remark = (f" ({self.worst})" * bool(self.worst), f", {self.remark}" * bool(self.remark))
+        return f"{self.question}: {self.result}{worst}{remark}"
 
 
 class DemoReport(NamedTuple):
     """The report as text, at most 100 columns wide, and those answers of the verdict that are no."""
 
     text: str
-    unmet: tuple[str, ...]
+    unmet: tuple[VerdictAnswer, ...]
 
 
 def report(bag: Path, picture: Path | None = None) -> DemoReport:
@@ -68,7 +98,7 @@ def report(bag: Path, picture: Path | None = None) -> DemoReport:
         except OSError as error:
             notes = (f"the picture was not written: {error}",)
     files = [f"bag      {bag}", *([f"picture  {picture}"] if picture is not None and picture.is_file() else [])]
-    unmet = tuple(answer for answer in verdict(summary) if NO in answer)
+    unmet = tuple(answer for answer in verdict(summary) if answer.result is VerdictResult.NO)
     return DemoReport("\n".join([text(summary, notes), "", *files]), unmet)
 
 
@@ -95,28 +125,29 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
         *_positions(summary.presses),
         *_reactions(summary),
         "",
-        *_contacts(summary.contacts),
+        *_contacts(summary),
         *_touches(summary.touches, summary.period),
     ]
+    lines += [line for missed in summary.missed for line in _wrapped(f"  {missed.sentence}", "    ")]
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
     lines += [line for note in (*summary.notes, *notes) for line in _wrapped(f"Note     {note}")]
     return "\n".join(lines)
 
 
-def verdict(summary: DemoSummary) -> tuple[str, str, str]:
+def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, VerdictAnswer, VerdictAnswer]:
     """Whether force, link and position were right, each with its worst value."""
     return _force_verdict(summary.presses), _link_verdict(summary), _position_verdict(summary)
 
 
-def _force_verdict(presses: Sequence[SteadyPress]) -> str:
+def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
     question = f"force within {FORCE_TOLERANCE:g} %"
     # not the mean alone: a force that swings or is lost is not the commanded one
     done = [press for press in presses if not press.is_refused]
     ripples = [100.0 * press.ripple / abs(press.commanded) for press in done]
     errors = [abs(press.error(press.true)) + ripple for press, ripple in zip(done, ripples, strict=True)]
     if len(done) < len(presses):
-        return f"{question}{NO}{len(presses) - len(done)} of {len(presses)} refused)"
+        return VerdictAnswer(question, VerdictResult.NO, f"{len(presses) - len(done)} of {len(presses)} refused")
 
     def of(worst: float) -> str:
         ripple = f"{ripples[errors.index(worst)]:.1f}"
@@ -125,40 +156,40 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> str:
     return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, of)
 
 
-def _link_verdict(summary: DemoSummary) -> str:
+def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
     def wrong(touch: StepContact) -> float:
         if NOT_RECORDED in (touch.link_true, touch.link_estimated):
             return math.nan
-        return float(touch.link_true != touch.link_estimated)
+        return MISSED if touch.link_estimated == NO_LINK else float(touch.link_true != touch.link_estimated)
 
     least = min((touch.right for touch in summary.touches if not math.isnan(touch.right)), default=0.0)
     return _answer(
         "right link",
         [wrong(touch) for touch in summary.touches],
         lambda value: not value,
-        lambda wrong: "another link" if wrong else f"{100.0 * least:.0f} %",
+        lambda wrong: {MISSED: "missed", 0.0: f"{100.0 * least:.0f} %"}.get(wrong, "another link"),
     )
 
 
-def _position_verdict(summary: DemoSummary) -> str:
+def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
     touches = [touch for touch in summary.touches if touch.link_true != NO_LINK]
     errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.reason]
     question = f"position within {100.0 * POSITION_TOLERANCE:g} cm"
     unknown = len(touches) - len(errors)
     answer = _answer(question, errors, lambda error: error <= POSITION_TOLERANCE, lambda far: f"{100.0 * far:.1f} cm")
-    return answer + f", unknown for {unknown} of {len(touches)} contacts" * bool(unknown)
+    return answer._replace(remark=f"unknown for {unknown} of {len(touches)} contacts" * bool(unknown))
 
 
 def _answer(
     question: str, values: Sequence[float], good: Callable[[float], bool], worst: Callable[[float], str]
-) -> str:
+) -> VerdictAnswer:
     known = [value for value in values if not math.isnan(value)]
     if known and not all(good(value) for value in known):
-        return f"{question}{NO}{worst(max(known))})"
+        return VerdictAnswer(question, VerdictResult.NO, worst(max(known)))
     if not known or len(known) < len(values):
-        return f"{question}: NOT SHOWN"
-    return f"{question}: YES ({worst(max(known))})"
+        return VerdictAnswer(question, VerdictResult.NOTHING)
+    return VerdictAnswer(question, VerdictResult.YES, worst(max(known)))
 
 
 def _played(summary: DemoSummary) -> str:
@@ -212,10 +243,10 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
         return []
     first = ["", "", "configured", "[cm]", "", "estimated", "[cm]", "", "true", "[cm]", ""]
     head = ["step", "true", "at", "[N]", "error", "at", "[N]", "error", "at", "[N]", "error"]
-    title = "The force that the same torques are at three contact positions"
-    error = "  error: to the true force; at the true position, the error of the torques alone"
-    places = _wrapped(f"  used by the force loop, +- its standard deviation [cm]: {', '.join(used)}", "    ")
-    other = "  measured above: by all positions that this leaves open, so by none of these three"
+    title = "Force from the same torques, for three assumed contact positions"
+    error = "  error: relative to the true force; at the true position it is that of the torques alone"
+    places = _wrapped(f"  position used by the force loop, +- its standard deviation [cm]: {', '.join(used)}", "    ")
+    other = "  the measured force above allows for that uncertainty, so it is none of these three"
     return ["", title, *_table(rows, first, head), error, *places, other]
 
 
@@ -230,31 +261,40 @@ def _reactions(summary: DemoSummary) -> list[str]:
     return ["", *lines, *(line for one in stated for line in _wrapped(f"  {one}", "    "))] if stated else []
 
 
-def _contacts(contacts: Sequence[ListedContact]) -> list[str]:
+def _contacts(summary: DemoSummary) -> list[str]:
     """All that was estimated, from the estimate alone."""
-    title = "Estimated contacts, medians over each"
+    title, contacts = "Estimated contacts, medians over each", summary.contacts
     if not contacts:
-        return [title, "  none"]
-    first = ["", "time", "[s]", "link", "", "position", "[cm]", "force", "[N]", "second"]
-    head = ["step", "from", "to", "", "[%]", "", "+-", "", "+-", "[%]"]
+        return [title, "  none" if np.any(summary.traces.estimated.is_known) else f"  {NOT_ESTIMATED}"]
+    first = ["", "time", "[s]", "link", "prob.", "position", "[cm]", "force", "[N]", "second"]
+    head = ["step", "from", "to", "", "[%]", "", "+-", "", "+-", "contact"]
     rows = [
         [
-            *(one.step, _number(one.begin, 2), _number(one.end, 2), one.link, _number(100.0 * one.probability, 0)),
+            *(one.step, "<=" * one.began_before + _number(one.begin, 2), bounded(_number(one.end, 2), one.goes_past)),
+            *(one.link, _number(100.0 * one.probability, 0)),
             "?*" if math.isnan(one.position) and one.reasons else _number(100.0 * one.position, 1),
             _number(100.0 * one.position_sd, 1),
-            ">=" * one.is_lower_bound + _number(one.force, 2),
+            bounded(_number(one.force, 2), one.is_lower_bound),
             *(_number(one.force_sd, 2), _number(100.0 * one.second, 0)),
         ]
         for one in contacts
     ]
     lines = [title, *_table(rows, first, head)]
+    if any(one.began_before for one in contacts):
+        lines.append("  from <=: it began before the recording")
+    if any(one.goes_past for one in contacts):
+        lines.append("  to >=: it goes past the end of the recording")
+    if any(math.isnan(one.position) and not one.reasons for one in contacts):
+        lines.append("  position -: known for less than half of the time of the contact")
+    if any(one.is_lower_bound for one in contacts):
+        lines.append("  force >=: the least force that explains the torques, not an estimate")
     unknown = (reason for one in contacts if math.isnan(one.position) for reason in one.reasons)
     for reason in dict.fromkeys(unknown):
         lines += _wrapped(f"  * {reason}", "    ")
     if any(math.isnan(one.probability) for one in contacts):
         lines += _wrapped(f"  {NOT_CERTAIN}", "    ")
-    link = "link [%]: its probability; +-: standard deviation"
-    second = "second: of the time in which a second contact was suspected"
+    link = "prob.: probability of the link; +-: standard deviation"
+    second = "second contact: per cent of the time in which one was suspected"
     return [*lines, *_wrapped(f"  {link}; {second}", "    ")]
 
 
@@ -263,33 +303,35 @@ def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
     compared = [touch for touch in touches if touch.link_true != NOT_RECORDED]
     if not compared:
         return []
-    first = ["", "link", "", "right", "position", "[cm]", "force", "[N]", ""]
-    head = ["step", "true", "estimated", "[%]", "true", "est.", "true", "est.", "latency"]
+    first = ["", "link", "", "same", "position", "[cm]", "force", "[N]", ""]
+    head = ["step", "true", "estimated", "link", "true", "est.", "true", "est.", "latency"]
     rows = [
         [
             *(touch.step, touch.link_true, touch.link_estimated, _number(100.0 * touch.right, 0)),
             _number(100.0 * touch.position_true, 1),
             "?" if touch.reason else _number(100.0 * touch.position_estimated, 1),
             _number(touch.force_true, 2),
-            f">={_number(touch.force_estimated, 2)}" if touch.reason else _number(touch.force_estimated, 2),
+            bounded(_number(touch.force_estimated, 2), bool(touch.reason)),
             "-" if touch.link_true == NO_LINK else _latency(touch.latency, period),
         ]
         for touch in compared
     ]
-    right = "right: fraction of the contact's time in which the estimated link was the true one"
-    latency = f"latency: of the detection where the contact began; the true one is recorded every {1e3 * period:.0f} ms"
+    same = "same link: per cent of the contact's time in which the estimated link was the true one"
     force = "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world"
+    latency = f"latency: from the start of the contact, known to {1e3 * period:.0f} ms, to its detection"
+    none = "- where it began before the step or the recording"
     return [
-        *("", "The same compared with the true contact, by step that pushes or presses"),
+        *("", "Compared with the true contact: each step that pushes or presses, and contacts in other steps"),
         *_table(rows, first, head),
-        *_wrapped(f"  {right}; {force}; {latency}", "    "),
+        *_wrapped(f"  {same}; {force}; {latency}, {none}", "    "),
     ]
 
 
 def _false_contacts(summary: DemoSummary) -> str:
     if not summary.free:
-        is_known = np.any(summary.traces.true.is_known)
-        why = "the arm was in contact all the time" if is_known else "the true contact was not recorded"
+        true, estimated = (np.any(signal.is_known) for signal in (summary.traces.true, summary.traces.estimated))
+        why = "the arm was in contact all the time" if true else "the true contact was not recorded"
+        why = why if estimated or not true else NOT_ESTIMATED
         return f"  false detections: not known, {why}"
     longest = f", longest {1e3 * summary.longest_false_contact:.0f} ms" if summary.false_contact else ""
     return f"  false detections: {1e3 * summary.false_contact:.0f} ms{longest}, in {summary.free:.1f} s without contact"
@@ -331,7 +373,7 @@ def _per_cent(press: SteadyPress, force: float) -> str:
 
 def _latency(latency: float | None, period: float) -> str:
     if latency is None:
-        return "goes on"
+        return "-"
     if math.isnan(latency):
         return "missed"
     return "before" if latency < 0.0 else f"<{1e3 * (latency + period):.0f} ms"

@@ -7,10 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.contact_list import (
+    BOUNCE,
     NO_LINK,
     ListedContact,
     MissedContact,
     contact_rows,
+    cut_ends,
     listed_contacts,
     median,
     missed_contacts,
@@ -70,9 +72,9 @@ class StepContact(NamedTuple):
     Attributes
     ----------
     begin, end : of the step, ns.
-    right : fraction of the contact's time in which the estimated link was the true one.
+    right : fraction of the contact's time in which the estimated link was the true one; NaN where it is not known.
     latency : s from the start of the true contact to its detection, below zero if a contact was reported before; NaN
-        if it was missed, None if the contact began in an earlier step.
+        if it was missed, None if the contact began in an earlier step, or one of both was not recorded then.
     reason : why the estimator gives no position, as it reports it; '' if it gives one.
     """
 
@@ -273,8 +275,10 @@ def _mean(values: Numbers) -> float:
 def _touches(
     run: RecordedRun, traces: Traces, steps: tuple[RecordedStep, ...], refused: Collection[str]
 ) -> tuple[StepContact, ...]:
+    """Of each step that pushes or presses, and of each other true contact with the step in which it began."""
     touches = []
     seen: set[int] = set()
+    compared = np.zeros(len(traces.stamp), bool)
     for step in steps:
         rows = traces.during(step.begin, step.end)
         is_known = step.name in refused or np.any(rows & traces.true.is_known)
@@ -282,7 +286,14 @@ def _touches(
             continue  # nothing was touched
         if np.any(rows & (traces.push.acts | traces.commanded.acts)):
             touches.append(_touch(traces, step, rows, seen, _reasons(run, step)))
-    return tuple(touches)
+            compared |= rows
+    for begin, end in contact_rows(traces.stamp, traces.true.acts):
+        first, last = int(traces.stamp[begin]), int(traces.stamp[end - 1])
+        if last - first >= BOUNCE and not np.any(compared[begin:end]):
+            step = next((one for one in steps if one.begin <= first < one.end), RecordedStep("", first, last, {}))
+            rows = traces.during(first, last + 1)
+            touches.append(_touch(traces, step, rows, seen, _reasons(run, step._replace(begin=first, end=last))))
+    return tuple(sorted(touches, key=lambda touch: touch.begin))
 
 
 def _touch(
@@ -298,22 +309,23 @@ def _touch(
     right = both & (estimated.frame == true.frame)
     if not np.any(rows & true.is_known):
         link_true, right = NOT_RECORDED, both & (estimated.frame == link_estimated)
+    known = touching & estimated.is_known
     link = link_estimated if link_true == NOT_RECORDED else link_true
     position_estimated = median(estimated.position[right & (estimated.frame == link)])
-    known = [reason for (link, reason), _ in reasons.most_common() if link == link_estimated and reason]
+    why = [reason for (link, reason), _ in reasons.most_common() if link == link_estimated and reason]
     return StepContact(
         step=step.name,
         begin=step.begin,
         end=step.end,
         link_true=link_true,
         link_estimated=link_estimated,
-        right=float(np.mean(right[touching])) if np.any(touching & true.acts) else NAN,
+        right=float(np.mean(right[known])) if np.any(known & true.acts) else NAN,
         position_true=median(true.position[touching & (true.frame == link_true)]),
         position_estimated=position_estimated,
         force_true=median(true.size[touching & true.acts]),
         force_estimated=median(estimated.size[both]),
         latency=_latency(traces, rows, seen),
-        reason=known[0] if known and np.isnan(position_estimated) else "",
+        reason=why[0] if why and np.isnan(position_estimated) else "",
     )
 
 
@@ -324,6 +336,9 @@ def _latency(traces: Traces, rows: Mask, seen: set[int]) -> float | None:
         if begin in seen:
             return None
         seen.add(begin)
+        began_before, _ = cut_ends(traces.true, begin, end)
+        if began_before or not traces.estimated.is_known[begin]:
+            return None
         estimated = traces.estimated.acts
         if estimated[begin]:
             before = np.flatnonzero(~estimated[:begin])

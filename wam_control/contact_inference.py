@@ -37,7 +37,7 @@ ELBOW = "torque of the elbow near 0: a contact at the elbow and one on the inner
 STRAIGHT_LINK = "elbow straight and force out of plane: the links cannot be distinguished"
 LINKS = "the torques do not identify the link"
 MORE = "one contact does not explain the torques"
-ALONG = "a force along the tube and one at its start cannot be distinguished"
+ALONG = "the force may act along the link: then its torques are the same at every position, and on the link before"
 SECOND = (
     "a second contact is suspected, or friction of this one has turned: if there is a second one, position and force "
     "are those of both together"

@@ -336,14 +336,14 @@ class ForceHold:
             return Refusal(
                 ForceReaction.NOT_SENSED,
                 f"the force is known to +-{stated:.3g} N from the motors at {point.position:.3g} m of {point.cover}; "
-                f"allowed to begin: {sensing.stated_fraction * desired:.3g} N, {sensing.stated_fraction:.0%} of the "
-                "commanded (sensing.stated_fraction)",
+                f"to start, it must be known to {sensing.stated_fraction * desired:.3g} N, "
+                f"{sensing.stated_fraction:.0%} of the commanded force (sensing.stated_fraction)",
                 f"{SENSORS}, or allow more where less accuracy will do",
             )
         return Refusal(
             ForceReaction.NOT_SENSED,
             f"the force is measured with a standard deviation of {axis.force_sd:.3g} N at {point.position:.3g} m "
-            f"of {point.cover}; allowed to begin: {RESUME * limit:.3g} N, {RESUME:g} of the limit "
+            f"of {point.cover}; to start, it must be below {RESUME * limit:.3g} N, {RESUME:.0%} of the limit "
             "(sensing.force_sd_limit, force_sd_fraction)",
         )
 
@@ -486,7 +486,7 @@ class ForceHold:
         if self._strange > lasting:
             return ForceReaction.NOT_EXPLAINED, (
                 f"the torques are not those of a force along the commanded direction at {point.position:.3g} m of "
-                f"{point.cover} (chi^2 {unexplained:.3g}; allowed: {UNEXPLAINED:g}): it acts elsewhere or on another "
+                f"{point.cover} ({_deviation(unexplained, UNEXPLAINED)}): it acts elsewhere or on another "
                 "link, or is not the only one; pin it where it acts, or free the arm"
             )
         if self._assumed > lasting:
@@ -529,9 +529,9 @@ class ForceHold:
         if self._turned <= CONFLICT:
             return ""
         return (
-            f"the torques are no longer those with which the force of {desired:.3g} N has settled (chi^2 of the "
-            f"change {change:.3g}; allowed: {TURNED:g}): something else acts on the arm, and the measured force is "
-            "that of both together, or the friction of the surface has turned; free the arm, or command the force again"
+            f"the torques are no longer those with which the force of {desired:.3g} N has settled "
+            f"({_deviation(change, TURNED)}): something else acts on the arm, and the measured force is that of both "
+            "together, or the friction of the surface has turned; free the arm, or command the force again"
         )
 
     def _lasting(self, missed: str, parameters: ForceLoopParameters) -> str:
@@ -588,13 +588,18 @@ def tolerance(desired: float, parameters: ForceLoopParameters) -> float:
     return max(TOLERANCE * desired, parameters.limits.least_tolerance)
 
 
+def _deviation(unexplained: float, most: float) -> str:
+    """A chi^2 and the largest one in the standard deviations that they are."""
+    return f"off by {math.sqrt(unexplained):.3g} standard deviations; allowed: {math.sqrt(most):.2g}"
+
+
 def _slowed(axis: ForceAxis) -> str:
     """Why the arm is slow along the force, '' where it is not."""
     if axis.speed_fraction > NOT_SLOWED:
         return ""
     return (
         f"; along the force the arm moves at {axis.speed_fraction:.0%} of the speed that force_gain gives, because its "
-        "apparent mass is large in this pose (sensing.apparent_mass_limit)"
+        "own inertia resists like a large mass in this pose (sensing.apparent_mass_limit)"
     )
 
 

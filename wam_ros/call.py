@@ -122,13 +122,19 @@ class CalledStack:
         return [found.name for found in answer.descriptors if not found.read_only]
 
     def statuses(self) -> dict[str, NodeStatus]:
-        """The newest status of each node by its name; kept up to date while messages are awaited.
+        """The newest status of each node by its name, as `heard_statuses`.
 
         Raises
         ------
         NoAnswerError
             where the driver sends none.
         """
+        found = self.heard_statuses()
+        self._wait(lambda: "driver" in found, "no status of the driver")
+        return found
+
+    def heard_statuses(self) -> dict[str, NodeStatus]:
+        """The newest status of each node by its name, empty at first; kept up to date while messages are awaited."""
         found: dict[str, NodeStatus] = {}
 
         def take(message: DiagnosticStatus) -> None:
@@ -138,7 +144,6 @@ class CalledStack:
         profile = qos(BY_NAME[STATUS])
         profile.depth = WAITING
         self.node.create_subscription(DiagnosticStatus, STATUS, take, profile)
-        self._wait(lambda: "driver" in found, "no status of the driver")
         return found
 
     def messages(
@@ -150,7 +155,7 @@ class CalledStack:
         ----------
         topic : name in the namespace of the arm, or a full one.
         silence : s, in which a message must come.
-        check : called while none comes; it may raise what is to end the waiting.
+        check : called while none comes, and while there is no such topic; it may raise what is to end the waiting.
 
         Raises
         ------
@@ -162,13 +167,14 @@ class CalledStack:
         name, own = self.node.resolve_topic_name(topic), f"{self.node.get_namespace()}/"
 
         def kinds() -> list[str]:
-            return dict(self.node.get_topic_names_and_types()).get(name, [])
+            return dict(self.node.get_topic_names_and_types()).get(name, []) if self._is_of_others(name) else []
 
         def topics() -> list[str]:
             found = (name for name, _ in self.node.get_topic_names_and_types() if name.startswith(own))
-            return [name.removeprefix(own) for name in found if "/_" not in name]  # those are hidden
+            visible = (name for name in found if "/_" not in name)  # others are hidden
+            return [name.removeprefix(own) for name in visible if self._is_of_others(name)]
 
-        self._wait(kinds, f"no topic {name}", topics)
+        self._wait(kinds, f"no topic {name}", topics, check)
         package, _, kind = kinds()[0].split("/")
         row = BY_NAME.get(topic)
         profile = QoSProfile(depth=WAITING, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -196,8 +202,19 @@ class CalledStack:
         finally:
             self.node.destroy_subscription(subscription)
 
-    def _wait(self, condition: Callable[[], Any], failure: str, others: Callable[[], Sequence[str]] = tuple) -> None:
-        """Wait for a condition; not as long where others are there instead, and no more come."""
+    def _is_of_others(self, topic: str) -> bool:
+        """Whether a node has a topic other than one that calls, as this one, which subscribes to the status."""
+        ends = (*self.node.get_publishers_info_by_topic(topic), *self.node.get_subscriptions_info_by_topic(topic))
+        return any(end.node_name != self.node.get_name() for end in ends)
+
+    def _wait(
+        self,
+        condition: Callable[[], Any],
+        failure: str,
+        others: Callable[[], Sequence[str]] = tuple,
+        check: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Wait for a condition, unless a check raises; not as long where others are there instead, and no more come."""
         begin = since = time.monotonic()
         there: Sequence[str] = ()
         while not condition():
@@ -207,4 +224,5 @@ class CalledStack:
                 raise NoAnswerError(f"{failure}; there are {', '.join(there)}")
             if now - begin > PATIENCE:
                 raise NoAnswerError(f"{failure} within {PATIENCE:g} s; {START}")
+            check()
             self._connection.executor.spin_once(timeout_sec=0.05)

@@ -11,10 +11,20 @@ import signal
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def end_at_once_on_signals() -> None:
-    """Until the program handles SIGINT and SIGTERM itself, they end it silently, with code 128 + number."""
+def end_at_once_on_signals(last_words: str = "") -> None:
+    """Until the program handles SIGINT and SIGTERM itself, they end it with code 128 + number.
+
+    Parameters
+    ----------
+    last_words : written to standard error before that; '' for nothing.
+    """
+
+    def end(number: int, frame: object) -> None:
+        os.write(2, last_words.encode())
+        os._exit(128 + number)  # there is nothing to clean up
+
     for number in SIGNALS:
-        signal.signal(number, _end)
+        signal.signal(number, end)
     # mujoco would look for GLFW in a child process, which prints a traceback of its own; we open no window
     os.environ.setdefault("MUJOCO_GL", "disable")
 
@@ -46,10 +56,6 @@ def main() -> None:
         run_node()
     finally:
         ignore_signals()
-
-
-def _end(number: int, frame: object) -> None:
-    os._exit(128 + number)  # there is nothing to clean up yet
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, ListedContact
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, ListedContact
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
@@ -24,13 +24,10 @@ def contact_section(recording: AnalysedRun) -> Section:
     lacking = recording.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
-    verdict: list[str] = []
+    verdict = [missed.sentence for missed in summary.missed]
     for number, contact in enumerate(summary.contacts, 1):
         sentences += _doubts(f"{number} {contact.link}", contact)
         findings += _numbers(f"{number} {contact.link}", contact)
-    for missed in summary.missed:
-        where = f"{f'{missed.step}: ' * bool(missed.step)}the contact of {missed.link}"
-        verdict.append(f"{where} with {shown(missed.force, 'N')} at {shown(missed.begin, 's')} was MISSED.")
     sentences += verdict
     true, sensed = traces.true, traces.estimated
     known = true.is_known & sensed.is_known
@@ -65,7 +62,8 @@ def contact_section(recording: AnalysedRun) -> Section:
     if any(math.isnan(contact.probability) for contact in summary.contacts):
         sentences.append(NOT_CERTAIN)
     if not sentences and not findings:
-        sentences.append("No contact was recorded.")
+        is_recorded = np.any(sensed.is_known)
+        sentences.append("No contact was estimated." if is_recorded else f"{NOT_ESTIMATED.capitalize()}.")
     findings += _tracked_friction(recording)
     return Section("contact", "Contact", tuple(sentences), tuple(findings), lacking, tuple(verdict))
 
@@ -80,7 +78,7 @@ def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
     yield Finding(f"{name}: position along the link", "cm", cm * contact.position, error=cm * contact.position_sd)
     yield Finding(f"{name}: its standard deviation", "cm", cm * contact.position_sd)
     least = "the least force that explains the torques" * contact.is_lower_bound
-    yield Finding(f"{name}: force", "N", contact.force, note=least, error=contact.force_sd)
+    yield Finding(f"{name}: force", "N", contact.force, math.nan, least, contact.force_sd, contact.is_lower_bound)
     yield Finding(f"{name}: standard deviation of the force", "N", contact.force_sd)
     yield Finding(f"{name}: second contact suspected", "%", 100.0 * contact.second, note="of the time")
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
@@ -89,6 +87,9 @@ def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
 
 def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
     """What is not to be trusted of a contact, and whether it was another one."""
+    if contact.began_before or contact.goes_past:
+        cut = ["it began before the recording"] * contact.began_before + ["it goes past its end"] * contact.goes_past
+        yield f"{name}: {' and '.join(cut)}."
     if contact.lasting < STEADY_LINK:
         yield f"{name}: this link was estimated for {contact.lasting:.0%} of the time, others for the rest."
     if contact.reasons:

@@ -18,6 +18,7 @@ class Finding(NamedTuple):
     predicted : by the theory for the recorded parameters; NaN if there is no prediction.
     note : qualification of either, '' if there is none.
     error : standard error of `measured`; NaN if it is not known.
+    is_lower_bound : whether `measured` is the least value that is possible, and no estimate.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Finding(NamedTuple):
     predicted: float = math.nan
     note: str = ""
     error: float = math.nan
+    is_lower_bound: bool = False
 
     @property
     def subject(self) -> str:

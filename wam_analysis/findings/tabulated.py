@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.findings.finding import Finding, shown
+from wam_analysis.table import bounded
 
 MARK = " !"  # after a number more than three standard errors from its prediction
 LEGEND = "! more than three standard errors from its prediction"
@@ -53,13 +54,17 @@ def _table(findings: list[Finding]) -> Tabulated:
         columns.append(head)
         predicted.append(False)
         for row, one in zip(rows, found, strict=True):
-            row.append("" if one is None else shown(one.measured) + MARK * one.deviates)
+            row.append("" if one is None else _measured(one))
         if any(one is not None and not np.isnan(one.predicted) for one in found):
             columns.append("predicted")
             predicted.append(True)
             for row, one in zip(rows, found, strict=True):
                 row.append("" if one is None or np.isnan(one.predicted) else shown(one.predicted))
     return Tabulated(tuple(columns), tuple(predicted), tuple(tuple(row) for row in rows))
+
+
+def _measured(one: Finding) -> str:
+    return bounded(shown(one.measured), one.is_lower_bound) + MARK * one.deviates
 
 
 def _titled(quantity: str, unit: str) -> str:

@@ -82,28 +82,24 @@ def estimator_values(configuration: Configuration) -> dict[str, Any]:
     }
 
 
-def require_possible(configuration: Configuration, values: Mapping[str, Any], source: str) -> None:
-    """Refuse an identified model that no configuration could have.
+def impossibility(configuration: Configuration, values: Mapping[str, Any], source: str) -> str:
+    """Why no configuration could have an identified model, with the value and what is allowed; '' where one could.
 
     Parameters
     ----------
     values : by dotted name, as of `model_values`.
     source : the recording.
-
-    Raises
-    ------
-    ParameterError
-        which names the value and what is allowed.
     """
     try:
         _ = configuration.with_values(values).shared
     except ParameterError as error:
         reason = str(error).removeprefix(f"{configuration.path}, section '{SHARED}': ")
-        raise ParameterError(
+        return (
             f"the model identified from {source} is not possible, so it is not written: {reason}. Either something "
             "touched the arm, or it moved too little: identify from a recording without contact, as of wam identify "
             "--excite"
-        ) from error
+        )
+    return ""
 
 
 def _by_group(result: Identified) -> dict[str, Array]:

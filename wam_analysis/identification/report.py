@@ -28,7 +28,8 @@ Friction of a joint with a motor of its own is part of that motor's friction.
 A torque offset is not identifiable from this recording: in motion, at rest and with a dither it gives the torques of a
 difference between the directions of friction. Shown is the offset if friction were alike in both directions; used is
 the sum of both, in coulomb_positive and coulomb_negative.
-'not tracked' is the stated error of the torques that the contact estimator has no error of its model for."""
+'not in the covariance': standard deviation of each motor's torque by those errors of the parameters that the covariance
+for the contact estimator cannot express."""
 
 
 STATIC = "motors.static_"
@@ -59,7 +60,7 @@ def report(shared: Shared, found: Identification, label: str) -> str:
     lines = [f"{label}: model of the controllers from free motion", "", *plain(head, rows, left=(0, 4, 5)), ""]
     parts = (found.before, found.residual, found.held_out)
     lines += plain(
-        [["motor", "motion", "left by the present model", "by the estimate", "held out", "not tracked"]],
+        [["motor", "motion", "left by the present model", "by the estimate", "held out", "not in the covariance"]],
         [
             [name, f"{found.seconds[i]:.1f} s", *(f"{1e3 * rms[i]:.3g} mN m" for rms in (*parts, found.tracked.left))]
             for i, name in enumerate(shared.arm.motors.names)
@@ -84,8 +85,8 @@ def warnings(shared: Shared, found: Identification) -> Iterator[str]:
             yield f"{name} turns freely for {found.seconds[i]:.1f} s only; record {SHORT:g} s or more"
         if found.both_directions[i] < FEW:
             yield (
-                f"{name} turns both ways in {found.both_directions[i]} of {PARTS} parts of the recording only; "
-                "its standard errors are uncertain: let it reverse more often"
+                f"{name} turns in both directions in only {found.both_directions[i]} of the {PARTS} equal sections of "
+                "the recording from which standard errors are computed: its own are uncertain; let it reverse more"
             )
         if found.held_out[i] > UNEXPLAINED * found.residual[i] + 1e-4:
             yield (

@@ -16,11 +16,12 @@ from wam_cli.commands import at_least, namespace
 from wam_description.arm import Shared
 from wam_description.configuration import option_values
 from wam_description.parameters import build_part, fields
-from wam_description.signals import Wrench
+from wam_description.signals import NodeStatus, Wrench
+from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
 from wam_description.wiring import Call, SetParameters
 from wam_live.push import push
-from wam_ros.call import SILENCE, CalledStack, Reply
+from wam_ros.call import SILENCE, START, CalledStack, Reply
 from wam_ros.message_text import plain
 
 SERVICES: Final[dict[str, tuple[str, tuple[Call, ...]]]] = {
@@ -60,7 +61,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--timeout",
         type=float,
         metavar="S",
-        help="end with exit code 1 after S seconds without a message; default: wait",
+        help="end with exit code 1 after S seconds without a message, the search for the topic included; default: wait",
     )
     pushed = requests.add_parser("push", parents=[where], help="push the simulated arm, as by hand")
     pushed._negative_number_matcher = NEGATIVE  # that of argparse takes -1e1 and -inf for options, up to Python 3.13
@@ -149,28 +150,34 @@ def _echo(given: argparse.Namespace, stack: CalledStack) -> int:
     at_least("--timeout", silence, 0.0)
     if given.count is not None:
         at_least("--count", given.count, 1)
-    waiting = Waiting(given.topic, given.count)
+    waiting = Waiting(given.topic, given.count, silence, stack.heard_statuses())
     try:
-        for message in islice(stack.messages(given.topic, silence, waiting.check), given.count):
+        for message in islice(stack.messages(given.topic, check=waiting.check), given.count):
             waiting.take()
             print(yaml.safe_dump(plain(message, given.topic), sort_keys=False, default_flow_style=None), end="---\n")
             sys.stdout.flush()
-    except TimeoutError:
-        print(f"wam call: {waiting.text}; none for {silence:g} s (--timeout)", file=sys.stderr)
+    except TimeoutError as error:
+        print(f"wam call: {error}", file=sys.stderr)
         return 1
     return 0
 
 
 class Waiting:
-    """Reports once that no message comes, and for which one it waits.
+    """Reports once that no message comes, for which one it waits and why none may come, and ends the waiting.
+
+    Parameters
+    ----------
+    topic, count : as given.
+    timeout : s without a message, from now on, after which the waiting ends.
+    statuses : of the nodes by name, kept up to date by somebody else.
 
     Attributes
     ----------
     text : what is waited for.
     """
 
-    def __init__(self, topic: str, count: int | None) -> None:
-        self._topic, self._count = topic, count
+    def __init__(self, topic: str, count: int | None, timeout: float, statuses: Mapping[str, NodeStatus]) -> None:
+        self._topic, self._count, self._timeout, self._statuses = topic, count, timeout, statuses
         self._taken, self._since, self._is_reported = 0, time.monotonic(), False
 
     @property
@@ -184,12 +191,30 @@ class Waiting:
         self._taken, self._since, self._is_reported = self._taken + 1, time.monotonic(), False
 
     def check(self) -> None:
-        """No message has come in a while."""
-        if not self._is_reported and time.monotonic() - self._since > SILENCE:
+        """No message has come in a while.
+
+        Raises
+        ------
+        TimeoutError
+            where none came for as long as was given.
+        """
+        silent = time.monotonic() - self._since
+        if silent > self._timeout:
+            raise TimeoutError(f"{self.text}; none for {self._timeout:g} s (--timeout){self._hint}")
+        if not self._is_reported and silent > SILENCE:
             self._is_reported = True
             row = BY_NAME.get(self._topic)
             seldom = ", which is published only when it changes" * bool(row and row.latched)
-            print(f"{self.text}{seldom}; Ctrl-C ends, --timeout S after S seconds", file=sys.stderr, flush=True)
+            ends = "Ctrl-C ends, --timeout S after S seconds"
+            print(f"{self.text}{seldom}{self._hint}; {ends}", file=sys.stderr, flush=True)
+
+    @property
+    def _hint(self) -> str:
+        """Why no message may come, '' where that is not known."""
+        driver = self._statuses.get("driver")
+        if driver is None:
+            return f"; no driver was found: {START}"
+        return "; the arm is paused, and continues after 'wam call resume'" * (PAUSED in driver.facts)
 
 
 def _push(given: argparse.Namespace, stack: CalledStack) -> int:

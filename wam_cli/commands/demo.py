@@ -75,8 +75,7 @@ def run(given: argparse.Namespace) -> int:
     if stopped:
         print(f"stopped; what was recorded until then is in {bag}" if bag.exists() else "stopped before anything moved")
         return 130
-    end_at_once_on_signals()  # the bag is closed
-    stated = _report(bag, bool(failures), task)
+    stated = stoppable_report(bag, bool(failures), task)
     if failures:
         stream = sys.stdout if stated.is_there else sys.stderr  # that of the report
         print(f"\nthe demonstration failed: {_cause(bag) or ', '.join(failures)}", file=stream)
@@ -118,6 +117,13 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     return list(steps)
 
 
+def stoppable_report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
+    """Print the report; a signal ends the program with where the recording is, which is closed."""
+    missing = "stopped before the report was finished"
+    end_at_once_on_signals(f"\n{missing}; the recording is in {bag}; to print the report: wam report {bag}\n")
+    return _report(bag, failed, task)
+
+
 def _report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
     """Print the report; of a demonstration that failed, as far as there is one."""
     try:
@@ -134,7 +140,8 @@ def _report(bag: Path, failed: bool, task: Experiment | None) -> PrintedReport:
 def _report_of_demonstration(bag: Path) -> tuple[str, tuple[str, ...]]:
     from wam_analysis.demo_report import report  # imports matplotlib: not before the nodes
 
-    return report(bag, bag / "demo.png")
+    made = report(bag, bag / "demo.png")
+    return made.text, tuple(map(str, made.unmet))
 
 
 def _report_of_task(task: Experiment, bag: Path) -> tuple[str, tuple[str, ...]]:

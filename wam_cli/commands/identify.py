@@ -11,12 +11,13 @@ import yaml
 
 from wam_analysis.identification.fit import identify
 from wam_analysis.identification.motion import recorded_motion
-from wam_analysis.identification.overlay import estimator_values, model_values, require_possible, write_overlay
+from wam_analysis.identification.overlay import estimator_values, impossibility, model_values, write_overlay
 from wam_analysis.identification.report import report
 from wam_bag.bag import read
 from wam_cli.commands import at_least, configuration_of, take_configuration, writable_directory, writable_file
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
+from wam_description.parameters import ParameterError
 from wam_experiments.identification.excitation import scenario
 from wam_ros.bring_up import Composition
 from wam_ros.network import move_to_free_domain
@@ -62,11 +63,15 @@ def run(given: argparse.Namespace) -> int:
     shared = configuration.shared
     _refuse_other_arm(run_in_bag, shared)
     found = identify(shared, recorded_motion(run_in_bag, shared.arm))
-    print(report(shared, found, str(bag)))
+    values = model_values(shared, found, bag.name) | estimator_values(configuration)
+    impossible = impossibility(configuration, values, str(bag))
+    if impossible:
+        print(f"NOT POSSIBLE: {impossible}\n")  # before a report of many lines, and as the last line
+    print(report(shared, found, str(bag)), flush=True)
     if run_in_bag.parameters.nodes.get("driver", {}).get("timing.dither_cycle", 0):
         print("warning: recorded with the dither, which falsifies all of it; record with timing.dither_cycle 0")
-    values = model_values(shared, found, bag.name) | estimator_values(configuration)
-    require_possible(configuration, values, str(bag))
+    if impossible:
+        raise ParameterError(impossible)
     if given.write is not None:
         command = shlex.join(["wam", "identify", str(bag), "--config", given.config])
         write_overlay(given.write, _base(given), values, command)
