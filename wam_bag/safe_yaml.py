@@ -4,9 +4,10 @@ from typing import Any, Final
 
 import yaml
 
-from wam_description.yaml_text import DUMPER, LOADER, events
-
+DEEPEST: Final = 50  # nested maps and lists; the C loader recurses and would end the process at some thousands
 LONGEST: Final = 2**22  # bytes; the longest files of our own, of bags of a thousand files, have a tenth of it
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C, if it was built
+_DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 def load(text: str | bytes) -> Any:
@@ -22,12 +23,17 @@ def load(text: str | bytes) -> Any:
     if len(text) > LONGEST:
         raise yaml.YAMLError(f"it has {len(text)} bytes; at most {LONGEST} are read")
     text = text.decode() if isinstance(text, bytes) else text
-    if any(isinstance(event, yaml.AliasEvent) for event in events(text)):
-        raise yaml.YAMLError("aliases are not read")
-    return yaml.load(text, LOADER)
+    depth = 0
+    for event in yaml.parse(text, Loader=_LOADER):
+        if isinstance(event, yaml.AliasEvent):
+            raise yaml.YAMLError("aliases are not read")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
+    return yaml.load(text, _LOADER)
 
 
-class _Plain(DUMPER):
+class _Plain(_DUMPER):
     """YAML without anchors, which rosbag2's reader and people read more easily."""
 
     def ignore_aliases(self, data: Any) -> bool:

@@ -1,19 +1,19 @@
 """YAML read with duplicate keys refused, which YAML itself accepts silently; parameters written as ROS does."""
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Mapping
 from typing import Any, Final
 
 import yaml
 
 from wam_description.parameters import nested
 
-DEEPEST: Final = 50  # nested maps and lists; the C loader recurses and would end the process at some thousands
+DEEPEST: Final = 50  # nested mappings and lists; the loader in C recurses
 # in C they take a tenth of the time, if they were built
-LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-DUMPER: Final[Any] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+_LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_DUMPER: Final[Any] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
-class _Strict(LOADER):
+class _Strict(_LOADER):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
@@ -26,39 +26,26 @@ class _Strict(LOADER):
         return mapping
 
 
-def events(text: str) -> Iterator[yaml.Event]:
-    """What the parser finds in a YAML text.
-
-    Raises
-    ------
-    yaml.YAMLError
-        if it is not YAML, or nested more than `DEEPEST` levels deep.
-    """
-    depth = 0
-    for event in yaml.parse(text, Loader=LOADER):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST:
-            raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
-        yield event
-
-
 def parse(text: str) -> Any:
     """The content of a YAML text.
 
     Raises
     ------
     yaml.YAMLError
-        if it is not YAML, a key is given twice in one mapping, or it is nested too deeply; names the line where it is
-        known.
+        if it is not YAML, a key is given twice in one mapping, or it is nested more than `DEEPEST` levels deep; names
+        the line where it is known.
     """
-    for _ in events(text):
-        pass
+    depth = 0
+    for event in yaml.parse(text, Loader=_LOADER):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
     return yaml.load(text, _Strict)  # a safe loader
 
 
 def dump(tree: Any) -> str:
     """YAML of plain values: mappings in their own order, lists of numbers in a line."""
-    written = yaml.dump(tree, Dumper=DUMPER, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
+    written = yaml.dump(tree, Dumper=_DUMPER, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
     return str(written)
 
 
