@@ -45,10 +45,11 @@ install: $(INSTALLED)  ## install the stack and ROS wheels into .venv; then .ven
 
 dependencies: $(STAMPS)/test  # for the container: everything but the package itself
 
-check: PYTEST_ARGS = -m "not ros and not slow"
+check: PYTEST_ARGS = -n auto -m "not ros and not slow"
 check: $(STAMPS)/test  ## lint, types and fast tests without ROS nodes, in under a minute; ARGS="-k plant" goes to pytest
 	@$(RUN_CHECKS)
 
+test: PYTEST_ARGS = -n 2
 test: $(STAMPS)/test $(INSTALLED)  ## lint, types and all tests; ARGS="-k plant -x" goes to pytest
 	@$(RUN_CHECKS)
 
@@ -57,7 +58,7 @@ define RUN_CHECKS
 failed=; \
 echo '== ruff'; { $(PY) -P -m ruff check . && $(PY) -P -m ruff format --check -q .; } || failed="$$failed ruff"; \
 echo '== mypy'; $(PY) -P -m mypy || failed="$$failed mypy"; \
-echo '== pytest'; $(PY) -P -m pytest -n 2 --dist loadgroup $(PYTEST_ARGS) $(ARGS) || failed="$$failed pytest"; \
+echo '== pytest'; $(PY) -P -m pytest --dist loadgroup $(PYTEST_ARGS) $(ARGS) || failed="$$failed pytest"; \
 if [ -n "$$failed" ]; then echo "make $@: failed:$$failed" >&2; exit 1; fi
 endef
 
