@@ -996,6 +996,32 @@ def test_a_pinned_point_stays_on_what_is_touched_while_the_link_slides(pinned_at
     assert out.point.position == pytest.approx(expected, abs=3e-4)
 
 
+def test_a_pinned_point_stays_on_what_is_to_be_touched_while_the_link_comes_near() -> None:
+    """A new position is that of now, and so is the first one of a force that begins again."""
+    along = BODY.cover_pose(POSE, "outer_link").rotation[:, 0] @ BODY.point_jacobian(POSE, "outer_link", (0.2, 0, 0))
+    step = along * (0.002 / float(along @ along))  # rad, moves the link by 2 mm along itself
+    loop = force_loop(ARM, PINNED)
+    world = World(400.0)
+
+    def positions(pinned_at: float, newtons: float) -> list[float]:
+        x, direction = pinned_at, BODY.cover_pose(POSE, "outer_link").rotation.T @ DOWNWARDS
+        fx, fy, fz = (newtons * direction).tolist()
+        command = ForceCommand("outer_link", (fx, fy, fz), (0.0, -x * fz, x * fy)) if newtons else None
+        found = []
+        for _ in range(6):
+            world.q = [angle + moved for angle, moved in zip(world.q, step, strict=True)]
+            sensors = State(world.q, STILL, BODY.gravity_torque(world.q).tolist())
+            out = loop.step(world.joints, sensors, NO_CONTACT, None, command, None, None, DT)
+            found.append(out.point.position if out.point else math.nan)
+        return found
+
+    first, other = positions(0.2, 5.0), positions(0.25, 5.0)
+    assert (first[0], other[0]) == pytest.approx((0.2, 0.25), abs=1e-6)
+    assert (first[-1], other[-1]) == pytest.approx((0.192, 0.24), abs=1.1e-3)
+    positions(0.25, 0.0)
+    assert positions(0.25, 5.0)[0] == pytest.approx(0.25, abs=1e-6)
+
+
 @pytest.mark.parametrize("pushed", [6.0, 4.0])
 def test_until_the_link_is_identified_no_link_is_pressed_harder_than_commanded(pushed: float) -> None:
     """A force on the inner link, measured as one on the outer link, reads too small; near the shoulder it is larger."""

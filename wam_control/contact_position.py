@@ -59,18 +59,20 @@ class ContactPosition:
     def __init__(self, covers: Covers) -> None:
         self._covers = covers
         self._last: tuple[str, float, float] | None = None
+        self._pinned = ("", 0.0)
         self._slid = 0.0
 
     def slide(self, way: float) -> None:
-        """Count a way of the pinned point along its cover, m, while it touches something.
+        """Count a way of the pinned point along its cover, m, since it was pinned or the force began.
 
-        What is touched stays where it is, so that it is touched elsewhere on the link; at the end of a cover it is the
-        end that slides.
+        What is touched, or is to be, stays where it is, so that it is touched elsewhere on the link; at the end of a
+        cover it is the end that slides.  The way before the touch counts, too: a touch is detected late, and where the
+        lever of the force is short the arm moves further along itself than along the force.
         """
         self._slid += way
 
-    def touch_again(self) -> None:
-        """Nothing is touched, or a force begins: it acts where it is pinned."""
+    def restart(self) -> None:
+        """A force begins: it acts where it is pinned."""
         self._slid = 0.0
 
     def step(
@@ -89,6 +91,8 @@ class ContactPosition:
         if pinned is not None or parameters.contact_source == "pinned":
             self._last = None
             cover, position = pinned or (parameters.contact_cover, parameters.contact_position)
+            if (cover, position) != self._pinned:
+                self._pinned, self._slid = (cover, position), 0.0
             conflict = _conflict(contact, cover, parameters)
             position = slid_position(self._covers, cover, position, self._slid)
             sd = parameters.contact_position_sd
@@ -114,7 +118,7 @@ class ContactPosition:
 
 
 def slid_position(covers: Covers, cover: str, position: float, way: float) -> float:
-    """Where a cover is touched, m, that has slid along itself by a way, m, since it was touched at a position, m."""
+    """Where a cover is touched, m, that has slid along itself by a way, m, since that was at a position, m."""
     length = covers.length_of(cover)
     return min(max(position - way, 0.0), length) if position < length - covers.radius_of(cover) else position
 

@@ -321,7 +321,7 @@ class ForceLoop:
         What a free arm at rest measures is the error of its model.
         """
         self._hold.reset()
-        self._position.touch_again()
+        self._position.restart()
         self._delay.reset()
         self._feed_forward.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
@@ -573,13 +573,12 @@ class ForceLoop:
         return self._hold.watch_shaking(axis, moved, 2.0 * math.pi / (cycle * self._timing.period), dt)
 
     def _remember(self, q: Sequence[float], moved: Array, contact: Contact, point: ForcePoint, axis: ForceAxis) -> None:
-        """Keep where the arm presses, how far it has slid there, its way there, and where it was free."""
+        """Keep where the arm presses, how far it has slid, its way there, and where it was free."""
+        self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
         if self._hold.is_touching:
             if not self.reaction.holds:
                 self._pressed_at = list(q)
-            self._position.slide(self._force_axes.slide(q, point.cover, point.position, moved))
         else:
-            self._position.touch_again()
             way = axis.lever * (float(axis.lever @ moved) / max(float(axis.lever @ axis.lever), SHORTEST))
             self._approached = [a + b for a, b in zip(self._approached, way.tolist(), strict=True)]
         if not (contact.cover or self._hold.is_touching) or not self._free_at:
