@@ -103,6 +103,9 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
     [
         ("a: [1,", "is not YAML"),
         ("? [a]\n: 1", "is not YAML"),
+        ("/**: !!map x", "is not YAML: it is marked as a mapping and is none"),
+        ("/**: 2001-99-99", "is not YAML: one of its values is none of its kind: month must be"),
+        ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
         ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; remove one of the two.*\n.*line 3"),
         ("", r"has no section '/\*\*'"),
         ("/**/driver: {ros__parameters: {}}", r"has no section '/\*\*'"),

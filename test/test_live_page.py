@@ -168,10 +168,12 @@ def test_a_drag_at_the_surface_pushes_at_the_axis_and_across_it_only() -> None:
     assert beyond.torque[2] == pytest.approx(0.5 * 6.0)  # a grip at the round end acts at the end of the axis
 
 
-def mouse(scene: Scene, phase: str) -> None:
+def mouse(scene: Scene, phase: str, client: int = 0) -> None:
     """Report a drag of the outer link as viser does, from a thread of its own."""
     start = scene.point("outer_link", 0.2)
-    event = SimpleNamespace(phase=phase, start_position=start, end_position=start + np.array([0.0, 0.5, 0.25]))
+    event = SimpleNamespace(
+        phase=phase, client_id=client, start_position=start, end_position=start + np.array([0.0, 0.5, 0.25])
+    )
     reported = threading.Thread(target=lambda: asyncio.run(scene._dragged("outer_link", (START, END))(event)))
     reported.start()
     reported.join()
@@ -195,6 +197,18 @@ def test_a_drag_that_ends_while_its_push_is_computed_is_over(server: Any, monkey
     assert scene.push() is None
     scene.show(Snapshot(2, POSE))
     assert not server.scene.get_handle_by_name("/hand").visible
+
+
+def test_a_link_that_one_browser_drags_no_other_one_drags_or_releases(server: Any) -> None:
+    scene = Scene(server, ARM, OBSTACLES, draggable=True)
+    scene.show(Snapshot(1, POSE))
+    mouse(scene, "start", 1)
+    before = scene.push()
+    for phase in ("start", "update", "end"):
+        mouse(scene, phase, 2)
+    assert scene.push() == before is not None
+    mouse(scene, "end", 1)
+    assert scene.push() is None
 
 
 def test_the_status_escapes_what_comes_from_topics() -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from conftest import LONG, soon
+from rclpy.context import Context
 
 from wam_bag.bag import read
 from wam_cli.main import COMMANDS, main
@@ -21,6 +22,8 @@ from wam_description.nodes import GROUPED
 from wam_description.topics import BY_NAME
 from wam_ros import bring_up
 from wam_ros.bring_up import Processes
+from wam_ros.leaving import HELD_UP as HELD_UP_BY
+from wam_ros.leaving import bound_leaving, leaving
 from wam_ros.qos import qos
 
 ROOT = Path(__file__).parents[1]
@@ -249,6 +252,18 @@ def test_a_process_that_the_middleware_holds_up_at_its_end_is_over_and_has_done_
     assert processes.ended() == {"recorder": 0}
     assert list(tmp_path.glob("bags/*/metadata.yaml"))
     assert "WARN" not in capfd.readouterr().err
+
+
+def test_a_process_with_a_failure_ends_by_itself_so_that_its_code_reports_it() -> None:
+    context, before = Context(), signal.getsignal(HELD_UP_BY)
+    try:
+        for failure, is_bounded in (("nothing was touched", False), ("", True)):
+            bound_leaving(context, lambda failure=failure: failure)
+            with leaving(context):
+                assert (signal.getitimer(signal.ITIMER_VIRTUAL)[0] > 0.0) is is_bounded
+            assert signal.getitimer(signal.ITIMER_VIRTUAL)[0] == 0.0
+    finally:
+        signal.signal(HELD_UP_BY, before)
 
 
 def main_without_exit(*words: str) -> None:

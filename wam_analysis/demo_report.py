@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED
+from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATED
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import (
     NOT_RECORDED,
@@ -163,9 +163,10 @@ def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
         return MISSED if touch.link_estimated == NO_LINK else float(touch.link_true != touch.link_estimated)
 
     least = min((touch.right for touch in summary.touches if not math.isnan(touch.right)), default=0.0)
+    missed = [MISSED for contact in summary.missed if contact.end - contact.begin >= 1e-9 * BOUNCE]
     return _answer(
         "right link",
-        [wrong(touch) for touch in summary.touches],
+        [*(wrong(touch) for touch in summary.touches), *missed],
         lambda value: not value,
         lambda wrong: {MISSED: "missed", 0.0: f"{100.0 * least:.0f} %"}.get(wrong, "another link"),
     )

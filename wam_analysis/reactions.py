@@ -65,6 +65,8 @@ def reactions_of(run: RecordedRun, end: int) -> tuple[RecordedReaction, ...]:
                 present = None
             if name and present is None:
                 present = RecordedReaction(stamp, end, name, reason)
+            elif present is not None and reason.startswith(present.reason):
+                present = present._replace(reason=reason)  # with what would help, which is found later
         if present is not None:
             found.append(present)
     return tuple(sorted(one for one in found if one.end > one.begin))

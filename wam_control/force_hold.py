@@ -14,7 +14,7 @@ from wam_control.force_case import ForceCase
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.force_measurement import STEADY, LowPass
 from wam_control.force_swing import Reversals, Shake
-from wam_control.sensing_advice import Advice, OtherForces
+from wam_control.sensing_advice import TURNS, Advice, OtherForces
 from wam_description.number_text import brief
 
 Array = NDArray[np.float64]
@@ -113,6 +113,11 @@ class ForceHold:
         self._turns, self._shake, self._pattern = Reversals(), Shake(SHAKE_SAMPLES), LowPass()
         self._advice = Advice()
         self.reset()
+
+    @property
+    def is_advised(self) -> bool:
+        """Whether what would help a refused force is known."""
+        return self._advice.is_complete
 
     def reset(self) -> None:
         """Another force is commanded."""
@@ -369,8 +374,8 @@ class ForceHold:
             return f": {', or '.join(self._advice.ways)}{besides}"
         pinned = "" if case.point.is_pinned else ", with a pinned position or without"
         return (
-            f"; neither up to 5 times the force nor another angle of one joint would be accepted{pinned}: command "
-            f"another direction or position{besides}"
+            f"; no force up to 5 times and no angle of one joint up to {TURNS[-1]:g} rad away was found that would be "
+            f"accepted with a margin{pinned}: command another direction or position{besides}"
         )
 
     def _admits(self, case: ForceCase, parameters: ForceLoopParameters) -> bool:

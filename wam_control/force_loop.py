@@ -156,6 +156,11 @@ class ForceLoop:
         """The guard's report; a new object where it has changed."""
         return self._supervision.report
 
+    @property
+    def is_advised(self) -> bool:
+        """Whether the reason of a refused force states what would help: it is looked for in several periods."""
+        return self._hold.is_advised
+
     def tune(self, parameters: ForceLoopParameters) -> None:
         """Take new parameters, or refuse the set.
 
@@ -499,7 +504,9 @@ class ForceLoop:
 
         moving = np.flatnonzero(np.any(body.cover_jacobian(q, point.cover) != 0.0, axis=0))[::-1].tolist()
         turnable = [Turnable(i, joints.names[i], joints.lower[i] + margin, joints.upper[i] - margin) for i in moving]
-        where = "" if point.is_pinned else f"computed for {point.position:.3g} m of {point.cover}"
+        where = (
+            "" if point.is_pinned else f"by a force in the frame of {point.cover}; computed for {point.position:.3g} m"
+        )
         return OtherForces(q, turnable, where, at)
 
     def _torque_error(self, axis: ForceAxis) -> float:

@@ -35,7 +35,7 @@ class ForceLoopNode:
         self._refusal = ""
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
-        self._reported: tuple[Report, ForceReaction, bool, tuple[str, ...], str] | None = None
+        self._reported: tuple[Report, ForceReaction, bool, tuple[str, ...], str, bool] | None = None
         self._reaction = ForceReaction.NONE
 
     @reaction(
@@ -137,7 +137,8 @@ class ForceLoopNode:
         report, reaction = self._loop.report, self._loop.reaction
         refused = self.refusals
         refused.pop("contact/hypotheses", None)
-        present = report, reaction, self._loop.is_pushed, tuple(refused), self._refusal or self._player.refusal
+        advised, other = self._loop.is_advised, self._refusal or self._player.refusal
+        present = report, reaction, self._loop.is_pushed, tuple(refused), other, advised
         if present == self._reported:
             return {}
         self._reported = present

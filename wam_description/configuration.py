@@ -4,6 +4,7 @@ import difflib
 import hashlib
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -281,8 +282,21 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
             raise ParameterError(
                 f"{path}: section '{key}' needs '{PARAMETERS}:' with names and values below it, and nothing else"
             )
+        if twice := [one for one, count in Counter(_names(body[PARAMETERS])).items() if count > 1]:
+            raise ParameterError(
+                f"{path}: section '{key}': '{twice[0]}' is given twice, with dots and without; remove one"
+            )
         sections[name] = flatten(body[PARAMETERS])
     return _frozen(sections)
+
+
+def _names(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
+    """Dotted names of the values of a nested mapping."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _names(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}"
 
 
 def _thawed(path: Path, sections: Mapping[str, Mapping[str, Any]], written: str) -> Configuration:

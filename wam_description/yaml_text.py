@@ -15,6 +15,10 @@ _DUMPER: Final[Any] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 class _Strict(_LOADER):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        if not isinstance(node, yaml.MappingNode):
+            raise yaml.constructor.ConstructorError(
+                None, None, "it is marked as a mapping and is none", node.start_mark
+            )
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             if key.value in seen:
@@ -40,7 +44,10 @@ def parse(text: str) -> Any:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:
             raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
-    return yaml.load(text, _Strict)  # a safe loader
+    try:
+        return yaml.load(text, _Strict)  # a safe loader
+    except (ValueError, TypeError, LookupError, OverflowError) as error:  # of the value of a tag, as a date of month 99
+        raise yaml.YAMLError(f"one of its values is none of its kind: {error}") from error
 
 
 def dump(tree: Any) -> str:

@@ -53,8 +53,9 @@ class Grip(NamedTuple):
 
 
 class Drag(NamedTuple):
-    """A drag as the browser reports it: what it holds, and where its pointer is in the base frame, (3,), m."""
+    """A drag as a browser, by its number, reports it: what it holds, and its pointer in the base frame, (3,), m."""
 
+    client: int
     grip: Grip
     pointer: Array
 
@@ -196,18 +197,20 @@ class Scene:
 
     def _dragged(self, cover: str, axis: tuple[Array, Array]) -> Callable[[Any], Any]:
         async def take(event: Any) -> None:  # an async callback: others run in a pool, out of order
+            drag = self._drag
+            is_own = drag is not None and (drag.client, drag.grip.cover) == (event.client_id, cover)
             if event.phase == "end":  # viser reports it where the browser is gone, too
-                self._drag = None
+                self._drag = None if is_own else drag
                 return
-            if event.phase == "start":
+            if event.phase == "start" and drag is None:
                 pose = self._body.cover_pose(self._q, cover)
                 point = pose.rotation.T @ (np.array(event.start_position) - pose.position)
                 grip = Grip(cover, point, *axis)
-            elif self._drag is not None:
-                grip = self._drag.grip
+            elif drag is not None and is_own:
+                grip = drag.grip
             else:
-                return  # late, of a drag that is over
-            self._drag = Drag(grip, np.array(event.end_position))
+                return  # late, of a drag that is over, or another browser holds a link
+            self._drag = Drag(event.client_id, grip, np.array(event.end_position))
 
         return take
 

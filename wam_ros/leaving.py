@@ -6,28 +6,35 @@ same moment, one of them may do so indefinitely.  Its work is done by then: brak
 """
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
-from weakref import WeakSet
+from weakref import WeakKeyDictionary
 
 from rclpy.context import Context
 
 LONGEST: Final = 1.0  # s of computing, a hundred times what it takes
 HELD_UP: Final = signal.SIGVTALRM  # by which the system ends the process
 
-_BOUNDED: WeakSet[Context] = WeakSet()
+_BOUNDED: WeakKeyDictionary[Context, Callable[[], str]] = WeakKeyDictionary()
 
 
-def bound_leaving(context: Context) -> None:
-    """Let the system end this process where leaving the network with a context takes too long; its nodes are all."""
-    _BOUNDED.add(context)
+def bound_leaving(context: Context, failure: Callable[[], str]) -> None:
+    """Let the system end this process where leaving the network with a context takes too long.
+
+    Parameters
+    ----------
+    context : of all nodes of this process.
+    failure : why one of them has failed, '' where none has; a failure is to be reported, however long that takes.
+    """
+    _BOUNDED[context] = failure
 
 
 @contextmanager
 def leaving(context: Context) -> Iterator[None]:
     """What destroys a node, the last one with the participant; not its own work before."""
-    if context not in _BOUNDED:
+    failure = _BOUNDED.get(context)
+    if failure is None or failure():
         yield
         return
     signal.signal(HELD_UP, signal.SIG_DFL)

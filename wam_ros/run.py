@@ -9,7 +9,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -166,7 +166,6 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
     except RuntimeError as error:
         reason = str(error).split(", at /")[0]
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
-    bound_leaving(connection.context)
     BUSES[connection.context] = LocalBus(connection.executor, makers)
     nodes: dict[str, Node] = {}
 
@@ -187,11 +186,17 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
             getattr(node, "raise_priority", lambda: None)()
         gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
         spin(connection.executor, is_over, end)
+        bound_leaving(connection.context, lambda: _failure(nodes.values()))
     except ParameterError as error:
         raise SystemExit(f"error: {error}") from None
     except RCLError as error:  # for example security that is enforced where the middleware has none
         raise SystemExit(f"error: {str(error).split(', at /')[0]}") from None
     finally:
         connection.close()
-    if failure := next(filter(None, (getattr(node, "failure", "") for node in nodes.values())), ""):
-        raise SystemExit(f"error: {failure}")
+    if reason := _failure(nodes.values()):
+        raise SystemExit(f"error: {reason}")
+
+
+def _failure(nodes: Iterable[Node]) -> str:
+    """Why one of the nodes has failed, '' where none has."""
+    return next(filter(None, (str(getattr(node, "failure", "")) for node in nodes)), "")

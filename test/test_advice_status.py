@@ -1,0 +1,20 @@
+"""What would help a refused force is in the status of the force loop, which looks for it in several periods."""
+
+from wam_control.scenario import ScenarioStep
+from wam_description.configuration import Configuration, packaged
+from wam_description.signals import BASE, ForceCommand, NodeStatus
+from wam_sim.simulation import Simulation
+
+
+def test_the_status_of_a_refused_force_states_what_would_help() -> None:
+    steps = [
+        ScenarioStep("release", 0.05, request="enable"),
+        ScenarioStep("press", 1.0, force=ForceCommand(BASE, (0.2, 0.0, 0.0))),
+    ]
+    run = Simulation(Configuration.load(packaged("wam")), steps)
+    seen: list[NodeStatus] = []
+    run.listen("status", lambda _, status: seen.append(status), "force_loop")
+    assert run.play() == ""
+    refused = [status.message for status in seen if status.facts.get("reaction") == "not_sensed"]
+    assert refused[0].endswith("the arm holds its position")  # at once
+    assert refused[-1].startswith(f"{refused[0]}: turn joint")
