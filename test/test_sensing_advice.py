@@ -67,7 +67,8 @@ def moving(speed: float) -> ForceLoopParameters:
 
 MOTORS = replace(PINNED, feedback="contact_estimate")
 UNPINNED_MOTORS = replace(MOTORS, contact_source="estimated")
-PIN = "pin the position (computed for 0.28 m of outer_link)"
+ALONE = "accepted with a margin"
+PIN = "pin the position (by a force in the frame of outer_link; computed for 0.28 m)"
 
 
 @pytest.mark.parametrize("frame", [BASE, "outer_link"])
@@ -118,18 +119,18 @@ def test_what_would_be_sensed_but_is_refused_for_another_reason_is_not_advised()
 @pytest.mark.parametrize(
     ("own", "sd", "text"),
     [
-        (moving(1e-2), 0.0, "accepted: command another direction or position"),
+        (moving(1e-2), 0.0, f"{ALONE}: command another direction or position"),
         (
             UNPINNED_MOTORS,
             0.5,
-            "accepted, with a pinned position or without: command another direction or position, or use joint sensors",
+            f"{ALONE}, with a pinned position or without: command another direction or position, or use joint sensors",
         ),
     ],
 )
 def test_where_nothing_computed_helps_the_reason_states_it(own: ForceLoopParameters, sd: float, text: str) -> None:
     q = bent(0.4)
     refused = Refused(own, q, radial(q), 5.0, sd=sd)
-    nothing = "neither up to 5 times the force nor another angle of one joint would be"
+    nothing = "no force up to 5 times and no angle of one joint up to 1.6 rad away was found that would be"
     assert f"{HELD}; {nothing} {text}" in refused.loop.reason
 
 
