@@ -1,7 +1,7 @@
 """The estimated contacts of a recording one by one, each compared with the true one where that was recorded."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -161,9 +161,8 @@ def _links(traces: Traces, begin: int, end: int) -> list[tuple[int, int]]:
     """Parts of a contact in each of which another link is estimated; a change shorter than `BOUNCE` is none."""
     acting = begin + np.flatnonzero(traces.estimated.acts[begin:end])
     names = traces.estimated.frame[acting]
-    changes = [0, *(1 + np.flatnonzero(names[1:] != names[:-1])).tolist()]
     starts, link = [begin], ""
-    for first, after in pairwise([*changes, len(names)]):
+    for first, after in _constant(names[1:] != names[:-1]):
         if traces.stamp[acting[after - 1]] - traces.stamp[acting[first]] < BOUNCE:
             continue
         if link and names[first] != link:
@@ -177,8 +176,13 @@ def _other_commands(traces: Traces) -> list[int]:
     force, stamp = np.nan_to_num(traces.commanded.force), traces.stamp
     if not len(stamp):
         return []
-    changes = [0, *(1 + np.flatnonzero(np.any(force[1:] != force[:-1], axis=1))).tolist(), len(stamp)]
-    return [int(stamp[first]) for first, after in pairwise(changes) if stamp[after - 1] - stamp[first] >= PLATEAU]
+    constant = _constant(np.any(force[1:] != force[:-1], axis=1))
+    return [int(stamp[first]) for first, after in constant if stamp[after - 1] - stamp[first] >= PLATEAU]
+
+
+def _constant(differs: Mask) -> Iterator[tuple[int, int]]:
+    """Rows [first, after) between changes; `differs`: whether each row but the first is another than that before."""
+    return pairwise([0, *(1 + np.flatnonzero(differs)).tolist(), len(differs) + 1])
 
 
 def _cut(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -> list[tuple[int, int]]:

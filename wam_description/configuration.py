@@ -14,7 +14,7 @@ import yaml
 
 from wam_description import yaml_text
 from wam_description.arm import Shared
-from wam_description.parameters import ParameterError, build, fields, flatten, listed, nested
+from wam_description.parameters import ParameterError, build, dotted, fields, listed, nested
 
 T = TypeVar("T")
 SHARED = "/**"
@@ -282,21 +282,13 @@ def _sections(path: Path, tree: Any, whole: bool = True) -> Mapping[str, Mapping
             raise ParameterError(
                 f"{path}: section '{key}' needs '{PARAMETERS}:' with names and values below it, and nothing else"
             )
-        if twice := [one for one, count in Counter(_names(body[PARAMETERS])).items() if count > 1]:
+        values = list(dotted(body[PARAMETERS]))
+        if twice := [one for one, count in Counter(one for one, _ in values).items() if count > 1]:
             raise ParameterError(
                 f"{path}: section '{key}': '{twice[0]}' is given twice, with dots and without; remove one"
             )
-        sections[name] = flatten(body[PARAMETERS])
+        sections[name] = dict(values)
     return _frozen(sections)
-
-
-def _names(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
-    """Dotted names of the values of a nested mapping."""
-    for key, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from _names(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}"
 
 
 def _thawed(path: Path, sections: Mapping[str, Mapping[str, Any]], written: str) -> Configuration:

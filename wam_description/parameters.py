@@ -128,15 +128,18 @@ def fields(cls: type, prefix: str = "") -> Iterator[Field]:
         yield Field(name, kind, is_array, **item.metadata)
 
 
-def flatten(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """A nested mapping as a flat one with dotted names, the form that ROS uses."""
-    flat: dict[str, Any] = {}
+def flatten(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """A nested mapping as a flat one with dotted names, the form that ROS uses; of a name given twice the last one."""
+    return dict(dotted(tree))
+
+
+def dotted(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted names and values of a nested mapping, each as often as it is given."""
     for key, value in tree.items():
         if isinstance(value, Mapping):
-            flat.update(flatten(value, f"{prefix}{key}."))
+            yield from dotted(value, f"{prefix}{key}.")
         else:
-            flat[prefix + key] = value
-    return flat
+            yield prefix + key, value
 
 
 def nested(flat: Mapping[str, Any]) -> dict[str, Any]:

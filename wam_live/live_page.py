@@ -19,7 +19,7 @@ from wam_live.hold import HeldTopic
 from wam_live.object_meshes import ObjectMeshes, at_rest
 from wam_live.page import name_page, quiet, serve, url
 from wam_live.panel import DITHER, NO_PRESS, SLIDERS, Bend, Controls, Play, Press, Request, mode_of
-from wam_live.push import NO_PUSH
+from wam_live.push import release
 from wam_live.scenario_player import ScenarioPlayer
 from wam_live.scene import Scene
 from wam_live.snapshot import size
@@ -161,9 +161,8 @@ class LivePage:
         if push is not None:
             if refusal := hold.send(source.stamp, push):
                 panel.notify(f"not pushed: {refusal}", refused=True)
-        elif hold.is_on:
-            hold.send(source.stamp, NO_PUSH)
-            hold.end()
+        else:
+            release(hold, source.stamp)
 
     def _start_press(self, press: Press, source: RunningStack, panel: Controls) -> None:
         """Answer each state with the force from now on."""

@@ -47,10 +47,15 @@ def push(stack: CalledStack, shared: Shared, wrench: Wrench, seconds: float) -> 
         stated = "the push ended" if begin else "not pushed"
         raise ValueError(f"{stated}: {error}; wam call resume") from error
     finally:
-        if hold.is_on:
-            hold.send(stamp, NO_PUSH)
-            hold.end()
+        release(hold, stamp)
     return (stamp - begin) / 1e9
+
+
+def release(hold: HeldTopic, stamp: int) -> None:
+    """End a push of `sim/disturbance`, where there is one, as the answer to a state, ns."""
+    if hold.is_on:
+        hold.send(stamp, NO_PUSH)
+        hold.end()
 
 
 def _raise_if_paused(statuses: Mapping[str, NodeStatus]) -> None:
