@@ -25,6 +25,7 @@ from wam_description.configuration import Configuration, option_values, packaged
 from wam_description.interface import process_groups
 from wam_description.nodes import EACH, GROUPED, NODES
 from wam_description.urdf import urdf
+from wam_ros.processors import placements
 from wam_ros.run import NAMESPACE, PARENT
 
 CONFIGURED = "configured"
@@ -91,6 +92,8 @@ def start_nodes(context: LaunchContext) -> list[Any]:
     if configuration.shared.timing.mode == "lockstep" and given["processes"] == "false":
         command = ["up", "--config", str(parameters), "--namespace", namespace, "--log-level", given["log_level"]]
         return [program(command, ends), *viewers]
+    groups = process_groups(configuration.shared.nodes, GROUPED if given["processes"] == GROUPED else EACH)
+    places = placements(groups, configuration.shared.timing.mode == "lockstep")
     nodes = [
         Node(
             package="wam_stack",
@@ -99,9 +102,9 @@ def start_nodes(context: LaunchContext) -> list[Any]:
             ros_arguments=["--log-level", given["log_level"]],
             namespace=namespace,
             parameters=[str(parameters)],
-            **ends,
+            **{**ends, "additional_env": {**ends["additional_env"], **place}},
         )
-        for group in process_groups(configuration.shared.nodes, GROUPED if given["processes"] == GROUPED else EACH)
+        for group, place in zip(groups, places, strict=True)
     ]
     return [*nodes, *viewers]
 

@@ -14,12 +14,12 @@ NODES: Final = {
 }
 ONE, GROUPED, EACH = "one", "grouped", "each"  # process for all nodes, for each group, for each node
 # What works in every inner period is together: its messages do not leave the process.  The outer loop has a period for
-# its answer, and the recorder has time.
+# its answer, and the recorder has time.  All others, also nodes of your own, are of the outer group.
+INNER, OUTER = "inner", "outer"
 GROUPS: Final = {
-    "driver": "inner",
-    "transform": "inner",
-    "velocity_loop": "inner",
-    "gravity": "inner",
+    "driver": INNER,
+    "transform": INNER,
+    "velocity_loop": INNER,
+    "gravity": INNER,
     "recorder": "recorder",
 }
-OUTER: Final = "outer"  # group of all others, also of nodes of your own

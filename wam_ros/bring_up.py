@@ -6,10 +6,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any, Final, NamedTuple, cast
 
 from rclpy.logging import get_logger
@@ -22,6 +22,7 @@ from wam_ros.leaving import HELD_UP
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node
+from wam_ros.processors import placements
 from wam_ros.run import FIRST, LAST, NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
 LOGGER: Final = get_logger("wam")
@@ -113,10 +114,12 @@ class Processes:
         self._stack = ExitStack()
         parameters = self._stack.enter_context(parameter_file(configuration))
         own = ["--params-file", str(parameters), "--log-level", log_level]
-        place = f"__ns:=/{namespace.strip('/')}"
+        namespaced = f"__ns:=/{namespace.strip('/')}"
+        groups = process_groups(configuration.shared.nodes, processes)
+        places = placements(groups, configuration.shared.timing.mode == "lockstep")
         self._processes = {
-            " or ".join(names[entry] for entry in group): _start(group, [*own, "-r", place])
-            for group in process_groups(configuration.shared.nodes, processes)
+            " or ".join(names[entry] for entry in group): _start(group, [*own, "-r", namespaced], place)
+            for group, place in zip(groups, places, strict=True)
         }
         self._first = next((name for name in self._processes if FIRST in name.split()), FIRST)
 
@@ -239,12 +242,14 @@ class NodeProcess:
         self._stack.close()
 
 
-def _start(entries: Sequence[str], arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+def _start(
+    entries: Sequence[str], arguments: Sequence[str], place: Mapping[str, str] = MappingProxyType({})
+) -> subprocess.Popen[bytes]:
     # a session of its own: Ctrl-C reaches the parent alone, which stops the nodes in order
     return subprocess.Popen(
         [sys.executable, "-m", "wam_ros.program", *entries, "--ros-args", *arguments],
         start_new_session=True,
-        env={**os.environ, PARENT: str(os.getpid())},
+        env={**os.environ, PARENT: str(os.getpid()), **place},
     )
 
 

@@ -32,15 +32,15 @@ def raise_priority(fifo: int, niceness: int) -> str:
     What was granted, for people.
     """
     level = os.sched_param(fifo)  # inherited by threads that begin later: the executor has one for its timers
-    if fifo and _granted(lambda thread: os.sched_setscheduler(thread, os.SCHED_FIFO, level), SENDS_LATER):
+    if fifo and for_all_threads(lambda thread: os.sched_setscheduler(thread, os.SCHED_FIFO, level), SENDS_LATER):
         return f"SCHED_FIFO {fifo}"
-    if niceness and _granted(lambda thread: os.setpriority(os.PRIO_PROCESS, thread, niceness)):
+    if niceness and for_all_threads(lambda thread: os.setpriority(os.PRIO_PROCESS, thread, niceness)):
         return f"nice {niceness}{' with its session' if _session_granted(niceness) else ''}"
     return "usual"
 
 
-def _granted(ask: Callable[[int], None], but: str = " ") -> bool:
-    """Ask for something for all threads; whether the system has granted it to each that has not ended meanwhile.
+def for_all_threads(ask: Callable[[int], None], but: str = " ") -> bool:
+    """Ask for something for all threads of this process; whether it was granted to each that has not ended meanwhile.
 
     Parameters
     ----------

@@ -27,6 +27,7 @@ from wam_description.parameters import ParameterError
 from wam_ros.leaving import bound_leaving
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import limit_to_this_machine
+from wam_ros.processors import keep_to_processors
 from wam_ros.program import Stop
 
 FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
@@ -182,7 +183,8 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
         for name, make in makers.items():
             nodes[name] = make(context=connection.context, namespace=NAMESPACE)
             connection.add(nodes[name])
-        for node in nodes.values():  # all threads are there
+        keep_to_processors(os.environ)  # all threads are there
+        for node in nodes.values():
             getattr(node, "raise_priority", lambda: None)()
         gc.freeze()  # to look through all modules takes 0.1 s, in which the node would be late
         spin(connection.executor, is_over, end)

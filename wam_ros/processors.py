@@ -1,0 +1,81 @@
+"""Processors of the processes of one lockstep: what works in every inner period keeps to one of them.
+
+A message between two processes wakes its reader.  The kernel starts that at once, on a processor that is idle: it has
+to be woken itself and has nothing of the reader in its cache, and the writer is interrupted before it has sent its
+message to the next reader.  In lockstep, where the nodes wait for each other anyway, most of a period went into that.
+Here the inner loop has a processor, all others have the rest, and who reads waits until who writes has finished
+(SCHED_BATCH, which needs no right).  benchmarks/speed.py shows the gain; the bits are the same.
+"""
+
+import os
+import random
+import time
+from collections.abc import Collection, Mapping, MutableMapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from wam_description.interface import declared
+from wam_description.nodes import GROUPS, INNER
+from wam_ros.priority import for_all_threads
+
+PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a process, by their numbers
+TIMES: Final = Path("/proc/stat")
+LOOK: Final = 0.05  # s, in which the idlest processor is found
+IDLE: Final = slice(3, 5)  # columns of a processor's times: idle, and waiting for a disk
+STEPS: Final = 10  # of load; within one of them it is chance which processor is the idlest
+
+
+def placements(groups: Sequence[Sequence[str]], is_lockstep: bool) -> list[dict[str, str]]:
+    """Environment of each process, in which it finds its processors; empty where it may be anywhere.
+
+    Parameters
+    ----------
+    groups : entries of the parameter `nodes` that share a process, for each process.
+    is_lockstep : whether the nodes wait for each other.
+    """
+    if not is_lockstep:
+        return [{} for _ in groups]
+    inner, outer = divided(idle_parts(os.sched_getaffinity(0)))
+    places = (inner if GROUPS.get(declared(group[0]).name) == INNER else outer for group in groups)
+    return [{PROCESSORS: " ".join(map(str, place))} for place in places]
+
+
+def divided(idle: Mapping[int, float]) -> tuple[set[int], set[int]]:
+    """Processors of the inner loop and of all others.
+
+    Parameters
+    ----------
+    idle : part of the time that each permitted processor has been idle, 0 to 1.
+
+    Returns
+    -------
+    The idlest one for the inner loop, the others; both alike where only one is permitted.
+    """
+    inner = max(idle, key=lambda one: (round(STEPS * idle[one]), random.random()))
+    return {inner}, set(idle) - {inner} or {inner}
+
+
+def idle_parts(permitted: Collection[int]) -> dict[int, float]:
+    """Part of the time that processors are idle, 0 to 1, measured for a moment."""
+    before = _times()
+    time.sleep(LOOK)
+    after = _times()
+    parts = {}
+    for one in permitted:
+        spent = [b - a for a, b in zip(before.get(one, []), after.get(one, []), strict=True)]
+        parts[one] = sum(spent[IDLE]) / (sum(spent) or 1)
+    return parts
+
+
+def _times() -> dict[int, list[int]]:
+    lines = [line.split() for line in TIMES.read_text(encoding="ascii").splitlines() if line.startswith("cpu")]
+    return {int(line[0][3:]): [int(value) for value in line[1:]] for line in lines if line[0] != "cpu"}
+
+
+def keep_to_processors(environment: MutableMapping[str, str]) -> None:
+    """Keep all threads of this process to the processors that bring-up has given it, if it has."""
+    with suppress(OSError, KeyError):  # where the system permits others by now, it shares them out itself
+        processors = [int(one) for one in environment.pop(PROCESSORS).split()]
+        for_all_threads(lambda thread: os.sched_setaffinity(thread, processors))
+        for_all_threads(lambda thread: os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0)))
