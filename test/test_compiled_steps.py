@@ -66,6 +66,8 @@ def history(made: Plant) -> bytes:
     for k in range(900):
         if k == 300:
             made.push("outer_link" if n > 1 else "link", np.array([0.0, 12.0, 3.0]), np.array([0.0, 0.0, 3.0]))
+        if k == 400 and n > 1:
+            made.push("inner_link", np.array([1.0, 0.3, -7.0]), np.array([0.1, 0.0, 0.2]))
         if k == 500:
             made.release()
         if k == 600:
@@ -129,9 +131,10 @@ def test_an_error_of_mujoco_is_an_exception_and_the_next_step_works(with_c: pyte
 
 def test_a_failure_in_python_comes_through(with_c: pytest.MonkeyPatch) -> None:
     made = plant()
-    made.push("outer_link", np.array([0.0, 1.0, 0.0]), np.zeros(3))
-    made._loads.pushes["nowhere"] = made._loads.pushes["outer_link"]
-    with pytest.raises(KeyError, match="nowhere"):
+    made.brake(False)  # the levels of friction change, which Python looks up
+    made._brakes = None  # type: ignore[assignment]
+    made.brake(True)
+    with pytest.raises(TypeError, match="NoneType"):
         made.step([0.0] * 4, 2)
 
 

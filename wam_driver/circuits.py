@@ -23,7 +23,7 @@ class CableCircuits:
     depends_on_torque : True if `follow` has anything to do.
     is_slack : True if a strand is slack and friction depends on the tension.
     each : of each circuit the first slack end between its strands, creep in a step per speed and torque, and the
-        torque, N m, above which friction depends on the tension.
+        torque, N m, above which friction depends on the tension; it remains the same list, which the steps in C read.
     """
 
     def __init__(self, data: Any, arm: Arm, effects: Effects, step: float) -> None:
@@ -44,10 +44,11 @@ class CableCircuits:
         self._strands = [i for i in range(n) if effects.slack and not effects.play(i)]
         self._damping = np.array([circuit.damping for circuit in arm.circuits])
         self._losses = [step * circuit.loss_per_torque if effects.creep else 0.0 for circuit in arm.circuits]
+        self.each: list[tuple[int, float, float]] = []
         self._prepare()
 
     def _prepare(self) -> None:
-        self.each = [
+        self.each[:] = [
             (4 * i + 1, loss, 2.0 * circuit.pretension * circuit.radius if self._friction_counts else math.inf)
             for i, (loss, circuit) in enumerate(zip(self._losses, self._circuits, strict=True))
         ]

@@ -8,30 +8,49 @@ from typing import Any
 
 import mujoco
 
+from wam_driver.circuits import CableCircuits
+from wam_driver.dry_friction import DryFriction
+from wam_driver.loads import AppliedPush
 from wam_driver.surfaces import SHARPNESS, SMALLEST_DEPTH, SurfaceLaw
 
-Advance = Callable[..., list[float]]  # see the docstring of `advance` in fast_steps.c, without its first argument
+Advance = Callable[
+    [int, bool, Callable[[], object]], list[float]
+]  # `advance` of fast_steps.c, without its first argument
 
 
-def compiled_steps(model: Any, data: Any, laws: list[SurfaceLaw], step: float) -> Advance | None:
+def compiled_steps(
+    model: Any,
+    data: Any,
+    laws: list[SurfaceLaw],
+    friction: DryFriction,
+    circuits: CableCircuits,
+    pushes: dict[str, AppliedPush],
+    step: float,
+) -> Advance | None:
     """What advances a plant in C; None where it has not been built, or for another MuJoCo.
 
     Parameters
     ----------
     model, data : of MuJoCo; they have to live as long as what is returned.
     laws : of `Surfaces`.
+    friction, circuits : of the plant.
+    pushes : of `CoverLoads`.
     step : of the plant, s.
     """
     try:
         built: Any = importlib.import_module("wam_driver.fast_steps")
         library = ctypes.CDLL(f"libmujoco.so.{mujoco.__version__}")  # which mujoco has loaded already
-        functions = [library.mj_step1, library.mj_step2, library["_mjPRIVATE_setTlsLogHandler"]]
+        functions = [library[name] for name in ("mj_step1", "mj_step2", "mj_applyFT", "_mjPRIVATE_setTlsLogHandler")]
     except (ImportError, OSError, AttributeError):
         return None
     if mujoco.mj_version() != built.MUJOCO:
         return None
     addresses = [ctypes.cast(function, ctypes.c_void_p).value for function in functions]
+    each = circuits.each if circuits.depends_on_torque else []
+    lists = (laws, *friction.bounds, friction.direction, each)
     constants = (step, SMALLEST_DEPTH, float(SHARPNESS))
-    fixed = (model._address, data._address, *addresses, mujoco.FatalError, laws, *constants)
-    advance: Advance = partial(built.advance, fixed)
+    prepared = built.prepare(
+        model._address, data._address, *addresses, mujoco.FatalError, *lists, circuits, pushes, *constants
+    )
+    advance: Advance = partial(built.advance, prepared)
     return advance

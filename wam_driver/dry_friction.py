@@ -32,6 +32,8 @@ class DryFriction:
     direction : sign of the velocity of each shaft, 0 while it is stuck.
     levels : torque up to which each shaft sticks rigidly, N m; 0 if it has elastic displacement.
     elastic : torque of friction on each shaft with elastic displacement, N m; empty if no shaft has any.
+    bounds : velocities of each shaft, rad/s, above and below which `follow` has anything to do; they and `direction`
+        remain the same lists, which the steps in C read.
     is_steady : True if `follow` needs neither loads nor held torques.
 
     Raises
@@ -69,22 +71,19 @@ class DryFriction:
         slowest = [math.nextafter(v, math.inf) for v in [STUCK_ROTOR] * (size // 2) + [STUCK_JOINT] * (size // 2)]
         self._bounds = [((-v, v), (0.0, math.inf), (-math.inf, 0.0)) for v in slowest]
         self.direction = [0] * size
+        self._low, self._high = self.bounds = [0.0] * size, [0.0] * size
         self.set_circuits(arm.circuits)
         self.reset()
 
     def reset(self) -> None:
         """Return to power-up: every shaft is stuck, none is displaced."""
-        self.direction = [0] * len(self._shafts)
-        self._low, self._high = ([bounds[0][end] for bounds in self._bounds] for end in (0, 1))
+        self.direction[:] = [0] * len(self._shafts)
+        for end, limits in enumerate(self.bounds):
+            limits[:] = [bounds[0][end] for bounds in self._bounds]
         self.levels = self._static.copy()
         for presliding in self._presliding.values():
             presliding.torque = 0.0
         self.elastic = [0.0] * len(self._shafts) if self._presliding else []
-
-    @property
-    def bounds(self) -> tuple[list[float], list[float]]:
-        """Velocities of each shaft, rad/s, above and below which `follow` has anything to do."""
-        return self._low, self._high
 
     def set_circuits(self, circuits: Sequence[Circuit]) -> None:
         """Take the pretension of each circuit, (n,), for the friction by tension (6.5)."""

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import reduce
+from functools import partial, reduce
 from itertools import chain
 from operator import add
+from struct import Struct
 from typing import Any, NamedTuple
 
 import mujoco
@@ -36,6 +37,18 @@ class PartialLoad(NamedTuple):
     position: float  # where it acts along the cover, m
 
 
+class AppliedPush(NamedTuple):
+    """A push on a cover, as it is applied and as it is measured."""
+
+    site: int  # the frame of the cover
+    body: int
+    force: tuple[float, ...]  # (3,) N, in the frame of the cover
+    torque: tuple[float, ...]  # (3,) N m, about its origin
+    rows: np.ndarray  # (9,) of the rotation of that frame, MuJoCo's memory
+    origin: np.ndarray  # (3,) m, of it in the base frame, MuJoCo's memory
+    load: PartialLoad
+
+
 class CoverLoads:
     """What acts on the covers: contacts, springs and pushes.
 
@@ -47,31 +60,41 @@ class CoverLoads:
 
     Attributes
     ----------
-    pushes : force, (3,), N, and torque, (3,), N m, of each cover that is pushed, in its frame.
+    pushes : on each cover that is pushed; the dictionary remains the same one, which the steps in C read.
     """
 
     def __init__(self, model: Any, data: Any, arm: Arm, springs: Springs) -> None:
         self._model, self._data = model, data
         covers = arm.covers
         # views into MuJoCo's memory: to fetch them in each step costs more than the push
-        sites = {name: model.site(f"{name}_frame").id for name in covers.names}
-        self._rotation = {name: data.site_xmat[site].reshape(3, 3) for name, site in sites.items()}
-        self._origin = {name: data.site_xpos[site] for name, site in sites.items()}
+        self._site = {name: model.site(f"{name}_frame").id for name in covers.names}
+        self._rotation = {name: data.site_xmat[site].reshape(3, 3) for name, site in self._site.items()}
+        self._origin = {name: data.site_xpos[site] for name, site in self._site.items()}
+        self._rows = {name: data.site_xmat[site] for name, site in self._site.items()}
         self._applied = data.qfrc_applied
         present = {model.geom(i).name for i in range(model.ngeom)}
         geoms = {geom: name for name in covers.names for geom in (name, folded(name)) if geom in present}
         self._cover_of_geom = {model.geom(geom).id: name for geom, name in geoms.items()}
         self._body = {name: model.body(link).id for name, link in zip(covers.names, covers.links, strict=True)}
         self._springs = list(_springs_on_covers(model, arm, springs))
-        self.pushes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self.pushes: dict[str, AppliedPush] = {}
         self._wrench = np.zeros(6)
+        turned = np.zeros(6)
+        self._turned = turned[:3], turned[3:]  # force and torque of a push in the base frame
+        self._turn = partial(Struct("6d").pack_into, turned.data, 0)
 
     def push(self, cover: str, force: np.ndarray, torque: np.ndarray) -> None:
-        """Push on a cover, see `Plant.push`."""
+        """AppliedPush on a cover, see `Plant.push`."""
         if cover not in self._origin:
             raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._origin)}")
         if any(force) or any(torque):
-            self.pushes[cover] = (np.array(force, float), np.array(torque, float))
+            square = float(force[1] ** 2 + force[2] ** 2)  # a force along x passes through every position
+            moment = float(force[1] * torque[2] - force[2] * torque[1])
+            position = moment / square if square > 0.0 else np.nan
+            load = PartialLoad(np.array(force, float), np.array(torque, float), position)
+            applied = tuple(load.force.tolist()), tuple(load.moment.tolist())
+            frame = self._rows[cover], self._origin[cover]
+            self.pushes[cover] = AppliedPush(self._site[cover], self._body[cover], *applied, *frame, load)
         else:
             self.pushes.pop(cover, None)
 
@@ -81,10 +104,17 @@ class CoverLoads:
 
     def apply_pushes(self) -> None:
         """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""
-        model, data, applied = self._model, self._data, self._applied
-        for cover, (force, torque) in self.pushes.items():
-            turned = self._rotation[cover].dot
-            mj_applyFT(model, data, turned(force), turned(torque), self._origin[cover], self._body[cover], applied)
+        for _, body, (x, y, z), (u, v, w), rows, origin, _ in self.pushes.values():
+            a, b, c, d, e, f, g, h, i = rows.tolist()
+            self._turn(
+                a * x + b * y + c * z,
+                d * x + e * y + f * z,
+                g * x + h * y + i * z,
+                a * u + b * v + c * w,
+                d * u + e * v + f * w,
+                g * u + h * v + i * w,
+            )
+            mj_applyFT(self._model, self._data, *self._turned, origin, body, self._applied)
 
     def measure(self) -> list[Load]:
         """What the world does to each touched, sprung or pushed cover, in the order of the arm's covers."""
@@ -110,10 +140,8 @@ class CoverLoads:
                     yield cover, PartialLoad(force, np.cross(at, force), float(at[0]))
 
     def _pushed(self) -> Iterator[tuple[str, PartialLoad]]:
-        for cover, (force, torque) in self.pushes.items():
-            square = float(force[1] ** 2 + force[2] ** 2)  # a force along x passes through every position
-            moment = float(force[1] * torque[2] - force[2] * torque[1])
-            yield cover, PartialLoad(force, torque, moment / square if square > 0.0 else np.nan)
+        for cover, push in self.pushes.items():
+            yield cover, push.load
 
     def _sprung(self) -> Iterator[tuple[str, PartialLoad]]:
         data = self._data

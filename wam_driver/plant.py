@@ -116,7 +116,8 @@ class Plant:
         self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
         is_plain = self._friction.is_steady and not self._movers  # what the steps in C do
-        self._advance = compiled_steps(model, data, self._surfaces.laws, step) if is_plain else None
+        shared = self._surfaces.laws, self._friction, self._circuits, self._loads.pushes
+        self._advance = compiled_steps(model, data, *shared, step) if is_plain else None
         self._rest()
         self._kept = self._position.tolist(), self._plastic.tolist()
         if set(effects.pretension_share) != {1.0}:
@@ -239,16 +240,7 @@ class Plant:
         model, data, pushes, circuits = self.model, self.data, self._loads.pushes, self._circuits
         self._write_torque(0, *torque)
         if self._advance is not None:
-            self._velocity = self._advance(
-                count,
-                self._is_set,
-                *self._friction.bounds,
-                self._friction.direction,
-                circuits,
-                circuits.each if circuits.depends_on_torque else [],
-                self._set_friction,
-                self._loads.apply_pushes if pushes else None,
-            )
+            self._velocity = self._advance(count, self._is_set, self._set_friction)
             return
         for _ in range(count):
             self._set_friction()

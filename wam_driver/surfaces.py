@@ -16,7 +16,7 @@ SurfaceLaw = tuple[int, int, float, float, float, int, bool]  # see `Surfaces.la
 SHARPNESS = (
     32  # of the sharing between the ends of a tube: energy is conserved to 0.2 %, and depths within 2 % count as equal
 )
-WHOLE = (1.0,)
+WHOLE = [1.0]
 SMALLEST_DEPTH = 1e-12  # m
 
 
@@ -48,6 +48,7 @@ class Surfaces:
 
     def __init__(self, model: Any, data: Any, arm: Arm, world: World, movers: Sequence[Mover], step: float) -> None:
         self._data, self._contact, self._step = data, data.contact, step
+        self._first: Any = None  # view of the first contact, always at the same address
         pairs = list(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True))
         # MuJoCo may name the two geoms of a contact in either order
         self._pair = {geoms: i for i, pair in enumerate(pairs) for geoms in (pair, pair[::-1])}
@@ -68,11 +69,15 @@ class Surfaces:
         step, as for the joints; MuJoCo's own value, the damping over the impedance d, makes friction alternate between
         its limits from step to step.
         """
-        data, contact = self._data, self._contact
-        pairs = [self._pair[first, second] for first, second in contact.geom.tolist()]
-        rows, distances = contact.efc_address.tolist(), contact.dist.tolist()
+        data, contact, fractions = self._data, self._contact, WHOLE
+        if data.ncon == 1:  # a view of one contact is read in half the time of arrays of all
+            only = self._first = self._first or contact[0]
+            pairs, rows, distances = [self._pair[only.geom1, only.geom2]], [only.efc_address], [only.dist]
+        else:
+            pairs = [self._pair[first, second] for first, second in contact.geom.tolist()]
+            rows, distances = contact.efc_address.tolist(), contact.dist.tolist()
+            fractions = _fractions(pairs, distances)
         reference, regularisation, velocity = data.efc_aref, data.efc_R, data.efc_vel.tolist()
-        fractions = WHOLE if len(pairs) == 1 else _fractions(pairs, distances)
         if self._mover:
             self._subtract_movers(velocity, rows, pairs)
         for pair, row, distance, fraction in zip(pairs, rows, distances, fractions):  # noqa: B905 - one of each per contact

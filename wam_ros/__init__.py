@@ -12,6 +12,7 @@
 - parameters: declared, described, live; remote_parameters: those of other nodes
 - recorder, recorder_node, recorder_interface: every topic into a bag
 - bring_up: all nodes, in processes or in this one; run: context, executor and signals; priority: of a process
+- processors: those that the processes of one lockstep keep to
 - leaving: the system ends a process that the middleware would hold up indefinitely at its end
 - program: ends a program quietly whose imports are interrupted
 - requests: requests to services and their answers; call: one request from a shell
