@@ -4,9 +4,11 @@ import os
 import time
 from pathlib import Path
 
+import pytest
 from conftest import LONG
 
 from wam_description.configuration import Configuration, packaged
+from wam_ros import processors
 from wam_ros.bring_up import Processes
 from wam_ros.processors import PROCESSORS, divided, idle_parts
 from wam_ros.run import PARENT
@@ -32,6 +34,14 @@ def test_every_permitted_processor_is_looked_at() -> None:
     parts = idle_parts(ALL)
     assert set(parts) == ALL
     assert all(0.0 <= part <= 1.0 for part in parts.values())
+
+
+def test_a_system_that_shows_no_times_has_no_idle_processor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for file, text in (("none", None), ("another", "cpu 1 2\ncpu9999 1 2 3 4 5\nintr 5 4\n\n")):
+        if text is not None:
+            (tmp_path / file).write_text(text)
+        monkeypatch.setattr(processors, "TIMES", tmp_path / file)
+        assert idle_parts(ALL) == dict.fromkeys(ALL, 0.0)
 
 
 def placed(processes: Processes) -> dict[str, set[tuple[int, frozenset[int]]]]:

@@ -9,6 +9,7 @@ Here the inner loop has a processor, all others have the rest, and who reads wai
 
 import os
 import random
+import re
 import time
 from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from contextlib import suppress
@@ -57,20 +58,24 @@ def divided(idle: Mapping[int, float]) -> tuple[set[int], set[int]]:
 
 
 def idle_parts(permitted: Collection[int]) -> dict[int, float]:
-    """Part of the time that processors are idle, 0 to 1, measured for a moment."""
+    """Part of the time that processors are idle, 0 to 1, measured for a moment; 0 where the system does not show it."""
     before = _times()
     time.sleep(LOOK)
     after = _times()
     parts = {}
     for one in permitted:
-        spent = [b - a for a, b in zip(before.get(one, []), after.get(one, []), strict=True)]
+        spent = [b - a for a, b in zip(before.get(one, []), after.get(one, []), strict=False)]
         parts[one] = sum(spent[IDLE]) / (sum(spent) or 1)
     return parts
 
 
 def _times() -> dict[int, list[int]]:
-    lines = [line.split() for line in TIMES.read_text(encoding="ascii").splitlines() if line.startswith("cpu")]
-    return {int(line[0][3:]): [int(value) for value in line[1:]] for line in lines if line[0] != "cpu"}
+    try:
+        text = TIMES.read_text(encoding="ascii")
+    except OSError:
+        return {}
+    lines = re.findall(r"^cpu(\d+) (.*)", text, re.MULTILINE)
+    return {int(number): [int(time) for time in times.split()] for number, times in lines}
 
 
 def keep_to_processors(environment: MutableMapping[str, str]) -> None:
