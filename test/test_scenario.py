@@ -299,6 +299,11 @@ def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, tex
     [
         ("steps: [", "is not YAML"),
         ("steps: []\nsteps: []", "'steps' is given twice"),
+        ("steps: &a [{name: x, seconds: 1.0, set: *a}]", r"is not YAML: \*a is inside of what it refers to"),
+        (
+            {"steps": [{"name": "a", "seconds": 1, "set": {"force_loop": {1: 2}}}]},
+            "is not YAML: the key 1 is no text; write it in quotes",
+        ),
         ("- 1", "has no list 'steps'"),
         ("", "has no list 'steps'"),
         ({"steps": {"name": "a"}}, "has no list 'steps'"),
