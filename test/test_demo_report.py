@@ -895,6 +895,20 @@ def test_of_a_part_of_a_recording_a_status_without_a_stamp_is_as_old_as_what_was
     assert "lower: refused" not in text(summary_of(run))
 
 
+def test_a_reaction_is_reported_where_a_later_step_has_the_same_name():
+    recording = Recording()
+    recording.statuses = [(name, at, 0) for name, at in (("move", START), ("move", START + 4000 * MS))]
+    bag = recording.bag()
+    reacts = [
+        status("force_loop", message, stamp=str(START + at * MS), reaction=reaction)
+        for at, reaction, message in ((1000, "joint_end", "joint1 is at its end"), (1500, "none", ""))
+    ]
+    stated = messages([*itertools.starmap(said, recording.statuses), *reacts, said("done", START + 5000 * MS, 0)])
+    found = analyse_bag(bag._replace(topics={**bag.topics, "/wam/status": stated}), lambda doing: None)
+    (force,) = (section for section in found.sections if section.key == "force")
+    assert any(line.startswith("move: reported (joint_end) from 1.20 to 1.70 s") for line in force.sentences)
+
+
 def test_failed_scenario_says_why_and_ends_its_last_step():
     recording = Recording()
     recording.statuses = [*recording.statuses[:3], ("step 'lower': no contact estimated", START + 4900 * MS, 2)]

@@ -18,7 +18,7 @@ from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
 from wam_bag.bag_writer import exact_cdr
 from wam_bag.cdr_encoder import encoded
 from wam_bag.contents import contents
-from wam_control.scenario import Push, ScenarioStep
+from wam_control.scenario import Push, ScenarioStep, Setting
 from wam_description.configuration import Configuration, packaged
 from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record
@@ -173,3 +173,15 @@ def test_what_a_scenario_commands_is_recorded_with_a_configuration_that_does_not
     pushed = topics["/wam/sim/disturbance"]
     assert isinstance(pushed, WrenchColumns)
     assert pushed.force[1].tolist() == [0.0, 12.0, 0.0]
+
+
+def test_a_step_with_the_name_of_the_one_before_is_a_step_of_its_own_with_what_it_sets(tmp_path: Path) -> None:
+    setting = Setting("force_loop", "limits.contact_force", 20.0)
+    steps = [ScenarioStep("hold", 0.05), ScenarioStep("hold", 0.05, settings=(setting,)), ScenarioStep("hold", 0.05)]
+    record(Configuration.load(packaged("wam")), steps, tmp_path / "bag")
+    found = recorded_run(read(tmp_path / "bag")).steps
+    assert [(step.name, dict(step.settings)) for step in found] == [
+        ("hold", {}),
+        ("hold", {"force_loop:limits.contact_force": 20.0}),
+        ("hold", {}),
+    ]

@@ -119,6 +119,7 @@ class ScenarioOutput(NamedTuple):
     request: str
     settings: tuple[Setting, ...]
     step: str
+    begins: bool  # the step, in this period
     done: bool
     failure: str
     task: TaskCommand | None = None
@@ -181,6 +182,7 @@ class Scenario:
             request=request if begins else "",
             settings=step.settings if begins and not self.done else (),
             step=step.name,
+            begins=begins and not self.done,
             done=self.done,
             failure=self.failure,
             task=None if self.done else step.task,
