@@ -371,6 +371,19 @@ def test_where_no_position_was_recorded_that_is_reported_and_no_force_is_a_lower
     assert math.isnan(inner.force_error)
 
 
+def test_a_lower_bound_has_no_error_in_the_median_either():
+    recording = Recording()
+    recording.set(recording.true, 2.1, 3.9, "inner_link", (0.0, 15.0, 0.0), 0.4)  # nearly half of all contact
+    recording.set(recording.estimated, 2.1, 3.9, "inner_link", (0.0, 5.0, 0.0))
+    recording.set(recording.true, 4.5, 10.0, "base", (0.0, 0.0, 0.0))
+    name = "size of the force error, median"
+    (error,) = (one for one in contact_section(recording).findings if one.name == name)
+    assert error.measured == pytest.approx(1.0)
+    recording.without = ("contact/point", "contact/hypotheses")
+    (error,) = (one for one in contact_section(recording).findings if one.name == name)
+    assert math.isnan(error.measured)
+
+
 def test_a_hole_in_a_recording_of_the_estimate_alone_ends_the_contact():
     recording = without_truth(Recording())
     bag = recording.bag()

@@ -325,7 +325,10 @@ def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
         for touch in compared
     ]
     same = "same link: per cent of the contact's time in which the estimated link was the true one"
-    force = "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world"
+    force = (
+        "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world; where "
+        "several links are touched at once, on the one with the largest (sim/contact/wrench)"
+    )
     latency = f"latency: from the start of the contact, known to {1e3 * period:.0f} ms, to its detection"
     none = (
         "- where it cannot be known: the contact began before the step or the recording, the estimate is missing, or "
