@@ -285,6 +285,9 @@ def test_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() ->
         ("&a [*a]", r"\*a is inside of what it refers to"),
         ("{1: 2}", "the key 1 is no text"),
         ("*a", "undefined alias"),
+        ("010", "010 is 8 in YAML; write that number, or a text in quotes"),
+        ("[1.0, 1:30]", "1:30 is 90 in YAML"),
+        ("1:30.5", "1:30.5 is 90.5 in YAML"),
     ],
 )
 def test_an_odd_value_of_an_option_is_refused_with_its_name_as_in_a_file(value: str, reason: str) -> None:
@@ -330,3 +333,10 @@ def test_an_int_above_every_float_is_refused() -> None:
         build(Loop, {"gain": 10**400, "names": ["a"]})
     with pytest.raises(ParameterError, match=r"seconds is 10000*; it must be a finite number"):
         number("step 1", "seconds", 10**400)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("07", 7), ("0", 0), ("-00", 0), ("0x10", 16), ("1_000", 1000), ("-8", -8)]
+)
+def test_other_numbers_of_yaml_are_read(text: str, value: int) -> None:
+    assert option_values([f"a={text}"]) == {"a": value}

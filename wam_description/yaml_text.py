@@ -1,5 +1,6 @@
 """YAML of plain values, read with every oddity refused that YAML itself accepts; parameters written as ROS does."""
 
+import re
 from collections.abc import Hashable, Mapping
 from typing import Any, Final
 
@@ -8,6 +9,7 @@ import yaml
 from wam_description.parameters import nested
 
 DEEPEST: Final = 50  # nested mappings and lists; the loader in C recurses
+OCTAL: Final = re.compile("[-+]?0[0-7_]+")
 UNREADABLE: Final = (ValueError, TypeError, LookupError, OverflowError, AttributeError)  # of tags, as `!!bool x`
 # in C they take a tenth of the time, if they were built
 _LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -35,6 +37,23 @@ class _Strict(_LOADER):
                 )
         return mapping
 
+    def construct_decimal(self, node: yaml.ScalarNode) -> float:
+        """A number as it reads: YAML 1.1 takes 010 for 8 and 1:30 for 90."""
+        is_int = node.tag.endswith(":int")
+        value: float = self.construct_yaml_int(node) if is_int else self.construct_yaml_float(node)
+        if ":" in node.value or (is_int and OCTAL.fullmatch(node.value) and value != int(node.value)):
+            raise yaml.constructor.ConstructorError(
+                None,
+                None,
+                f"{node.value} is {value:g} in YAML; write that number, or a text in quotes",
+                node.start_mark,
+            )
+        return value
+
+
+for _kind in ("int", "float"):
+    _Strict.add_constructor(f"tag:yaml.org,2002:{_kind}", _Strict.construct_decimal)
+
 
 def parse(text: str) -> Any:
     """The content of a YAML text.
@@ -42,8 +61,8 @@ def parse(text: str) -> Any:
     Raises
     ------
     yaml.YAMLError
-        if it is not YAML, a key is given twice in one mapping or is no text, it contains itself, or it is nested more
-        than `DEEPEST` levels deep; names the line where it is known.
+        if it is not YAML, a key is given twice in one mapping or is no text, a number is another one than it seems, it
+        contains itself, or it is nested more than `DEEPEST` levels deep; names the line where it is known.
     """
     within: list[str | None] = []  # anchors of the mappings and lists around an event
     for event in yaml.parse(text, Loader=_LOADER):
