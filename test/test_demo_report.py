@@ -432,6 +432,7 @@ def test_a_contact_in_motion_that_is_harder_than_allowed_is_in_the_verdict():
         one for one in analyse_bag(with_limits(recording), lambda doing: None).sections if one.key == "contact"
     )
     assert sentence in section.verdict
+    assert sentence in " ".join(demo_report.reaction_text(summary).split())  # of a task, which has its own report
     assert summarize(recording.bag()).hard == ()  # what is allowed was not recorded
 
 

@@ -96,8 +96,14 @@ def report(bag: Path, picture: Path | None = None) -> DemoReport:
 
 
 def reaction_report(bag: Path) -> str:
-    """What was not simply obeyed in a recording, by step; '' if nothing."""
-    return "\n".join(_reactions(summary_of(recorded_run(read(bag, TOPICS_READ, may_lack=True)))))
+    """What was not simply obeyed in a recording, by step, and contacts that were too hard; '' if nothing."""
+    return reaction_text(summary_of(recorded_run(read(bag, TOPICS_READ, may_lack=True))))
+
+
+def reaction_text(summary: DemoSummary) -> str:
+    """The same of a summary."""
+    hard = [line for one in summary.hard for line in _wrapped(f"  {one.sentence}", "    ")]
+    return "\n".join([*_reactions(summary), *([""] if hard else []), *hard])
 
 
 def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
