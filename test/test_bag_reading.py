@@ -517,6 +517,9 @@ def test_yaml_that_would_take_much_memory_or_end_the_process_is_refused(text: by
 
 
 def test_yaml_that_is_too_long_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
+    for text in ("!!bool x", "!!timestamp x", "2001-99-99", '!!int ""'):
+        with pytest.raises(yaml.YAMLError, match="does not fit its tag, or is no date"):
+            safe_yaml.load(text)
     long = b"- 1\n" * (safe_yaml.LONGEST // 4 + 1)
     with pytest.raises(yaml.YAMLError, match="bytes; at most"):
         safe_yaml.load(long)

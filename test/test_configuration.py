@@ -6,12 +6,14 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
-from wam_description.configuration import Configuration, packaged
-from wam_description.parameters import ParameterError, parameter
+from wam_control.scenario_values import number
+from wam_description.configuration import Configuration, option_values, packaged
+from wam_description.parameters import ParameterError, build, parameter
 
 WAM = Configuration.load(packaged("wam"))
 
@@ -104,7 +106,11 @@ def test_unknown_key_is_refused_by_name(file: Path, key: str, message: str) -> N
         ("a: [1,", "is not YAML"),
         ("? [a]\n: 1", "is not YAML"),
         ("/**: !!map x", "is not YAML: it is marked as a mapping and is none"),
-        ("/**: 2001-99-99", "is not YAML: one of its values is none of its kind: month must be"),
+        ("/**: 2001-99-99", "is not YAML: one of its values does not fit its tag, or is no date: month must"),
+        ("/**: !!timestamp x", "is not YAML: one of its values does not fit its tag"),
+        ("/**:\n  ros__parameters:\n    1: 2", "is not YAML: the key 1 is no text; write it in quotes.*\n.*line 3"),
+        ("/**:\n  ros__parameters:\n    a: &a [*a]", r"is not YAML: \*a is inside of what it refers to.*\n.*line 3"),
+        ("/**:\n  ros__parameters:\n    a: &a {b: [*a]}", r"is not YAML: \*a is inside of what it refers to"),
         ("/**:\n  ros__parameters:\n    a.b: 1\n    a: {b: 2}", "'a.b' is given twice, with dots and without"),
         ("/**:\n  ros__parameters:\n    a: {b: 1, b: 2}", "'b' is given twice; remove one of the two.*\n.*line 3"),
         ("", r"has no section '/\*\*'"),
@@ -264,3 +270,73 @@ def test_a_link_whose_numbers_do_not_meet_is_refused_with_the_others_to_change(
 def test_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() -> None:
     longer = {"arm.covers.length": [0.5588, 0.5], "arm.covers.end": [0.5588, 0.0, 0.04064, 0.5, 0.0, 0.0]}
     assert WAM.with_values({**longer, "arm.tool": [0.6, 0.0, 0.0]}).shared.arm.covers.length == (0.5588, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("value", "reason"),
+    [
+        ("{a: 1, a: 2}", "'a' is given twice; remove one of the two"),
+        ("[" * 3000, "nested more than 50 levels deep"),
+        ("[" * 60 + "]" * 60, "nested more than 50 levels deep"),
+        ("!!bool x", "one of its values does not fit its tag"),
+        ("!!timestamp x", "one of its values does not fit its tag"),
+        ("2001-99-99", "no date: month must be in 1..12"),
+        ("9" * 5000, "one of its values does not fit its tag"),
+        ("&a [*a]", r"\*a is inside of what it refers to"),
+        ("{1: 2}", "the key 1 is no text"),
+        ("*a", "undefined alias"),
+        ("010", "010 is 8 in YAML; write that number, or a text in quotes"),
+        ("[1.0, 1:30]", "1:30 is 90 in YAML"),
+        ("1:30.5", "1:30.5 is 90.5 in YAML"),
+    ],
+)
+def test_an_odd_value_of_an_option_is_refused_with_its_name_as_in_a_file(value: str, reason: str) -> None:
+    with pytest.raises(ParameterError, match=rf"--set loop:gain: '.*' is no value of YAML: .*{reason}") as refusal:
+        option_values([f"loop:gain={value}"])
+    assert len(str(refusal.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("value", "hint"),
+    [
+        ("1e-3", "; YAML takes '1e-3' for a text: write 0.001"),
+        ("1e-7", "; YAML takes '1e-7' for a text: write 1.0e-07"),
+        (".5e3", "; YAML takes '.5e3' for a text: write 500"),
+        ("1e22", "; YAML takes '1e22' for a text: write 1.0e+22"),
+        ("'4'", "; YAML takes '4' for a text: write 4"),
+        ("fast", ""),
+        ("1e400", ""),
+        ("nan", ""),
+    ],
+)
+def test_a_text_that_looks_like_a_number_is_refused_with_what_to_write(value: str, hint: str) -> None:
+    read = option_values([f"gain={value}"])["gain"]
+    with pytest.raises(ParameterError) as refusal:
+        build(Loop, {"gain": read, "names": ["a"]})
+    assert str(refusal.value) == f"parameter 'gain' is {read!r}; allowed: a number{hint}"
+    if hint:
+        written = option_values([f"gain={hint.rpartition(' ')[2]}"])["gain"]
+        assert build(Loop, {"gain": written, "names": ["a"]}).gain == float(read)
+    with pytest.raises(ParameterError) as refusal:
+        number("step 1", "seconds", read)
+    assert str(refusal.value) == f"step 1: seconds is {read!r}; it must be a finite number{hint}"
+
+
+@pytest.mark.parametrize("value", [{}, {"a": 1}, {"a"}, b"a", "a"])
+def test_what_is_no_list_is_none_for_a_parameter_either(value: Any) -> None:
+    with pytest.raises(ParameterError, match=r"parameter 'names' is .*; it must be a list of str"):
+        build(Loop, {"gain": 1.0, "names": value})
+
+
+def test_an_int_above_every_float_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"parameter 'gain' is 10000*; allowed"):
+        build(Loop, {"gain": 10**400, "names": ["a"]})
+    with pytest.raises(ParameterError, match=r"seconds is 10000*; it must be a finite number"):
+        number("step 1", "seconds", 10**400)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("07", 7), ("0", 0), ("-00", 0), ("0x10", 16), ("1_000", 1000), ("-8", -8)]
+)
+def test_other_numbers_of_yaml_are_read(text: str, value: int) -> None:
+    assert option_values([f"a={text}"]) == {"a": value}

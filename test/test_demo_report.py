@@ -20,10 +20,11 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture, demo_report
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, listed_contacts
+from wam_analysis.contact_comparison import NOT_RECORDED
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_PLACED, Cut, certainty_of, listed_contacts
 from wam_analysis.demo_figure import draw_arm, draw_forces, save
 from wam_analysis.demo_report import VerdictResult, report, text
-from wam_analysis.demo_summary import NOT_RECORDED, DemoSummary, summarize, summary_of
+from wam_analysis.demo_summary import DemoSummary, summarize, summary_of
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.findings.text import text as analysis_text
@@ -130,6 +131,7 @@ def hypotheses(series: list[Any]) -> TableColumns:
     columns = {name: np.full(len(rows), known.get(name, 0.0)) for name in HYPOTHESIS_COLUMNS}
     columns["reasons"] = inner * 2 ** REASONS.index(REASON)
     columns["is_lower_bound"] = inner
+    columns["position"] = np.array([series[i][2] for i in rows])
     frames = tuple(series[i][0] for i in rows)
     return TableColumns(STAMPS[rows], STAMPS[rows], frames, np.arange(len(rows)), columns)
 
@@ -250,7 +252,7 @@ def test_force_on_another_link_than_commanded_is_not_compared():
 
 
 def test_contacts_have_link_position_force_and_latency():
-    outer, inner, press, held = Recording().summary().touches
+    outer, inner, press, held, lifted = Recording().summary().touches
     assert (outer.link_true, outer.link_estimated) == ("outer_link", "outer_link")
     assert (outer.position_true, outer.position_estimated) == pytest.approx((0.28, 0.30))
     assert (outer.force_true, outer.force_estimated) == pytest.approx((12.0, 11.0))
@@ -259,16 +261,236 @@ def test_contacts_have_link_position_force_and_latency():
     assert (inner.link_true, inner.latency) == ("inner_link", 0.0)
     assert press.latency == pytest.approx(0.03)  # the contact began while lowering
     assert held.latency is None
+    assert (lifted.step, lifted.latency, lifted.force_true) == ("lift", None, pytest.approx(math.hypot(1.0, 3.0)))
     assert press.force_true == pytest.approx(math.hypot(2.0, 8.4))
+
+
+def test_two_contacts_in_one_step_are_compared_one_by_one_each_with_its_own_force():
+    """A light push on the inner link is missed; later in the step the outer link runs into something."""
+    recording = Recording()
+    recording.set(recording.push, 0.0, 2.0, "inner_link", (0.0, 0.05, 0.0))
+    recording.set(recording.true, 0.1, 0.5, "inner_link", (0.0, 0.05, 0.0), 0.4)
+    missed, hit, *_ = recording.summary().touches
+    assert [one.step for one in (missed, hit)] == ["push outer", "push outer"]
+    assert (missed.link_true, missed.link_estimated, missed.force_true) == ("inner_link", NO_LINK, 0.05)
+    assert (hit.link_true, hit.force_true, hit.force_estimated) == ("outer_link", 12.0, 11.0)
+    assert math.isnan(missed.force_estimated)
+    assert (hit.is_lower_bound, hit.latency) == (False, pytest.approx(0.02))
+    assert math.isnan(missed.latency or 0.0)
+
+
+def test_without_a_pause_between_them_contacts_on_two_links_are_two():
+    recording = Recording()
+    recording.set(recording.true, 1.0, 1.5, "inner_link", (0.0, 30.0, 0.0), 0.4)
+    recording.set(recording.estimated, 1.05, 1.55, "inner_link", (0.0, 25.0, 0.0))
+    outer, inner, *_ = recording.summary().touches
+    assert [(one.link_true, one.link_estimated) for one in (outer, inner)] == [
+        ("outer_link", "outer_link"),
+        ("inner_link", "inner_link"),
+    ]
+    assert (outer.force_true, outer.force_estimated, inner.force_true, inner.force_estimated) == (12, 11, 30, 25)
+    assert inner.right == pytest.approx(0.9)
+    assert inner.latency is None  # the estimate of the contact before goes on
+
+
+def test_a_contact_that_goes_on_into_a_step_that_only_moves_is_compared_there_too():
+    recording = Recording()
+    recording.set(recording.true, 9.0, 10.0, "outer_link", (0.0, 30.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.0, 10.0, "inner_link", (0.0, 30.0, 0.0))
+    last = recording.summary().touches[-1]
+    assert (last.step, last.link_true, last.link_estimated, last.force_true) == (
+        "lift",
+        "outer_link",
+        "inner_link",
+        30.0,
+    )
+    assert "right link: NO (another link)" in verdict(recording.summary())
+
+
+def test_a_touch_just_before_a_press_belongs_to_the_press():
+    """Else the step that lowers the arm until it touches would be compared in the time of detection alone."""
+    recording = Recording()
+    recording.set(recording.true, 4.6, 5.0, "outer_link", (0.0, 3.0, 0.0), 0.25)
+    assert [touch.step for touch in recording.summary().touches].count("lower") == 0
+    recording.set(recording.true, 4.4, 5.0, "outer_link", (0.0, 3.0, 0.0), 0.25)  # for longer
+    assert [touch.step for touch in recording.summary().touches].count("lower") == 1
+
+
+def test_the_estimate_of_the_contact_before_is_no_early_detection():
+    recording = Recording()
+    recording.set(recording.estimated, 1.55, 2.5, "outer_link", (0.0, 1.0, 0.0), 0.28)  # never released
+    assert recording.summary().touches[0].latency == pytest.approx(0.02)
+    recording.set(recording.true, 1.6, 2.5, "base", (0.0, 0.0, 0.0))
+    assert recording.summary().touches[1].latency is None
+
+
+def test_while_the_estimate_is_missing_nothing_is_missed_and_no_latency_is_known():
+    bag = Recording().bag()
+    kept = np.r_[0:95, 160:2000]  # of 0.52 to 1.55 s
+    estimated = bag.topics["/wam/contact/wrench"]
+    lost = thinned(estimated, kept)
+    touch = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": lost})).touches[0]
+    assert (touch.link_estimated, touch.latency) == ("outer_link", None)
+    nothing = thinned(estimated, np.r_[0:95, 320:2000])
+    touch = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": nothing})).touches[0]
+    assert (touch.link_estimated, touch.latency) == (NOT_RECORDED, None)
+
+
+def thinned(columns: WrenchColumns, kept: Any) -> WrenchColumns:
+    frames = tuple(columns.frames[i] for i in kept)
+    return WrenchColumns(STAMPS[kept], STAMPS[kept], frames, columns.force[kept], columns.torque[kept])
+
+
+def test_without_contact_point_the_position_is_that_of_the_hypotheses_and_no_force_becomes_a_lower_bound():
+    recording = Recording()
+    recording.without = ("contact/point",)
+    outer, inner, *_ = recording.summary().touches
+    assert (outer.is_lower_bound, outer.position_estimated) == (False, pytest.approx(0.30))
+    assert inner.is_lower_bound
+    assert verdict(recording.summary()) == verdict(Recording().summary())
+
+
+def test_where_no_position_was_recorded_that_is_reported_and_no_force_is_a_lower_bound():
+    recording = Recording()
+    recording.without = ("contact/point", "contact/hypotheses")
+    summary = recording.summary()
+    assert not any(touch.is_lower_bound for touch in summary.touches)
+    assert all(math.isnan(one.force_error) for one in summary.contacts)  # the force may be the least one
+    shown = text(summary)
+    assert ">=" not in shown
+    assert "?" not in shown
+    assert f"position -: {NOT_PLACED}" in " ".join(shown.split())
+    assert "less than half" not in shown
+    section = contact_section(recording)
+    assert f"Positions of contacts: {NOT_PLACED}." in section.sentences
+    errors = [one for one in section.findings if one.quantity == "error of the size of the force"]
+    assert {one.note for one in errors} == {"not known: the force may be only the least one"}
+    recording.without = ("contact/hypotheses",)  # with contact/point it is known
+    outer, inner, *_ = recording.summary().contacts
+    assert (outer.force_error, inner.estimate.is_lower_bound) == (pytest.approx(-1.0), True)
+    assert math.isnan(inner.force_error)
+
+
+def test_a_lower_bound_has_no_error_in_the_median_either():
+    recording = Recording()
+    recording.set(recording.true, 2.1, 3.9, "inner_link", (0.0, 15.0, 0.0), 0.4)  # nearly half of all contact
+    recording.set(recording.estimated, 2.1, 3.9, "inner_link", (0.0, 5.0, 0.0))
+    recording.set(recording.true, 4.5, 10.0, "base", (0.0, 0.0, 0.0))
+    name = "size of the force error, median"
+    (error,) = (one for one in contact_section(recording).findings if one.name == name)
+    assert error.measured == pytest.approx(1.0)
+    recording.without = ("contact/point", "contact/hypotheses")
+    (error,) = (one for one in contact_section(recording).findings if one.name == name)
+    assert math.isnan(error.measured)
+
+
+def test_a_hole_in_a_recording_of_the_estimate_alone_ends_the_contact():
+    recording = without_truth(Recording())
+    bag = recording.bag()
+    lost = thinned(bag.topics["/wam/contact/wrench"], np.r_[0:1200, 1300:2000])  # from 6.0 to 6.5 s
+    topics = {name: one for name, one in bag.topics.items() if "contact" not in name} | {"/wam/contact/wrench": lost}
+    summary = summarize(bag._replace(topics=topics))
+    pressed = [(one.before, one.after) for one in summary.contacts if one.step == "press 8 N"]
+    assert pressed == [(Cut.NOTHING, Cut.GAP), (Cut.GAP, Cut.NOTHING)]
+
+
+def test_a_thinned_recording_has_no_gaps():
+    recording = without_truth(Recording())
+    bag = recording.bag()
+    few = thinned(bag.topics["/wam/contact/wrench"], np.r_[0:2000:40])  # every 0.2 s
+    topics = {name: one for name, one in bag.topics.items() if "contact" not in name} | {"/wam/contact/wrench": few}
+    contacts = summarize(bag._replace(topics=topics)).contacts
+    assert [one.step for one in contacts] == ["push outer", "push inner", "press 8 N", "press 4 N"]
+    assert {cut for one in contacts for cut in (one.before, one.after)} == {Cut.NOTHING}
+
+
+def with_limits(recording: Recording) -> Bag:
+    """The same, with the parameters of the force loop and a status of it in the last step."""
+    sections = Configuration.load(packaged("wam")).sections
+    content = yaml.safe_dump({"/wam/force_loop": {"ros__parameters": {**sections["/**"], **sections["force_loop"]}}})
+    bag = recording.bag()
+    reacts = status("force_loop", "at least 81 N", stamp=str(START + 9300 * MS), reaction="contact_force")
+    stated = messages([*itertools.starmap(said, recording.statuses), reacts])
+    return bag._replace(topics={**bag.topics, "/wam/status": stated}, attachments={"parameters.yaml": content.encode()})
+
+
+def test_a_contact_in_motion_that_is_harder_than_allowed_is_in_the_verdict():
+    recording = Recording()
+    recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 80.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.2, 9.6, "outer_link", (0.0, 70.0, 0.0), 0.25)
+    assert summarize(with_limits(recording)).hard == ()
+    recording.set(recording.true, 9.4, 9.5, "outer_link", (0.0, 157.0, 0.0), 0.25)
+    summary = summarize(with_limits(recording))
+    answer = demo_report.verdict(summary)[-1]
+    assert str(answer) == "without a commanded force no contact above 90 N: NO (157 N)"
+    sentence = (
+        "lift: TOO HARD: a contact with 157 N (true, at 9.60 s) while no force was commanded; allowed: "
+        "limits.contact_force, 90 N."
+    )
+    assert sentence in " ".join(text(summary).split())
+    (section,) = (
+        one for one in analyse_bag(with_limits(recording), lambda doing: None).sections if one.key == "contact"
+    )
+    assert sentence in section.verdict
+    assert sentence in " ".join(demo_report.reaction_text(summary).split())  # of a task, which has its own report
+    assert summarize(recording.bag()).hard == ()  # what is allowed was not recorded
+
+
+def test_without_truth_the_estimate_shows_what_was_too_hard():
+    recording = without_truth(Recording())
+    recording.set(recording.estimated, 9.4, 9.5, "outer_link", (0.0, 115.0, 0.0), 0.25)
+    (hard,) = summarize(with_limits(recording)).hard
+    assert (hard.force, hard.allowed, hard.source) == (115.0, 90.0, "estimated")
+
+
+def test_what_a_step_sets_is_what_is_allowed_from_then_on():
+    recording = Recording()
+    recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 157.0, 0.0), 0.25)
+    bag = with_limits(recording)
+    stated = bag.topics["/wam/status"].messages
+    setting = SimpleNamespace(key="force_loop:limits.contact_force", value="200.0")
+    stated[3].values.append(setting)  # of a step before
+    assert summarize(bag).hard == ()
+
+
+def test_a_contact_in_a_task_is_not_unplanned():
+    recording = Recording()
+    recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 157.0, 0.0), 0.25)
+    bag = with_limits(recording)
+    axis = {"kind": np.zeros(len(STAMPS))}
+    task = TableColumns(STAMPS, STAMPS, ("base",) * len(STAMPS), np.arange(len(STAMPS)), axis)
+    assert summarize(bag._replace(topics={**bag.topics, "/wam/task_command": task})).hard == ()
+    none = task._replace(message=np.arange(0), columns={"kind": np.zeros(0)})  # no axes, no task
+    assert len(summarize(bag._replace(topics={**bag.topics, "/wam/task_command": none})).hard) == 1
+
+
+def test_a_push_or_a_commanded_force_is_not_unplanned():
+    recording = Recording()
+    recording.set(recording.push, 0.5, 1.5, "outer_link", (0.0, 120.0, 0.0))
+    recording.set(recording.true, 0.5, 1.52, "outer_link", (0.0, 120.0, 0.0), 0.28)  # it ends later than its command
+    recording.set(recording.true, 5.0, 5.5, "outer_link", (0.0, 120.0, 0.0), 0.25)
+    assert summarize(with_limits(recording)).hard == ()
+
+
+def test_a_reaction_to_what_pushes_states_how_hard_it_became():
+    """The reason is that of its first moment."""
+    recording = Recording()
+    recording.set(recording.true, 9.3, 9.8, "outer_link", (0.0, 89.0, 0.0), 0.25)
+    recording.set(recording.true, 9.6, 9.7, "outer_link", (0.0, 157.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.3, 9.8, "outer_link", (0.0, 85.0, 0.0), 0.25)
+    shown = " ".join(text(summarize(with_limits(recording))).split())
+    assert (
+        "at least 81 N; the largest force until its end: 157 N (true, at 9.80 s), 85 N (estimated, at 9.50 s)" in shown
+    )
 
 
 def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():
     summary = Recording().summary()
     inner = summary.touches[1]
     assert math.isnan(inner.position_estimated)
-    assert inner.reason == REASON
+    assert inner.is_lower_bound
     assert f"* {REASON}" in text(summary)
-    assert verdict(summary).endswith("position within 4 cm: YES (2.0 cm), unknown for 1 of 4 contacts")
+    assert verdict(summary).endswith("position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts")
     row = next(line for line in text(summary).splitlines() if "push inner" in line)
     assert ">=10.00" in row.split()
 
@@ -343,7 +565,7 @@ def test_good_run_has_a_good_verdict_in_narrow_lines():
     summary = Recording().summary()
     assert verdict(summary) == (
         "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
-        "position within 4 cm: YES (2.0 cm), unknown for 1 of 4 contacts"
+        "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts"
     )
     assert all(len(line) <= 100 for line in text(summary).splitlines())
 
@@ -381,15 +603,16 @@ def test_each_contact_of_a_real_arm_has_its_time_link_position_and_force_with_th
     recording = Recording()
     without_truth(recording)
     outer, inner, *pressed = recording.summary().contacts
-    assert (outer.begin, outer.end, outer.link, outer.step) == pytest.approx((0.72, 1.745, "outer_link", "push outer"))
-    assert (outer.probability, outer.position, outer.position_sd) == pytest.approx((0.97, 0.30, 0.03))
-    assert (outer.force, outer.force_sd, outer.second) == pytest.approx((11.0, 0.5, 0.0))
-    assert (outer.is_lower_bound, outer.true) == (False, "")
+    assert (outer.begin, outer.end, outer.step) == pytest.approx((0.72, 1.745, "push outer"))
+    found = outer.estimate
+    assert (found.link, found.probability, found.position, found.position_sd) == ("outer_link", 0.97, 0.30, 0.03)
+    assert (found.force, found.force_sd, found.second) == pytest.approx((11.0, 0.5, 0.0))
+    assert (found.is_lower_bound, outer.true) == (False, "")
     assert math.isnan(outer.position_error)
-    assert (inner.is_lower_bound, inner.reasons) == (True, (REASON,))
-    assert math.isnan(inner.position)
+    assert (inner.estimate.is_lower_bound, inner.estimate.reasons) == (True, (REASON,))
+    assert math.isnan(inner.estimate.position)
     assert [one.step for one in pressed] == ["press 8 N", "press 4 N", "lift"]
-    assert [one.force for one in pressed] == pytest.approx([7.84, 3.92, 3.0])
+    assert [one.estimate.force for one in pressed] == pytest.approx([7.84, 3.92, 3.0])
     shown = text(recording.summary())
     row = next(line for line in shown.splitlines() if line.startswith("  push outer"))
     assert row.split()[2:] == ["0.72", "1.75", "outer_link", "97", "30.0", "3.0", "11.00", "0.50", "0"]
@@ -403,7 +626,7 @@ def test_times_by_the_clock_of_a_system_count_from_the_start_of_the_recording():
     run, summary = recorded_run(Recording().bag()), Recording().summary()
     clock = 1_763_800_000_000_000_000
     traces = summary.traces._replace(stamp=summary.traces.stamp + clock)
-    first, *_ = listed_contacts(run, traces, ())
+    first, *_ = listed_contacts(traces, certainty_of(run, traces), ())
     assert (first.begin, first.end) == pytest.approx((0.52, 1.545))
     assert (summary.traces.zero, traces.zero) == (0, START + clock)
     reaction = RecordedReaction(clock + START + 5000 * MS, clock + START + 7000 * MS, "not_sensed", "why")
@@ -423,8 +646,8 @@ def test_a_second_contact_that_was_suspected_is_listed_with_the_contact():
     columns = bag.topics["/wam/contact/hypotheses"].columns
     columns["reasons"][: 206 // 2] = 2.0 ** REASONS.index(SECOND)  # half of the first contact, of 206 periods
     first, second, *_ = summarize(bag).contacts
-    assert (first.second, second.second) == pytest.approx((0.5, 0.0))
-    assert first.reasons == ()
+    assert (first.estimate.second, second.estimate.second) == pytest.approx((0.5, 0.0))
+    assert first.estimate.reasons == ()
 
 
 def without_truth(recording: Recording) -> Recording:
@@ -448,13 +671,15 @@ def test_a_position_known_for_a_moment_is_not_that_of_the_whole_contact():
     recording.set(recording.estimated, 0.52, 1.55, "outer_link", (0.0, 11.0, 0.0))
     recording.set(recording.estimated, 0.52, 0.54, "outer_link", (0.0, 11.0, 0.0), 0.30)  # 2 % of it
     summary = recording.summary()
-    assert math.isnan(summary.contacts[0].position)
-    assert math.isnan(summary.contacts[0].position_sd)
+    found = summary.contacts[0].estimate
+    assert math.isnan(found.position)
+    assert math.isnan(found.position_sd)
+    assert found.is_lower_bound
     assert math.isnan(summary.touches[0].position_estimated)
-    assert "position -: known for less than half of the time of the contact" in text(summary)
-    assert "position within 4 cm: NOT SHOWN" in verdict(summary)
+    assert "position ?: the estimator cannot observe it" in text(summary)
+    assert "position within 4 cm: YES (2.0 cm), unknown for 2 of 5 contacts" in verdict(summary)
     recording.set(recording.estimated, 0.52, 1.2, "outer_link", (0.0, 11.0, 0.0), 0.30)  # two thirds of it
-    assert recording.summary().contacts[0].position == pytest.approx(0.30)
+    assert recording.summary().contacts[0].estimate.position == pytest.approx(0.30)
 
 
 def test_the_least_force_is_marked_as_such_by_the_analysis_too():
@@ -471,8 +696,9 @@ def test_a_contact_cut_by_the_recording_is_marked_and_has_no_latency():
     recording.set(recording.true, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.25)
     recording.set(recording.estimated, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.26)
     summary = recording.summary()
-    cut = [(one.began_before, one.goes_past) for one in summary.contacts]
-    assert cut == [(True, False), (False, False), (False, False), (False, False), (False, True)]
+    cut = [(one.before, one.after) for one in summary.contacts]
+    whole = (Cut.NOTHING, Cut.NOTHING)
+    assert cut == [(Cut.RECORDING, Cut.NOTHING), whole, whole, whole, (Cut.NOTHING, Cut.RECORDING)]
     assert summary.touches[0].latency is None
     shown = text(summary)
     rows = [line.split() for line in shown.splitlines()]
@@ -482,7 +708,7 @@ def test_a_contact_cut_by_the_recording_is_marked_and_has_no_latency():
     assert "from <=: it began before the recording\n  to >=: it goes past the end of the recording\n" in shown
     sentences = contact_section(recording).sentences
     assert "1 outer_link: it began before the recording." in sentences
-    assert "5 outer_link: it goes past its end." in sentences
+    assert "5 outer_link: it goes past the end of the recording." in sentences
 
 
 def test_a_contact_is_cut_where_the_estimate_was_lost():
@@ -497,8 +723,16 @@ def test_a_contact_is_cut_where_the_estimate_was_lost():
         estimated.torque[kept],
     )
     summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": lost}))
-    pressed = [(one.began_before, one.goes_past) for one in summary.contacts if one.step == "press 8 N"]
-    assert pressed == [(False, True), (True, False)]
+    pressed = [(one.before, one.after) for one in summary.contacts if one.step == "press 8 N"]
+    assert pressed == [(Cut.NOTHING, Cut.GAP), (Cut.GAP, Cut.NOTHING)]
+    shown = text(summary)
+    assert "from <=, to >= within the recording: the estimate is missing there, and comes again" in shown
+    assert "it began before the recording" not in shown
+    assert "it goes past the end of the recording" not in shown
+    found = analyse_bag(bag._replace(topics={**bag.topics, "/wam/contact/wrench": lost}), lambda doing: None)
+    stated = [sentence for section in found.sections for sentence in section.sentences]
+    assert "3 outer_link: the estimate is missing after it." in stated
+    assert "4 outer_link: the estimate is missing before it." in stated
 
 
 def test_a_contact_that_is_missed_in_a_step_that_only_moves_is_reported_and_wrong():
@@ -549,7 +783,7 @@ def test_answers_that_are_no_are_those_and_not_a_text():
     force, link, position = demo_report.verdict(recording.summary())
     assert (force.result, force.worst) == (VerdictResult.NO, "12.5 %")
     assert (link.result, position.result) == (VerdictResult.YES, VerdictResult.YES)
-    assert position.remark == "unknown for 1 of 4 contacts"
+    assert position.remark == "unknown for 1 of 5 contacts"
 
 
 def test_a_press_on_nothing_is_neither_a_contact_nor_a_missed_one():
@@ -579,23 +813,24 @@ def test_a_contact_that_goes_over_to_another_link_is_two_and_a_moment_of_another
     recording.set(recording.estimated, 1.0, 1.55, "inner_link", (0.0, 25.0, 0.0))
     recording.set(recording.estimated, 0.7, 0.75, "inner_link", (0.0, 5.0, 0.0))
     outer, inner, *_ = recording.summary().contacts
-    assert [outer.link, inner.link] == ["outer_link", "inner_link"]
+    assert [outer.estimate.link, inner.estimate.link] == ["outer_link", "inner_link"]
     assert (outer.begin, outer.end, inner.begin) == pytest.approx((0.72, 1.195, 1.2))
-    assert (outer.force, inner.force) == pytest.approx((11.0, 25.0))
+    assert (outer.estimate.force, inner.estimate.force) == pytest.approx((11.0, 25.0))
 
 
 def test_without_a_scenario_each_commanded_force_has_a_contact_of_its_own():
     recording = Recording()
     recording.without = ("status",)
     recording.set(recording.commanded, 7.0, 7.3, "outer_link", (0.0, -6.0, 0.0))  # a ramp of one step
-    forces = [one.force for one in listed_contacts(recorded_run(recording.bag()), recording.summary().traces, ())]
+    traces = recording.summary().traces
+    contacts = listed_contacts(traces, certainty_of(recorded_run(recording.bag()), traces), ())
+    forces = [one.estimate.force for one in contacts]
     assert forces == pytest.approx([11.0, 10.0, 7.84, 3.92, 3.0], abs=0.01)  # the last one with none
 
 
 def test_a_position_on_another_link_is_no_position_on_the_true_one():
     recording = Recording()
-    for series in (recording.true, recording.estimated):
-        recording.set(series, 2.5, 2.9, "outer_link", (0.0, 12.0, 0.0), 0.26)
+    recording.set(recording.estimated, 2.5, 2.9, "outer_link", (0.0, 12.0, 0.0), 0.26)
     touch = recording.summary().touches[1]
     assert touch.link_true == touch.link_estimated == "inner_link"
     assert math.isnan(touch.position_estimated)
@@ -627,7 +862,7 @@ def test_without_truth_contacts_are_listed_where_no_force_was_commanded():
     bag.topics["/wam/force_command"] = WrenchColumns(
         STAMPS[late], STAMPS[late], commands.frames[late], commands.force[late], commands.torque[late]
     )
-    assert summarize(bag).contacts[0].link == "outer_link"
+    assert summarize(bag).contacts[0].estimate.link == "outer_link"
     assert summarize(bag).contacts[0].begin == pytest.approx(0.72)
 
 
@@ -656,6 +891,36 @@ def test_empty_bag_gives_a_report_and_a_picture(tmp_path):
     assert "no pressing step was recorded" in text(summary)
     assert save(tmp_path / "demo.png", summary, arm_of(empty), gl=())
     assert (tmp_path / "demo.png").stat().st_size > 10_000
+
+
+def test_of_a_part_of_a_recording_a_status_without_a_stamp_is_as_old_as_what_was_recorded_before_it():
+    """Latched topics are kept from before the part; no joint state is."""
+    recording, kept = Recording(), slice(1200, 2000)  # from 6.0 s
+    bag = recording.bag()
+    holds = status("force_loop", "not sensed", reaction="not_sensed")
+    logged = [*(at for _, at, _ in recording.statuses[:4]), START + 5002 * MS, recording.statuses[4][1]]
+    stated = [*itertools.starmap(said, recording.statuses[:4]), holds, said(*recording.statuses[4])]
+    states = JointColumns(*(column[kept] for column in joints()[:3]), joints().names, *(c[kept] for c in joints()[4:]))
+    topics = {"/wam/status": Messages(np.array(logged), tuple(stated)), "/wam/joint_states": states}
+    run = recorded_run(bag._replace(topics={**bag.topics, **topics}))
+    assert [stamp for stamp, _ in run.stamped_statuses()][-2:] == [START + 5000 * MS, START + 7000 * MS]
+    (reaction,) = summary_of(run).reactions
+    assert reaction.begin == START + 5000 * MS
+    assert "lower: refused" not in text(summary_of(run))
+
+
+def test_a_reaction_is_reported_where_a_later_step_has_the_same_name():
+    recording = Recording()
+    recording.statuses = [(name, at, 0) for name, at in (("move", START), ("move", START + 4000 * MS))]
+    bag = recording.bag()
+    reacts = [
+        status("force_loop", message, stamp=str(START + at * MS), reaction=reaction)
+        for at, reaction, message in ((1000, "joint_end", "joint1 is at its end"), (1500, "none", ""))
+    ]
+    stated = messages([*itertools.starmap(said, recording.statuses), *reacts, said("done", START + 5000 * MS, 0)])
+    found = analyse_bag(bag._replace(topics={**bag.topics, "/wam/status": stated}), lambda doing: None)
+    (force,) = (section for section in found.sections if section.key == "force")
+    assert any(line.startswith("move: reported (joint_end) from 1.20 to 1.70 s") for line in force.sentences)
 
 
 def test_failed_scenario_says_why_and_ends_its_last_step():

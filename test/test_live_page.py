@@ -35,7 +35,18 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
 from wam_description.parameters import build_part
-from wam_description.signals import BASE, Contact, Level, LikelyRange, NodeStatus, ObjectState, Point, State, Wrench
+from wam_description.signals import (
+    BASE,
+    NO_CONTACT,
+    Contact,
+    Level,
+    LikelyRange,
+    NodeStatus,
+    ObjectState,
+    Point,
+    State,
+    Wrench,
+)
 from wam_description.status import PAUSED
 from wam_description.topics import BY_NAME
 from wam_description.world import NO_SPRINGS, Obstacles, World
@@ -482,6 +493,17 @@ def test_a_bag_is_played_as_it_was_recorded(alone: Path) -> None:
     assert len(list(source.past(400_000_000))) == POINTS
     levels = [source.snapshot(at).statuses["force_loop"].level for at in (400_000_000, 650_000_000)]
     assert levels == [Level.OK, Level.WARN]  # of the press at 0.6 s, whose status has no stamp
+
+
+def test_of_a_bag_without_hypotheses_the_estimated_contact_is_played_from_its_own_topics(alone: Path) -> None:
+    bag = read(alone)
+    whole = BagSource(analysed_run(bag)).snapshot(400_000_000).estimated
+    topics = {name: columns for name, columns in bag.topics.items() if not name.endswith("contact/hypotheses")}
+    alike = BagSource(analysed_run(bag._replace(topics=topics))).snapshot(400_000_000).estimated
+    assert (alike.cover, alike.position, alike.force) == (whole.cover, whole.position, whole.force)
+    assert alike.cover == "outer_link"
+    topics = {name: columns for name, columns in topics.items() if not name.endswith("/contact/point")}
+    assert BagSource(analysed_run(bag._replace(topics=topics))).snapshot(400_000_000).estimated == NO_CONTACT
 
 
 def test_a_topic_is_published_only_while_somebody_holds_on_and_not_beside_another(ros: RosWorld) -> None:

@@ -162,6 +162,15 @@ def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_pa
     np.testing.assert_allclose(out.push_torque, [-0.4064, 0.0, 5.588], rtol=1e-9)
 
 
+def test_a_push_without_times_lasts_for_its_step_and_one_of_several_steps_without_a_pause(tmp_path: Path) -> None:
+    push = {"cover": "outer_link", "contact_position": 0.3, "newtons": [0.0, 10.0, 0.0]}
+    names = [{"name": name, "seconds": 0.1, "push": push} for name in "ab"]
+    outs = play(Scenario(load(write(tmp_path, {"steps": [*names, {"name": "c", "seconds": 0.1}]}), ARM)), 60)
+    assert [k for k, out in enumerate(outs) if any(out.push_force)] == list(range(40))
+    outs = play(Scenario(load(write(tmp_path, {"steps": [{**names[0], "push": {**push, "end": 0.1}}]}), ARM)), 30)
+    assert [k for k, out in enumerate(outs) if any(out.push_force)] == list(range(20))
+
+
 def test_a_push_does_at_the_joints_what_a_force_at_its_place_does() -> None:
     out = play(Scenario([ScenarioStep("pushed", 0.2, push=Push("outer_link", 0.3, (1.0, -7.0, 4.0), 0.0, 1.0))]), 1)[0]
     body = RigidBody(ARM)
@@ -267,13 +276,15 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
         (placed(0.0), "contact_position is 0 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
         (placed(0.9), "contact_position is 0.9 m; allowed: above 0, up to 0.4[0-9]* m of outer_link"),
         ({**WHOLE, "push": [1.0]}, r"push is \[1.0\]; it must be a mapping with cover, contact_position"),
-        ({**WHOLE, "push": without(WHOLE["push"], "end")}, "push: 'end' is missing"),
+        ({**WHOLE, "push": without(WHOLE["push"], "newtons")}, "push: 'newtons' is missing"),
         ({**WHOLE, "push": {**WHOLE["push"], "cover": "base"}}, "cover is 'base'; allowed: inner_link, outer_link"),
         (
             {**WHOLE, "push": {**WHOLE["push"], "contact_position": 0.6}},
             "contact_position is 0.6 m; inner_link reaches from 0 to 0.5588 m",
         ),
-        ({**WHOLE, "push": {**WHOLE["push"], "end": 0.1}}, "begin is 0.1 s, end 0.1 s; end must be later"),
+        ({**WHOLE, "push": {**WHOLE["push"], "end": 0.1}}, "push has begin 0.1 s and end 0.1 s; allowed: begin from 0"),
+        ({**WHOLE, "push": {**WHOLE["push"], "end": 5.0}}, "begin 0.1 s and end 5 s; allowed: .* up to the 2.5 s of "),
+        ({**WHOLE, "push": {**without(WHOLE["push"], "end"), "begin": 2.5}}, "begin 2.5 s and end 2.5 s; allowed"),
     ],
 )
 def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, text: str, tmp_path: Path) -> None:
@@ -288,6 +299,11 @@ def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, tex
     [
         ("steps: [", "is not YAML"),
         ("steps: []\nsteps: []", "'steps' is given twice"),
+        ("steps: &a [{name: x, seconds: 1.0, set: *a}]", r"is not YAML: \*a is inside of what it refers to"),
+        (
+            {"steps": [{"name": "a", "seconds": 1, "set": {"force_loop": {1: 2}}}]},
+            "is not YAML: the key 1 is no text; write it in quotes",
+        ),
         ("- 1", "has no list 'steps'"),
         ("", "has no list 'steps'"),
         ({"steps": {"name": "a"}}, "has no list 'steps'"),

@@ -18,7 +18,10 @@ from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
 from wam_bag.bag_writer import exact_cdr
 from wam_bag.cdr_encoder import encoded
 from wam_bag.contents import contents
+from wam_control.scenario import Push, ScenarioStep, Setting
+from wam_description.configuration import Configuration, packaged
 from wam_sim.recording import recorded_run
+from wam_sim.simulated_bag import record
 
 ROOT = Path(__file__).parents[1]
 HIDDEN = (
@@ -158,3 +161,27 @@ def test_messages_are_serialized_as_ros_does() -> None:
         data = encoded(kind, fields)
         assert deserialize_message(data, type(message)) == message
         assert len(data) == len(exact_cdr(kind, bytes(serialize_message(message))))  # its padding is not defined
+
+
+def test_what_a_scenario_commands_is_recorded_with_a_configuration_that_does_not_name_its_node(tmp_path: Path) -> None:
+    configuration = Configuration.load(packaged("wam"))
+    assert "scenario" not in configuration.shared.nodes
+    push = Push("outer_link", 0.28, (0.0, 12.0, 0.0), 0.0, 0.05)
+    assert record(configuration, [ScenarioStep("push", 0.05, push=push)], tmp_path / "bag") == ""
+    topics = read(tmp_path / "bag").topics
+    assert {"/wam/force_command", "/wam/joint_posture_command", "/wam/task_command"} <= set(topics)
+    pushed = topics["/wam/sim/disturbance"]
+    assert isinstance(pushed, WrenchColumns)
+    assert pushed.force[1].tolist() == [0.0, 12.0, 0.0]
+
+
+def test_a_step_with_the_name_of_the_one_before_is_a_step_of_its_own_with_what_it_sets(tmp_path: Path) -> None:
+    setting = Setting("force_loop", "limits.contact_force", 20.0)
+    steps = [ScenarioStep("hold", 0.05), ScenarioStep("hold", 0.05, settings=(setting,)), ScenarioStep("hold", 0.05)]
+    record(Configuration.load(packaged("wam")), steps, tmp_path / "bag")
+    found = recorded_run(read(tmp_path / "bag")).steps
+    assert [(step.name, dict(step.settings)) for step in found] == [
+        ("hold", {}),
+        ("hold", {"force_loop:limits.contact_force": 20.0}),
+        ("hold", {}),
+    ]

@@ -1,21 +1,23 @@
 """From recordings to measures, findings, reports and pictures; nothing here runs the arm.
 
-recorded        the arm and its controllers, built from the parameters in a bag
-measures        step responses, limit cycles, friction ...: functions of arrays
-findings        the analysis behind `wam analyse`: sections of sentences and numbers, as text, HTML and JSON
-foreign         recordings of other robots: any bag with joints, wrenches or mapped topics
-identification  from a recording of free motion to the controllers' model, behind `wam identify`
-demo_traces     forces and contacts of a run on one time base
-contact_list    the estimated contacts one by one, each compared with the true one
-task_forces     forces that tasks command, and what was measured of each
-reactions       what the force loop did instead of what was commanded, when and why
-demo_summary    the demonstration in numbers
-press_positions the force of a press at the configured, the estimated and the true position
-demo_report     its report, as text
-demo_figure     its picture
-drawing         colours and sizes that all pictures share
-arm_picture     the arm and its obstacles from the side
-arm_render      the process that renders it with MuJoCo
-rerun_view      a bag for the Rerun viewer
-table           tables of text, for a terminal and for Markdown
+recorded            the arm and its controllers, built from the parameters in a bag
+measures            step responses, limit cycles, friction ...: functions of arrays
+findings            the analysis behind `wam analyse`: sections of sentences and numbers, as text, HTML and JSON
+foreign             recordings of other robots: any bag with joints, wrenches or mapped topics
+identification      from a recording of free motion to the controllers' model, behind `wam identify`
+demo_traces         forces and contacts of a run on one time base
+contact_list        the contacts one by one, each estimated one compared with the true one
+contact_comparison  the true contacts one by one, each with what was estimated of it
+unplanned_contact   contacts while no force is commanded that are harder than allowed
+task_forces         forces that tasks command, and what was measured of each
+reactions           what the force loop did instead of what was commanded, when and why
+demo_summary        the demonstration in numbers
+press_positions     the force of a press at the configured, the estimated and the true position
+demo_report         its report, as text
+demo_figure         its picture
+drawing             colours and sizes that all pictures share
+arm_picture         the arm and its obstacles from the side
+arm_render          the process that renders it with MuJoCo
+rerun_view          a bag for the Rerun viewer
+table               tables of text, for a terminal and for Markdown
 """

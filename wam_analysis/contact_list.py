@@ -1,29 +1,75 @@
-"""The estimated contacts of a recording one by one, each compared with the true one where that was recorded."""
+"""The contacts of a recording one by one: those that were estimated, the true ones, and how both compare."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from enum import Enum
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_traces import NAN, ForceSignal, Mask, Names, Numbers, Times, Traces, held_rows
+from wam_analysis.demo_traces import (
+    HYPOTHESIS,
+    NAN,
+    ForceSignal,
+    Mask,
+    Names,
+    Numbers,
+    Times,
+    Traces,
+    held_rows,
+    most_probable,
+)
 from wam_analysis.measures.runs import runs
-from wam_bag.bag import TableColumns
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
 from wam_sim.recording import RecordedRun, RecordedStep
 
 NO_LINK = "none"
 BOUNCE = 100_000_000  # ns; a shorter loss of contact does not end the contact, and no shorter part of one is listed
-NOT_CERTAIN = (
-    "Without contact/hypotheses it is not known how certain contacts are, nor whether a force is only the least one."
-)
+NOT_CERTAIN = "Without contact/hypotheses it is not known how certain contacts are."
+NOT_PLACED = "not recorded (contact/point), so it is not known whether a force is only the least one"
 NOT_ESTIMATED = "the estimated contact was not recorded"
 PLATEAU = 500_000_000  # ns, for which a commanded force is the same
 LASTING = 0.5  # of a contact, above which a reason belongs to it; a value known for less of it is unknown
 TWO = tuple(2 ** REASONS.index(reason) for reason in (SECOND, CERTAIN_SECOND))
-ESTIMATED = ("probability", "position_sd", "force_sd", "is_lower_bound")
+
+
+class Cut(Enum):
+    """What cuts off a contact at one of its ends."""
+
+    NOTHING = ""
+    RECORDING = "recording"  # begins or ends there
+    GAP = "gap"  # the signal is missing there, and comes again
+
+
+class Estimate(NamedTuple):
+    """What was estimated in some time of contact; medians, NaN if unknown.
+
+    Attributes
+    ----------
+    link : estimated most of the time, 'none' if no contact was.
+    lasting : fraction of the time in which that link was estimated.
+    probability : of that link.
+    position, position_sd : m along the link.
+    is_placed : whether positions were recorded.
+    force, force_sd : size, N.
+    is_lower_bound : whether that is the least force that explains the torques.
+    second : fraction of the time in which a second contact was suspected; NaN without `contact/hypotheses`.
+    reasons : why the estimate is not to be trusted for most of the time, a second contact left out.
+    """
+
+    link: str
+    lasting: float
+    probability: float
+    position: float
+    position_sd: float
+    is_placed: bool
+    force: float
+    force_sd: float
+    is_lower_bound: bool
+    second: float
+    reasons: tuple[str, ...]
 
 
 class ListedContact(NamedTuple):
@@ -33,15 +79,7 @@ class ListedContact(NamedTuple):
     ----------
     step : name of the step, '' outside of a scenario.
     begin, end : s of the arm's time; from the start of the recording where that is a system's clock.
-    began_before, goes_past : whether the contact was there when the recording of the estimate began, and when it ended.
-    link : estimated most of the time.
-    lasting : fraction of the time in which that link was estimated.
-    probability : of that link.
-    position, position_sd : m along the link.
-    force, force_sd : size, N.
-    is_lower_bound : whether that is the least force that explains the torques.
-    second : fraction of the time in which a second contact was suspected; NaN without `contact/hypotheses`.
-    reasons : why the estimate is not to be trusted for most of the time, a second contact left out.
+    before, after : what cuts it off there.
     true : the true link, 'none' where nothing was touched, '' where the true contact was not recorded.
     true_position, true_force : m and N; of that link, in the same time.
     """
@@ -49,18 +87,9 @@ class ListedContact(NamedTuple):
     step: str
     begin: float
     end: float
-    began_before: bool
-    goes_past: bool
-    link: str
-    lasting: float
-    probability: float
-    position: float
-    position_sd: float
-    force: float
-    force_sd: float
-    is_lower_bound: bool
-    second: float
-    reasons: tuple[str, ...]
+    before: Cut
+    after: Cut
+    estimate: Estimate
     true: str
     true_position: float
     true_force: float
@@ -68,12 +97,14 @@ class ListedContact(NamedTuple):
     @property
     def position_error(self) -> float:
         """Estimated less true position, m; NaN where either is unknown or the link is another one."""
-        return self.position - self.true_position if self.true == self.link else NAN
+        return self.estimate.position - self.true_position if self.true == self.estimate.link else NAN
 
     @property
     def force_error(self) -> float:
-        """Estimated less true size of the force, N; NaN as that of the position, and of a lower bound."""
-        return self.force - self.true_force if self.true == self.link and not self.is_lower_bound else NAN
+        """Estimated less true size of the force, N; NaN as that of the position, and of what may be a lower bound."""
+        found = self.estimate
+        is_known = self.true == found.link and found.is_placed and not found.is_lower_bound
+        return found.force - self.true_force if is_known else NAN
 
 
 class MissedContact(NamedTuple):
@@ -94,23 +125,30 @@ class MissedContact(NamedTuple):
         )
 
 
-class _Certainty(NamedTuple):
+class Certainty(NamedTuple):
     """What is known of the estimate at each instant, from `contact/hypotheses`; NaN and -1 where it is not."""
 
     numbers: dict[str, Numbers]
     reasons: NDArray[np.int64]
 
 
-def listed_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
+def certainty_of(run: RecordedRun, traces: Traces) -> Certainty:
+    """Of the estimated contact at each instant."""
+    numbers = {name: np.full(len(traces.stamp), NAN) for name in HYPOTHESIS}
+    if (hypotheses := most_probable(run)) is not None:
+        row, known = held_rows(hypotheses.stamp, traces.stamp)
+        for name, values in numbers.items():
+            values[known] = hypotheses.columns[name][row[known]]
+    return Certainty(numbers, np.nan_to_num(numbers["reasons"], nan=-1.0).astype(np.int64))
+
+
+def listed_contacts(traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep]) -> tuple[ListedContact, ...]:
     """All estimated contacts, each cut where another link is estimated and where a step of the scenario ends.
 
     Without a scenario they are cut where another commanded force begins that lasts.
     """
-    certainty = _certainty(run, traces)
-    contacts = contact_rows(traces.stamp, traces.estimated.acts)
-    of_links = [part for begin, end in contacts for part in _links(traces, begin, end)]
     bounds = [step.begin for step in steps] or _other_commands(traces)
-    rows = _cut(traces.stamp, of_links, bounds)
+    rows = cut_at(traces.stamp, contacts_by_link(traces.stamp, traces.estimated), bounds)
     return tuple(_listed(traces, certainty, steps, begin, end) for begin, end in rows)
 
 
@@ -122,7 +160,7 @@ def missed_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[Miss
         if np.all(estimated.is_known[begin:end]) and not np.any(estimated.acts[begin:end]):
             acting = begin + np.flatnonzero(true.acts[begin:end])
             force = median(true.size[acting])
-            found.append(MissedContact(*_time(traces, steps, begin, end), most(true.frame[acting]), force))
+            found.append(MissedContact(*time_of(traces, steps, begin, end), most(true.frame[acting]), force))
     return tuple(found)
 
 
@@ -148,22 +186,34 @@ def median(values: Numbers) -> float:
     return float(np.median(known)) if len(known) >= LASTING * len(values) > 0 else NAN
 
 
-def cut_ends(signal: ForceSignal, begin: int, end: int) -> tuple[bool, bool]:
-    """Whether a contact in the rows [begin, end) began before the recording of its signal, and whether it goes past it.
+def cut_ends(signal: ForceSignal, begin: int, end: int) -> tuple[Cut, Cut]:
+    """What cuts off a contact in the rows [begin, end) before and after it.
 
     A part of a contact that is followed by another part of it is not cut there.
     """
     known = signal.is_known
-    return bool(begin == 0 or not known[begin - 1]), bool(end == len(known) or not known[end])
+    return _cut_by(known[:begin][::-1]), _cut_by(known[end:])
 
 
-def _links(traces: Traces, begin: int, end: int) -> list[tuple[int, int]]:
-    """Parts of a contact in each of which another link is estimated; a change shorter than `BOUNCE` is none."""
-    acting = begin + np.flatnonzero(traces.estimated.acts[begin:end])
-    names = traces.estimated.frame[acting]
+def _cut_by(known: Mask) -> Cut:
+    """What cuts off a contact, from where its signal is known outside of it, the nearest instant first."""
+    if len(known) and known[0]:
+        return Cut.NOTHING
+    return Cut.GAP if np.any(known) else Cut.RECORDING
+
+
+def contacts_by_link(stamp: Times, signal: ForceSignal) -> list[tuple[int, int]]:
+    """Rows [begin, end) of each contact, cut where the link changes."""
+    return [part for begin, end in contact_rows(stamp, signal.acts) for part in _links(stamp, signal, begin, end)]
+
+
+def _links(stamp: Times, signal: ForceSignal, begin: int, end: int) -> list[tuple[int, int]]:
+    """Parts of a contact, each on another link; a change shorter than `BOUNCE` is none."""
+    acting = begin + np.flatnonzero(signal.acts[begin:end])
+    names = signal.frame[acting]
     starts, link = [begin], ""
     for first, after in _constant(names[1:] != names[:-1]):
-        if traces.stamp[acting[after - 1]] - traces.stamp[acting[first]] < BOUNCE:
+        if stamp[acting[after - 1]] - stamp[acting[first]] < BOUNCE:
             continue
         if link and names[first] != link:
             starts.append(int(acting[first]))
@@ -185,7 +235,7 @@ def _constant(differs: Mask) -> Iterator[tuple[int, int]]:
     return pairwise([0, *(1 + np.flatnonzero(differs)).tolist(), len(differs) + 1])
 
 
-def _cut(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -> list[tuple[int, int]]:
+def cut_at(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -> list[tuple[int, int]]:
     """Rows of the parts of contacts between some stamps; none is shorter than `BOUNCE`, if its contact is not."""
     bounds = np.searchsorted(stamp, at).tolist()
     parts: list[tuple[int, int]] = []
@@ -199,57 +249,50 @@ def _cut(stamp: Times, contacts: Sequence[tuple[int, int]], at: Sequence[int]) -
     return parts
 
 
-def _listed(
-    traces: Traces, certainty: _Certainty, steps: Sequence[RecordedStep], begin: int, end: int
-) -> ListedContact:
+def _listed(traces: Traces, certainty: Certainty, steps: Sequence[RecordedStep], begin: int, end: int) -> ListedContact:
     true, estimated = traces.true, traces.estimated
     rows = begin + np.flatnonzero(estimated.acts[begin:end])
-    link = most(estimated.frame[rows])
-    own = rows[estimated.frame[rows] == link]
     acting = rows[true.acts[rows]]
-    is_known = bool(np.any(true.is_known[rows]))
-    touched = most(true.frame[acting]) if is_known else ""
+    touched = most(true.frame[acting]) if np.any(true.is_known[rows]) else ""
     there = acting[true.frame[acting] == touched]
-    bits = certainty.reasons[own][certainty.reasons[own] >= 0]
-    lasting = {why: float(np.mean(bits >> i & 1)) for i, why in enumerate(REASONS)} if len(bits) else {}
-    probability, position_sd, force_sd, lower = (median(certainty.numbers[name][own]) for name in ESTIMATED)
-    position = median(estimated.position[own])
     return ListedContact(
-        *_time(traces, steps, begin, end),
+        *time_of(traces, steps, begin, end),
         *cut_ends(estimated, begin, end),
-        link,
-        len(own) / len(rows),
-        probability,
-        position,
-        position_sd if not np.isnan(position) else NAN,
-        median(estimated.size[own]),
-        force_sd,
-        lower > LASTING,
-        float(np.mean(bits & sum(TWO) > 0)) if len(bits) else NAN,
-        tuple(why for why, part in lasting.items() if part > LASTING and why not in (SECOND, CERTAIN_SECOND)),
+        estimate(traces, certainty, rows),
         touched,
         median(true.position[there]),
         median(true.size[there]),
     )
 
 
-def _time(traces: Traces, steps: Sequence[RecordedStep], begin: int, end: int) -> tuple[str, float, float]:
+def estimate(traces: Traces, certainty: Certainty, rows: NDArray[np.intp]) -> Estimate:
+    """What was estimated in some rows, in all of which a contact was."""
+    estimated = traces.estimated
+    link = most(estimated.frame[rows])
+    own = rows[estimated.frame[rows] == link]
+    bits = certainty.reasons[own][certainty.reasons[own] >= 0]
+    lasting = {why: float(np.mean(bits >> i & 1)) for i, why in enumerate(REASONS)} if len(bits) else {}
+    probability, position_sd, force_sd = (
+        median(certainty.numbers[name][own]) for name in ("probability", "position_sd", "force_sd")
+    )
+    position = median(estimated.position[own])
+    return Estimate(
+        link,
+        len(own) / max(len(rows), 1),
+        probability,
+        position,
+        position_sd if not np.isnan(position) else NAN,
+        bool(np.any(estimated.is_placed[own])),
+        median(estimated.size[own]),
+        force_sd,
+        float(np.sum(estimated.is_lower_bound[own])) > LASTING * len(own),
+        float(np.mean(bits & sum(TWO) > 0)) if len(bits) else NAN,
+        tuple(why for why, part in lasting.items() if part > LASTING and why not in (SECOND, CERTAIN_SECOND)),
+    )
+
+
+def time_of(traces: Traces, steps: Sequence[RecordedStep], begin: int, end: int) -> tuple[str, float, float]:
     """The step in which most of some rows is, and both ends, s."""
     first, last = int(traces.stamp[begin]), int(traces.stamp[end - 1])
     name = next((step.name for step in steps if step.begin <= (first + last) // 2 < step.end), "")
     return name, (first - traces.zero) / 1e9, (last - traces.zero) / 1e9
-
-
-def _certainty(run: RecordedRun, traces: Traces) -> _Certainty:
-    """Of the most probable hypothesis of each message, which is the contact that is published."""
-    numbers = {name: np.full(len(traces.stamp), NAN) for name in ESTIMATED}
-    reasons = np.full(len(traces.stamp), -1, np.int64)
-    columns = run.bag.topics.get(f"{run.namespace}/contact/hypotheses")
-    if isinstance(columns, TableColumns) and len(columns.message) and {*ESTIMATED, "reasons"} <= set(columns.columns):
-        _, first = np.unique(columns.message, return_index=True)
-        stamps = columns.row_stamp_ns[first]
-        row, known = held_rows(stamps, traces.stamp)
-        for name in ESTIMATED:
-            numbers[name][known] = columns.columns[name][first][row[known]]
-        reasons[known] = columns.columns["reasons"][first][row[known]].astype(np.int64)
-    return _Certainty(numbers, reasons)

@@ -14,8 +14,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wam_analysis import arm_picture
-from wam_analysis.demo_summary import DemoSummary, StepContact
-from wam_analysis.demo_traces import ForceSignal, Mask, Numbers, Traces
+from wam_analysis.contact_comparison import StepContact
+from wam_analysis.demo_summary import DemoSummary
+from wam_analysis.demo_traces import ForceSignal, Numbers, Traces
 from wam_analysis.drawing import COMMANDED, ESTIMATED, MEASURED, METRES_PER_NEWTON, STYLE, TRUE
 from wam_analysis.recorded import RecordedArm
 from wam_description.arm import Arm
@@ -205,7 +206,7 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     measured = np.where(pressed, traces.along(traces.measured), np.nan)
     axes.plot(time, measured, color=MEASURED, lw=1.1, ls=(0, (4, 2)), label="measured", zorder=6)
     estimated = shown(traces.estimated, -1.0)
-    bound = np.where(_is_lower_bound(traces.estimated), estimated, np.nan)
+    bound = np.where(traces.estimated.is_lower_bound, estimated, np.nan)
     axes.plot(time, np.where(np.isnan(bound), estimated, np.nan), color=ESTIMATED, lw=1.0, label="estimated", zorder=5)
     if np.any(np.isfinite(bound)):
         axes.plot(time, bound, color=ESTIMATED, lw=1.6, ls=(0, (0.6, 2.0)), label="at least", zorder=5)
@@ -227,12 +228,6 @@ def draw_forces(axes: Axes, summary: DemoSummary, letter: str = "(b)", room: int
     _name_steps(axes, summary, room)
 
 
-def _is_lower_bound(estimated: ForceSignal) -> Mask:
-    """Where the position is not known: then the force is the least one that explains the torques."""
-    unknown: Mask = estimated.acts & np.isnan(estimated.position)
-    return unknown & bool(np.any(np.isfinite(estimated.position)))  # else positions were not recorded
-
-
 def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c)", most: int = 0) -> None:
     """Contact position along the link, true and estimated; arguments as in `draw_forces`."""
     summary = _thinned(summary, most)
@@ -242,7 +237,7 @@ def draw_positions(axes: Axes, summary: DemoSummary, arm: Arm, letter: str = "(c
         position = np.where(signal.acts, 100.0 * signal.position, np.nan)
         axes.plot(time, position, color=colour, lw=width, zorder=4)
     for touch in summary.touches:
-        if touch.reason:
+        if touch.is_lower_bound:
             middle = _middle(summary, touch)
             axes.text(
                 middle, 0.07 * length, "not\nobservable", ha="center", fontsize=7.5, color=ESTIMATED, linespacing=0.95
@@ -261,7 +256,7 @@ def _thinned(summary: DemoSummary, most: int) -> DemoSummary:
     rows = np.linspace(0, len(traces.stamp) - 1, most).astype(np.int64)
 
     def some(signal: ForceSignal) -> ForceSignal:
-        return ForceSignal(signal.frame[rows], signal.force[rows], signal.position[rows])
+        return ForceSignal(signal.frame[rows], signal.force[rows], signal.position[rows], signal.is_placed[rows])
 
     signals = map(some, (traces.commanded, traces.measured, traces.true, traces.estimated, traces.push))
     return summary._replace(traces=Traces(traces.stamp[rows], *signals))
@@ -273,7 +268,9 @@ def _frame(axes: Axes, summary: DemoSummary, letter: str) -> None:
         first = int(summary.traces.stamp[0]) if len(summary.traces.stamp) else zero
         begin = max(first - zero, 0) / 1e9  # a recording may begin later than its scenario
         axes.set_xlim(begin, max((summary.steps[-1].end - zero) / 1e9, begin + 1e-3))
-    busy = {touch.begin: "#e7f0f7" for touch in summary.touches}
+    middles = [(touch.begin + touch.end) // 2 for touch in summary.touches]
+    touched = [step for step in summary.steps if any(step.begin <= middle < step.end for middle in middles)]
+    busy = {step.begin: "#e7f0f7" for step in touched}
     busy |= {step.begin: "#faeee2" for step in summary.steps for press in summary.presses if press.end == step.end}
     for step in summary.steps:
         begin, end = (step.begin - zero) / 1e9, (step.end - zero) / 1e9

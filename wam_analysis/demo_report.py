@@ -9,17 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATED
+from wam_analysis.contact_comparison import NOT_RECORDED, StepContact
+from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, Cut
 from wam_analysis.demo_figure import save
-from wam_analysis.demo_summary import (
-    NOT_RECORDED,
-    STEADY,
-    DemoSummary,
-    LoopReport,
-    SteadyPress,
-    StepContact,
-    summary_of,
-)
+from wam_analysis.demo_summary import STEADY, DemoSummary, LoopReport, SteadyPress, summary_of
 from wam_analysis.demo_traces import TOPICS_READ
 from wam_analysis.reactions import sentences, within
 from wam_analysis.recorded import recorded_arm
@@ -103,8 +96,14 @@ def report(bag: Path, picture: Path | None = None) -> DemoReport:
 
 
 def reaction_report(bag: Path) -> str:
-    """What was not simply obeyed in a recording, by step; '' if nothing."""
-    return "\n".join(_reactions(summary_of(recorded_run(read(bag, TOPICS_READ, may_lack=True)))))
+    """What was not simply obeyed in a recording, by step, and contacts that were too hard; '' if nothing."""
+    return reaction_text(summary_of(recorded_run(read(bag, TOPICS_READ, may_lack=True))))
+
+
+def reaction_text(summary: DemoSummary) -> str:
+    """The same of a summary."""
+    hard = [line for one in summary.hard for line in _wrapped(f"  {one.sentence}", "    ")]
+    return "\n".join([*_reactions(summary), *([""] if hard else []), *hard])
 
 
 def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
@@ -128,16 +127,22 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
         *_contacts(summary),
         *_touches(summary.touches, summary.period),
     ]
-    lines += [line for missed in summary.missed for line in _wrapped(f"  {missed.sentence}", "    ")]
+    for sentence in [one.sentence for one in summary.missed] + [one.sentence for one in summary.hard]:
+        lines += _wrapped(f"  {sentence}", "    ")
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
     lines += [line for note in (*summary.notes, *notes) for line in _wrapped(f"Note     {note}")]
     return "\n".join(lines)
 
 
-def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, VerdictAnswer, VerdictAnswer]:
-    """Whether force, link and position were right, each with its worst value."""
-    return _force_verdict(summary.presses), _link_verdict(summary), _position_verdict(summary)
+def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, ...]:
+    """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
+    answers = _force_verdict(summary.presses), _link_verdict(summary), _position_verdict(summary)
+    if not summary.hard:
+        return answers
+    worst = max(summary.hard, key=lambda one: one.force)
+    question = f"without a commanded force no contact above {worst.allowed:g} N"
+    return *answers, VerdictAnswer(question, VerdictResult.NO, f"{worst.force:.0f} N")
 
 
 def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
@@ -175,7 +180,7 @@ def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
 def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
     """Positions are compared unless the estimator reports that it cannot observe them, which are counted."""
     touches = [touch for touch in summary.touches if touch.link_true != NO_LINK]
-    errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.reason]
+    errors = [abs(touch.position_estimated - touch.position_true) for touch in touches if not touch.is_lower_bound]
     question = f"position within {100.0 * POSITION_TOLERANCE:g} cm"
     unknown = len(touches) - len(errors)
     answer = _answer(question, errors, lambda error: error <= POSITION_TOLERANCE, lambda far: f"{100.0 * far:.1f} cm")
@@ -267,32 +272,40 @@ def _contacts(summary: DemoSummary) -> list[str]:
     title, contacts = "Estimated contacts, medians over each", summary.contacts
     if not contacts:
         return [title, "  none" if np.any(summary.traces.estimated.is_known) else f"  {NOT_ESTIMATED}"]
+    estimates = [contact.estimate for contact in contacts]
     first = ["", "time", "[s]", "link", "prob.", "position", "[cm]", "force", "[N]", "second"]
     head = ["step", "from", "to", "", "[%]", "", "+-", "", "+-", "contact"]
     rows = [
         [
-            *(one.step, "<=" * one.began_before + _number(one.begin, 2), bounded(_number(one.end, 2), one.goes_past)),
+            *(contact.step, "<=" * (contact.before is not Cut.NOTHING) + _number(contact.begin, 2)),
+            bounded(_number(contact.end, 2), contact.after is not Cut.NOTHING),
             *(one.link, _number(100.0 * one.probability, 0)),
-            "?*" if math.isnan(one.position) and one.reasons else _number(100.0 * one.position, 1),
+            ("?" + "*" * bool(one.reasons)) if one.is_lower_bound else _number(100.0 * one.position, 1),
             _number(100.0 * one.position_sd, 1),
             bounded(_number(one.force, 2), one.is_lower_bound),
             *(_number(one.force_sd, 2), _number(100.0 * one.second, 0)),
         ]
-        for one in contacts
+        for contact, one in zip(contacts, estimates, strict=True)
     ]
     lines = [title, *_table(rows, first, head)]
-    if any(one.began_before for one in contacts):
+    before, after = ({getattr(contact, end) for contact in contacts} for end in ("before", "after"))
+    if Cut.RECORDING in before:
         lines.append("  from <=: it began before the recording")
-    if any(one.goes_past for one in contacts):
+    if Cut.RECORDING in after:
         lines.append("  to >=: it goes past the end of the recording")
-    if any(math.isnan(one.position) and not one.reasons for one in contacts):
+    if Cut.GAP in before | after:
+        lines.append("  from <=, to >= within the recording: the estimate is missing there, and comes again")
+    if any(math.isnan(one.position) and one.is_placed and not one.is_lower_bound for one in estimates):
         lines.append("  position -: known for less than half of the time of the contact")
-    if any(one.is_lower_bound for one in contacts):
+    if not all(one.is_placed for one in estimates):
+        lines += _wrapped(f"  position -: {NOT_PLACED}", "    ")
+    if any(one.is_lower_bound for one in estimates):
+        lines.append("  position ?: the estimator cannot observe it")
         lines.append("  force >=: the least force that explains the torques, not an estimate")
-    unknown = (reason for one in contacts if math.isnan(one.position) for reason in one.reasons)
+    unknown = (reason for one in estimates if one.is_lower_bound for reason in one.reasons)
     for reason in dict.fromkeys(unknown):
         lines += _wrapped(f"  * {reason}", "    ")
-    if any(math.isnan(one.probability) for one in contacts):
+    if any(math.isnan(one.probability) for one in estimates):
         lines += _wrapped(f"  {NOT_CERTAIN}", "    ")
     link = "prob.: probability of the link; +-: standard deviation"
     second = "second contact: per cent of the time in which one was suspected"
@@ -310,19 +323,25 @@ def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
         [
             *(touch.step, touch.link_true, touch.link_estimated, _number(100.0 * touch.right, 0)),
             _number(100.0 * touch.position_true, 1),
-            "?" if touch.reason else _number(100.0 * touch.position_estimated, 1),
+            "?" if touch.is_lower_bound else _number(100.0 * touch.position_estimated, 1),
             _number(touch.force_true, 2),
-            bounded(_number(touch.force_estimated, 2), bool(touch.reason)),
+            bounded(_number(touch.force_estimated, 2), touch.is_lower_bound),
             "-" if touch.link_true == NO_LINK else _latency(touch.latency, period),
         ]
         for touch in compared
     ]
     same = "same link: per cent of the contact's time in which the estimated link was the true one"
-    force = "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world"
+    force = (
+        "force: magnitude of all that acts on the link, a push (sim/disturbance) or the contact with the world; where "
+        "several links are touched at once, on the one with the largest (sim/contact/wrench)"
+    )
     latency = f"latency: from the start of the contact, known to {1e3 * period:.0f} ms, to its detection"
-    none = "- where it began before the step or the recording"
+    none = (
+        "- where it cannot be known: the contact began before the step or the recording, the estimate is missing, or "
+        "that of the contact before goes on"
+    )
     return [
-        *("", "Compared with the true contact: each step that pushes or presses, and contacts in other steps"),
+        *("", "Compared with the true contacts, each in each of its steps"),
         *_table(rows, first, head),
         *_wrapped(f"  {same}; {force}; {latency}, {none}", "    "),
     ]

@@ -1,36 +1,32 @@
 """The demonstration in numbers, from its bag alone: presses, contacts, loop timing and losses."""
 
-from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.contact_comparison import StepContact, compared_contacts
 from wam_analysis.contact_list import (
-    BOUNCE,
-    NO_LINK,
     ListedContact,
     MissedContact,
+    certainty_of,
     contact_rows,
-    cut_ends,
     listed_contacts,
     median,
     missed_contacts,
-    most,
 )
-from wam_analysis.demo_traces import NAN, RECORDED, Mask, Numbers, Traces, traces_of
+from wam_analysis.demo_traces import NAN, RECORDED, Numbers, Traces, traces_of
 from wam_analysis.measures.runs import runs
 from wam_analysis.press_positions import NOWHERE, PressPositions, press_positions
 from wam_analysis.reactions import RecordedReaction, reactions_of, within
 from wam_analysis.task_forces import TaskForce, measured_force, task_forces
-from wam_bag.bag import Bag, TableColumns
+from wam_analysis.unplanned_contact import HardContact, hard_contacts
+from wam_bag.bag import Bag
 from wam_bag.losses import RECORDING, losses
-from wam_control.contact_table import reasons_of
+from wam_control.force_hold import ForceReaction
 from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS, diagnosed_name
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
-from wam_sim.replay import tables
 
-NOT_RECORDED = "not recorded"
 UNFINISHED = "not finished: the recording ends before the scenario does"
 STEADY = 1.0  # s at the end of a step, taken as its steady state
 
@@ -64,32 +60,6 @@ class SteadyPress(NamedTuple):
     def error(self, force: float) -> float:
         """Deviation from the commanded force, in per cent of it."""
         return 100.0 * (force - self.commanded) / self.commanded
-
-
-class StepContact(NamedTuple):
-    """The contact in one step: links, medians of position (m) and force (N) while it lasted.
-
-    Attributes
-    ----------
-    begin, end : of the step, ns.
-    right : fraction of the contact's time in which the estimated link was the true one; NaN where it is not known.
-    latency : s from the start of the true contact to its detection, below zero if a contact was reported before; NaN
-        if it was missed, None if the contact began in an earlier step, or one of both was not recorded then.
-    reason : why the estimator gives no position, as it reports it; '' if it gives one.
-    """
-
-    step: str
-    begin: int
-    end: int
-    link_true: str
-    link_estimated: str
-    right: float
-    position_true: float
-    position_estimated: float
-    force_true: float
-    force_estimated: float
-    latency: float | None
-    reason: str
 
 
 class LoopReport(NamedTuple):
@@ -131,6 +101,7 @@ class DemoSummary(NamedTuple):
     tasks : forces that tasks command.
     contacts : all that were estimated.
     missed : true contacts that were not.
+    hard : contacts in motion, harder than allowed.
     reactions : of the force loop to what was commanded, and faults of the driver.
     outcome : DONE, why the scenario failed, or that the recording ended before.
     false_contact, longest_false_contact : time of false detections and the longest of them, s.
@@ -151,6 +122,7 @@ class DemoSummary(NamedTuple):
     touches: tuple[StepContact, ...]
     contacts: tuple[ListedContact, ...]
     missed: tuple[MissedContact, ...]
+    hard: tuple[HardContact, ...]
     reactions: tuple[RecordedReaction, ...]
     false_contact: float
     longest_false_contact: float
@@ -183,8 +155,9 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     missing = [name for name in RECORDED if not _length(run, name)]
     if missing:
         notes.append(f"not recorded: {', '.join(missing)}")
-    reactions = reactions_of(run, _end(traces, steps))
+    reactions = tuple(_with_largest(one, traces) for one in reactions_of(run, _end(traces, steps)))
     presses = tuple(press for step in steps for press in _presses(run, traces, tasks, step, reactions))
+    certainty = certainty_of(run, traces)
     known = traces.true.is_known & traces.estimated.is_known
     false = known & ~traces.true.acts & traces.estimated.acts
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
@@ -198,9 +171,10 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         traces=traces,
         tasks=tuple(tasks),
         presses=presses,
-        touches=_touches(run, traces, steps, {press.step for press in presses if press.is_refused}),
-        contacts=listed_contacts(run, traces, steps),
+        touches=compared_contacts(traces, certainty, steps, {press.step for press in presses if press.is_refused}),
+        contacts=listed_contacts(traces, certainty, steps),
         missed=missed_contacts(traces, steps),
+        hard=hard_contacts(run, traces, steps),
         reactions=reactions,
         false_contact=int(np.sum(false)) * period,
         longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * period,
@@ -218,6 +192,20 @@ def summary_of(run: RecordedRun) -> DemoSummary:
 def _length(run: RecordedRun, topic: str) -> int:
     columns = run.bag.topics.get(f"{run.namespace}/{topic}")
     return 0 if columns is None else len(columns.log_time_ns)
+
+
+def _with_largest(reaction: RecordedReaction, traces: Traces) -> RecordedReaction:
+    """A reaction to what pushes, with how hard it pushed at most: its reason is that of its first moment."""
+    rows = np.flatnonzero(traces.during(reaction.begin, reaction.end))
+    sizes = {name: signal.size[rows] for name, signal in (("true", traces.true), ("estimated", traces.estimated))}
+    known = {name: size for name, size in sizes.items() if np.any(size > 0.0)}
+    if reaction.name != ForceReaction.CONTACT_FORCE.name.lower() or not known:
+        return reaction
+    largest = [
+        f"{np.nanmax(size):.3g} N ({name}, at {(traces.stamp[rows[np.nanargmax(size)]] - traces.zero) / 1e9:.2f} s)"
+        for name, size in known.items()
+    ]
+    return reaction._replace(reason=f"{reaction.reason}; the largest force until its end: {', '.join(largest)}")
 
 
 def _end(traces: Traces, steps: Sequence[RecordedStep]) -> int:
@@ -270,99 +258,6 @@ def _mean(values: Numbers) -> float:
     """Mean if at least half of the values are known, else NaN."""
     known = values[~np.isnan(values)]
     return float(np.mean(known)) if 2 * len(known) >= len(values) > 0 else NAN
-
-
-def _touches(
-    run: RecordedRun, traces: Traces, steps: tuple[RecordedStep, ...], refused: Collection[str]
-) -> tuple[StepContact, ...]:
-    """Of each step that pushes or presses, and of each other true contact with the step in which it began."""
-    touches = []
-    seen: set[int] = set()
-    compared = np.zeros(len(traces.stamp), bool)
-    for step in steps:
-        rows = traces.during(step.begin, step.end)
-        is_known = step.name in refused or np.any(rows & traces.true.is_known)
-        if is_known and not np.any(rows & (traces.true.acts | traces.estimated.acts)):
-            continue  # nothing was touched
-        if np.any(rows & (traces.push.acts | traces.commanded.acts)):
-            touches.append(_touch(traces, step, rows, seen, _reasons(run, step)))
-            compared |= rows
-    for begin, end in contact_rows(traces.stamp, traces.true.acts):
-        first, last = int(traces.stamp[begin]), int(traces.stamp[end - 1])
-        if last - first >= BOUNCE and not np.any(compared[begin:end]):
-            step = next((one for one in steps if one.begin <= first < one.end), RecordedStep("", first, last, {}))
-            rows = traces.during(first, last + 1)
-            touches.append(_touch(traces, step, rows, seen, _reasons(run, step._replace(begin=first, end=last))))
-    return tuple(sorted(touches, key=lambda touch: touch.begin))
-
-
-def _touch(
-    traces: Traces, step: RecordedStep, rows: Mask, seen: set[int], reasons: Counter[tuple[str, str]]
-) -> StepContact:
-    true, estimated = traces.true, traces.estimated
-    touching = rows & true.acts
-    link_true = most(true.frame[touching])
-    if link_true == NO_LINK:
-        touching = rows & estimated.acts
-    both = touching & estimated.acts
-    link_estimated = most(estimated.frame[both]) if np.any(estimated.is_known) else NOT_RECORDED
-    right = both & (estimated.frame == true.frame)
-    if not np.any(rows & true.is_known):
-        link_true, right = NOT_RECORDED, both & (estimated.frame == link_estimated)
-    known = touching & estimated.is_known
-    link = link_estimated if link_true == NOT_RECORDED else link_true
-    position_estimated = median(estimated.position[right & (estimated.frame == link)])
-    why = [reason for (link, reason), _ in reasons.most_common() if link == link_estimated and reason]
-    return StepContact(
-        step=step.name,
-        begin=step.begin,
-        end=step.end,
-        link_true=link_true,
-        link_estimated=link_estimated,
-        right=float(np.mean(right[known])) if np.any(known & true.acts) else NAN,
-        position_true=median(true.position[touching & (true.frame == link_true)]),
-        position_estimated=position_estimated,
-        force_true=median(true.size[touching & true.acts]),
-        force_estimated=median(estimated.size[both]),
-        latency=_latency(traces, rows, seen),
-        reason=why[0] if why and np.isnan(position_estimated) else "",
-    )
-
-
-def _latency(traces: Traces, rows: Mask, seen: set[int]) -> float | None:
-    for begin, end in contact_rows(traces.stamp, traces.true.acts):
-        if not np.any(rows[begin:end]):
-            continue
-        if begin in seen:
-            return None
-        seen.add(begin)
-        began_before, _ = cut_ends(traces.true, begin, end)
-        if began_before or not traces.estimated.is_known[begin]:
-            return None
-        estimated = traces.estimated.acts
-        if estimated[begin]:
-            before = np.flatnonzero(~estimated[:begin])
-            first = before[-1] + 1 if len(before) else 0
-        else:
-            after = np.flatnonzero(estimated[begin:end])
-            if not len(after):
-                return NAN
-            first = begin + after[0]
-        return float(traces.stamp[first] - traces.stamp[begin]) / 1e9
-    return NAN
-
-
-def _reasons(run: RecordedRun, step: RecordedStep) -> Counter[tuple[str, str]]:
-    """(link, reason) of the most probable hypothesis in each message of a step."""
-    columns = run.bag.topics.get(f"{run.namespace}/contact/hypotheses")
-    if not isinstance(columns, TableColumns):
-        return Counter()
-    stamped = zip(columns.stamp_ns.tolist(), tables(columns), strict=True)
-    return Counter(
-        (table.frame, (*reasons_of(table.rows[0]), "")[0])
-        for stamp, table in stamped
-        if table.rows and step.begin <= stamp < step.end
-    )
 
 
 def _loop(run: RecordedRun) -> LoopReport:

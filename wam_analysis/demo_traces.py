@@ -19,8 +19,10 @@ Mask = NDArray[np.bool_]
 
 NAN = float("nan")
 HELD = 100_000_000  # ns for which a message is held; after that the signal is unknown
+THINNED, FEWEST = 2, 10  # periods of a thinned topic for which a message is held, and messages of which one is known
 CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
+HYPOTHESIS = ("probability", "position", "position_sd", "force_sd", "reasons")  # columns that are read
 RECORDED = (
     "force_command", "force_measured", "contact/wrench", "contact/point", "sim/contact/wrench", "sim/contact/point",
     "sim/disturbance", "sim/joint_states",
@@ -39,11 +41,13 @@ class ForceSignal(NamedTuple):
     frame : (k,), frame of each force.
     force : (k, 3), N.
     position : (k,), distance along the frame's x, m; NaN also where it is not known.
+    is_placed : (k,), whether a position was recorded, be it NaN.
     """
 
     frame: Names
     force: Numbers
     position: Numbers
+    is_placed: Mask
 
     @property
     def size(self) -> Numbers:
@@ -59,6 +63,12 @@ class ForceSignal(NamedTuple):
     def is_known(self) -> Mask:
         """Whether it was recorded, (k,)."""
         return ~np.isnan(self.size)
+
+    @property
+    def is_lower_bound(self) -> Mask:
+        """Whether an estimated force is the least one that explains the torques, (k,): its position is unknown."""
+        unknown: Mask = self.acts & self.is_placed & np.isnan(self.position)
+        return unknown
 
 
 class Traces(NamedTuple):
@@ -114,27 +124,27 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
     tasks : forces that tasks command in it.
     """
 
-    def signal(wrench: str, point: str = "") -> ForceSignal:
-        forces, points = run.wrench(wrench), run.points(point)
+    def signal(wrench: str, points: _Points | None = None) -> ForceSignal:
+        forces = run.wrench(wrench)
+        position, is_placed = np.full(len(base), NAN), np.zeros(len(base), bool)
         if forces is None:
-            return ForceSignal(np.full(len(base), ""), np.full((len(base), 3), NAN), np.full(len(base), NAN))
+            return ForceSignal(np.full(len(base), ""), np.full((len(base), 3), NAN), position, is_placed)
         row, known = held_rows(forces.stamp_ns, base)
         force = np.where(known[:, np.newaxis], forces.force[row], NAN)
-        position = np.full(len(base), NAN)
         if points is not None:
-            at, is_there = held_rows(points.stamp_ns, base)
-            same = is_there & known & (points.stamp_ns[at] == forces.stamp_ns[row])
-            position[same] = points.point[at[same], 0]
-        return ForceSignal(np.array(forces.frames, np.str_)[row], force, position)
+            at, is_there = held_rows(points.stamp, base)
+            is_placed = is_there & known & (points.stamp[at] == forces.stamp_ns[row])
+            position[is_placed] = points.position[at[is_placed]]
+        return ForceSignal(np.array(forces.frames, np.str_)[row], force, position, is_placed)
 
     base = np.empty(0, np.int64)
     for name in ("sim/contact/wrench", "contact/wrench", "force_command"):
         if (columns := run.wrench(name)) is not None:
-            base = columns.stamp_ns
+            base = _with_holes(columns.stamp_ns)
             break
     commanded, measured = signal("force_command"), signal("force_measured")
-    true = signal("sim/contact/wrench", "sim/contact/point")
-    estimated = signal("contact/wrench", "contact/point")
+    true = signal("sim/contact/wrench", _points(run, "sim/contact/point"))
+    estimated = signal("contact/wrench", _points(run, "contact/point") or _points_of_hypotheses(run))
     covers = _controlled(run, base, np.where(estimated.acts & ~true.acts, estimated.frame, true.frame))
     for task in tasks:
         rows = (base >= task.begin) & (base < task.end) & task.is_only
@@ -143,6 +153,48 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
         commanded = commanded._replace(frame=frames.astype(np.str_), force=forces)
     commanded, measured = _on_links(run, base, (commanded, measured), covers)
     return Traces(base, commanded, measured, true, estimated, signal("sim/disturbance"))
+
+
+class _Points(NamedTuple):
+    """Recorded positions along a link, m, and their stamps, ns, (k,)."""
+
+    stamp: Times
+    position: Numbers
+
+
+def _points(run: RecordedRun, topic: str) -> _Points | None:
+    columns = run.points(topic)
+    return None if columns is None else _Points(columns.stamp_ns, columns.point[:, 0])
+
+
+def _points_of_hypotheses(run: RecordedRun) -> _Points | None:
+    """Positions of the most probable hypotheses, which are those of `contact/point`."""
+    hypotheses = most_probable(run)
+    return None if hypotheses is None else _Points(hypotheses.stamp, hypotheses.columns["position"])
+
+
+class MostProbable(NamedTuple):
+    """The most probable hypothesis of each message of `contact/hypotheses`, which is the contact that is published.
+
+    Attributes
+    ----------
+    stamp : (k,), ns.
+    columns : by their names, (k,).
+    """
+
+    stamp: Times
+    columns: dict[str, Numbers]
+
+
+def most_probable(run: RecordedRun) -> MostProbable | None:
+    """The hypotheses of a run; None if there are none, or they are those of the first edition, which are others."""
+    columns = run.bag.topics.get(f"{run.namespace}/contact/hypotheses")
+    if not isinstance(columns, TableColumns) or not len(columns.message):
+        return None
+    if not {*HYPOTHESIS} <= {*columns.columns}:
+        return None
+    _, first = np.unique(columns.message, return_index=True)
+    return MostProbable(columns.row_stamp_ns[first], {name: columns.columns[name][first] for name in HYPOTHESIS})
 
 
 def _controlled(run: RecordedRun, base: Times, touched: Names) -> Names:
@@ -183,4 +235,16 @@ def held_rows(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
     row = np.searchsorted(stamps, base, side="right") - 1
     known = row >= 0
     row = np.maximum(row, 0)
-    return row, known & (base - stamps[row] <= HELD)
+    return row, known & (base - stamps[row] <= _held(stamps))
+
+
+def _held(stamps: Times) -> int:
+    """For how long a message of these is held, ns: `HELD`, or longer where a recording was thinned."""
+    return max(HELD, THINNED * int(np.median(np.diff(stamps)))) if len(stamps) > FEWEST else HELD
+
+
+def _with_holes(stamps: Times) -> Times:
+    """These and, where none comes for longer than one is held, an instant at which it is not held any more."""
+    held = _held(stamps)
+    last = stamps[:-1][np.diff(stamps) > held]
+    return np.sort(np.concatenate([stamps, last + held + 1])) if len(last) else stamps

@@ -16,7 +16,8 @@ def load(text: str | bytes) -> Any:
     Raises
     ------
     yaml.YAMLError
-        if it is not YAML, too long or nested too deeply, or has aliases, whose expansion may take any amount of memory.
+        if it is not YAML, too long or nested too deeply, has a value that is none of its kind, as `!!bool x`, or has
+        aliases, whose expansion may take any amount of memory.
     UnicodeDecodeError
         if it is not UTF-8.
     """
@@ -30,7 +31,10 @@ def load(text: str | bytes) -> Any:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:
             raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
-    return yaml.load(text, _LOADER)
+    try:
+        return yaml.load(text, _LOADER)
+    except (ValueError, TypeError, LookupError, OverflowError, AttributeError) as error:
+        raise yaml.YAMLError(f"one of its values does not fit its tag, or is no date: {error}") from error
 
 
 class _Plain(_DUMPER):

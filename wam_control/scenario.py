@@ -34,7 +34,8 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "until_force": "N; the step ends when a contact of this force is detected, and the scenario fails where none is",
     "chirp": "`{newtons, from, to}`: a sine along the force, from one frequency to another, Hz",
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm, m along the link, N"
-    " in its frame, s from the start of the step",
+    " in its frame, s from the start of the step; `begin` and `end` may be left out: for the whole step. A push of "
+    "several steps is given in each",
     "request": "`enable` or `disable` at the start of the step",
     "set": "`{force_loop: {force_gain: [0.01]}}`: live parameters of driver or force_loop from the start of the step",
 }
@@ -118,6 +119,7 @@ class ScenarioOutput(NamedTuple):
     request: str
     settings: tuple[Setting, ...]
     step: str
+    begins: bool  # the step, in this period
     done: bool
     failure: str
     task: TaskCommand | None = None
@@ -180,6 +182,7 @@ class Scenario:
             request=request if begins else "",
             settings=step.settings if begins and not self.done else (),
             step=step.name,
+            begins=begins and not self.done,
             done=self.done,
             failure=self.failure,
             task=None if self.done else step.task,
@@ -327,7 +330,7 @@ def _step(where: str, body: Any, arm: Arm) -> ScenarioStep:
         posture=_posture(where, body["posture"], arm) if "posture" in body else (),
         until_force=until_force,
         force=force,
-        push=_push(where, body["push"], arm) if "push" in body else None,
+        push=_push(where, body["push"], arm, seconds) if "push" in body else None,
         request=request,
         chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
         settings=tuple(_settings(where, body["set"])) if "set" in body else (),
@@ -402,19 +405,24 @@ def _settings(where: str, body: Any) -> Iterator[Setting]:
             yield Setting(node, name, tuple(value) if isinstance(value, list) else value)
 
 
-def _push(where: str, body: Any, arm: Arm) -> Push:
-    names = ("cover", "contact_position", "newtons", "begin", "end")
-    known(where + ", push", body, names, names)
+def _push(where: str, body: Any, arm: Arm, seconds: float) -> Push:
+    needed = ("cover", "contact_position", "newtons")
+    known(where + ", push", body, (*needed, "begin", "end"), needed)
     require(
         body["cover"] in arm.covers.names,
         f"{where}: cover is {body['cover']!r}; allowed: {', '.join(arm.covers.names)}",
     )
     x, y, z = numbers(where, "newtons", body["newtons"], 3)
-    place, begin, end = (number(where, key, body[key]) for key in ("contact_position", "begin", "end"))
+    place = number(where, "contact_position", body["contact_position"])
+    begin, end = number(where, "begin", body.get("begin", 0.0)), number(where, "end", body.get("end", seconds))
     length = arm.covers.length_of(body["cover"])
     require(
         0.0 <= place <= length,
         f"{where}: contact_position is {place:g} m; {body['cover']} reaches from 0 to {length:g} m",
     )
-    require(0.0 <= begin < end, f"{where}: begin is {begin:g} s, end {end:g} s; end must be later, begin 0 or later")
+    require(
+        0.0 <= begin < end <= seconds + ROUNDING,
+        f"{where}: the push has begin {begin:g} s and end {end:g} s; allowed: begin from 0 s, end after it, up to the "
+        f"{seconds:g} s of the step, with which a push ends: where it goes on, give it in the next step again",
+    )
     return Push(body["cover"], place, (x, y, z), begin, end, arm.covers.aside(body["cover"], place))

@@ -62,7 +62,7 @@ class ScenarioNode:
         }
         if out.done:
             return {**outputs, **self._end(out.failure)}
-        if out.step != self._step:
+        if out.begins:  # it may have the name of the one before
             self._step = out.step
             facts = {f"{s.node}:{s.name}": str(_plain(s)) for s in out.settings}
             outputs["status"] = NodeStatus(Level.OK, out.step, step=out.step, stamp=inputs.stamp, facts=facts)

@@ -1,10 +1,10 @@
 """Values of a scenario file, each refused with the step, the key and what is allowed."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wam_description.parameters import ParameterError, require
+from wam_description.number_text import as_number
+from wam_description.parameters import ParameterError, is_finite, require
 
 
 def known(where: str, body: Any, allowed: Sequence[str], needed: Sequence[str]) -> None:
@@ -19,8 +19,8 @@ def known(where: str, body: Any, allowed: Sequence[str], needed: Sequence[str]) 
 
 def number(where: str, key: str, value: Any) -> float:
     """A finite number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ParameterError(f"{where}: {key} is {value!r}; it must be a finite number")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not is_finite(value):
+        raise ParameterError(f"{where}: {key} is {value!r}; it must be a finite number{as_number(value)}")
     return float(value)
 
 

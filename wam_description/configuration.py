@@ -20,6 +20,7 @@ T = TypeVar("T")
 SHARED = "/**"
 BASE = "base"  # key of an overlay that names the configuration it changes
 PARAMETERS = "ros__parameters"
+LONGEST = 60  # characters of a value that is refused
 MOST_OVERLAYS = 20  # files that build on each other
 SCENARIO_KEY = "steps"  # a file with this at its top is a scenario
 _DERIVED = frozenset(field.name for field in fields(Shared) if field.derived)  # a file need not give them
@@ -172,10 +173,11 @@ def option_values(texts: Iterable[str]) -> dict[str, Any]:
         if not (name.strip() and equals and value.strip()):
             raise ParameterError(f"--set is '{text}'; write [node:]parameter=value, e.g. force_loop:force_gain=[0.01]")
         try:
-            found[name.strip()] = yaml.safe_load(value)
+            found[name.strip()] = yaml_text.parse(value)
         except yaml.YAMLError as error:
             reason = str(error).partition("\n")[0]
-            raise ParameterError(f"--set {name.strip()}: '{value}' is no value of YAML: {reason}") from error
+            shown = value if len(value) <= LONGEST else f"{value[:LONGEST]}..."
+            raise ParameterError(f"--set {name.strip()}: '{shown}' is no value of YAML: {reason}") from error
     return found
 
 

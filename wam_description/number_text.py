@@ -1,6 +1,25 @@
-"""Numbers as messages write them."""
+"""Numbers as messages and YAML write them."""
+
+import math
+from typing import Any
 
 
 def brief(value: float) -> str:
     """A number to two digits, without an exponent from 1e-4 to 1e10: 0.0042, 7.1, 120."""
     return f"{float(f'{value:.2g}'):.10g}"
+
+
+def as_number(value: Any) -> str:
+    """What to write where a text in place of a number looks like one, as a clause of a refusal; '' where it does not.
+
+    YAML 1.1 takes numbers such as 1e-3 and .5e3 for texts, and whatever is in quotes.
+    """
+    try:
+        number = float(value) if isinstance(value, str) else math.nan
+    except ValueError:
+        return ""
+    if not math.isfinite(number):
+        return ""
+    written = repr(int(number) if number.is_integer() and abs(number) < 1e15 else number)
+    written = written if "." in written else written.replace("e", ".0e")
+    return f"; YAML takes {value!r} for a text: write {written}"

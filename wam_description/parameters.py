@@ -8,8 +8,11 @@ nowhere else.  The same classes check the values, describe the parameters to ROS
 import contextlib
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+
+from wam_description.number_text import as_number
 
 T = TypeVar("T")
 Value = bool | int | float | str | tuple[Any, ...]
@@ -236,7 +239,7 @@ def _assemble(cls: type[T], flat: Mapping[str, Value], prefix: str) -> T:
 
 def _checked(field: Field, value: Any) -> Value:
     if field.is_array:
-        if isinstance(value, str) or not hasattr(value, "__iter__"):
+        if isinstance(value, (str, bytes, Mapping, Set)) or not hasattr(value, "__iter__"):
             raise ParameterError(f"parameter '{field.name}' is {value!r}; it must be a list of {field.kind.__name__}")
         if field.length and len(value) != field.length:
             raise ParameterError(f"parameter '{field.name}' has {len(value)} values; it needs {field.length}")
@@ -256,12 +259,17 @@ def _checked_scalar(field: Field, value: Any) -> bool | int | float | str:
             raise refuse(field.allowed)
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise refuse("a number")
-    if field.kind is int and math.isfinite(value) and value != int(value):
+        raise refuse(f"a number{as_number(value)}")
+    if field.kind is int and is_finite(value) and value != int(value):
         raise refuse("a whole number")
-    if not math.isfinite(value) or not field.low <= value <= field.high:
+    if not is_finite(value) or not field.low <= value <= field.high:
         raise refuse(field.allowed or "a finite number")
     return field.kind(value)
+
+
+def is_finite(value: float) -> bool:
+    """Whether a number is finite, as a float also where it is an int of hundreds of digits."""
+    return abs(value) <= sys.float_info.max
 
 
 def require(condition: bool, message: str) -> None:

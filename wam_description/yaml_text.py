@@ -1,5 +1,6 @@
-"""YAML read with duplicate keys refused, which YAML itself accepts silently; parameters written as ROS does."""
+"""YAML of plain values, read with every oddity refused that YAML itself accepts; parameters written as ROS does."""
 
+import re
 from collections.abc import Hashable, Mapping
 from typing import Any, Final
 
@@ -8,6 +9,8 @@ import yaml
 from wam_description.parameters import nested
 
 DEEPEST: Final = 50  # nested mappings and lists; the loader in C recurses
+OCTAL: Final = re.compile("[-+]?0[0-7_]+")
+UNREADABLE: Final = (ValueError, TypeError, LookupError, OverflowError, AttributeError)  # of tags, as `!!bool x`
 # in C they take a tenth of the time, if they were built
 _LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _DUMPER: Final[Any] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -27,7 +30,29 @@ class _Strict(_LOADER):
                 )
             seen.add(key.value)
         mapping: dict[Hashable, Any] = super().construct_mapping(node, deep)
+        for name in mapping:
+            if not isinstance(name, str):
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key {name!r} is no text; write it in quotes if it is one", node.start_mark
+                )
         return mapping
+
+    def construct_decimal(self, node: yaml.ScalarNode) -> float:
+        """A number as it reads: YAML 1.1 takes 010 for 8 and 1:30 for 90."""
+        is_int = node.tag.endswith(":int")
+        value: float = self.construct_yaml_int(node) if is_int else self.construct_yaml_float(node)
+        if ":" in node.value or (is_int and OCTAL.fullmatch(node.value) and value != int(node.value)):
+            raise yaml.constructor.ConstructorError(
+                None,
+                None,
+                f"{node.value} is {value:g} in YAML; write that number, or a text in quotes",
+                node.start_mark,
+            )
+        return value
+
+
+for _kind in ("int", "float"):
+    _Strict.add_constructor(f"tag:yaml.org,2002:{_kind}", _Strict.construct_decimal)
 
 
 def parse(text: str) -> Any:
@@ -36,18 +61,26 @@ def parse(text: str) -> Any:
     Raises
     ------
     yaml.YAMLError
-        if it is not YAML, a key is given twice in one mapping, or it is nested more than `DEEPEST` levels deep; names
-        the line where it is known.
+        if it is not YAML, a key is given twice in one mapping or is no text, a number is another one than it seems, it
+        contains itself, or it is nested more than `DEEPEST` levels deep; names the line where it is known.
     """
-    depth = 0
+    within: list[str | None] = []  # anchors of the mappings and lists around an event
     for event in yaml.parse(text, Loader=_LOADER):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST:
+        if isinstance(event, yaml.CollectionStartEvent):
+            within.append(event.anchor)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            within.pop()
+        elif isinstance(event, yaml.AliasEvent) and event.anchor in within:
+            mark: Any = event.start_mark
+            raise yaml.composer.ComposerError(
+                None, None, f"*{event.anchor} is inside of what it refers to; write the value itself", mark
+            )
+        if len(within) > DEEPEST:
             raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
     try:
         return yaml.load(text, _Strict)  # a safe loader
-    except (ValueError, TypeError, LookupError, OverflowError) as error:  # of the value of a tag, as a date of month 99
-        raise yaml.YAMLError(f"one of its values is none of its kind: {error}") from error
+    except UNREADABLE as error:
+        raise yaml.YAMLError(f"one of its values does not fit its tag, or is no date: {error}") from error
 
 
 def dump(tree: Any) -> str:

@@ -80,7 +80,7 @@ class BagSource:
             stamp=stamp,
             q=tuple(self._angles[at].tolist()),
             true=self._contact(traces.true, row) if known else NO_CONTACT,
-            estimated=self._estimated[estimate] if is_fresh else NO_CONTACT,
+            estimated=self._estimated[estimate] if is_fresh else self._alone(row),
             likely=self._likely[estimate] if is_fresh else (),
             commanded=float(traces.commanded.size[row]) if known else NAN,
             measured=float(traces.measured.size[row]) if known else NAN,
@@ -100,6 +100,15 @@ class BagSource:
         """What the plots show before a time of the arm, ns, oldest first."""
         first = max(self.begin, stamp - round(WINDOW * 1e9))
         return (self.snapshot(int(at)) for at in np.linspace(first, stamp, POINTS, endpoint=False))
+
+    def _alone(self, row: int) -> Contact:
+        """The estimated contact of a bag without `contact/hypotheses`; none where its position was not recorded.
+
+        A contact without one is shown as one whose position cannot be observed.
+        """
+        signal = self._traces.estimated
+        is_alone = row >= 0 and not self._likely_stamps and signal.is_placed[row]
+        return self._contact(signal, row) if is_alone else NO_CONTACT
 
     @staticmethod
     def _contact(signal: ForceSignal, row: int) -> Contact:

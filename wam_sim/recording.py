@@ -1,11 +1,10 @@
 """Contents of a bag as a run: arm, parameters, steps, faults, status and mode; the one reader of all these."""
 
 import json
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from wam_bag.bag import Bag, JointColumns, Messages, PointColumns, WrenchColumns
 from wam_bag.contents import mode_of
@@ -82,13 +81,24 @@ class RecordedRun(NamedTuple):
         return found
 
     def stamped_statuses(self) -> list[tuple[int, NodeStatus]]:
-        """Each status and when it was published, ns: where it has no stamp, at the last joint state before it."""
+        """Each status and when it was published, ns; where it has no stamp, the newest one that was recorded before it.
+
+        That is one of a joint state or of another status: of a part of a recording only statuses are from before it.
+        """
         columns, states = self.bag.topics.get(f"{self.namespace}/status"), self.joints("joint_states")
-        if columns is None or states is None:
+        if columns is None:
             return [(status.stamp, status) for status in self.statuses]
-        before = np.searchsorted(states.log_time_ns, columns.log_time_ns, side="right")
-        newest = np.concatenate(([0], states.stamp_ns))[before].tolist()
-        return [(status.stamp or stamp, status) for stamp, status in zip(newest, self.statuses, strict=True)]
+        logged = columns.log_time_ns.tolist()
+        known = [(at, status.stamp) for at, status in zip(logged, self.statuses, strict=True) if status.stamp]
+        if states is not None:
+            known += zip(states.log_time_ns.tolist(), states.stamp_ns.tolist(), strict=True)
+        known.sort()
+        times = [at for at, _ in known]
+        newest = [max(bisect_right(times, at) - 1, 0) for at in logged]
+        return [
+            (status.stamp or (known[row][1] if known else 0), status)
+            for row, status in zip(newest, self.statuses, strict=True)
+        ]
 
     def joints(self, topic: str) -> JointColumns | None:
         """Columns of a JointState topic of the arm, None if nothing was recorded."""

@@ -25,6 +25,7 @@ from wam_sim.simulation import Simulation
 DESCRIPTION: Final = "robot_description"
 DOUBLE: Final = 8  # FLOAT64 of a PointField
 DEPTH: Final = 1000
+PLAYER: Final = "scenario"  # the node
 Values = Callable[[int, Any], Sequence[Any]]
 
 
@@ -46,7 +47,7 @@ def record(
     steps : the scenario.
     path : of the bag, a new directory.
     namespace : of the recorded topics.
-    tell : called with the arm's time, s, and the name of each step that begins.
+    report : called with the arm's time, s, and the name of each step that begins.
     is_stopped : ends the recording once it is true.
 
     Returns
@@ -59,11 +60,13 @@ def record(
     RecordingError
         if the bag cannot be written.
     """
+    if PLAYER not in configuration.shared.nodes:  # it is simulated in any case
+        configuration = configuration.with_values({"nodes": [*configuration.shared.nodes, PLAYER]})
     simulation = Simulation(configuration, steps)
     shared = configuration.shared
     with BagWriter(path) as bag:
         recording = _Recording(bag, simulation, shared, namespace)
-        simulation.listen(STATUS, lambda _, status: report(status.stamp / 1e9, status.message), "scenario")
+        simulation.listen(STATUS, lambda _, status: report(status.stamp / 1e9, status.message), PLAYER)
         bag.attach(ATTACHMENT, "application/yaml", _parameters(configuration, namespace).encode())
         recording.watch_driver()
         while not is_stopped() and not simulation.step():

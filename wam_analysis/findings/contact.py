@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, ListedContact
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, Cut, ListedContact
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
@@ -13,6 +13,16 @@ from wam_analysis.task_forces import arm_of
 from wam_bag.bag import TableColumns
 from wam_description.topics import FRICTION_COLUMNS
 
+BEFORE = {
+    Cut.NOTHING: "",
+    Cut.RECORDING: "it began before the recording",
+    Cut.GAP: "the estimate is missing before it",
+}
+AFTER = {
+    Cut.NOTHING: "",
+    Cut.RECORDING: "it goes past the end of the recording",
+    Cut.GAP: "the estimate is missing after it",
+}
 STEADY_LINK = 0.9  # of the time of a contact, below which it is reported that the estimated link changed
 
 
@@ -24,10 +34,11 @@ def contact_section(recording: AnalysedRun) -> Section:
     lacking = recording.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
-    verdict = [missed.sentence for missed in summary.missed]
+    verdict = [one.sentence for one in summary.missed] + [one.sentence for one in summary.hard]
     for number, contact in enumerate(summary.contacts, 1):
-        sentences += _doubts(f"{number} {contact.link}", contact)
-        findings += _numbers(f"{number} {contact.link}", contact)
+        name = f"{number} {contact.estimate.link}"
+        sentences += _doubts(name, contact)
+        findings += _numbers(name, contact)
     sentences += verdict
     true, sensed = traces.true, traces.estimated
     known = true.is_known & sensed.is_known
@@ -36,7 +47,8 @@ def contact_section(recording: AnalysedRun) -> Section:
         both = touching & sensed.acts & (sensed.frame == true.frame)
         position = np.abs(sensed.position - true.position)[both]
         position = position[np.isfinite(position)]
-        force = np.linalg.norm(sensed.force - true.force, axis=1)[both]
+        is_estimate = both & sensed.is_placed & ~sensed.is_lower_bound
+        force = np.linalg.norm(sensed.force - true.force, axis=1)[is_estimate]
         right = 100.0 * float(np.mean(both[touching]))
         away = 100.0 * float(np.median(position)) if len(position) else math.nan
         off = float(np.median(force)) if len(force) else math.nan
@@ -44,7 +56,10 @@ def contact_section(recording: AnalysedRun) -> Section:
             Finding("contact on the right link", "%", right),
             Finding("position error, median", "cm", away, note="along the link, without its sign"),
             Finding(
-                "size of the force error, median", "N", off, note="of the vector: the norm of its three components"
+                "size of the force error, median",
+                "N",
+                off,
+                note="of the vector: the norm of its three components; where the force is not the least one",
             ),
         ]
         verdict.append(f"Contact: on the right link {right:.0f} % of the time{_errors(away, off)}.")
@@ -59,8 +74,10 @@ def contact_section(recording: AnalysedRun) -> Section:
     elif summary.contacts:
         sentences.insert(0, "Estimated contacts; the true ones are not in this bag.")
         verdict.append(f"Contact: {len(summary.contacts)} estimated; the true ones are not in this bag.")
-    if any(math.isnan(contact.probability) for contact in summary.contacts):
+    if any(math.isnan(contact.estimate.probability) for contact in summary.contacts):
         sentences.append(NOT_CERTAIN)
+    if not all(contact.estimate.is_placed for contact in summary.contacts):
+        sentences.append(f"Positions of contacts: {NOT_PLACED}.")
     if not sentences and not findings:
         is_recorded = np.any(sensed.is_known)
         sentences.append("No contact was estimated." if is_recorded else f"{NOT_ESTIMATED.capitalize()}.")
@@ -74,27 +91,28 @@ def _numbers(name: str, contact: ListedContact) -> Iterator[Finding]:
     note = f"in step '{contact.step}'" if contact.step else ""
     yield Finding(f"{name}: from", "s", contact.begin, note=note)
     yield Finding(f"{name}: to", "s", contact.end)
-    yield Finding(f"{name}: probability of the link", "%", 100.0 * contact.probability)
-    yield Finding(f"{name}: position along the link", "cm", cm * contact.position, error=cm * contact.position_sd)
-    yield Finding(f"{name}: its standard deviation", "cm", cm * contact.position_sd)
-    least = "the least force that explains the torques" * contact.is_lower_bound
-    yield Finding(f"{name}: force", "N", contact.force, math.nan, least, contact.force_sd, contact.is_lower_bound)
-    yield Finding(f"{name}: standard deviation of the force", "N", contact.force_sd)
-    yield Finding(f"{name}: second contact suspected", "%", 100.0 * contact.second, note="of the time")
+    one = contact.estimate
+    yield Finding(f"{name}: probability of the link", "%", 100.0 * one.probability)
+    yield Finding(f"{name}: position along the link", "cm", cm * one.position, error=cm * one.position_sd)
+    yield Finding(f"{name}: its standard deviation", "cm", cm * one.position_sd)
+    least = "the least force that explains the torques" * one.is_lower_bound
+    yield Finding(f"{name}: force", "N", one.force, math.nan, least, one.force_sd, one.is_lower_bound)
+    yield Finding(f"{name}: standard deviation of the force", "N", one.force_sd)
+    yield Finding(f"{name}: second contact suspected", "%", 100.0 * one.second, note="of the time")
     yield Finding(f"{name}: error of the position", "cm", cm * contact.position_error)
-    yield Finding(f"{name}: error of the size of the force", "N", contact.force_error)
+    unknown = "not known: the force may be only the least one" * (not one.is_placed)
+    yield Finding(f"{name}: error of the size of the force", "N", contact.force_error, note=least or unknown)
 
 
 def _doubts(name: str, contact: ListedContact) -> Iterator[str]:
     """What is not to be trusted of a contact, and whether it was another one."""
-    if contact.began_before or contact.goes_past:
-        cut = ["it began before the recording"] * contact.began_before + ["it goes past its end"] * contact.goes_past
+    if cut := [text for text in (BEFORE[contact.before], AFTER[contact.after]) if text]:
         yield f"{name}: {' and '.join(cut)}."
-    if contact.lasting < STEADY_LINK:
-        yield f"{name}: this link was estimated for {contact.lasting:.0%} of the time, others for the rest."
-    if contact.reasons:
-        yield f"{name}: {'; '.join(contact.reasons)}."
-    if contact.true not in ("", contact.link):
+    if contact.estimate.lasting < STEADY_LINK:
+        yield f"{name}: this link was estimated for {contact.estimate.lasting:.0%} of the time, others for the rest."
+    if contact.estimate.reasons:
+        yield f"{name}: {'; '.join(contact.estimate.reasons)}."
+    if contact.true not in ("", contact.estimate.link):
         yield f"{name}: {'nothing was' if contact.true == NO_LINK else f'{contact.true} was'} touched."
 
 

@@ -50,7 +50,9 @@ def _other_reactions(recording: AnalysedRun) -> dict[str, tuple[RecordedReaction
     spans = [(hold.begin, hold.end) for hold in recording.holds]
     reactions = [one for one in recording.summary.reactions if one.name != FAULT]
     rest = [one for one in reactions if not any(within([one], *span) for span in spans)]
-    steps = {step.name: within(rest, step.begin, step.end) for step in recording.summary.steps}
+    steps: dict[str, tuple[RecordedReaction, ...]] = {}
+    for step in recording.summary.steps:  # several may have one name
+        steps[step.name] = (*steps.get(step.name, ()), *within(rest, step.begin, step.end))
     return {name: found for name, found in (steps or {"force loop": tuple(rest)}).items() if found}
 
 

@@ -19,6 +19,7 @@ from wam_cli.commands import (
     writable_picture,
 )
 from wam_control.scenario import load
+from wam_description import yaml_text
 from wam_description.configuration import packaged
 from wam_experiments.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_experiments.thesis import definition, sweeping
@@ -121,7 +122,7 @@ def _axis(text: str) -> Axis:
             raise argparse.ArgumentTypeError(f"'{values}' is no LOW:HIGH:N with 0 < LOW < HIGH and N of 2 or more")
         return Axis(name, tuple(low * (high / low) ** (i / (count - 1)) for i in range(count)))
     try:
-        parsed: Any = yaml.safe_load(f"[{values}]")
+        parsed: Any = yaml_text.parse(f"[{values}]")
     except yaml.YAMLError:
         parsed = []
     if not (name and parsed):
