@@ -44,9 +44,9 @@ static void apply_pushes(const Plant *plant) {
     for (int k = 0; k < 2; k++) {
       PyObject *own = PyTuple_GET_ITEM(push, 2 + k);
       for (int i = 0; i < 3; i++)
-        turned[k][i] = rows[3 * i] * PyFloat_AS_DOUBLE(PyTuple_GET_ITEM(own, 0)) +
-                       rows[3 * i + 1] * PyFloat_AS_DOUBLE(PyTuple_GET_ITEM(own, 1)) +
-                       rows[3 * i + 2] * PyFloat_AS_DOUBLE(PyTuple_GET_ITEM(own, 2));
+        turned[k][i] = rows[3 * i] * PyFloat_AS_DOUBLE(PyList_GET_ITEM(own, 0)) +
+                       rows[3 * i + 1] * PyFloat_AS_DOUBLE(PyList_GET_ITEM(own, 1)) +
+                       rows[3 * i + 2] * PyFloat_AS_DOUBLE(PyList_GET_ITEM(own, 2));
     }
     plant->apply(plant->model, plant->data, turned[0], turned[1], plant->data->site_xpos + 3 * site, (int)body,
                  plant->data->qfrc_applied);

@@ -42,8 +42,8 @@ class AppliedPush(NamedTuple):
 
     site: int  # the frame of the cover
     body: int
-    force: tuple[float, ...]  # (3,) N, in the frame of the cover
-    torque: tuple[float, ...]  # (3,) N m, about its origin
+    force: list[float]  # (3,) N, in the frame of the cover
+    torque: list[float]  # (3,) N m, about its origin
     rows: np.ndarray  # (9,) of the rotation of that frame, MuJoCo's memory
     origin: np.ndarray  # (3,) m, of it in the base frame, MuJoCo's memory
     load: PartialLoad
@@ -84,17 +84,17 @@ class CoverLoads:
         self._turn = partial(Struct("6d").pack_into, turned.data, 0)
 
     def push(self, cover: str, force: np.ndarray, torque: np.ndarray) -> None:
-        """AppliedPush on a cover, see `Plant.push`."""
+        """Push on a cover, see `Plant.push`."""
         if cover not in self._origin:
             raise ValueError(f"no cover is named '{cover}'; covers: {', '.join(self._origin)}")
         if any(force) or any(torque):
-            square = float(force[1] ** 2 + force[2] ** 2)  # a force along x passes through every position
-            moment = float(force[1] * torque[2] - force[2] * torque[1])
-            position = moment / square if square > 0.0 else np.nan
-            load = PartialLoad(np.array(force, float), np.array(torque, float), position)
-            applied = tuple(load.force.tolist()), tuple(load.moment.tolist())
-            frame = self._rows[cover], self._origin[cover]
-            self.pushes[cover] = AppliedPush(self._site[cover], self._body[cover], *applied, *frame, load)
+            pushed, turned = np.array(force, float), np.array(torque, float)
+            (_, fy, fz), (_, ty, tz) = at_frame = pushed.tolist(), turned.tolist()
+            square = fy * fy + fz * fz  # a force along x passes through every position
+            position = (fy * tz - fz * ty) / square if square > 0.0 else math.nan
+            load = PartialLoad(pushed, turned, position)
+            frame = self._site[cover], self._body[cover]
+            self.pushes[cover] = AppliedPush(*frame, *at_frame, self._rows[cover], self._origin[cover], load)
         else:
             self.pushes.pop(cover, None)
 
