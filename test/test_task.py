@@ -114,6 +114,27 @@ def test_the_point_slides_with_the_commanded_velocity_while_it_presses() -> None
     assert world.force(DOWN) == pytest.approx(10.0, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("others", "slid"),
+    [
+        ((), 0.022),
+        ((force(0.0, Y),), 0.022),  # at the same position: the way counts once
+        ((TaskAxis(AxisKind.VELOCITY, -1, COVER, PLACE, Y, 0.05),), 0.0),
+    ],
+)
+def test_a_pinned_point_stays_on_what_is_to_be_touched_unless_another_motion_is_commanded(
+    others: tuple[TaskAxis, ...], slid: float
+) -> None:
+    """As under a force command; another motion may lead to what is to be touched."""
+    world = Springs(place=PLACE - slid)
+    along = BODY.cover_pose(POSE, COVER).rotation[:, 0] @ BODY.point_jacobian(POSE, COVER, (PLACE, 0.0, 0.0))
+    for k in range(80):
+        world.q = np.array(POSE) + min(k, 11) * 0.002 * along / float(along @ along)  # 22 mm along the link
+        world.hand = (-5.0 if k > 20 else 0.0) * world.lever(DOWN)
+        out = world.step(base(force(5.0), *others))
+    assert out.rows[0][2] == pytest.approx(5.0, rel=0.01), "N, measured"
+
+
 def test_the_first_axis_has_priority() -> None:
     """Two velocities of one point along nearly the same direction: the first is exact."""
     world = Springs()

@@ -40,6 +40,7 @@ FINE, COARSE = 4e-4, 1e-3  # m, way of the whole force below which jerks of fric
 SETTLE, LEAVE = 0.03, 0.06  # of the commanded force: errors below which it is kept below FINE, and up to which it is
 LEFT = 0.25  # of the settling time, after which a force that is too large, or has been reached and left, is reported
 FEW = 2  # turns of the late force of the motors, after which the arm is slowed down
+FAINT = 0.5  # of a swing that is reported, from which it is: a cycle that grows is seen late, and with a wrong size
 SLOWED = 0.5  # of the speed along the force, from then on
 SHAKE_SAMPLES = 8  # outer periods: a dither of 25 Hz
 RESONANCE = 4.0  # largest swing on a surface, per swing without resonance
@@ -309,11 +310,12 @@ class ForceHold:
         force_sd = math.hypot(_likely_sd(axis, case.torque_error, parameters), case.unknown)
         is_uncertain = force_sd > known
         self._uncertain = self._uncertain + dt if is_touching and is_uncertain else 0.0
-        swing = parameters.limits.cycle_force * desired
-        is_cycling = self._turns.step(measured, swing, parameters.limits.settling_time, dt) and is_touching
+        is_late, limits = parameters.is_estimated and self.share > SLOWED, parameters.limits
+        is_faint = is_late and not (limits.surface_speed or limits.slide_speed)  # such a surface swings the force, too
+        swing = limits.cycle_force * desired * (FAINT if is_faint else 1.0)
+        is_cycling = self._turns.step(measured, swing, limits.settling_time, dt) and is_touching
         missed = self._lasting(self._not_reached(axis, measured, desired, parameters, dt), parameters)
         turned = self._has_turned(axis, external, measured, desired, parameters, dt)
-        is_late = parameters.is_estimated and self.share > SLOWED
         if is_late and is_touching and self._turns.count > FEW:
             self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
             self._turns.reset()

@@ -84,7 +84,7 @@ class TaskControl:
         self._task: TaskCommand | None = None
         self._anchors: dict[object, float] = {}
         self._holds: list[ForceHold] = []
-        # by cover and position: m since something is touched there, s since it is no more
+        # by cover and position: m since something is touched or approached there, s since it is no more
         self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
         self._begun: list[float] = []  # (n,) rad, where the task began
@@ -181,18 +181,24 @@ class TaskControl:
     def _slide(self, q: Sequence[float], dt: float) -> None:
         """Count how far the link has slid along what each force presses, which stays where it is.
 
-        Other axes, and a touch that is lost for a moment, change nothing of that.
+        Where nothing but forces is commanded, the way to the touch counts, too; another motion may lead to what is to
+        be touched.  Other axes, and a touch that is lost for a moment, change nothing of that.
         """
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
-        for axis, hold in zip(self._task.axes if self._task else (), self._holds, strict=True):
-            if axis.kind is not AxisKind.FORCE or not axis.cover or axis.position is None:
-                continue
-            at = axis.cover, axis.position
-            slid, lost = self._slid.get(at, (0.0, math.inf))
-            lost = 0.0 if hold.is_touching else lost + dt
-            slid += self._force_axes.slide(q, *at, moved)
-            self._slid[at] = (slid, lost) if lost < LOST else (0.0, math.inf)
+        axes = self._task.axes if self._task else ()
+        is_approach = all(axis.kind is AxisKind.FORCE for axis in axes)
+        pressed = dict.fromkeys(self._slid, False)
+        for axis, hold in zip(axes, self._holds, strict=True):
+            if axis.kind is AxisKind.FORCE and axis.cover and axis.position is not None:
+                at = axis.cover, axis.position
+                pressed[at] = pressed.get(at, False) or hold.is_touching or (is_approach and bool(axis.value))
+        before, self._slid = self._slid, {}
+        for at, is_pressed in pressed.items():
+            slid, lost = before.get(at, (0.0, math.inf))
+            lost = 0.0 if is_pressed else lost + dt
+            if lost < LOST:
+                self._slid[at] = slid + self._force_axes.slide(q, *at, moved), lost
 
     @property
     def is_touching(self) -> bool:

@@ -23,7 +23,7 @@ NOTES = """{rank} combinations of {count} parameters are identified, condition {
 'In combination': only together with others.
 '{by_shape}': static friction is where the fitted curve of friction ends at rest, with the error of that curve. Stiction
 that acts below {slowest:g} rad/s of a motor only is not in it: see `wam analyse` for the torques of breakaway.
-The inertia of rotors that move a joint together may err by a fifth, more than its standard error: see docs/identify.md.
+The inertia of a rotor may err by a quarter, up to twice its standard error, in either direction: see docs/identify.md.
 Friction of a joint with a motor of its own is part of that motor's friction.
 A torque offset is not identifiable from this recording: in motion, at rest and with a dither it gives the torques of a
 difference between the directions of friction. Shown is the offset if friction were alike in both directions; used is
