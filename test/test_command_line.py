@@ -82,6 +82,24 @@ def test_a_number_that_cannot_be_changed_is_named(
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ("010,020", "'seed=010,020' is no NAME=VALUES: 010 is 8 in YAML; write that number"),
+        ("{a: 1, a: 2}", "'a' is given twice"),
+        ("0.01:inf:3", "'0.01:inf:3' is no LOW:HIGH:N with 0 < LOW < HIGH"),
+        ("0x" + "f" * 5000, "beyond every float"),
+        ("", "write for example servo.gain=1,2"),
+    ],
+)
+def test_values_of_a_sweep_are_refused_with_the_reason(values: str, reason: str, capsys: Any) -> None:
+    with pytest.raises(SystemExit):
+        main(["sweep", "t.csv", "--vary", f"seed={values}"])
+    printed = " ".join(capsys.readouterr().err.split())
+    assert reason in printed
+    assert len(printed) < 2000
+
+
 @pytest.mark.parametrize("command", ["plant FILE", "sweep t.csv --vary seed=1:2:2 --picture FILE"])
 def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
     command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path

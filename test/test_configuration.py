@@ -282,6 +282,8 @@ def test_a_longer_link_whose_numbers_meet_and_a_tool_beyond_it_are_accepted() ->
         ("!!timestamp x", "one of its values does not fit its tag"),
         ("2001-99-99", "no date: month must be in 1..12"),
         ("9" * 5000, "one of its values does not fit its tag"),
+        ("0x" + "f" * 5000, "a number of 5002 digits is beyond every float"),
+        ("\udcff", "character 1 is no UTF-8"),
         ("&a [*a]", r"\*a is inside of what it refers to"),
         ("{1: 2}", "the key 1 is no text"),
         ("*a", "undefined alias"),

@@ -10,7 +10,7 @@ from conftest import LONG
 from wam_description.configuration import Configuration, packaged
 from wam_ros import processors
 from wam_ros.bring_up import Processes
-from wam_ros.processors import PROCESSORS, divided, idle_parts
+from wam_ros.processors import PROCESSORS, divided, idle_parts, keep_to_processors
 from wam_ros.run import PARENT
 
 ALL = os.sched_getaffinity(0)
@@ -42,6 +42,15 @@ def test_a_system_that_shows_no_times_has_no_idle_processor(tmp_path: Path, monk
             (tmp_path / file).write_text(text)
         monkeypatch.setattr(processors, "TIMES", tmp_path / file)
         assert idle_parts(ALL) == dict.fromkeys(ALL, 0.0)
+
+
+@pytest.mark.parametrize("given", ["", "x", "-1", "99999999999", "9999"])
+def test_processors_that_do_not_exist_are_none(given: str) -> None:
+    environment = {PROCESSORS: given}
+    keep_to_processors(environment)
+    assert environment == {}
+    assert os.sched_getaffinity(0) == ALL
+    assert os.sched_getscheduler(0) != os.SCHED_BATCH
 
 
 def placed(processes: Processes) -> dict[str, set[tuple[int, frozenset[int]]]]:

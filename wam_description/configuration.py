@@ -176,8 +176,8 @@ def option_values(texts: Iterable[str]) -> dict[str, Any]:
             found[name.strip()] = yaml_text.parse(value)
         except yaml.YAMLError as error:
             reason = str(error).partition("\n")[0]
-            shown = value if len(value) <= LONGEST else f"{value[:LONGEST]}..."
-            raise ParameterError(f"--set {name.strip()}: '{shown}' is no value of YAML: {reason}") from error
+            shown = repr(value if len(value) <= LONGEST else f"{value[:LONGEST]}...")
+            raise ParameterError(f"--set {name.strip()}: {shown} is no value of YAML: {reason}") from error
     return found
 
 

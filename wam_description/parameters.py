@@ -240,7 +240,9 @@ def _assemble(cls: type[T], flat: Mapping[str, Value], prefix: str) -> T:
 def _checked(field: Field, value: Any) -> Value:
     if field.is_array:
         if isinstance(value, (str, bytes, Mapping, Set)) or not hasattr(value, "__iter__"):
-            raise ParameterError(f"parameter '{field.name}' is {value!r}; it must be a list of {field.kind.__name__}")
+            raise ParameterError(
+                f"parameter '{field.name}' is {value!r}; it must be a list of {field.kind.__name__}{as_number(value)}"
+            )
         if field.length and len(value) != field.length:
             raise ParameterError(f"parameter '{field.name}' has {len(value)} values; it needs {field.length}")
         return tuple(_checked_scalar(field, element) for element in value)

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import yaml
 
-from wam_description.parameters import nested
+from wam_description.parameters import is_finite, nested
 
 DEEPEST: Final = 50  # nested mappings and lists; the loader in C recurses
 OCTAL: Final = re.compile("[-+]?0[0-7_]+")
@@ -41,6 +41,10 @@ class _Strict(_LOADER):
         """A number as it reads: YAML 1.1 takes 010 for 8 and 1:30 for 90."""
         is_int = node.tag.endswith(":int")
         value: float = self.construct_yaml_int(node) if is_int else self.construct_yaml_float(node)
+        if not is_finite(value) and is_int:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"a number of {len(node.value)} digits is beyond every float", node.start_mark
+            )
         if ":" in node.value or (is_int and OCTAL.fullmatch(node.value) and value != int(node.value)):
             raise yaml.constructor.ConstructorError(
                 None,
@@ -64,6 +68,18 @@ def parse(text: str) -> Any:
         if it is not YAML, a key is given twice in one mapping or is no text, a number is another one than it seems, it
         contains itself, or it is nested more than `DEEPEST` levels deep; names the line where it is known.
     """
+    try:
+        _require_plain(text)
+        return yaml.load(text, _Strict)  # a safe loader
+    except UNREADABLE as error:
+        raise yaml.YAMLError(f"one of its values does not fit its tag, or is no date: {error}") from error
+
+
+def _require_plain(text: str) -> None:
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise yaml.YAMLError(f"character {error.start + 1} is no UTF-8") from error
     within: list[str | None] = []  # anchors of the mappings and lists around an event
     for event in yaml.parse(text, Loader=_LOADER):
         if isinstance(event, yaml.CollectionStartEvent):
@@ -77,10 +93,6 @@ def parse(text: str) -> Any:
             )
         if len(within) > DEEPEST:
             raise yaml.YAMLError(f"it is nested more than {DEEPEST} levels deep")
-    try:
-        return yaml.load(text, _Strict)  # a safe loader
-    except UNREADABLE as error:
-        raise yaml.YAMLError(f"one of its values does not fit its tag, or is no date: {error}") from error
 
 
 def dump(tree: Any) -> str:

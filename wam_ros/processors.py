@@ -80,7 +80,8 @@ def _times() -> dict[int, list[int]]:
 
 def keep_to_processors(environment: MutableMapping[str, str]) -> None:
     """Keep all threads of this process to the processors that bring-up has given it, if it has."""
-    with suppress(OSError, KeyError):  # where the system permits others by now, it shares them out itself
+    # where the system permits others by now, it shares them out itself
+    with suppress(OSError, KeyError, ValueError, OverflowError):
         processors = [int(one) for one in environment.pop(PROCESSORS).split()]
         for_all_threads(lambda thread: os.sched_setaffinity(thread, processors))
         for_all_threads(lambda thread: os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0)))

@@ -2,7 +2,9 @@
 
 import argparse
 import csv
+import math
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
 
 RANDOM_RUNS = 100
 SCENARIO = "demo_scenario"
+LONGEST = 60  # characters of a refused option that are shown
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -112,21 +115,20 @@ def _of_experiment(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> l
 
 def _axis(text: str) -> Axis:
     name, equals, values = text.partition("=")
-    ends = values.split(":")
-    if equals and len(ends) == 3:
-        try:
-            low, high, count = float(ends[0]), float(ends[1]), int(ends[2])
-        except ValueError:
-            low, high, count = 0.0, 0.0, 0
-        if not (0.0 < low < high and count > 1):
+    with suppress(ValueError):
+        low, high, count = (kind(end) for kind, end in zip((float, float, int), values.split(":"), strict=True))
+        if not (0.0 < low < high < math.inf and count > 1):
             raise argparse.ArgumentTypeError(f"'{values}' is no LOW:HIGH:N with 0 < LOW < HIGH and N of 2 or more")
-        return Axis(name, tuple(low * (high / low) ** (i / (count - 1)) for i in range(count)))
+        return Axis(name, tuple(low * (high / low) ** (i / (count - 1)) for i in range(int(count))))
+    parsed, reason = [], ""
     try:
-        parsed: Any = yaml_text.parse(f"[{values}]")
-    except yaml.YAMLError:
-        parsed = []
-    if not (name and parsed):
-        raise argparse.ArgumentTypeError(f"'{text}' is no NAME=VALUES; write for example servo.gain=1,2 or 1:2:5")
+        parsed = yaml_text.parse(f"[{values}]")
+    except yaml.YAMLError as error:
+        reason = f": {getattr(error, 'problem', None) or error}"
+    if not (name and equals and parsed):
+        raise argparse.ArgumentTypeError(
+            f"{text[:LONGEST]!r} is no NAME=VALUES{reason}; write for example servo.gain=1,2 or 1:2:5"
+        )
     return Axis(name, tuple(parsed))
 
 
