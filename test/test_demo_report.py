@@ -40,6 +40,7 @@ from wam_control.scenario import load as load_steps
 from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
+from wam_description.status import CHANGES
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
 from wam_experiments.thesis.definition import load
 from wam_sim.recorded_parameters import recorded_parameters
@@ -54,6 +55,8 @@ POSE = [0.0, -1.2, 0.0, 0.53]
 STEPS = {"push outer": 0.0, "push inner": 2.0, "lower": 4.0, "press 8 N": 5.0, "press 4 N": 7.0, "lift": 9.0}
 REASON = REASONS[0]
 PARAMETERS = "arm: {joints: "  # not YAML
+NO_LIMIT = "without a commanded force no contact above limits.contact_force: NOT SHOWN, see below"
+NO_TASK = TableColumns(STAMPS, STAMPS, ("base",) * len(STAMPS), np.arange(0), {"kind": np.zeros(0)})  # no axes
 
 
 class Recording:
@@ -411,16 +414,18 @@ def with_limits(recording: Recording) -> Bag:
     bag = recording.bag()
     reacts = status("force_loop", "at least 81 N", stamp=str(START + 9300 * MS), reaction="contact_force")
     stated = messages([*itertools.starmap(said, recording.statuses), reacts])
-    return bag._replace(topics={**bag.topics, "/wam/status": stated}, attachments={"parameters.yaml": content.encode()})
+    topics = {**bag.topics, "/wam/status": stated, "/wam/task_command": NO_TASK}
+    return bag._replace(topics=topics, attachments={"parameters.yaml": content.encode()})
 
 
 def test_a_contact_in_motion_that_is_harder_than_allowed_is_in_the_verdict():
     recording = Recording()
     recording.set(recording.true, 9.2, 9.6, "outer_link", (0.0, 80.0, 0.0), 0.25)
     recording.set(recording.estimated, 9.2, 9.6, "outer_link", (0.0, 70.0, 0.0), 0.25)
-    assert summarize(with_limits(recording)).hard == ()
+    assert summarize(with_limits(recording)).unplanned.hard == ()
     recording.set(recording.true, 9.4, 9.5, "outer_link", (0.0, 157.0, 0.0), 0.25)
     summary = summarize(with_limits(recording))
+    assert summary.unplanned.unknown == ""
     answer = demo_report.verdict(summary)[-1]
     assert str(answer) == "without a commanded force no contact above 90 N: NO (157 N)"
     sentence = (
@@ -433,13 +438,148 @@ def test_a_contact_in_motion_that_is_harder_than_allowed_is_in_the_verdict():
     )
     assert sentence in section.verdict
     assert sentence in " ".join(demo_report.reaction_text(summary).split())  # of a task, which has its own report
-    assert summarize(recording.bag()).hard == ()  # what is allowed was not recorded
+
+
+def nothing_but(true: tuple[float, float, str, float], estimated: tuple[float, float, str, float]) -> Recording:
+    """A recording with one true and one estimated contact: begin, end, link and N."""
+    recording = Recording()
+    for series in (recording.true, recording.estimated, recording.push, recording.commanded, recording.measured):
+        recording.set(series, 0.0, 10.0, "base", (0.0, 0.0, 0.0))
+    for series, (begin, end, link, newtons) in ((recording.true, true), (recording.estimated, estimated)):
+        recording.set(series, begin, end, link, (0.0, newtons, 0.0), 0.28)
+    return recording
+
+
+@pytest.mark.parametrize(
+    ("steps", "name"),
+    [((), ""), ((0.0, 0.9), ""), ((1.5, 5.0), "move"), ((0.0, 1.2), "move"), ((0.0, 5.0), "move")],
+    ids=["no scenario", "after it", "begins before", "goes on after", "in it"],
+)
+def test_a_contact_is_too_hard_whenever_it_is(steps, name):
+    hit = (1.0, 2.0, "outer_link", 200.0)
+    recording = nothing_but(hit, hit)
+    stamps = [START + round(1e9 * at) for at in steps]
+    recording.statuses = [(said, stamp, 0) for said, stamp in zip(("move", "done"), stamps, strict=False)]
+    summary = summarize(with_limits(recording))
+    assert name in [hard.step for hard in summary.unplanned.hard]
+    assert demo_report.verdict(summary)[-1].result is VerdictResult.NO
+    assert "TOO HARD: a contact with 200 N" in text(summary)
+
+
+def test_where_the_allowed_force_is_not_known_no_contact_is_shown_to_be_soft_enough():
+    hit = (1.0, 2.0, "outer_link", 200.0)
+    recording = nothing_but(hit, hit)
+    odd = with_limits(recording)
+    odd.topics["/wam/status"].messages[0].values.append(
+        SimpleNamespace(key="force_loop:limits.contact_force", value="x")
+    )
+    for bag in (recording.bag(), odd):
+        summary = summarize(bag)
+        assert str(demo_report.verdict(summary)[-1]) == NO_LIMIT
+        sentence = (
+            "Whether a contact without a commanded force was too hard is not known: limits.contact_force of the force "
+            "loop was not recorded, or cannot be read."
+        )
+        assert sentence in " ".join(text(summary).split())
+        (section,) = (one for one in analyse_bag(bag, lambda doing: None).sections if one.key == "contact")
+        assert sentence in section.verdict
+    nothing = nothing_but((1.0, 1.0, "base", 0.0), (1.0, 1.0, "base", 0.0))
+    assert summarize(nothing.bag()).unplanned == ((), "")
+    elsewhere = with_limits(recording)  # a setting of a node that was not recorded
+    elsewhere.topics["/wam/status"].messages[0].values.append(SimpleNamespace(key="driver:world.box", value="1"))
+    assert len(summarize(elsewhere).unplanned.hard) == 1
+
+
+def test_what_a_node_takes_live_is_what_is_allowed_from_then_on():
+    hit = (1.0, 2.0, "outer_link", 200.0)
+    bag = with_limits(nothing_but(hit, hit))
+    given = {"force_loop:limits.contact_force": "250.0", CHANGES: "1"}
+    bag.topics["/wam/status"] = messages(
+        [status("force_loop", "", stamp=str(START), **given), *bag.topics["/wam/status"].messages]
+    )
+    assert summarize(bag).unplanned == ((), "")
+
+
+@pytest.mark.parametrize("lost", ["sim/disturbance", "force_command", "task_command"])
+def test_a_hard_contact_that_may_have_been_commanded_is_not_shown_to_be_too_hard(lost):
+    hit = (1.0, 2.0, "outer_link", 120.0)
+    bag = with_limits(nothing_but(hit, hit))
+    assert len(summarize(bag).unplanned.hard) == 1
+    del bag.topics[f"/wam/{lost}"]
+    summary = summarize(bag)
+    assert summary.unplanned.hard == ()
+    assert str(demo_report.verdict(summary)[-1]) == NO_LIMIT
+    sentence = f"one had 120 N, and what may have been commanded then was not recorded ({lost})"
+    assert sentence in " ".join(text(summary).split())
+    soft = (1.0, 2.0, "outer_link", 80.0)
+    bag = with_limits(nothing_but(soft, soft))
+    del bag.topics[f"/wam/{lost}"]
+    assert summarize(bag).unplanned == ((), "")  # allowed in any case
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 5])
+def test_a_lower_bound_stays_one_where_positions_are_recorded_less_often(every):
+    bag = Recording().bag()
+    points = bag.topics["/wam/contact/point"]
+    kept = np.arange(0, len(STAMPS), every)
+    few = PointColumns(STAMPS[kept], STAMPS[kept], tuple(points.frames[i] for i in kept), points.point[kept])
+    summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/point": few}))
+    assert (summary.contacts[1].estimate.is_lower_bound, summary.touches[1].is_lower_bound) == (True, True)
+    assert not summary.contacts[0].estimate.is_lower_bound
+    assert math.isnan(summary.contacts[1].force_error)
+
+
+def test_a_contact_that_is_seen_for_a_moment_is_missed():
+    recording = nothing_but((1.0, 4.0, "outer_link", 10.0), (1.0, 1.1, "outer_link", 9.0))
+    recording.set(recording.push, 1.0, 4.0, "outer_link", (0.0, 10.0, 0.0))
+    recording.statuses = [("push", START, 0), ("done", START + 5000 * MS, 0)]
+    summary = recording.summary()
+    (touch,) = summary.touches
+    assert (touch.link_estimated, touch.right, touch.latency) == (NO_LINK, pytest.approx(1 / 30), 0.0)
+    assert math.isnan(touch.force_estimated)
+    assert "right link: NO (missed)" in verdict(summary)
+    assert "estimated none: no contact was, for most of the time" in text(summary)
+    recording.set(recording.estimated, 1.0, 2.6, "outer_link", (0.0, 9.0, 0.0), 0.28)
+    assert "right link: YES (53 %)" in verdict(recording.summary())
+
+
+def test_the_number_of_contacts_that_are_too_short_to_be_compared_is_in_the_report():
+    recording = nothing_but((1.0, 1.0, "base", 0.0), (1.0, 1.0, "base", 0.0))
+    for i in range(20):
+        recording.set(recording.true, 1 + 0.3 * i, 1.095 + 0.3 * i, "outer_link", (0.0, 10.0, 0.0), 0.2)
+        recording.set(recording.estimated, 1 + 0.3 * i, 1.095 + 0.3 * i, "inner_link", (0.0, 10.0, 0.0), 0.2)
+    summary = recording.summary()
+    assert (summary.touches, summary.uncompared) == ((), 20)
+    assert "20 true contacts are shorter than 0.1 s and not compared." in text(summary)
+    assert "not compared" not in text(Recording().summary())
+
+
+def test_a_press_that_is_touched_just_before_is_compared_once_even_if_it_is_short():
+    recording = nothing_but((1.6, 5.0, "outer_link", 10.0), (1.62, 5.0, "outer_link", 10.0))
+    recording.set(recording.commanded, 2.0, 5.0, "outer_link", (0.0, -8.0, 0.0))
+    times = {"lower": 0.0, "press 1": 2.0, "press 2": 2.3, "done": 5.0}
+    recording.statuses = [(name, START + round(1e9 * at), 0) for name, at in times.items()]
+    assert [touch.step for touch in recording.summary().touches] == ["press 1", "press 2"]
+
+
+def test_contacts_are_counted_by_link_wherever_they_are():
+    recording = nothing_but((1.0, 3.0, "outer_link", 10.0), (1.0, 3.0, "outer_link", 10.0))
+    recording.set(recording.true, 3.0, 4.0, "inner_link", (0.0, 10.0, 0.0), 0.28)
+    recording.statuses = [("push", START, 0), ("done", START + 5000 * MS, 0)]
+    bag = recording.bag()
+    summary = summarize(bag)
+    found = analyse_bag(bag, lambda doing: None)
+    assert "Something touched the arm 2 times." in [line for one in found.sections for line in one.sentences]
+    assert [touch.link_true for touch in summary.touches] == ["outer_link", "inner_link"]
+    assert [missed.link for missed in summary.missed] == ["inner_link"]
 
 
 def test_without_truth_the_estimate_shows_what_was_too_hard():
     recording = without_truth(Recording())
     recording.set(recording.estimated, 9.4, 9.5, "outer_link", (0.0, 115.0, 0.0), 0.25)
-    (hard,) = summarize(with_limits(recording)).hard
+    assert summarize(with_limits(recording)).unplanned.hard == ()  # of a simulated arm, which may have been pushed
+    recording.recording = {"mode": "realtime"}
+    (hard,) = summarize(with_limits(recording)).unplanned.hard
     assert (hard.force, hard.allowed, hard.source) == (115.0, 90.0, "estimated")
 
 
@@ -450,7 +590,7 @@ def test_what_a_step_sets_is_what_is_allowed_from_then_on():
     stated = bag.topics["/wam/status"].messages
     setting = SimpleNamespace(key="force_loop:limits.contact_force", value="200.0")
     stated[3].values.append(setting)  # of a step before
-    assert summarize(bag).hard == ()
+    assert summarize(bag).unplanned == ((), "")
 
 
 def test_a_contact_in_a_task_is_not_unplanned():
@@ -459,9 +599,8 @@ def test_a_contact_in_a_task_is_not_unplanned():
     bag = with_limits(recording)
     axis = {"kind": np.zeros(len(STAMPS))}
     task = TableColumns(STAMPS, STAMPS, ("base",) * len(STAMPS), np.arange(len(STAMPS)), axis)
-    assert summarize(bag._replace(topics={**bag.topics, "/wam/task_command": task})).hard == ()
-    none = task._replace(message=np.arange(0), columns={"kind": np.zeros(0)})  # no axes, no task
-    assert len(summarize(bag._replace(topics={**bag.topics, "/wam/task_command": none})).hard) == 1
+    assert summarize(bag._replace(topics={**bag.topics, "/wam/task_command": task})).unplanned.hard == ()
+    assert len(summarize(bag._replace(topics={**bag.topics, "/wam/task_command": NO_TASK})).unplanned.hard) == 1
 
 
 def test_a_push_or_a_commanded_force_is_not_unplanned():
@@ -469,7 +608,7 @@ def test_a_push_or_a_commanded_force_is_not_unplanned():
     recording.set(recording.push, 0.5, 1.5, "outer_link", (0.0, 120.0, 0.0))
     recording.set(recording.true, 0.5, 1.52, "outer_link", (0.0, 120.0, 0.0), 0.28)  # it ends later than its command
     recording.set(recording.true, 5.0, 5.5, "outer_link", (0.0, 120.0, 0.0), 0.25)
-    assert summarize(with_limits(recording)).hard == ()
+    assert summarize(with_limits(recording)).unplanned.hard == ()
 
 
 def test_a_reaction_to_what_pushes_states_how_hard_it_became():
@@ -490,7 +629,7 @@ def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():
     assert math.isnan(inner.position_estimated)
     assert inner.is_lower_bound
     assert f"* {REASON}" in text(summary)
-    assert verdict(summary).endswith("position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts")
+    assert "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts" in verdict(summary)
     row = next(line for line in text(summary).splitlines() if "push inner" in line)
     assert ">=10.00" in row.split()
 
@@ -565,7 +704,7 @@ def test_good_run_has_a_good_verdict_in_narrow_lines():
     summary = Recording().summary()
     assert verdict(summary) == (
         "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
-        "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts"
+        f"position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | {NO_LIMIT}"
     )
     assert all(len(line) <= 100 for line in text(summary).splitlines())
 
@@ -780,7 +919,7 @@ def test_without_contact_topics_the_estimate_is_not_recorded_and_not_none():
 def test_answers_that_are_no_are_those_and_not_a_text():
     recording = Recording()
     recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
-    force, link, position = demo_report.verdict(recording.summary())
+    force, link, position, _ = demo_report.verdict(recording.summary())
     assert (force.result, force.worst) == (VerdictResult.NO, "12.5 %")
     assert (link.result, position.result) == (VerdictResult.YES, VerdictResult.YES)
     assert position.remark == "unknown for 1 of 5 contacts"

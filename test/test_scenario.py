@@ -171,6 +171,16 @@ def test_a_push_without_times_lasts_for_its_step_and_one_of_several_steps_withou
     assert [k for k, out in enumerate(outs) if any(out.push_force)] == list(range(20))
 
 
+@pytest.mark.parametrize(
+    ("begin", "end", "acts"),
+    [(0.197, 0.2, [39]), (0.1011, 0.1039, [20]), (0.1039, 0.1061, [21]), (0.1, 0.105, [20]), (0.1, 0.1001, [20])],
+)
+def test_a_push_between_two_outer_periods_lasts_for_one(begin: float, end: float, acts: list[int]) -> None:
+    push = Push("outer_link", 0.3, (0.0, 10.0, 0.0), begin, end)
+    outs = play(Scenario([ScenarioStep("pushed", 0.2, push=push), ScenarioStep("free", 0.1)]), 50)
+    assert [k for k, out in enumerate(outs) if any(out.push_force)] == acts
+
+
 def test_a_push_does_at_the_joints_what_a_force_at_its_place_does() -> None:
     out = play(Scenario([ScenarioStep("pushed", 0.2, push=Push("outer_link", 0.3, (1.0, -7.0, 4.0), 0.0, 1.0))]), 1)[0]
     body = RigidBody(ARM)

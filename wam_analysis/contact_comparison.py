@@ -18,7 +18,6 @@ from wam_analysis.contact_list import (
     estimate,
     median,
     most,
-    time_of,
 )
 from wam_analysis.demo_traces import NAN, Mask, Times, Traces
 from wam_sim.recording import RecordedStep
@@ -34,6 +33,7 @@ class StepContact(NamedTuple):
     ----------
     begin, end : ns.
     link_true : 'none' where something was estimated and nothing touched.
+    link_estimated : 'none' also where a contact was estimated for less than `LASTING` of the time.
     right : fraction of the time in which the estimated link was the true one; NaN where it is not known.
     position_estimated : NaN also where another link was estimated.
     is_lower_bound : whether the estimated force is the least one, because the estimator cannot observe the position.
@@ -67,16 +67,19 @@ def compared_contacts(
     acting = [step for step in steps if np.any(traces.during(step.begin, step.end) & _acts(traces))]
     moving = [step for step in steps if step not in acting]
     found: list[StepContact] = []
+    compared: list[RecordedStep | None] = []
     links = contacts_by_link(traces.stamp, traces.true)
     for number, (first, last) in enumerate(links):
         latency = _latency(traces, links, number)
         for begin, end in cut_at(traces.stamp, [(first, last)], _bounds(traces.stamp, first, steps, moving)):
             if traces.stamp[end - 1] - traces.stamp[begin] >= BOUNCE:
-                name, *_ = time_of(traces, steps, begin, end)
+                own = _step(traces.stamp[begin:end], steps, moving)
+                name = own.name if own else ""
                 rows = np.arange(begin, end)
                 found.append(_compared(traces, certainty, name, rows, latency if begin == first else None))
+                compared.append(own)
     for step in acting:
-        if any(step.begin <= (one.begin + one.end) // 2 < step.end for one in found):
+        if step in compared:
             continue
         rows = np.flatnonzero(traces.during(step.begin, step.end))
         true = traces.true
@@ -86,6 +89,12 @@ def compared_contacts(
         begun = [_latency(traces, links, i) for i, (begin, _) in enumerate(links) if rows[0] <= begin <= rows[-1]]
         found.append(_compared(traces, certainty, step.name, rows, next(iter(begun), None)))
     return tuple(sorted(found, key=lambda one: one.begin))
+
+
+def uncompared_contacts(traces: Traces, touches: Sequence[StepContact]) -> int:
+    """The number of true contacts that are in none of those that are compared: they are shorter than `BOUNCE`."""
+    times = [traces.stamp[[begin, end - 1]] for begin, end in contacts_by_link(traces.stamp, traces.true)]
+    return sum(not any(one.begin <= end and begin <= one.end for one in touches) for begin, end in times)
 
 
 def _acts(traces: Traces) -> Mask:
@@ -98,11 +107,24 @@ def _bounds(stamp: Times, first: int, steps: Sequence[RecordedStep], moving: Seq
 
     A step that lowers the arm until it touches ends with a contact that is that of the step which presses then.
     """
-    begin = int(stamp[first])
-    later = [step.begin for step in steps if step.begin > begin]
+    pressing = _pressed(int(stamp[first]), steps, moving)
+    return [step.begin for step in steps if step.begin > stamp[first] and step != pressing]
+
+
+def _pressed(begin: int, steps: Sequence[RecordedStep], moving: Sequence[RecordedStep]) -> RecordedStep | None:
+    """The step to which a contact belongs that begins shortly before it, in a step that only moves."""
+    later = next((step for step in steps if step.begin > begin), None)
     is_moving = any(step.begin <= begin < step.end for step in moving)
-    presses = bool(later) and all(step.begin != later[0] for step in moving)
-    return later[1:] if is_moving and presses and later[0] - begin < TOUCH else later
+    return later if later and is_moving and later not in moving and later.begin - begin < TOUCH else None
+
+
+def _step(stamp: Times, steps: Sequence[RecordedStep], moving: Sequence[RecordedStep]) -> RecordedStep | None:
+    """The step to which a part of a contact at some stamps belongs: that of its middle, or that which presses then."""
+    begin, end = int(stamp[0]), int(stamp[-1])
+    pressing = _pressed(begin, steps, moving)
+    if pressing and pressing.begin <= end:
+        begin = pressing.begin
+    return next((step for step in steps if step.begin <= (begin + end) // 2 < step.end), None)
 
 
 def _compared(
@@ -117,7 +139,8 @@ def _compared(
     own = touching[true.frame[touching] == link]
     watched = touching if len(touching) else rows
     known = touching[estimated.is_known[touching]]
-    found = estimate(traces, certainty, touching[estimated.acts[touching]])
+    is_lasting = link == NOT_RECORDED or float(np.mean(estimated.acts[known])) >= LASTING if len(known) else False
+    found = estimate(traces, certainty, touching[estimated.acts[touching] & is_lasting])
     is_seen = found.link != NO_LINK or float(np.mean(estimated.is_known[watched])) >= LASTING
     is_same = estimated.acts[known] & (estimated.frame[known] == true.frame[known])
     return StepContact(

@@ -153,10 +153,10 @@ def listed_contacts(traces: Traces, certainty: Certainty, steps: Sequence[Record
 
 
 def missed_contacts(traces: Traces, steps: Sequence[RecordedStep]) -> tuple[MissedContact, ...]:
-    """The true contacts during which none was estimated, as far as both were recorded."""
+    """The true contacts, by link, during which none was estimated, as far as both were recorded."""
     true, estimated = traces.true, traces.estimated
     found = []
-    for begin, end in contact_rows(traces.stamp, true.acts):
+    for begin, end in contacts_by_link(traces.stamp, true):
         if np.all(estimated.is_known[begin:end]) and not np.any(estimated.acts[begin:end]):
             acting = begin + np.flatnonzero(true.acts[begin:end])
             force = median(true.size[acting])
@@ -276,16 +276,17 @@ def estimate(traces: Traces, certainty: Certainty, rows: NDArray[np.intp]) -> Es
         median(certainty.numbers[name][own]) for name in ("probability", "position_sd", "force_sd")
     )
     position = median(estimated.position[own])
+    placed = own[estimated.is_placed[own]]
     return Estimate(
         link,
         len(own) / max(len(rows), 1),
         probability,
         position,
         position_sd if not np.isnan(position) else NAN,
-        bool(np.any(estimated.is_placed[own])),
+        bool(len(placed)),
         median(estimated.size[own]),
         force_sd,
-        float(np.sum(estimated.is_lower_bound[own])) > LASTING * len(own),
+        float(np.sum(estimated.is_lower_bound[placed])) > LASTING * len(placed),
         float(np.mean(bits & sum(TWO) > 0)) if len(bits) else NAN,
         tuple(why for why, part in lasting.items() if part > LASTING and why not in (SECOND, CERTAIN_SECOND)),
     )

@@ -17,6 +17,7 @@ from wam_analysis.demo_traces import TOPICS_READ
 from wam_analysis.reactions import sentences, within
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import bounded, plain
+from wam_analysis.unplanned_contact import LIMIT
 from wam_bag.bag import BagError, read
 from wam_description.status import DONE
 from wam_sim.recording import recorded_run
@@ -102,7 +103,7 @@ def reaction_report(bag: Path) -> str:
 
 def reaction_text(summary: DemoSummary) -> str:
     """The same of a summary."""
-    hard = [line for one in summary.hard for line in _wrapped(f"  {one.sentence}", "    ")]
+    hard = [line for sentence in summary.unplanned.sentences for line in _wrapped(f"  {sentence}", "    ")]
     return "\n".join([*_reactions(summary), *([""] if hard else []), *hard])
 
 
@@ -127,7 +128,7 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
         *_contacts(summary),
         *_touches(summary.touches, summary.period),
     ]
-    for sentence in [one.sentence for one in summary.missed] + [one.sentence for one in summary.hard]:
+    for sentence in (*_uncompared(summary), *(one.sentence for one in summary.missed), *summary.unplanned.sentences):
         lines += _wrapped(f"  {sentence}", "    ")
     lines += _wrapped(_false_contacts(summary))
     lines += ["", *_wrapped(f"Loop     {_loop(summary.loop)}"), f"Messages {_messages(summary)}"]
@@ -138,11 +139,12 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
 def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, ...]:
     """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
     answers = _force_verdict(summary.presses), _link_verdict(summary), _position_verdict(summary)
-    if not summary.hard:
-        return answers
-    worst = max(summary.hard, key=lambda one: one.force)
-    question = f"without a commanded force no contact above {worst.allowed:g} N"
-    return *answers, VerdictAnswer(question, VerdictResult.NO, f"{worst.force:.0f} N")
+    hard, unknown = summary.unplanned
+    question = "without a commanded force no contact above"
+    if hard:
+        worst = max(hard, key=lambda one: one.force)
+        return *answers, VerdictAnswer(f"{question} {worst.allowed:g} N", VerdictResult.NO, f"{worst.force:.0f} N")
+    return *answers, *[VerdictAnswer(f"{question} {LIMIT}", VerdictResult.NOTHING, "", "see below")][: bool(unknown)]
 
 
 def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
@@ -340,11 +342,20 @@ def _touches(touches: Sequence[StepContact], period: float) -> list[str]:
         "- where it cannot be known: the contact began before the step or the recording, the estimate is missing, or "
         "that of the contact before goes on"
     )
+    is_missed = any(touch.link_estimated == NO_LINK for touch in compared)
     return [
         *("", "Compared with the true contacts, each in each of its steps"),
         *_table(rows, first, head),
         *_wrapped(f"  {same}; {force}; {latency}, {none}", "    "),
+        *[f"  estimated {NO_LINK}: no contact was, for most of the time"][:is_missed],
     ]
+
+
+def _uncompared(summary: DemoSummary) -> list[str]:
+    """How many true contacts the table lacks."""
+    number = summary.uncompared
+    contacts = "1 true contact is" if number == 1 else f"{number} true contacts are"
+    return [f"{contacts} shorter than {1e-9 * BOUNCE:g} s and not compared."] if number else []
 
 
 def _false_contacts(summary: DemoSummary) -> str:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_comparison import StepContact, compared_contacts
+from wam_analysis.contact_comparison import StepContact, compared_contacts, uncompared_contacts
 from wam_analysis.contact_list import (
     ListedContact,
     MissedContact,
@@ -20,7 +20,7 @@ from wam_analysis.measures.runs import runs
 from wam_analysis.press_positions import NOWHERE, PressPositions, press_positions
 from wam_analysis.reactions import RecordedReaction, reactions_of, within
 from wam_analysis.task_forces import TaskForce, measured_force, task_forces
-from wam_analysis.unplanned_contact import HardContact, hard_contacts
+from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.bag import Bag
 from wam_bag.losses import RECORDING, losses
 from wam_control.force_hold import ForceReaction
@@ -101,7 +101,8 @@ class DemoSummary(NamedTuple):
     tasks : forces that tasks command.
     contacts : all that were estimated.
     missed : true contacts that were not.
-    hard : contacts in motion, harder than allowed.
+    unplanned : contacts without a command of a force, harder than allowed.
+    uncompared : number of the true contacts that are in none of the touches, as they are too short.
     reactions : of the force loop to what was commanded, and faults of the driver.
     outcome : DONE, why the scenario failed, or that the recording ended before.
     false_contact, longest_false_contact : time of false detections and the longest of them, s.
@@ -122,7 +123,8 @@ class DemoSummary(NamedTuple):
     touches: tuple[StepContact, ...]
     contacts: tuple[ListedContact, ...]
     missed: tuple[MissedContact, ...]
-    hard: tuple[HardContact, ...]
+    unplanned: UnplannedContacts
+    uncompared: int
     reactions: tuple[RecordedReaction, ...]
     false_contact: float
     longest_false_contact: float
@@ -158,6 +160,8 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     reactions = tuple(_with_largest(one, traces) for one in reactions_of(run, _end(traces, steps)))
     presses = tuple(press for step in steps for press in _presses(run, traces, tasks, step, reactions))
     certainty = certainty_of(run, traces)
+    refused = {press.step for press in presses if press.is_refused}
+    touches = compared_contacts(traces, certainty, steps, refused)
     known = traces.true.is_known & traces.estimated.is_known
     false = known & ~traces.true.acts & traces.estimated.acts
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
@@ -171,10 +175,11 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         traces=traces,
         tasks=tuple(tasks),
         presses=presses,
-        touches=compared_contacts(traces, certainty, steps, {press.step for press in presses if press.is_refused}),
+        touches=touches,
         contacts=listed_contacts(traces, certainty, steps),
         missed=missed_contacts(traces, steps),
-        hard=hard_contacts(run, traces, steps),
+        unplanned=unplanned_contacts(run, traces, steps),
+        uncompared=uncompared_contacts(traces, touches),
         reactions=reactions,
         false_contact=int(np.sum(false)) * period,
         longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * period,

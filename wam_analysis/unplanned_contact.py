@@ -1,16 +1,17 @@
 """Contacts while neither a force nor a task is commanded and nothing pushes: harder than the configuration allows."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.demo_traces import Mask, Traces, held_rows
+from wam_analysis.demo_traces import NAN, Mask, Numbers, Traces, held_rows
 from wam_bag.bag import BagError, TableColumns
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_sim.recording import RecordedRun, RecordedStep
 
 AFTER = 100_000_000  # ns, for which the force of a push or a press may last after its command
+LIMIT = "limits.contact_force"
 
 
 class HardContact(NamedTuple):
@@ -18,7 +19,7 @@ class HardContact(NamedTuple):
 
     Attributes
     ----------
-    step : name of the step.
+    step : name of the step, '' outside of a scenario.
     seconds : when, s, counted as in `Traces.zero`.
     force, allowed : N, of all that acts, and `limits.contact_force` of the force loop.
     source : 'true', or 'estimated' where the true contact was not recorded.
@@ -33,34 +34,89 @@ class HardContact(NamedTuple):
     @property
     def sentence(self) -> str:
         """What was too hard, and when."""
+        during = f"{self.step}: " * bool(self.step)
         return (
-            f"{self.step}: TOO HARD: a contact with {self.force:.3g} N ({self.source}, at {self.seconds:.2f} s) while "
-            f"no force was commanded; allowed: limits.contact_force, {self.allowed:g} N."
+            f"{during}TOO HARD: a contact with {self.force:.3g} N ({self.source}, at {self.seconds:.2f} s) while "
+            f"no force was commanded; allowed: {LIMIT}, {self.allowed:g} N."
         )
 
 
-def hard_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> tuple[HardContact, ...]:
-    """Of each step in which one was harder than allowed; none where the parameters are not known."""
-    found, settings = [], dict[str, Any]()
-    is_planned = _planned(run, traces)
-    for step in steps:
-        settings |= step.settings
-        try:
-            own = run.parameters.with_values(settings).part("force_loop", ForceLoopParameters)
-        except BagError:
-            return ()
-        rows = np.flatnonzero(traces.during(step.begin, step.end) & ~is_planned)
+class UnplannedContacts(NamedTuple):
+    """Those that were too hard, one for each step and for the time before and after; and what is not known of others.
+
+    Attributes
+    ----------
+    hard : in the order of time.
+    unknown : why it is not known whether contacts were too hard, '' where it is.
+    """
+
+    hard: tuple[HardContact, ...]
+    unknown: str
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What was too hard, and what is not known."""
+        unknown = f"Whether a contact without a commanded force was too hard is not known: {self.unknown}."
+        return (*(one.sentence for one in self.hard), *[unknown][: bool(self.unknown)])
+
+
+def unplanned_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> UnplannedContacts:
+    """Those of all the time that was recorded; with the true force where it is known in a step, else the estimated."""
+    found: list[HardContact] = []
+    unknown: list[str] = []
+    lacking = _lacking(run)
+    is_planned, allowed = _planned(run, traces), _allowed(run, traces, steps)
+    for name, begin, end in _parts(traces, steps):
+        rows = begin + np.flatnonzero(~is_planned[begin:end])
         source, signal = "true", traces.true
         if not np.any(signal.is_known[rows]):
             source, signal = "estimated", traces.estimated
-        if not np.any(signal.acts[rows]):
+        rows = rows[signal.acts[rows]]
+        if np.any(np.isnan(allowed[rows])):
+            unknown.append(f"{LIMIT} of the force loop was not recorded, or cannot be read")
+        rows = rows[signal.size[rows] > allowed[rows]]
+        if not len(rows):
             continue
-        hardest = int(rows[np.nanargmax(signal.size[rows])])
-        force, allowed = float(signal.size[hardest]), own.limits.contact_force
-        if force > allowed:
-            seconds = (int(traces.stamp[hardest]) - traces.zero) / 1e9
-            found.append(HardContact(step.name, seconds, force, allowed, source))
-    return tuple(found)
+        hardest = int(rows[np.argmax(signal.size[rows])])
+        seconds = (int(traces.stamp[hardest]) - traces.zero) / 1e9
+        hard = HardContact(name, seconds, float(signal.size[hardest]), float(allowed[hardest]), source)
+        if lacking:
+            unknown.append(f"one had {hard.force:.3g} N, and what may have been commanded then was not recorded "
+                           f"({', '.join(lacking)})")  # fmt: skip
+        else:
+            found.append(hard)
+    return UnplannedContacts(tuple(found), "; ".join(dict.fromkeys(unknown)))
+
+
+def _lacking(run: RecordedRun) -> list[str]:
+    """Topics of commands that were not recorded; the arm itself has no disturbance."""
+    topics = {*run.bag.topics, *run.bag.counts}
+    is_simulated = run.mode == "lockstep" or any(name.startswith(f"{run.namespace}/sim/") for name in topics)
+    names = ["force_command", "task_command", *["sim/disturbance"][:is_simulated]]
+    return [name for name in names if f"{run.namespace}/{name}" not in run.bag.topics]
+
+
+def _parts(traces: Traces, steps: Sequence[RecordedStep]) -> list[tuple[str, int, int]]:
+    """Name and rows [begin, end) of the time before the steps, of each and of that after them."""
+    bounds = np.searchsorted(traces.stamp, [step.begin for step in steps] + [step.end for step in steps[-1:]]).tolist()
+    names = ["", *(step.name for step in steps), *[""][: len(steps)]]
+    return list(zip(names, [0, *bounds], [*bounds, len(traces.stamp)], strict=True))
+
+
+def _allowed(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> Numbers:
+    """The largest force that the configuration allows at each instant, (k,), N; NaN where it cannot be read."""
+    changes = [(step.begin, step.settings) for step in steps]
+    changes += [(change.after, change.settings) for change in run.changes("force_loop")]
+    allowed = np.full(len(traces.stamp), NAN)
+    parameters = run.parameters
+    for begin, settings in [(0, {}), *sorted(changes, key=lambda change: change[0])]:
+        parameters = parameters.with_values(settings)
+        try:
+            limit = parameters.part("force_loop", ForceLoopParameters).limits.contact_force
+        except BagError:
+            limit = NAN
+        allowed[traces.stamp >= begin] = limit
+    return allowed
 
 
 def _planned(run: RecordedRun, traces: Traces) -> Mask:

@@ -34,8 +34,8 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "until_force": "N; the step ends when a contact of this force is detected, and the scenario fails where none is",
     "chirp": "`{newtons, from, to}`: a sine along the force, from one frequency to another, Hz",
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm, m along the link, N"
-    " in its frame, s from the start of the step; `begin` and `end` may be left out: for the whole step. A push of "
-    "several steps is given in each",
+    " in its frame, s from the start of the step; `begin` and `end` may be left out: for the whole step. It lasts for "
+    "one outer period at least. A push of several steps is given in each",
     "request": "`enable` or `disable` at the start of the step",
     "set": "`{force_loop: {force_gain: [0.01]}}`: live parameters of driver or force_loop from the start of the step",
 }
@@ -68,6 +68,17 @@ class Push(NamedTuple):
     begin: float  # s
     end: float  # s
     aside: tuple[float, float] = (0.0, 0.0)  # m, y and z of the tube's axis there
+
+    def acts(self, elapsed: float, dt: float) -> bool:
+        """Whether it acts in the outer period that begins now; one within a single period acts for all of that.
+
+        Parameters
+        ----------
+        elapsed : s from the start of the step.
+        dt : outer period, s.
+        """
+        is_within = elapsed <= self.begin and self.end <= elapsed + dt + ROUNDING
+        return is_within or self.begin <= elapsed + ROUNDING < self.end
 
 
 class Chirp(NamedTuple):
@@ -169,7 +180,7 @@ class Scenario:
         elif step.posture and not self.done:
             self._posture = self._on_path(step)
         push = step.push
-        pushing = push is not None and push.begin <= self._elapsed + ROUNDING < push.end and not self.done
+        pushing = push is not None and push.acts(self._elapsed, dt) and not self.done
         force = fx, fy, fz = push.force if push and pushing else (0.0, 0.0, 0.0)
         x, y, z = (push.position, *push.aside) if push and pushing else (0.0, 0.0, 0.0)
         request = "disable" if self.failure else step.request

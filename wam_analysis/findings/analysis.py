@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.contact_list import contact_rows
+from wam_analysis.contact_list import contacts_by_link
 from wam_analysis.demo_summary import driver_faults
 from wam_analysis.demo_traces import Traces
 from wam_analysis.findings.analysed_run import AnalysedRun, analysed_run
@@ -162,10 +162,10 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
 
 
 def _touched(traces: Traces) -> Iterator[str]:
-    """How often something touched the arm, as far as that was recorded."""
+    """How often something touched the arm, each link by itself, as far as that was recorded."""
     for signal, touched in ((traces.true, "Something touched the arm"), (traces.estimated, "A contact was estimated")):
         if np.any(signal.is_known):
-            yield f"{touched} {times(len(contact_rows(traces.stamp, signal.acts)))}."
+            yield f"{touched} {times(len(contacts_by_link(traces.stamp, signal)))}."
             return
 
 

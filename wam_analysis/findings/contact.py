@@ -34,7 +34,7 @@ def contact_section(recording: AnalysedRun) -> Section:
     lacking = recording.lacking(*estimated, "sim/contact/wrench", "sim/contact/point")
     sentences: list[str] = []
     findings: list[Finding] = []
-    verdict = [one.sentence for one in summary.missed] + [one.sentence for one in summary.hard]
+    verdict = [*(one.sentence for one in summary.missed), *summary.unplanned.sentences]
     for number, contact in enumerate(summary.contacts, 1):
         name = f"{number} {contact.estimate.link}"
         sentences += _doubts(name, contact)
