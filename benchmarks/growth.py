@@ -213,7 +213,7 @@ def main() -> None:
             rows.append([f"{name}: {size}", f"{1e3 * quartiles(values).median:.3g}", f"{growth:.2f}", each, reached])
     print(machine())
     print(table(["work", "cost [ms]", "relative to the smallest", "the same, in proportion", "[must, aim]"], rows))
-    if not given.quick:
+    if not (given.quick or given.only):
         draw({name: found for name, found in costs.items() if found})
 
 
