@@ -55,6 +55,7 @@ COMPILED = (
     "wam_sim/bus.py",
     "wam_sim/simulation.py",
 )
+COMPILE = "pip install -U mypy mujoco wheel 'setuptools>=68,<80' && WAM_COMPILE=1 pip install --no-build-isolation ."
 CONFIGURATIONS = ("config", "config/experiments", "config/experiments/sets", "config/tasks")
 
 
@@ -65,11 +66,12 @@ def extensions():
     try:
         from mypyc.build import mypycify
     except ImportError:
-        sys.exit("WAM_COMPILE needs mypyc: pip install mypy mujoco, then pip install --no-build-isolation .")
+        sys.exit(f"WAM_COMPILE needs mypyc: {COMPILE}")
     mujoco = find_spec("mujoco")
     if mujoco is None or mujoco.origin is None:
-        sys.exit("WAM_COMPILE needs the headers of MuJoCo: pip install mujoco")
-    found = mypycify([*COMPILED, "--config-file", "pyproject.toml"], opt_level="2", multi_file=True)
+        sys.exit(f"WAM_COMPILE needs the headers of MuJoCo: {COMPILE}")
+    given = ["--config-file", "pyproject.toml", "--ignore-missing-imports"]  # stubs are for `make lint`
+    found = mypycify([*COMPILED, *given], opt_level="2", multi_file=True)
     headers = Path(mujoco.origin).parent / "include"
     found.append(Extension("wam_driver.fast_steps", ["wam_driver/fast_steps.c"], include_dirs=[str(headers)]))
     for extension in found:

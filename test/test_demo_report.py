@@ -21,7 +21,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from wam_analysis import arm_picture, demo_report
 from wam_analysis.contact_comparison import NOT_RECORDED
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_PLACED, Cut, certainty_of, listed_contacts
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_PLACED, CutBy, certainty_of, listed_contacts
 from wam_analysis.demo_figure import draw_arm, draw_forces, save
 from wam_analysis.demo_report import VerdictResult, report, text
 from wam_analysis.demo_summary import DemoSummary, summarize, summary_of
@@ -394,7 +394,7 @@ def test_a_hole_in_a_recording_of_the_estimate_alone_ends_the_contact():
     topics = {name: one for name, one in bag.topics.items() if "contact" not in name} | {"/wam/contact/wrench": lost}
     summary = summarize(bag._replace(topics=topics))
     pressed = [(one.before, one.after) for one in summary.contacts if one.step == "press 8 N"]
-    assert pressed == [(Cut.NOTHING, Cut.GAP), (Cut.GAP, Cut.NOTHING)]
+    assert pressed == [(CutBy.NOTHING, CutBy.GAP), (CutBy.GAP, CutBy.NOTHING)]
 
 
 def test_a_thinned_recording_has_no_gaps():
@@ -404,7 +404,7 @@ def test_a_thinned_recording_has_no_gaps():
     topics = {name: one for name, one in bag.topics.items() if "contact" not in name} | {"/wam/contact/wrench": few}
     contacts = summarize(bag._replace(topics=topics)).contacts
     assert [one.step for one in contacts] == ["push outer", "push inner", "press 8 N", "press 4 N"]
-    assert {cut for one in contacts for cut in (one.before, one.after)} == {Cut.NOTHING}
+    assert {cut for one in contacts for cut in (one.before, one.after)} == {CutBy.NOTHING}
 
 
 def with_limits(recording: Recording) -> Bag:
@@ -836,8 +836,8 @@ def test_a_contact_cut_by_the_recording_is_marked_and_has_no_latency():
     recording.set(recording.estimated, 9.0, 10.0, "outer_link", (0.0, 3.0, 0.0), 0.26)
     summary = recording.summary()
     cut = [(one.before, one.after) for one in summary.contacts]
-    whole = (Cut.NOTHING, Cut.NOTHING)
-    assert cut == [(Cut.RECORDING, Cut.NOTHING), whole, whole, whole, (Cut.NOTHING, Cut.RECORDING)]
+    whole = (CutBy.NOTHING, CutBy.NOTHING)
+    assert cut == [(CutBy.RECORDING, CutBy.NOTHING), whole, whole, whole, (CutBy.NOTHING, CutBy.RECORDING)]
     assert summary.touches[0].latency is None
     shown = text(summary)
     rows = [line.split() for line in shown.splitlines()]
@@ -863,7 +863,7 @@ def test_a_contact_is_cut_where_the_estimate_was_lost():
     )
     summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": lost}))
     pressed = [(one.before, one.after) for one in summary.contacts if one.step == "press 8 N"]
-    assert pressed == [(Cut.NOTHING, Cut.GAP), (Cut.GAP, Cut.NOTHING)]
+    assert pressed == [(CutBy.NOTHING, CutBy.GAP), (CutBy.GAP, CutBy.NOTHING)]
     shown = text(summary)
     assert "from <=, to >= within the recording: the estimate is missing there, and comes again" in shown
     assert "it began before the recording" not in shown

@@ -13,7 +13,6 @@ from wam_ros.bring_up import Processes
 from wam_ros.processors import PROCESSORS, divided, idle_parts, keep_to_processors
 from wam_ros.run import PARENT
 
-ALL = os.sched_getaffinity(0)
 ENTRIES = ["driver", "velocity_loop", "contact_estimator"]
 
 
@@ -31,25 +30,28 @@ def test_among_processors_that_are_idle_alike_two_arms_choose_by_chance() -> Non
 
 
 def test_every_permitted_processor_is_looked_at() -> None:
-    parts = idle_parts(ALL)
-    assert set(parts) == ALL
+    permitted = os.sched_getaffinity(0)
+    parts = idle_parts(permitted)
+    assert set(parts) == permitted
     assert all(0.0 <= part <= 1.0 for part in parts.values())
 
 
 def test_a_system_that_shows_no_times_has_no_idle_processor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    permitted = os.sched_getaffinity(0)
     for file, text in (("none", None), ("another", "cpu 1 2\ncpu9999 1 2 3 4 5\nintr 5 4\n\n")):
         if text is not None:
             (tmp_path / file).write_text(text)
         monkeypatch.setattr(processors, "TIMES", tmp_path / file)
-        assert idle_parts(ALL) == dict.fromkeys(ALL, 0.0)
+        assert idle_parts(permitted) == dict.fromkeys(permitted, 0.0)
 
 
 @pytest.mark.parametrize("given", ["", "x", "-1", "99999999999", "9999"])
 def test_processors_that_do_not_exist_are_none(given: str) -> None:
+    permitted = os.sched_getaffinity(0)
     environment = {PROCESSORS: given}
     keep_to_processors(environment)
     assert environment == {}
-    assert os.sched_getaffinity(0) == ALL
+    assert os.sched_getaffinity(0) == permitted
     assert os.sched_getscheduler(0) != os.SCHED_BATCH
 
 
@@ -65,6 +67,7 @@ def placed(processes: Processes) -> dict[str, set[tuple[int, frozenset[int]]]]:
 
 
 def test_processes_of_a_lockstep_keep_to_their_processors(domain_id: int) -> None:
+    permitted = os.sched_getaffinity(0)
     configuration = Configuration.load(packaged("wam")).with_values({"timing.mode": "lockstep", "nodes": ENTRIES})
     with Processes(configuration) as processes:
         end = time.monotonic() + LONG
@@ -76,8 +79,8 @@ def test_processes_of_a_lockstep_keep_to_their_processors(domain_id: int) -> Non
     assert driver == velocity_loop
     (inner,) = driver
     assert len(inner) == 1
-    assert contact_estimator == {frozenset(ALL - inner or ALL)}
-    assert os.sched_getaffinity(0) == ALL
+    assert contact_estimator == {frozenset(permitted - inner or permitted)}
+    assert os.sched_getaffinity(0) == permitted
     assert os.sched_getscheduler(0) != os.SCHED_BATCH
 
 

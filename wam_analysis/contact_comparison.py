@@ -11,7 +11,7 @@ from wam_analysis.contact_list import (
     LASTING,
     NO_LINK,
     Certainty,
-    Cut,
+    CutBy,
     contacts_by_link,
     cut_at,
     cut_ends,
@@ -166,7 +166,7 @@ def _latency(traces: Traces, contacts: Sequence[tuple[int, int]], number: int) -
     """
     (begin, end), estimated = contacts[number], traces.estimated
     before, _ = cut_ends(traces.true, begin, end)
-    if before is not Cut.NOTHING or not estimated.is_known[begin]:
+    if before is not CutBy.NOTHING or not estimated.is_known[begin]:
         return None
     if estimated.acts[begin]:
         free = np.flatnonzero(~estimated.acts[:begin])

@@ -35,7 +35,7 @@ LASTING = 0.5  # of a contact, above which a reason belongs to it; a value known
 TWO = tuple(2 ** REASONS.index(reason) for reason in (SECOND, CERTAIN_SECOND))
 
 
-class Cut(Enum):
+class CutBy(Enum):
     """What cuts off a contact at one of its ends."""
 
     NOTHING = ""
@@ -87,8 +87,8 @@ class ListedContact(NamedTuple):
     step: str
     begin: float
     end: float
-    before: Cut
-    after: Cut
+    before: CutBy
+    after: CutBy
     estimate: Estimate
     true: str
     true_position: float
@@ -186,7 +186,7 @@ def median(values: Numbers) -> float:
     return float(np.median(known)) if len(known) >= LASTING * len(values) > 0 else NAN
 
 
-def cut_ends(signal: ForceSignal, begin: int, end: int) -> tuple[Cut, Cut]:
+def cut_ends(signal: ForceSignal, begin: int, end: int) -> tuple[CutBy, CutBy]:
     """What cuts off a contact in the rows [begin, end) before and after it.
 
     A part of a contact that is followed by another part of it is not cut there.
@@ -195,11 +195,11 @@ def cut_ends(signal: ForceSignal, begin: int, end: int) -> tuple[Cut, Cut]:
     return _cut_by(known[:begin][::-1]), _cut_by(known[end:])
 
 
-def _cut_by(known: Mask) -> Cut:
+def _cut_by(known: Mask) -> CutBy:
     """What cuts off a contact, from where its signal is known outside of it, the nearest instant first."""
     if len(known) and known[0]:
-        return Cut.NOTHING
-    return Cut.GAP if np.any(known) else Cut.RECORDING
+        return CutBy.NOTHING
+    return CutBy.GAP if np.any(known) else CutBy.RECORDING
 
 
 def contacts_by_link(stamp: Times, signal: ForceSignal) -> list[tuple[int, int]]:

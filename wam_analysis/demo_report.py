@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wam_analysis.contact_comparison import NOT_RECORDED, StepContact
-from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, Cut
+from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import STEADY, DemoSummary, LoopReport, SteadyPress, summary_of
 from wam_analysis.demo_traces import TOPICS_READ
@@ -279,8 +279,8 @@ def _contacts(summary: DemoSummary) -> list[str]:
     head = ["step", "from", "to", "", "[%]", "", "+-", "", "+-", "contact"]
     rows = [
         [
-            *(contact.step, "<=" * (contact.before is not Cut.NOTHING) + _number(contact.begin, 2)),
-            bounded(_number(contact.end, 2), contact.after is not Cut.NOTHING),
+            *(contact.step, "<=" * (contact.before is not CutBy.NOTHING) + _number(contact.begin, 2)),
+            bounded(_number(contact.end, 2), contact.after is not CutBy.NOTHING),
             *(one.link, _number(100.0 * one.probability, 0)),
             ("?" + "*" * bool(one.reasons)) if one.is_lower_bound else _number(100.0 * one.position, 1),
             _number(100.0 * one.position_sd, 1),
@@ -291,11 +291,11 @@ def _contacts(summary: DemoSummary) -> list[str]:
     ]
     lines = [title, *_table(rows, first, head)]
     before, after = ({getattr(contact, end) for contact in contacts} for end in ("before", "after"))
-    if Cut.RECORDING in before:
+    if CutBy.RECORDING in before:
         lines.append("  from <=: it began before the recording")
-    if Cut.RECORDING in after:
+    if CutBy.RECORDING in after:
         lines.append("  to >=: it goes past the end of the recording")
-    if Cut.GAP in before | after:
+    if CutBy.GAP in before | after:
         lines.append("  from <=, to >= within the recording: the estimate is missing there, and comes again")
     if any(math.isnan(one.position) and one.is_placed and not one.is_lower_bound for one in estimates):
         lines.append("  position -: known for less than half of the time of the contact")

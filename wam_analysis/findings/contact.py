@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, Cut, ListedContact
+from wam_analysis.contact_list import NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy, ListedContact
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown, times
 from wam_analysis.measures.runs import runs
@@ -14,14 +14,14 @@ from wam_bag.bag import TableColumns
 from wam_description.topics import FRICTION_COLUMNS
 
 BEFORE = {
-    Cut.NOTHING: "",
-    Cut.RECORDING: "it began before the recording",
-    Cut.GAP: "the estimate is missing before it",
+    CutBy.NOTHING: "",
+    CutBy.RECORDING: "it began before the recording",
+    CutBy.GAP: "the estimate is missing before it",
 }
 AFTER = {
-    Cut.NOTHING: "",
-    Cut.RECORDING: "it goes past the end of the recording",
-    Cut.GAP: "the estimate is missing after it",
+    CutBy.NOTHING: "",
+    CutBy.RECORDING: "it goes past the end of the recording",
+    CutBy.GAP: "the estimate is missing after it",
 }
 STEADY_LINK = 0.9  # of the time of a contact, below which it is reported that the estimated link changed
 
