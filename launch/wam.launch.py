@@ -22,10 +22,9 @@ from launch_ros.actions import Node
 from launch import LaunchContext, LaunchDescription
 from wam_control.scenario import load, script_file
 from wam_description.configuration import Configuration, option_values, packaged
-from wam_description.interface import process_groups
 from wam_description.nodes import EACH, GROUPED, NODES
 from wam_description.urdf import urdf
-from wam_ros.processors import placements
+from wam_ros.processors import placed_groups
 from wam_ros.run import NAMESPACE, PARENT
 
 CONFIGURED = "configured"
@@ -92,8 +91,7 @@ def start_nodes(context: LaunchContext) -> list[Any]:
     if configuration.shared.timing.mode == "lockstep" and given["processes"] == "false":
         command = ["up", "--config", str(parameters), "--namespace", namespace, "--log-level", given["log_level"]]
         return [program(command, ends), *viewers]
-    groups = process_groups(configuration.shared.nodes, GROUPED if given["processes"] == GROUPED else EACH)
-    places = placements(groups, configuration.shared.timing.mode == "lockstep")
+    processes = GROUPED if given["processes"] == GROUPED else EACH
     nodes = [
         Node(
             package="wam_stack",
@@ -104,7 +102,7 @@ def start_nodes(context: LaunchContext) -> list[Any]:
             parameters=[str(parameters)],
             **{**ends, "additional_env": {**ends["additional_env"], **place}},
         )
-        for group, place in zip(groups, places, strict=True)
+        for group, place in placed_groups(configuration.shared, processes)
     ]
     return [*nodes, *viewers]
 

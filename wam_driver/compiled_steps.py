@@ -13,9 +13,8 @@ from wam_driver.dry_friction import DryFriction
 from wam_driver.loads import AppliedPush
 from wam_driver.surfaces import SHARPNESS, SMALLEST_DEPTH, SurfaceLaw
 
-Advance = Callable[
-    [int, bool, Callable[[], object]], list[float]
-]  # `advance` of fast_steps.c, without its first argument
+# `advance` of fast_steps.c, without its first argument
+Advance = Callable[[int, bool, Callable[[], object]], list[float]]
 
 
 def compiled_steps(

@@ -20,6 +20,7 @@ typedef struct {
   Step first, second;
   Apply apply;
   SetHandler set;
+  PyObject *given;  /* the tuple of all that follow, which keeps them alive */
   PyObject *error, *laws, *low, *high, *direction, *each, *circuits, *pushes;
   double step, smallest, sharpness;
 } Plant;
@@ -160,9 +161,7 @@ static const char *const PREPARED = "wam_driver.fast_steps.Plant";
 
 static void forget(PyObject *capsule) {
   Plant *plant = PyCapsule_GetPointer(capsule, PREPARED);
-  PyObject *held[] = {plant->error, plant->laws, plant->low,      plant->high,
-                      plant->direction, plant->each, plant->circuits, plant->pushes};
-  for (size_t i = 0; i < sizeof held / sizeof *held; i++) Py_DECREF(held[i]);
+  Py_DECREF(plant->given);
   PyMem_Free(plant);
 }
 
@@ -182,7 +181,7 @@ static PyObject *prepare(PyObject *Py_UNUSED(self), PyObject *args) {
                         &given.direction, &PyList_Type, &given.each, &given.circuits, &PyDict_Type, &given.pushes,
                         &given.step, &given.smallest, &given.sharpness))
     return NULL;
-  given.model = (const mjModel *)model, given.data = (mjData *)data;
+  given.given = args, given.model = (const mjModel *)model, given.data = (mjData *)data;
   given.first = (Step)first, given.second = (Step)second, given.apply = (Apply)apply, given.set = (SetHandler)set;
   const Py_ssize_t shafts = PyList_GET_SIZE(given.low);
   if (PyList_GET_SIZE(given.high) != shafts || PyList_GET_SIZE(given.direction) != shafts ||
@@ -193,11 +192,11 @@ static PyObject *prepare(PyObject *Py_UNUSED(self), PyObject *args) {
   Plant *plant = PyMem_Malloc(sizeof *plant);
   if (!plant) return PyErr_NoMemory();
   *plant = given;
-  PyObject *held[] = {plant->error, plant->laws, plant->low,      plant->high,
-                      plant->direction, plant->each, plant->circuits, plant->pushes};
-  for (size_t i = 0; i < sizeof held / sizeof *held; i++) Py_INCREF(held[i]);
   PyObject *capsule = PyCapsule_New(plant, PREPARED, forget);
-  if (!capsule) PyMem_Free(plant);
+  if (capsule)
+    Py_INCREF(args);
+  else
+    PyMem_Free(plant);
   return capsule;
 }
 

@@ -70,7 +70,6 @@ class CoverLoads:
         self._site = {name: model.site(f"{name}_frame").id for name in covers.names}
         self._rotation = {name: data.site_xmat[site].reshape(3, 3) for name, site in self._site.items()}
         self._origin = {name: data.site_xpos[site] for name, site in self._site.items()}
-        self._rows = {name: data.site_xmat[site] for name, site in self._site.items()}
         self._applied = data.qfrc_applied
         present = {model.geom(i).name for i in range(model.ngeom)}
         geoms = {geom: name for name in covers.names for geom in (name, folded(name)) if geom in present}
@@ -94,7 +93,9 @@ class CoverLoads:
             position = (fy * tz - fz * ty) / square if square > 0.0 else math.nan
             load = PartialLoad(pushed, turned, position)
             frame = self._site[cover], self._body[cover]
-            self.pushes[cover] = AppliedPush(*frame, *at_frame, self._rows[cover], self._origin[cover], load)
+            self.pushes[cover] = AppliedPush(
+                *frame, *at_frame, self._rotation[cover].reshape(9), self._origin[cover], load
+            )
         else:
             self.pushes.pop(cover, None)
 

@@ -16,13 +16,13 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 
 from wam_description.configuration import Configuration
-from wam_description.interface import declared, process_groups
+from wam_description.interface import declared
 from wam_description.nodes import EACH, ONE
 from wam_ros.leaving import HELD_UP
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node
-from wam_ros.processors import placements
+from wam_ros.processors import placed_groups
 from wam_ros.run import FIRST, LAST, NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
 LOGGER: Final = get_logger("wam")
@@ -115,11 +115,9 @@ class Processes:
         parameters = self._stack.enter_context(parameter_file(configuration))
         own = ["--params-file", str(parameters), "--log-level", log_level]
         namespaced = f"__ns:=/{namespace.strip('/')}"
-        groups = process_groups(configuration.shared.nodes, processes)
-        places = placements(groups, configuration.shared.timing.mode == "lockstep")
         self._processes = {
             " or ".join(names[entry] for entry in group): _start(group, [*own, "-r", namespaced], place)
-            for group, place in zip(groups, places, strict=True)
+            for group, place in placed_groups(configuration.shared, processes)
         }
         self._first = next((name for name in self._processes if FIRST in name.split()), FIRST)
 

@@ -11,12 +11,13 @@ import os
 import random
 import re
 import time
-from collections.abc import Collection, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from wam_description.interface import declared
+from wam_description.arm import Shared
+from wam_description.interface import declared, process_groups
 from wam_description.nodes import GROUPS, INNER
 from wam_ros.priority import for_all_threads
 
@@ -27,19 +28,22 @@ IDLE: Final = slice(3, 5)  # columns of a processor's times: idle, and waiting f
 STEPS: Final = 10  # of load; within one of them it is chance which processor is the idlest
 
 
-def placements(groups: Sequence[Sequence[str]], is_lockstep: bool) -> list[dict[str, str]]:
-    """Environment of each process, in which it finds its processors; empty where it may be anywhere.
+def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[str, str]]]:
+    """Entries of the parameter `nodes` that share a process, and its environment, in which it finds its processors.
+
+    In realtime that is empty: each process may be anywhere.
 
     Parameters
     ----------
-    groups : entries of the parameter `nodes` that share a process, for each process.
-    is_lockstep : whether the nodes wait for each other.
+    shared : shared parameters.
+    processes : GROUPED or EACH, of `wam_description.nodes`.
     """
-    if not is_lockstep:
-        return [{} for _ in groups]
+    groups = process_groups(shared.nodes, processes)
+    if shared.timing.mode != "lockstep":
+        return [(group, {}) for group in groups]
     inner, outer = divided(idle_parts(os.sched_getaffinity(0)))
-    places = (inner if GROUPS.get(declared(group[0]).name) == INNER else outer for group in groups)
-    return [{PROCESSORS: " ".join(map(str, place))} for place in places]
+    places = [inner if GROUPS.get(declared(group[0]).name) == INNER else outer for group in groups]
+    return [(group, {PROCESSORS: " ".join(map(str, place))}) for group, place in zip(groups, places, strict=True)]
 
 
 def divided(idle: Mapping[int, float]) -> tuple[set[int], set[int]]:
@@ -83,5 +87,9 @@ def keep_to_processors(environment: MutableMapping[str, str]) -> None:
     # where the system permits others by now, it shares them out itself
     with suppress(OSError, KeyError, ValueError, OverflowError):
         processors = [int(one) for one in environment.pop(PROCESSORS).split()]
-        for_all_threads(lambda thread: os.sched_setaffinity(thread, processors))
-        for_all_threads(lambda thread: os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0)))
+
+        def keep(thread: int) -> None:
+            os.sched_setaffinity(thread, processors)
+            os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0))
+
+        for_all_threads(keep)

@@ -22,7 +22,7 @@ from wam_cli.commands import (
 )
 from wam_control.scenario import load
 from wam_description import yaml_text
-from wam_description.configuration import packaged
+from wam_description.configuration import LONGEST, packaged
 from wam_experiments.figures.sweeps import Sets, experiment_figure, scenario_figure
 from wam_experiments.thesis import definition, sweeping
 from wam_sim.batch import results
@@ -30,7 +30,6 @@ from wam_sim.sweep import Axis, SweepResult, drawn, grid, listed, points, sweep
 
 RANDOM_RUNS = 100
 SCENARIO = "demo_scenario"
-LONGEST = 60  # characters of a refused option that are shown
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
