@@ -117,7 +117,7 @@ def chosen(given: dict[str, str]) -> Configuration:
     more = []
     if given["scenario"]:
         file = script_file(given["scenario"]).resolve()
-        load(file, configuration.shared.arm)  # refused before any node starts
+        load(file, configuration.shared)  # refused before any node starts
         more.append("scenario")
         values["scenario:script"] = str(file)
     if given["record"] == "true" or given["bag"]:

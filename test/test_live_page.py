@@ -5,6 +5,7 @@ import asyncio
 import base64
 import json
 import math
+import os
 import shutil
 import socket
 import subprocess
@@ -30,7 +31,7 @@ from wam_analysis.drawing import TRUE, channels
 from wam_analysis.findings.analysed_run import analysed_run
 from wam_bag.bag import read
 from wam_cli.commands import take_page
-from wam_cli.commands.live import page_next_to
+from wam_cli.commands.live import NICENESS, PageProcess, page_next_to
 from wam_description.configuration import Configuration, packaged
 from wam_description.effects import no_effects
 from wam_description.mjcf import mjcf
@@ -651,6 +652,14 @@ def test_the_page_runs_beside_the_stack_and_ends_with_it(domain_id: int) -> None
     with page_next_to(options("--port", str(port)), "wam"):
         until(lambda: not port_is_free(port))
     assert port_is_free(port)
+
+
+def test_the_page_of_a_stack_lets_its_nodes_go_first(domain_id: int) -> None:
+    page = PageProcess(free_port(), "wam")
+    try:
+        until(lambda: os.getpriority(os.PRIO_PROCESS, page._process.pid) >= NICENESS)
+    finally:
+        page.close()
 
 
 # a real browser

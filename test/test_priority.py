@@ -9,7 +9,7 @@ import pytest
 OWN = f"{{{os.getpriority(os.PRIO_PROCESS, 0)}}}"  # niceness of the tests, which a started program inherits
 PROGRAM = """
 import ctypes, os, resource, sys, threading
-from wam_ros.priority import SESSION, raise_priority
+from wam_ros.priority import SESSION, set_priority
 fifo, nice, permitted = map(int, sys.argv[1:])
 if not permitted:
     for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_NICE):
@@ -27,7 +27,7 @@ def sends_later():
 later = threading.Thread(target=sends_later, daemon=True)
 later.start()
 named.wait()
-print(raise_priority(fifo, nice))
+print(set_priority(fifo, nice))
 begin()  # as the executor does
 threads = [int(thread) for thread in os.listdir("/proc/self/task")]
 assert os.sched_getscheduler(later.native_id) == os.SCHED_OTHER

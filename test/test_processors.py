@@ -1,6 +1,8 @@
-"""Processors: the processes of a lockstep keep to theirs, all threads of them, and nothing else does."""
+"""Processors: processes keep to those that they were given, all threads of them, and nothing else does."""
 
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -8,11 +10,14 @@ import pytest
 from conftest import LONG
 
 from wam_description.configuration import Configuration, packaged
+from wam_description.nodes import EACH
 from wam_ros import processors
 from wam_ros.bring_up import Processes
-from wam_ros.processors import PROCESSORS, divided, idle_parts, keep_to_processors
+from wam_ros.priority import fifo_is_granted
+from wam_ros.processors import FEWEST, PROCESSORS, divided, idle_parts, keep_to_processors, placed_groups
 from wam_ros.run import PARENT
 
+OWN = os.getpriority(os.PRIO_PROCESS, 0)
 ENTRIES = ["driver", "velocity_loop", "contact_estimator"]
 
 
@@ -84,9 +89,56 @@ def test_processes_of_a_lockstep_keep_to_their_processors(domain_id: int) -> Non
     assert os.sched_getscheduler(0) != os.SCHED_BATCH
 
 
-def test_processes_in_realtime_may_be_anywhere(domain_id: int) -> None:
-    configuration = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ENTRIES[:1]})
-    with Processes(configuration) as processes:
-        environment = Path("/proc", str(processes._processes["driver"].pid), "environ").read_bytes()
+REALTIME = Configuration.load(packaged("wam")).with_values({"timing.mode": "realtime", "nodes": ENTRIES})
+
+
+def places(monkeypatch: pytest.MonkeyPatch, permitted: set[int], granted: bool) -> dict[str, str]:
+    """Processors of each process in realtime, where the system permits these, and grants SCHED_FIFO or not."""
+    monkeypatch.setattr(processors.os, "sched_getaffinity", lambda _: permitted)
+    monkeypatch.setattr(processors, "fifo_is_granted", lambda fifo: granted and fifo > 0)
+    return {" ".join(group): place.get(PROCESSORS, "") for group, place in placed_groups(REALTIME.shared, EACH)}
+
+
+def test_in_realtime_the_driver_has_a_processor_and_all_others_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    driver, *others = places(monkeypatch, {0, 1, 2}, granted=True).values()
+    assert driver in {"0", "1", "2"}
+    assert [set(place.split()) for place in others] == [{"0", "1", "2"} - {driver}] * 2
+
+
+@pytest.mark.parametrize(("permitted", "granted"), [({0, 1, 2, 3}, False), ({0, 1}, True)])
+def test_without_priority_or_a_third_processor_they_may_be_anywhere(
+    permitted: set[int], granted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert set(places(monkeypatch, permitted, granted).values()) == {""}
+
+
+def test_processes_in_realtime_have_the_processors_that_they_were_given(domain_id: int) -> None:
+    permitted = frozenset(os.sched_getaffinity(0))
+    is_apart = len(permitted) >= FEWEST and fifo_is_granted(REALTIME.shared.timing.fifo_priority)
+    with Processes(REALTIME) as processes:
+        end = time.monotonic() + LONG
+        while any(is_apart == (permitted in {where for _, where in of}) for of in placed(processes).values()):
+            assert time.monotonic() < end, "some threads are elsewhere"
+            time.sleep(0.02)
+        found = placed(processes)
+        assert is_apart == (PROCESSORS.encode() in environment_of(processes, "driver"))
+        niceness = os.getpriority(os.PRIO_PROCESS, processes._processes["contact_estimator"].pid)
+    driver, *others = ({where for _, where in found[name]} for name in ENTRIES)
+    if is_apart:
+        (alone,) = driver
+        assert len(alone) == 1
+        assert others == [{permitted - alone}] * 2
+    assert niceness == (REALTIME.shared.timing.niceness if niceness_is_granted() else OWN)
+    assert os.SCHED_BATCH not in {policy for of in found.values() for policy, _ in of}
+    assert os.sched_getscheduler(0) not in {os.SCHED_FIFO, os.SCHED_BATCH}, "to look does not change it"
+
+
+def niceness_is_granted() -> bool:
+    program = f"import os; os.setpriority(os.PRIO_PROCESS, 0, {REALTIME.shared.timing.niceness})"
+    return subprocess.run([sys.executable, "-c", program], stderr=subprocess.DEVNULL, check=False).returncode == 0
+
+
+def environment_of(processes: Processes, name: str) -> bytes:
+    environment = Path("/proc", str(processes._processes[name].pid), "environ").read_bytes()
     assert PARENT.encode() in environment
-    assert PROCESSORS.encode() not in environment
+    return environment

@@ -28,7 +28,7 @@ refusals : by topic, why the present input is not used; reported once for each m
 needs : of the inputs with absent='brake' those that the node relies on as it is tuned now; all where it has none.
 diagnostics() : further values for /diagnostics, by name, as text or numbers.
 done, failure : the node has finished, and why it failed ('' where it did not).
-high_priority : ask the system for a higher priority in realtime.
+high_priority : ask the system for a higher priority in realtime than that of the other nodes.
 starts_with_all : in realtime, do nothing before all nodes of the bring-up are connected.
 topics : rows of the table of topics that this node adds.
 """

@@ -104,7 +104,7 @@ class DriverNode(TolerantNode):
 
     def raise_priority(self) -> None:
         """Ask the system to prefer this process."""
-        self._ports.raise_priority()
+        self._ports.raise_priority(is_first=True)
 
     def take_fault(self, reason: str) -> None:
         """Brake where a callback raised."""

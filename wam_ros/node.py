@@ -105,9 +105,8 @@ class AdaptedNode(TolerantNode):
         return getattr(self.node, "failure", "")
 
     def raise_priority(self) -> None:
-        """Ask the system to prefer this process, where the node is not to be late."""
-        if getattr(self.node, "high_priority", False):
-            self._ports.raise_priority()
+        """Ask the system to prefer this process."""
+        self._ports.raise_priority(getattr(self.node, "high_priority", False))
 
     def take_fault(self, reason: str) -> None:
         """Report what a callback raised."""

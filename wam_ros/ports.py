@@ -25,7 +25,7 @@ from wam_ros.display import COPIED, DisplayCopy
 from wam_ros.header import header
 from wam_ros.local_bus import BUSES
 from wam_ros.messages import LONGEST_REASON, Refused, diagnostic_status, message_type, read_status
-from wam_ros.priority import PRIORITY, raise_priority
+from wam_ros.priority import PRIORITY, set_priority
 from wam_ros.qos import DEPTH, qos
 from wam_ros.run import NAMESPACE, end_of_delivery
 from wam_ros.tolerance import TolerantNode
@@ -290,12 +290,19 @@ class Ports:
         is_played = "scenario" in self.shared.nodes
         self.node.get_logger().info(guidance(mode, before, self.absent, faulty, self.node.get_namespace(), is_played))
 
-    def raise_priority(self) -> None:
-        """In realtime: ask the system to prefer this process, and report what was granted."""
+    def raise_priority(self, is_first: bool) -> None:
+        """In realtime: ask the system to prefer this process, and report what was granted.
+
+        Parameters
+        ----------
+        is_first : whether it works in each inner period, and is to be ahead of all usual programs.
+        """
         timing = self.shared.timing
         if timing.mode == "realtime":
-            granted = self.facts[PRIORITY] = raise_priority(timing.fifo_priority, timing.niceness)
-            self.node.get_logger().info(f"{PRIORITY}: {granted}")
+            granted = set_priority(timing.fifo_priority if is_first else 0, timing.niceness)
+            self.facts[PRIORITY] = granted
+            if is_first:
+                self.node.get_logger().info(f"{PRIORITY}: {granted}")
 
     def wait_for_delivery(self) -> None:
         """Report how much was published, then wait until the recorder and all others have the last messages.

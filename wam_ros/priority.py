@@ -19,13 +19,13 @@ SENDS_LATER: Final = "dds.asyn"  # how the name of that thread begins
 PRIORITY: Final = "priority"  # key of what was granted, in the diagnostics
 
 
-def raise_priority(fifo: int, niceness: int) -> str:
-    """Ask the system to prefer this process: ahead of all usual ones, or else with a larger part of their time.
+def set_priority(fifo: int, niceness: int) -> str:
+    """Ask the system to prefer this process: ahead of all usual ones, or else with another part of their time.
 
     Parameters
     ----------
     fifo : of SCHED_FIFO; 0: not requested.
-    niceness : where that is not granted; 0: not requested.
+    niceness : where that is not granted; 0: not requested; above 0 others are preferred.
 
     Returns
     -------
@@ -37,6 +37,17 @@ def raise_priority(fifo: int, niceness: int) -> str:
     if niceness and for_all_threads(lambda thread: os.setpriority(os.PRIO_PROCESS, thread, niceness)):
         return f"nice {niceness}{' with its session' if _session_granted(niceness) else ''}"
     return "usual"
+
+
+def fifo_is_granted(fifo: int) -> bool:
+    """Whether the system grants a priority of SCHED_FIFO, which is not 0: this thread has it for a moment."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(fifo))
+    except OSError:
+        return False
+    os.sched_setscheduler(0, *before)
+    return True
 
 
 def for_all_threads(ask: Callable[[int], None], but: str = " ") -> bool:

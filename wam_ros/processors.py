@@ -1,10 +1,15 @@
-"""Processors of the processes of one lockstep: what works in every inner period keeps to one of them.
+"""Processors of the processes of one arm: what works in every inner period keeps to one of them.
 
 A message between two processes wakes its reader.  The kernel starts that at once, on a processor that is idle: it has
 to be woken itself and has nothing of the reader in its cache, and the writer is interrupted before it has sent its
 message to the next reader.  In lockstep, where the nodes wait for each other anyway, most of a period went into that.
 Here the inner loop has a processor, all others have the rest, and who reads waits until who writes has finished
 (SCHED_BATCH, which needs no right).  benchmarks/speed.py shows the gain; the bits are the same.
+
+In realtime the driver is ahead of all usual programs (SCHED_FIFO) and works for most of a period.  A node that it
+interrupts stays on that processor, and the kernel, which seldom looks for another one where all are busy in short
+pieces, left it there for up to 50 ms: the arm braked.  Here the driver has a processor to itself, and all others the
+rest.  benchmarks/real_time.py shows it.
 """
 
 import os
@@ -19,9 +24,11 @@ from typing import Final
 from wam_description.arm import Shared
 from wam_description.interface import declared, process_groups
 from wam_description.nodes import GROUPS, INNER
-from wam_ros.priority import for_all_threads
+from wam_ros.priority import fifo_is_granted, for_all_threads
 
-PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a process, by their numbers
+PROCESSORS: Final = "WAM_STACK_PROCESSORS"  # environment variable: those of a process by number, and a policy
+WAITING: Final = "batch"  # policy SCHED_BATCH
+FEWEST: Final = 3  # processors, of which the driver may have one to itself
 TIMES: Final = Path("/proc/stat")
 LOOK: Final = 0.05  # s, in which the idlest processor is found
 IDLE: Final = slice(3, 5)  # columns of a processor's times: idle, and waiting for a disk
@@ -31,7 +38,8 @@ STEPS: Final = 10  # of load; within one of them it is chance which processor is
 def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[str, str]]]:
     """Entries of the parameter `nodes` that share a process, and its environment, in which it finds its processors.
 
-    In realtime that is empty: each process may be anywhere.
+    In realtime that is empty where SCHED_FIFO is not granted, or fewer than three processors are permitted: then each
+    process may be anywhere.
 
     Parameters
     ----------
@@ -39,11 +47,18 @@ def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[
     processes : GROUPED or EACH, of `wam_description.nodes`.
     """
     groups = process_groups(shared.nodes, processes)
-    if shared.timing.mode != "lockstep":
+    permitted = os.sched_getaffinity(0)
+    if shared.timing.mode == "lockstep":
+        is_apart = [GROUPS.get(declared(group[0]).name) == INNER for group in groups]
+        policy = [WAITING]
+    elif len(permitted) >= FEWEST and fifo_is_granted(shared.timing.fifo_priority):
+        is_apart = [any(declared(entry).name == "driver" for entry in group) for group in groups]
+        policy = []
+    else:
         return [(group, {}) for group in groups]
-    inner, outer = divided(idle_parts(os.sched_getaffinity(0)))
-    places = [inner if GROUPS.get(declared(group[0]).name) == INNER else outer for group in groups]
-    return [(group, {PROCESSORS: " ".join(map(str, place))}) for group, place in zip(groups, places, strict=True)]
+    apart, others = divided(idle_parts(permitted))
+    places = [" ".join([*map(str, apart if one else others), *policy]) for one in is_apart]
+    return [(group, {PROCESSORS: place}) for group, place in zip(groups, places, strict=True)]
 
 
 def divided(idle: Mapping[int, float]) -> tuple[set[int], set[int]]:
@@ -86,10 +101,12 @@ def keep_to_processors(environment: MutableMapping[str, str]) -> None:
     """Keep all threads of this process to the processors that bring-up has given it, if it has."""
     # where the system permits others by now, it shares them out itself
     with suppress(OSError, KeyError, ValueError, OverflowError):
-        processors = [int(one) for one in environment.pop(PROCESSORS).split()]
+        given = environment.pop(PROCESSORS).split()
+        processors = [int(one) for one in given if one != WAITING]
 
         def keep(thread: int) -> None:
             os.sched_setaffinity(thread, processors)
-            os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0))
+            if WAITING in given:
+                os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0))
 
         for_all_threads(keep)

@@ -10,10 +10,12 @@ from typing import Final
 
 from wam_cli.commands import namespace, take_port
 from wam_live.page import NoPageError, free_port, needing_viser, obstacle
+from wam_ros.priority import set_priority
 from wam_ros.program import Stop, end_at_once_on_signals
 from wam_ros.run import NAMESPACE, PARENT, die_with_parent
 
 PATIENCE: Final = 1.0  # s, in which a page ends by itself
+NICENESS: Final = 15  # of a page next to a stack: drawing waits, where the nodes would
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,6 +78,8 @@ class PageProcess:
 def run(given: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C."""
     end_at_once_on_signals()  # an exception amid the imports would be swallowed by one of the libraries
+    if PARENT in os.environ:  # the stack comes first
+        set_priority(0, NICENESS)
     die_with_parent()
     with needing_viser():
         from wam_live.live_page import LivePage
