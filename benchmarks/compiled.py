@@ -71,7 +71,7 @@ def serve(seconds: float) -> None:
 
 def _direct(configuration: Configuration, script: Path) -> tuple[float, str]:
     """Simulated seconds per second of the processor, and a hash of all numbers of the run."""
-    run = Simulation(configuration, load(script, configuration.shared.arm))
+    run = Simulation(configuration, load(script, configuration.shared))
     begin = time.process_time()  # which other programs disturb less
     if failure := run.play():
         raise SystemExit(failure)

@@ -90,7 +90,7 @@ def main() -> None:
     """Measure in turns, print the table."""
     given = arguments(__doc__, rounds=20, quick_rounds=2)
     configuration = Configuration.load(packaged("wam"))
-    steps = scenario_steps(1.0, configuration.shared.arm)
+    steps = scenario_steps(1.0, configuration.shared)
     states, answers = recorded(configuration, steps)
 
     def answering(name: str, reaction: Reaction, _: Any) -> Any:

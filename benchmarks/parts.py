@@ -64,7 +64,7 @@ def play(configuration: Configuration, script: Path, which: str) -> Spent:
     """Microseconds per period of the parts: '' the whole, 'nodes' the nodes and the driver, 'within' parts of these."""
     spent: Spent = Counter()
     classes = {name: node_class(spent, name) for name in NODES} if which == "nodes" else {}
-    run = Simulation(configuration, load(script, configuration.shared.arm), classes)
+    run = Simulation(configuration, load(script, configuration.shared), classes)
     places = {"driver": ("driver", "advance"), TRUTH: ("", "_publish_truth")}
     for part, (path, name) in {"": {}, "nodes": places, "within": WITHIN}[which].items():
         place: Any = run

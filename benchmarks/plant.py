@@ -92,7 +92,7 @@ def every_effect(motors: int) -> dict[str, Any]:
 
 def pose_in_contact() -> tuple[float, ...]:
     """Where the outer link just touches the box on the demonstration's way down, rad."""
-    steps = load(packaged("demo_scenario"), Configuration.load(packaged("wam")).shared.arm)
+    steps = load(packaged("demo_scenario"), Configuration.load(packaged("wam")).shared)
     i = next(i for i, step in enumerate(steps) if step.until_force > 0.0)
     above, below = np.array(steps[i - 1].posture), np.array(steps[i].posture)
     for share in np.linspace(0.0, 1.0, 51):

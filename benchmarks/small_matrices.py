@@ -33,7 +33,7 @@ def main() -> None:
     """Measure in turns, print the table."""
     given = arguments(__doc__, rounds=15, quick_rounds=1)
     configuration = Configuration.load(packaged("wam"))
-    steps = scenario_steps(1.0 if given.quick else 4.0, configuration.shared.arm)
+    steps = scenario_steps(1.0 if given.quick else 4.0, configuration.shared)
     found: dict[str, list[list[float]]] = {name: [] for name in WAYS}
     for _ in range(given.rounds):
         rows = []

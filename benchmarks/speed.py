@@ -15,7 +15,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from wam_control.scenario import ScenarioStep, load
-from wam_description.arm import Arm
+from wam_description.arm import Shared
 from wam_description.configuration import Configuration, packaged
 from wam_description.nodes import EACH, GROUPED
 from wam_ros.bring_up import Composition, Processes
@@ -51,17 +51,17 @@ def scenario(seconds: float) -> dict[str, Any]:
     }
 
 
-def scenario_steps(seconds: float, arm: Arm) -> list[ScenarioStep]:
+def scenario_steps(seconds: float, shared: Shared) -> list[ScenarioStep]:
     """The steps of `scenario`, as the scenario node has them."""
     with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
         script = Path(folder) / "script.yaml"
         script.write_text(yaml.safe_dump(scenario(seconds)), encoding="utf-8")
-        return load(script, arm)
+        return load(script, shared)
 
 
 def direct(configuration: Configuration, script: Path) -> float:
     """Simulated seconds per second of wall-clock time, without ROS."""
-    run = Simulation(configuration, load(script, configuration.shared.arm))
+    run = Simulation(configuration, load(script, configuration.shared))
     begin = time.perf_counter()
     if failure := run.play():
         raise SystemExit(failure)

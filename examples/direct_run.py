@@ -5,7 +5,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_sim.simulation import Simulation
 
 configuration = Configuration.load(packaged("wam")).with_values({"force_loop:force_gain": [0.01]})
-run = Simulation(configuration, load(packaged("demo_scenario"), configuration.shared.arm))
+run = Simulation(configuration, load(packaged("demo_scenario"), configuration.shared))
 if failure := run.play():
     raise SystemExit(failure)
 for command, force in list(zip(run.rows["force_command"], run.rows["force_measured"], strict=True))[::200]:

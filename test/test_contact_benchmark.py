@@ -423,7 +423,7 @@ def test_a_scene_over_topics_gives_the_numbers_of_the_loop_without_ros(
     scenario = pick("sphere")
     file = tmp_path / "scenario.yaml"
     file.write_text(yaml.safe_dump(script(scenario)))
-    assert tuple(load_script(file, ARM)) == scenario.steps
+    assert tuple(load_script(file, CONFIGURATION.shared)) == scenario.steps
     short = scenario._replace(steps=scenario.steps[:3])
     direct = play(CONFIGURATION, short)
     over = contact_scenarios.play(CONFIGURATION, short, domain_id)

@@ -656,7 +656,7 @@ def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
     script, bag = tmp_path / "script.yaml", tmp_path / "bag"
     script.write_text(json.dumps({"steps": steps}))
     configuration = Configuration.load(packaged("wam"))
-    assert "no contact" in record(configuration, load_steps(script, configuration.shared.arm), bag)
+    assert "no contact" in record(configuration, load_steps(script, configuration.shared), bag)
     assert _report(bag, True, task).is_there
     assert (bag / "demo.png").is_file()
     out, err = capsys.readouterr()

@@ -76,7 +76,7 @@ def record_in_processes(configured: Configuration, how: str = EACH) -> None:
 
 
 def play_directly(configured: Configuration, script: Path) -> Simulation:
-    run = Simulation(configured, load(script, configured.shared.arm))
+    run = Simulation(configured, load(script, configured.shared))
     assert run.play() == ""
     return run
 
@@ -170,7 +170,7 @@ def test_direct_runs_are_equal_in_every_bit_across_processes(script: Path, tmp_p
         "from wam_control.scenario import load\n"
         "from wam_description.configuration import Configuration, packaged\n"
         "c = Configuration.load(packaged('wam'))\n"
-        "run = Simulation(c, load(Path(sys.argv[1]), c.shared.arm))\n"
+        "run = Simulation(c, load(Path(sys.argv[1]), c.shared))\n"
         "run.play()\n"
         "print(json.dumps({t: hashlib.sha256(repr(r).encode()).hexdigest() for t, r in run.rows.items()}))\n"
     )

@@ -79,7 +79,7 @@ def test_an_own_controller_is_the_same_in_simulation_topics_and_replay(
         scenario: Any = composition.nodes["scenario"]
         composition.spin(lambda: scenario.done)
         assert scenario.failure == ""
-    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm))
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared))
     assert run.play() == ""
     recorded = read(tmp_path / "bag").topics["/wam/joint_effort_command"]
     assert isinstance(recorded, JointColumns)
@@ -105,7 +105,7 @@ class Echo:
 def test_a_node_class_comes_on_top_of_a_configuration_with_a_topic_of_its_own(
     configured: Configuration, tmp_path: Path
 ) -> None:
-    steps = load(tmp_path / "script.yaml", configured.shared.arm)
+    steps = load(tmp_path / "script.yaml", configured.shared)
     run = Simulation(configured, steps, controllers={"echo": Echo})
     assert run.play() == ""
     assert [row.values for row in run.rows["echo"]] == [row.values for row in run.rows["gravity_effort"]]
@@ -142,7 +142,7 @@ def test_a_controller_whose_constructor_raises_is_named_with_its_line(
     configured: Configuration, tmp_path: Path
 ) -> None:
     with pytest.raises(ParameterError) as refusal:
-        Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"echo": Raising})
+        Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"echo": Raising})
     text = str(refusal.value)
     assert text.startswith(f"node 'echo' cannot be made: {__name__}:Raising raised KeyError: ")
     assert f", at {__file__}:" in text
@@ -186,7 +186,7 @@ def test_a_topic_that_is_in_no_table_is_refused(configured: Configuration) -> No
 
 
 def test_a_fault_of_the_driver_ends_the_task_in_the_simulation_too(configured: Configuration, tmp_path: Path) -> None:
-    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm))
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared))
     while run.driver.stamp < 150_000_000:
         assert not run.step()
     run.driver.estop()
@@ -215,7 +215,7 @@ def test_an_output_that_is_not_declared_is_refused_by_node_and_topic(configured:
         def step(self, inputs: Inputs) -> Outputs:
             return {"ecko": inputs["gravity_effort"]}
 
-    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"echo": Typing})
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"echo": Typing})
     with pytest.raises(ValueError, match="node 'echo' returned the topic 'ecko'; its reactions declare echo"):
         run.play()
 
@@ -229,7 +229,7 @@ def test_a_reaction_sees_the_arrays_that_it_takes_and_no_others(configured: Conf
             seen.append(inputs["joint_states"])
             return {}
 
-    Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"echo": Watching}).step()
+    Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"echo": Watching}).step()
     assert [len(array) for array in seen[0]] == [4, 0, 0]
 
 
@@ -259,7 +259,7 @@ def test_currents_that_are_not_finite_are_refused_by_name(configured: Configurat
         def step(self, inputs: Inputs) -> Outputs:
             return {"motor_current_command": State([], [], [float("nan")] * 4)}
 
-    steps = load(tmp_path / "script.yaml", configured.shared.arm)
+    steps = load(tmp_path / "script.yaml", configured.shared)
     own = {name: value for name, value in configured.sections.items() if name != "velocity_loop"}
     run = Simulation(configured._replace(sections=own), steps, {"velocity_loop": Broken})
     text = r"node 'velocity_loop' returned an unusable motor_current_command: effort of motor1 is nan; send finite"
@@ -332,7 +332,7 @@ def test_an_output_that_no_node_could_use_is_refused_by_node_topic_and_value(
 
     One.given = given
     with_own = configured.with_values({"nodes": ["driver", "transform", "velocity_loop", "gravity"]})
-    run = Simulation(with_own, load(tmp_path / "script.yaml", configured.shared.arm), {"careless": One})
+    run = Simulation(with_own, load(tmp_path / "script.yaml", configured.shared), {"careless": One})
     with pytest.raises(UnusableOutput) as refusal:
         run.play()
     assert str(refusal.value).startswith("node 'careless' returned an unusable joint_effort_command: ")
@@ -404,7 +404,7 @@ class Requesting(Echo):
 def test_without_an_answer_to_refusals_a_refused_step_publishes_nothing(
     configured: Configuration, tmp_path: Path
 ) -> None:
-    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"requesting": Requesting})
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"requesting": Requesting})
     for _ in range(20):
         run.step()
     assert len(run.rows["gravity_effort"]) == 4
@@ -415,7 +415,7 @@ def test_requests_in_a_new_list_are_made(configured: Configuration, tmp_path: Pa
     class Stopping(Requesting):
         given = (Call("driver", "estop"),)
 
-    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"requesting": Stopping})
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"requesting": Stopping})
     run.step()
     assert run.driver.safety.fault == "emergency stop"
 
@@ -456,7 +456,7 @@ def test_reactions_to_one_topic_work_in_the_order_of_their_declaration_everywher
 ) -> None:
     from wam_ros.bring_up import Composition
 
-    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared.arm), {"twice": Twice})
+    run = Simulation(configured, load(tmp_path / "script.yaml", configured.shared), {"twice": Twice})
     for _ in range(11):
         run.step()
     order = ["one [4, 0, 0]", "two [0, 4, 0]", "three"]

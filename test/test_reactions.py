@@ -49,7 +49,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSummary, Analys
     base = Configuration.load(packaged("wam"))
     names = [name for name in base.shared.nodes if name not in ("scenario", "recorder")]
     configuration = base.with_values({"nodes": [*names, "scenario"]})
-    assert not record(configuration, load(script, base.shared.arm), folder / "bag")
+    assert not record(configuration, load(script, base.shared), folder / "bag")
     bag = read(folder / "bag")
     return summarize(bag), analyse_bag(bag, lambda stage: None)
 

@@ -28,8 +28,10 @@ from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import NO_CONTACT, Contact, State
 from wam_description.synchroniser import Inputs
+from wam_sim.simulation import Simulation
 
-SHARED = Configuration.load(packaged("wam")).shared
+CONFIGURATION = Configuration.load(packaged("wam"))
+SHARED = CONFIGURATION.shared
 ARM = SHARED.arm
 DT = 0.005
 START, GOAL = [0.0, -0.6, 0.0, 0.5], [0.2, -1.0, 0.1, 0.7]
@@ -157,7 +159,7 @@ def test_a_push_is_the_wrench_about_the_origin_of_the_cover() -> None:
 def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_path: Path) -> None:
     """The inner tube is 1.6 in aside at the elbow: a push on the cover's axis would hardly touch it."""
     push = {"cover": "inner_link", "contact_position": 0.5588, "newtons": [0.0, 10.0, 0.0], "begin": 0.0, "end": 0.1}
-    steps = load(write(tmp_path, {"steps": [{"name": "a", "seconds": 0.2, "push": push}]}), ARM)
+    steps = load(write(tmp_path, {"steps": [{"name": "a", "seconds": 0.2, "push": push}]}), SHARED)
     out = play(Scenario(steps), 1)[0]
     np.testing.assert_allclose(out.push_torque, [-0.4064, 0.0, 5.588], rtol=1e-9)
 
@@ -165,9 +167,9 @@ def test_a_push_of_a_script_acts_on_the_axis_of_the_tube_not_of_the_cover(tmp_pa
 def test_a_push_without_times_lasts_for_its_step_and_one_of_several_steps_without_a_pause(tmp_path: Path) -> None:
     push = {"cover": "outer_link", "contact_position": 0.3, "newtons": [0.0, 10.0, 0.0]}
     names = [{"name": name, "seconds": 0.1, "push": push} for name in "ab"]
-    outs = play(Scenario(load(write(tmp_path, {"steps": [*names, {"name": "c", "seconds": 0.1}]}), ARM)), 60)
+    outs = play(Scenario(load(write(tmp_path, {"steps": [*names, {"name": "c", "seconds": 0.1}]}), SHARED)), 60)
     assert [k for k, out in enumerate(outs) if any(out.push_force)] == list(range(40))
-    outs = play(Scenario(load(write(tmp_path, {"steps": [{**names[0], "push": {**push, "end": 0.1}}]}), ARM)), 30)
+    outs = play(Scenario(load(write(tmp_path, {"steps": [{**names[0], "push": {**push, "end": 0.1}}]}), SHARED)), 30)
     assert [k for k, out in enumerate(outs) if any(out.push_force)] == list(range(20))
 
 
@@ -210,12 +212,12 @@ def test_every_scenario_that_comes_with_the_package_can_be_loaded() -> None:
     assert found
     for path in found:
         own = path.with_name(path.name.replace("_scenario", ""))
-        assert load(path, Configuration.load(own).shared.arm if own.exists() else ARM)
+        assert load(path, Configuration.load(own).shared if own.exists() else SHARED)
 
 
 def test_a_scenario_file_says_what_the_steps_are(tmp_path: Path) -> None:
     path = write(tmp_path, {"steps": [{"name": "a", "seconds": 1}, {**WHOLE, "request": "disable"}]})
-    first, second = load(path, ARM)
+    first, second = load(path, SHARED)
     assert first == ScenarioStep("a", 1.0)
     assert second == ScenarioStep(
         "b",
@@ -292,6 +294,10 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
             {**WHOLE, "push": {**WHOLE["push"], "contact_position": 0.6}},
             "contact_position is 0.6 m; inner_link reaches from 0 to 0.5588 m",
         ),
+        (
+            {**WHOLE, "push": {**WHOLE["push"], "newtons": [0, 0, 600]}},
+            "push: the force is 600 N; allowed: up to disturbance_force_limit, 500 N",
+        ),
         ({**WHOLE, "push": {**WHOLE["push"], "end": 0.1}}, "push has begin 0.1 s and end 0.1 s; allowed: begin from 0"),
         ({**WHOLE, "push": {**WHOLE["push"], "end": 5.0}}, "begin 0.1 s and end 5 s; allowed: .* up to the 2.5 s of "),
         ({**WHOLE, "push": {**without(WHOLE["push"], "end"), "begin": 2.5}}, "begin 2.5 s and end 2.5 s; allowed"),
@@ -300,7 +306,7 @@ def without(body: dict[str, Any], key: str) -> dict[str, Any]:
 def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, text: str, tmp_path: Path) -> None:
     path = write(tmp_path, {"steps": [{"name": "fine", "seconds": 1.0}, step]})
     with pytest.raises(ParameterError, match=text) as refusal:
-        load(path, ARM)
+        load(path, SHARED)
     assert str(refusal.value).startswith(f"{path}, step 2")
 
 
@@ -324,21 +330,48 @@ def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, tex
 def test_a_file_that_is_no_scenario_is_refused_by_name(tree: Any, text: str, tmp_path: Path) -> None:
     path = write(tmp_path, tree)
     with pytest.raises(ParameterError, match=text) as refusal:
-        load(path, ARM)
+        load(path, SHARED)
     assert str(path) in str(refusal.value)
 
 
 def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"scenario text is not a file; give the path of a YAML file"):
-        load("text", ARM)
+        load("text", SHARED)
     with pytest.raises(ParameterError, match=r"given as a text of several lines; write it to a file"):
-        load("steps:\n  - {name: a, seconds: 1.0}\n", ARM)
+        load("steps:\n  - {name: a, seconds: 1.0}\n", SHARED)
     with pytest.raises(ParameterError, match=rf"scenario {tmp_path}/none\.yaml is not a file"):
-        load(tmp_path / "none.yaml", ARM)
+        load(tmp_path / "none.yaml", SHARED)
     path = tmp_path / "binary.yaml"
     path.write_bytes(b"\xff\xfe\x00\x81")
     with pytest.raises(ParameterError, match=f"scenario {path} is not YAML"):
-        load(path, ARM)
+        load(path, SHARED)
+
+
+# an arm whose brakes are on
+
+FOR_NOTHING = "step 'go': it commanded the arm, and the brakes were on; give it, or a step before it, 'request: enable'"
+
+
+@pytest.mark.parametrize("step", [ScenarioStep("go", 0.1, tuple(GOAL)), ScenarioStep("go", 0.1, force=PRESS)])
+def test_a_scenario_that_commands_an_arm_which_nobody_has_enabled_fails(step: ScenarioStep) -> None:
+    run = Simulation(CONFIGURATION, [ScenarioStep("wait", 0.05), step, ScenarioStep("never", 1.0)])
+    assert run.play().startswith(FOR_NOTHING)
+    assert run.driver.stamp / 1e9 == pytest.approx(0.151, abs=0.01)
+    assert Simulation(CONFIGURATION, [step]).play().startswith(FOR_NOTHING), "the last step, too"
+
+
+def test_whoever_enables_the_arm_a_scenario_may_command_it() -> None:
+    steps = [ScenarioStep("go", 0.1, tuple(START)), ScenarioStep("stop", 0.02, request="disable")]
+    assert Simulation(CONFIGURATION, [ScenarioStep("on", 0.05, request="enable"), *steps]).play() == ""
+    assert Simulation(CONFIGURATION, [steps[0]._replace(request="enable")]).play() == ""
+    run = Simulation(CONFIGURATION, steps)
+    assert run.driver.enable("").success
+    assert run.play() == ""
+
+
+def test_a_braked_arm_may_be_pushed() -> None:
+    push = Push("outer_link", 0.3, (0.0, 5.0, 0.0), 0.0, 0.1)
+    assert Simulation(CONFIGURATION, [ScenarioStep("push", 0.1, push=push)]).play() == ""
 
 
 # chirps and settings
@@ -346,7 +379,7 @@ def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) ->
 
 def test_a_force_with_a_place_is_commanded_with_the_torque_that_pins_it(tmp_path: Path) -> None:
     step = {**without(placed(0.28), "push"), "chirp": {"newtons": 1.0, "from": 1.0, "to": 2.0}}
-    script = load(write(tmp_path, {"steps": [step]}), ARM)
+    script = load(write(tmp_path, {"steps": [step]}), SHARED)
     node = ScenarioNode(SHARED, ScenarioParameters(""), Scenario(script))
     sizes = []
     for tick in range(100):
@@ -384,7 +417,7 @@ def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) 
     def read(**body: Any) -> ScenarioStep:
         file = tmp_path / "one.yaml"
         file.write_text(yaml.safe_dump({"steps": [{"name": "a", "seconds": 1.0, **body}]}))
-        return load(file, ARM)[0]
+        return load(file, SHARED)[0]
 
     force = {"frame": "base", "newtons": [0.0, 0.0, -5.0]}
     step = read(

@@ -35,7 +35,7 @@ def script(tmp_path: Path) -> Path:
 def runs(script: Path, gains: tuple[float, ...]) -> list[SweepPoint]:
     configuration = Configuration.load(packaged("testbed"))
     axes = [Axis(GAIN, gains)]
-    return points(configuration, load(script, configuration.shared.arm), axes, grid(axes))
+    return points(configuration, load(script, configuration.shared), axes, grid(axes))
 
 
 def test_a_grid_has_every_combination_and_a_list_goes_in_step() -> None:
@@ -59,7 +59,7 @@ def test_random_sets_are_repeatable_and_between_the_ends() -> None:
 def test_an_unknown_parameter_is_refused_before_anything_runs(script: Path) -> None:
     configuration = Configuration.load(packaged("testbed"))
     with pytest.raises(ParameterError, match="no parameter 'nothing'"):
-        points(configuration, load(script, configuration.shared.arm), [Axis("force_loop:nothing", (1,))], [(1,)])
+        points(configuration, load(script, configuration.shared), [Axis("force_loop:nothing", (1,))], [(1,)])
 
 
 @pytest.mark.slow

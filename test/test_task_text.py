@@ -29,7 +29,7 @@ AT = {"along": [0, 0, -1], "cover": "outer_link", "contact_position": 0.28}
 def step_of(tmp_path: Path, **keys: Any) -> ScenarioStep:
     path = tmp_path / "scenario.yaml"
     path.write_text(yaml.safe_dump({"steps": [{"name": "do", "seconds": 1.0, **keys}]}))
-    return load(path, ARM)[0]
+    return load(path, SHARED)[0]
 
 
 def task(tmp_path: Path, *axes: dict[str, Any], **more: Any) -> TaskCommand:
@@ -158,7 +158,7 @@ def test_a_trajectory_message_that_is_none_is_refused(given: JointTrajectory, re
 
 @pytest.mark.slow
 def test_the_example_presses_slides_moves_straight_and_is_led() -> None:
-    run = Simulation(CONFIGURATION, load(EXAMPLE, ARM))
+    run = Simulation(CONFIGURATION, load(EXAMPLE, SHARED))
     assert run.play() == ""
     body = RigidBody(ARM)
     rows = run.rows["sim/joint_states"]

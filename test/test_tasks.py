@@ -38,7 +38,7 @@ def test_every_task_has_a_world_that_can_be_simulated_and_steps_that_can_be_play
         driver.advance(0.0)
     for before, row in zip(table.rows, driver.plant.objects(), strict=True):
         assert np.array(row)[1:4] == pytest.approx(np.array(before)[1:4], abs=2e-3)
-    steps = scenario.load(tmp_path / f"{run.name}.yaml", configuration.shared.arm)
+    steps = scenario.load(tmp_path / f"{run.name}.yaml", configuration.shared)
     assert sum(step.seconds for step in steps) == pytest.approx(run.seconds)
 
 
@@ -46,8 +46,8 @@ def test_tasks_move_along_lines_of_the_tip_and_joint_trajectories(tmp_path: Path
     motions = {}
     for name in tasks():
         (run,) = load(name).runs
-        arm = with_run(Configuration.load(packaged("wam")), run, tmp_path).shared.arm
-        steps = scenario.load(tmp_path / f"{run.name}.yaml", arm)
+        shared = with_run(Configuration.load(packaged("wam")), run, tmp_path).shared
+        steps = scenario.load(tmp_path / f"{run.name}.yaml", shared)
         motions[name] = sum(bool(step.trajectory) for step in steps), sum(bool(step.tip) for step in steps)
     assert sum(any(counts) for counts in motions.values()) >= 2, motions
     assert all(map(sum, zip(*motions.values(), strict=True))), motions

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import yaml
 
@@ -36,14 +36,16 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
     "push": "`{cover, contact_position, newtons: [x, y, z], begin, end}`: pushes the simulated arm, m along the link, N"
     " in its frame, s from the start of the step; `begin` and `end` may be left out: for the whole step. It lasts for "
     "one outer period at least. A push of several steps is given in each",
-    "request": "`enable` or `disable` at the start of the step",
+    "request": "`enable` or `disable` at the start of the step; the scenario fails where a step commands an arm that "
+    "nobody has enabled",
     "set": "`{force_loop: {force_gain: [0.01]}}`: live parameters of driver or force_loop from the start of the step",
 }
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
 REQUESTS = ("", "enable", "disable")
 TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
-NO_FORCE = ForceCommand("base", (0.0, 0.0, 0.0))
+ZERO: Final[Triple] = (0.0, 0.0, 0.0)
+NO_FORCE = ForceCommand("base", ZERO)
 ROUNDING = 1e-9  # s, of a sum of periods
 
 
@@ -68,6 +70,13 @@ class Push(NamedTuple):
     begin: float  # s
     end: float  # s
     aside: tuple[float, float] = (0.0, 0.0)  # m, y and z of the tube's axis there
+
+    @property
+    def torque(self) -> Triple:
+        """About the origin of the cover, N m."""
+        x, y, z = self.position, *self.aside
+        fx, fy, fz = self.force
+        return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
     def acts(self, elapsed: float, dt: float) -> bool:
         """Whether it acts in the outer period that begins now; one within a single period acts for all of that.
@@ -118,6 +127,11 @@ class ScenarioStep(NamedTuple):
         """Whether the posture of the arm is commanded."""
         return bool(self.posture) or self.trajectory is not None or self.tip is not None
 
+    @property
+    def commands_arm(self) -> bool:
+        """Whether a motion, a force or a task is commanded."""
+        return self.moves or self.force != NO_FORCE or self.task is not None
+
 
 class ScenarioOutput(NamedTuple):
     """Commands of the scenario in one outer period."""
@@ -133,6 +147,7 @@ class ScenarioOutput(NamedTuple):
     begins: bool  # the step, in this period
     done: bool
     failure: str
+    commands_arm: bool  # in this step
     task: TaskCommand | None = None
     rate: tuple[float, ...] = ()  # rad/s, of a posture that moves; empty where it is not known
 
@@ -181,21 +196,20 @@ class Scenario:
             self._posture = self._on_path(step)
         push = step.push
         pushing = push is not None and push.acts(self._elapsed, dt) and not self.done
-        force = fx, fy, fz = push.force if push and pushing else (0.0, 0.0, 0.0)
-        x, y, z = (push.position, *push.aside) if push and pushing else (0.0, 0.0, 0.0)
         request = "disable" if self.failure else step.request
         return ScenarioOutput(
             posture=list(self._posture),
             force=NO_FORCE if self.done else self._force(step),
             push_cover=push.cover if push else "",
-            push_force=force,
-            push_torque=(y * fz - z * fy, z * fx - x * fz, x * fy - y * fx),
+            push_force=push.force if push and pushing else ZERO,
+            push_torque=push.torque if push and pushing else ZERO,
             request=request if begins else "",
             settings=step.settings if begins and not self.done else (),
             step=step.name,
             begins=begins and not self.done,
             done=self.done,
             failure=self.failure,
+            commands_arm=step.commands_arm,
             task=None if self.done else step.task,
             rate=self._rate,
         )
@@ -288,13 +302,13 @@ def script_file(script: str) -> Path:
     return Path(script) if script.endswith(".yaml") else packaged(script, "scenario")
 
 
-def load(path: str | Path, arm: Arm) -> list[ScenarioStep]:
+def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:
     """Read the steps of a scenario.
 
     Parameters
     ----------
     path : of a YAML file; not its text.
-    arm : whose joints and links the steps may name.
+    shared : of the arm whose joints and links the steps may name, and how it may be pushed.
 
     Raises
     ------
@@ -314,10 +328,11 @@ def load(path: str | Path, arm: Arm) -> list[ScenarioStep]:
         raise ParameterError(f"scenario {path} has no list 'steps'")
     known(f"scenario {path}", tree, ("steps",), ("steps",))
     require(len(tree["steps"]) > 0, f"scenario {path} has no steps; give at least one")
-    return [_step(f"{path}, step {i + 1}", body, arm) for i, body in enumerate(tree["steps"])]
+    return [_step(f"{path}, step {i + 1}", body, shared) for i, body in enumerate(tree["steps"])]
 
 
-def _step(where: str, body: Any, arm: Arm) -> ScenarioStep:
+def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
+    arm = shared.arm
     if not isinstance(body, dict):
         raise ParameterError(f"{where} is {body!r}; it must be a mapping with name and seconds")
     known(where, body, tuple(STEP_KEYS), ("name", "seconds"))
@@ -341,7 +356,7 @@ def _step(where: str, body: Any, arm: Arm) -> ScenarioStep:
         posture=_posture(where, body["posture"], arm) if "posture" in body else (),
         until_force=until_force,
         force=force,
-        push=_push(where, body["push"], arm, seconds) if "push" in body else None,
+        push=_push(where, body["push"], shared, seconds) if "push" in body else None,
         request=request,
         chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
         settings=tuple(_settings(where, body["set"])) if "set" in body else (),
@@ -416,7 +431,8 @@ def _settings(where: str, body: Any) -> Iterator[Setting]:
             yield Setting(node, name, tuple(value) if isinstance(value, list) else value)
 
 
-def _push(where: str, body: Any, arm: Arm, seconds: float) -> Push:
+def _push(where: str, body: Any, shared: Shared, seconds: float) -> Push:
+    arm = shared.arm
     needed = ("cover", "contact_position", "newtons")
     known(where + ", push", body, (*needed, "begin", "end"), needed)
     require(
@@ -436,4 +452,7 @@ def _push(where: str, body: Any, arm: Arm, seconds: float) -> Push:
         f"{where}: the push has begin {begin:g} s and end {end:g} s; allowed: begin from 0 s, end after it, up to the "
         f"{seconds:g} s of the step, with which a push ends: where it goes on, give it in the next step again",
     )
-    return Push(body["cover"], place, (x, y, z), begin, end, arm.covers.aside(body["cover"], place))
+    push = Push(body["cover"], place, (x, y, z), begin, end, arm.covers.aside(body["cover"], place))
+    excess = shared.push_excess(push.force, push.torque)
+    require(not excess, f"{where}: push: {excess}")
+    return push

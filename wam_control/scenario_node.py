@@ -11,6 +11,11 @@ from wam_description.status import DONE
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Call, Input, Outputs, SetParameters, reaction
 
+BRAKED = (
+    "it commanded the arm, and the brakes were on; give it, or a step before it, 'request: enable', or enable the arm "
+    "before the scenario starts"
+)
+
 
 class ScenarioNode:
     """Streams postures, forces and pushes; requests the driver to enable and to brake.
@@ -33,9 +38,10 @@ class ScenarioNode:
     starts_with_all = True
 
     def __init__(self, shared: Shared, own: ScenarioParameters, scenario: Scenario | None = None) -> None:
-        self._scenario = scenario or Scenario(load(script_file(own.script), shared.arm), shared)
+        self._scenario = scenario or Scenario(load(script_file(own.script), shared), shared)
         self._covers = shared.arm.covers.names
         self._step, self._stamp = "", 0
+        self._commands_arm, self._was_enabled = False, False
         self.requests: list[Call | SetParameters] = []
         self.done, self.failure = False, ""
 
@@ -51,6 +57,8 @@ class ScenarioNode:
         self._stamp = inputs.stamp
         contact = contact_of(inputs["contact/hypotheses"], self._covers)
         out = self._scenario.step(inputs["joint_states"].position, contact, inputs.dt)
+        if (out.begins or out.done) and self._commands_arm and not self._was_enabled:
+            return self._end(f"step '{self._step}': {BRAKED}")
         if out.request or out.settings or out.done:
             self._request(out)
         force = out.force
@@ -63,13 +71,14 @@ class ScenarioNode:
         if out.done:
             return {**outputs, **self._end(out.failure)}
         if out.begins:  # it may have the name of the one before
-            self._step = out.step
+            self._step, self._commands_arm = out.step, out.commands_arm
             facts = {f"{s.node}:{s.name}": str(_plain(s)) for s in out.settings}
             outputs["status"] = NodeStatus(Level.OK, out.step, step=out.step, stamp=inputs.stamp, facts=facts)
         return outputs
 
     def _request(self, out: ScenarioOutput) -> None:
         if out.request:
+            self._was_enabled = self._was_enabled or out.request == "enable"  # or this one fails
             self.requests.append(Call("driver", "enable", out.request == "enable"))
         for node in dict.fromkeys(setting.node for setting in out.settings):
             values = {setting.name: _plain(setting) for setting in out.settings if setting.node == node}
@@ -82,8 +91,11 @@ class ScenarioNode:
         return self._end(f"step '{self._step}': {message}" if self._step else message)
 
     def take_status(self, status: NodeStatus) -> Outputs:
-        """End the task with a fault of the driver: no step may come any more."""
-        if self.done or status.node != "driver" or not status.fault:
+        """End the task with a fault of the driver: no step may come any more; notice who else enables the arm."""
+        if self.done or status.node != "driver":
+            return {}
+        self._was_enabled = self._was_enabled or status.mode == "enabled"
+        if not status.fault:
             return {}
         when = f"in step '{self._step}'" if self._step else "before the first step"
         return self._end(f"the driver stopped {when}: {status.fault}")

@@ -239,8 +239,8 @@ class Timing:
     outer_delay: int = parameter("inner periods after which an outer command is used (lockstep)", low=0, high=1)
     display_divisor: int = parameter("outer periods between messages at the display rate", low=1, high=1000)
     niceness: int = parameter(
-        "niceness of driver and velocity_loop, and of their sessions, in realtime, if the system grants it and not "
-        "timing.fifo_priority; 0: as other programs",
+        "niceness of the nodes and of their sessions in realtime, if the system grants it; of driver and velocity_loop "
+        "where it does not grant timing.fifo_priority; 0: as other programs",
         low=-20,
         high=0,
     )
@@ -358,6 +358,12 @@ class Shared:
     servo: Servo
     motion: MotionParameters
     model: ArmModel
+    disturbance_force_limit: float = parameter(
+        "largest force of a push of sim/disturbance", "N", low=0.0, high=1e4, before=1e4
+    )
+    disturbance_torque_limit: float = parameter(
+        "largest torque of a push of sim/disturbance about the cover's origin", "N m", low=0.0, high=1e4, before=1e4
+    )
     nodes: tuple[str, ...] = parameter("nodes of this bring-up; lockstep starts when all are present")
 
     def __post_init__(self) -> None:
@@ -368,6 +374,23 @@ class Shared:
         )
         each = ("joint_speed", "joint_acceleration", "joint_jerk")
         lengths("motion", self.arm.joints.names, {key: getattr(self.motion, key) for key in each})
+
+    def push_excess(self, force: Sequence[float], torque: Sequence[float]) -> str:
+        """Why a push is not allowed, '' where it is.
+
+        Parameters
+        ----------
+        force : (3,), N.
+        torque : (3,), N m, about the origin of the cover.
+        """
+        for what, vector, limit, unit in (
+            ("force", force, self.disturbance_force_limit, "N"),
+            ("torque", torque, self.disturbance_torque_limit, "N m"),
+        ):
+            size = math.hypot(*vector)
+            if not size <= limit:
+                return f"the {what} is {size:.4g} {unit}; allowed: up to disturbance_{what}_limit, {limit:g} {unit}"
+        return ""
 
     @cached_property
     def model_arm(self) -> Arm:

@@ -23,6 +23,8 @@ FORMER_NAMES: Final = {
     "inference.moment_arm_offset": "inference.miss",
     "inference.identification_threshold": "inference.sure",
     "inference.positions": "inference.places",
+    "disturbance_force_limit": "driver:disturbance_force_limit",
+    "disturbance_torque_limit": "driver:disturbance_torque_limit",
     "servo.proportional_gain": "velocity_loop:proportional_gain",
     "servo.integral_gain": "velocity_loop:integral_gain",
     "ages.feedback": "velocity_loop:command_timeout",
@@ -86,8 +88,10 @@ def _before(field: Field, values: Mapping[str, Any]) -> Any:
 
 def _names(node: str, name: str) -> Iterator[tuple[str, str]]:
     """Node and name of a parameter: the present ones, then the former ones."""
-    while name:
-        yield node, name
+    last = "", ""
+    while name and (node, name) != last:
+        last = node, name
+        yield last
         group = next((group for group in FORMER_NAMES if group.endswith(".") and name.startswith(group)), "")
         former = FORMER_NAMES[group] + name.removeprefix(group) if group else FORMER_NAMES.get(name, "")
         owner, _, name = former.rpartition(":")

@@ -1,6 +1,5 @@
 """The simulated hardware driver: plant, amplifier, safety and watchdog, without ROS and without a clock."""
 
-import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -49,12 +48,6 @@ class DriverParameters:
         high=100.0,
     )
     tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0, high=100.0)
-    disturbance_force_limit: float = parameter(
-        "largest force of a push of sim/disturbance", "N", low=0.0, high=1e4, before=1e4
-    )
-    disturbance_torque_limit: float = parameter(
-        "largest torque of a push of sim/disturbance about the cover's origin", "N m", low=0.0, high=1e4, before=1e4
-    )
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
 
@@ -103,7 +96,7 @@ class Driver:
         self._recent: deque[tuple[Any, ...]] = deque(maxlen=parameters.post_mortem_samples)
         self.warnings: list[str]
         self.stale_advice: Callable[[], str] = lambda: "check that velocity_loop runs"
-        self._arm, self._timing, self._parameters = arm, timing, parameters
+        self._arm, self._timing, self._parameters, self._push_excess = arm, timing, parameters, shared.push_excess
         self._watch = LimitWatch(arm, parameters.cover_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
@@ -221,16 +214,8 @@ class Driver:
         ValueError
             for a cover that the arm does not have, or more than the configured largest force or torque.
         """
-        own = self._parameters
-        for what, vector, name, limit, unit in (
-            ("force", force, "disturbance_force_limit", own.disturbance_force_limit, "N"),
-            ("torque", torque, "disturbance_torque_limit", own.disturbance_torque_limit, "N m"),
-        ):
-            size = math.hypot(*vector)
-            if not size <= limit:
-                raise ValueError(
-                    f"{what} is {size:.4g} {unit}; allowed: up to {name}, {limit:g} {unit}; the last push remains"
-                )
+        if excess := self._push_excess(force, torque):
+            raise ValueError(f"{excess}; the last push remains")
         self.plant.push(cover, np.array(force), np.array(torque))
         self._push_end = self._tick + self._push_ticks
 

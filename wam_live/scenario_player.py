@@ -48,7 +48,7 @@ class ScenarioPlayer:
             return "a scenario is being played; stop it first"
         try:
             file = script_file(script)
-            load(file, self._shared.arm)
+            load(file, self._shared)
         except ParameterError as error:
             return str(error)
         text = parameter_text({f"/**/{NODE}": {**values(self._shared), "script": str(Path(file).resolve())}})

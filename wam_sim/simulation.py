@@ -21,6 +21,7 @@ from wam_description.topics import STATUS
 from wam_description.wiring import Call, Declaration, Outputs, SetParameters
 from wam_driver.driver import Driver, DriverParameters
 from wam_driver.lockstep import unpublished
+from wam_driver.safety import Mode
 from wam_sim.bus import Bus, Rows, of_node
 
 
@@ -67,7 +68,7 @@ class Simulation:
         self._publish = self._bus.publish
         self._publish_states = self._bus.publisher("motor_states")
         self._currents: tuple[int, list[float]] = (0, [])
-        self._fault = ""
+        self._reported: tuple[Mode, str] | None = None
         self.nodes: dict[str, Any] = {}
         self._synchronisers: dict[str, set[Synchroniser]] = {}
         for name, declaration in self._interface.declarations.items():
@@ -156,8 +157,8 @@ class Simulation:
             return True
         driver.command(*self._currents)
         driver.advance(0.0)
-        if driver.safety.fault != self._fault:
-            self._report_fault()
+        if (driver.safety.mode, driver.safety.fault) != self._reported:
+            self._report()
         return False
 
     def _publish_truth(self, stamp: int) -> None:
@@ -227,9 +228,9 @@ class Simulation:
         found = self._interface.unanswered(["motor_current_command"], awaited)
         return unpublished(found) if found else "list a node in 'nodes' that publishes motor_current_command"
 
-    def _report_fault(self) -> None:
-        """Report a new fault of the driver to every node that takes status."""
-        self._fault = self.driver.safety.fault
+    def _report(self) -> None:
+        """Report a new mode or fault of the driver to every node that takes status."""
+        self._reported = self.driver.safety.mode, self.driver.safety.fault
         status = self.driver_status
         for node_name, node in self.nodes.items():
             if hasattr(node, "take_status"):

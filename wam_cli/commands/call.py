@@ -241,10 +241,6 @@ def _wrench(given: argparse.Namespace, driver: Mapping[str, Any]) -> tuple[Wrenc
         raise ValueError(f"--at is {at:g} m; {given.cover} is from {low:g} to {high:g} m")
     x, y, z = given.force
     wrench = Wrench(given.cover, (x, y, z), (0.0, -at * z, at * y))
-    for what, vector, unit in (("force", wrench.force, "N"), ("torque", wrench.torque, "N m")):
-        name = f"disturbance_{what}_limit"
-        if math.hypot(*vector) > driver.get(name, math.inf):  # a driver of one's own need not have one
-            raise ValueError(
-                f"the {what} is {math.hypot(*vector):.4g} {unit}; allowed: up to {name}, {driver[name]:g} {unit}"
-            )
+    if excess := shared.push_excess(wrench.force, wrench.torque):
+        raise ValueError(excess)
     return wrench, at, shared

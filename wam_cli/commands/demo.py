@@ -103,7 +103,7 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
         which names the file, the step and the value.
     """
     script = script_file(str(configuration.sections["scenario"]["script"]))
-    steps = steps_of(script, configuration.shared.arm)
+    steps = steps_of(script, configuration.shared)
     seconds = sum(step.seconds for step in steps)
     pushes = [step.push for step in steps if step.push]
     presses = [math.hypot(*step.force.force) for step in steps if any(step.force.force)]

@@ -84,7 +84,7 @@ def _of_scenario(given: argparse.Namespace, axes: list[Axis], sets: Sets) -> lis
     configuration = configuration_of(given)
     name: str = given.scenario or SCENARIO
     path = Path(name) if name.endswith((".yaml", ".yml")) else packaged(name, "scenario")
-    runs = points(configuration, load(path, configuration.shared.arm), axes, sets)
+    runs = points(configuration, load(path, configuration.shared), axes, sets)
     with batch_of(given) as batch:
         found = sweep(runs, *batch)
     _write(given.file, axes, SweepResult._fields, [(*v, *result) for v, result in zip(sets, found, strict=True)])

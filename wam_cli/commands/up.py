@@ -62,7 +62,7 @@ def run(given: argparse.Namespace) -> int:
     configuration = configuration.with_values({"nodes": [*configuration.shared.nodes, *extra]})
     if given.scenario:
         configuration = configuration.with_values({"scenario:script": given.scenario})
-        load(script_file(given.scenario), configuration.shared.arm)  # refused before any node starts
+        load(script_file(given.scenario), configuration.shared)  # refused before any node starts
     end_at_once_on_signals()
     import_nodes(configuration, given)
     stop = Stop()

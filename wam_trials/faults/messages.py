@@ -8,7 +8,6 @@ from typing import Final, NamedTuple
 from rclpy.publisher import Publisher
 
 from wam_description.configuration import Configuration
-from wam_driver.driver import DriverParameters
 from wam_experiments.faults.message_faults import MESSAGE_FAULTS, MessageFault, broken, made_effective
 from wam_experiments.faults.trials import HELD_MOTION, MOTION, FaultTrial
 from wam_trials.faults.watched_stack import StackSource, WatchedStack
@@ -58,7 +57,7 @@ def _send(todo: MessagePlan, chance: Random, stack: WatchedStack) -> int:
     if publisher is None:
         return 1
     if todo.topic == PUSH and not todo.is_foreign:  # bytes may be those of a push, and pushing is what it is for
-        stack.allowed_force = stack.configuration.node("driver", DriverParameters).disturbance_force_limit
+        stack.allowed_force = stack.configuration.shared.disturbance_force_limit
     for _ in range(MESSAGES):
         message = stack.newest(todo.topic)
         if todo.fault.moves:
