@@ -57,8 +57,8 @@ def test_every_experiment_has_parameters_that_exist_and_steps_that_can_be_played
     assert callable(function_of(experiment.evaluation))
     for run in experiment.runs:
         configuration = configured(experiment, run, tmp_path)
-        arm = configuration.shared.arm  # refuses what does not fit together
-        steps = scenario.load(tmp_path / f"{run.name}.yaml", arm)
+        shared = configuration.shared  # refuses what does not fit together
+        steps = scenario.load(tmp_path / f"{run.name}.yaml", shared)
         assert sum(step.seconds for step in steps) == pytest.approx(run.seconds)
 
 

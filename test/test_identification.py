@@ -344,7 +344,7 @@ def test_the_exciting_scenario_is_one_that_plays_and_keeps_its_limits(
         main(["identify", "--excite", str(file), "--only-write", "--seconds", "10"])
     assert ended.value.code == 0
     assert f"--scenario {file}" in capsys.readouterr().out
-    steps = load(file, WAM)
+    steps = load(file, CONFIGURATION.shared)
     assert sum(step.seconds for step in steps if step.posture) >= 10.0
     before = np.array(WAM.joints.start)
     for step in steps:
