@@ -20,11 +20,11 @@ from wam_description.signals import (
     State,
     Wrench,
 )
+from wam_description.status import ENABLED
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Input, Outputs, reaction
 
 DOUBTED = 0.5  # s, in one contact, from which a suspected second one is reported; a release looks like one for 0.4 s
-ENABLED = "enabled"  # mode of the driver in which no brake holds
 
 
 class ContactEstimatorNode:

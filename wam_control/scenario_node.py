@@ -7,7 +7,7 @@ from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, S
 from wam_control.task import table_of
 from wam_description.arm import Shared
 from wam_description.signals import BASE, Level, NodeStatus, State, Wrench
-from wam_description.status import DONE
+from wam_description.status import DONE, ENABLED
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Call, Input, Outputs, SetParameters, reaction
 
@@ -78,7 +78,7 @@ class ScenarioNode:
 
     def _request(self, out: ScenarioOutput) -> None:
         if out.request:
-            self._was_enabled = self._was_enabled or out.request == "enable"  # or this one fails
+            self._was_enabled |= out.request == "enable"  # or this one fails
             self.requests.append(Call("driver", "enable", out.request == "enable"))
         for node in dict.fromkeys(setting.node for setting in out.settings):
             values = {setting.name: _plain(setting) for setting in out.settings if setting.node == node}
@@ -94,7 +94,7 @@ class ScenarioNode:
         """End the task with a fault of the driver: no step may come any more; notice who else enables the arm."""
         if self.done or status.node != "driver":
             return {}
-        self._was_enabled = self._was_enabled or status.mode == "enabled"
+        self._was_enabled |= status.mode == ENABLED
         if not status.fault:
             return {}
         when = f"in step '{self._step}'" if self._step else "before the first step"

@@ -9,6 +9,7 @@ AWAITED = "waits for"  # fact: topics that a node lacks for its next step, separ
 PAUSED = "time"  # fact of the driver while the arm's time is stopped: "paused"
 CHANGES = "parameter changes"  # fact: how often live parameters were taken, with those that were taken last
 REFUSED = "refused"  # fact: topics whose present command a node does not obey
+ENABLED = "enabled"  # mode of the driver in which no brake holds
 DONE = "done"  # message of the scenario that was played to its end
 WALL_CLOCK = frozenset({REAL_TIME_FACTOR, BEHIND, SLIPS})  # facts that differ between two equal runs in lockstep
 
@@ -46,9 +47,9 @@ def guidance(
         return f"{mode}; not connected yet: {', '.join(absent)}"
     if mode == "braked" and faulty:
         return f"braked; enable is refused until the fault is over that is reported by {', '.join(faulty)}"
-    if mode == "enabled":
+    if mode == ENABLED:
         return "enabled: the brakes are released"
-    if is_played or (mode == "braked" and before == "enabled"):
+    if is_played or (mode == "braked" and before == ENABLED):
         return f"{mode}: the brakes are on"
     if mode == "braked":
         call = _call(namespace, "enable", "SetBool '{data: true}'")

@@ -49,16 +49,14 @@ def placed_groups(shared: Shared, processes: str) -> list[tuple[list[str], dict[
     groups = process_groups(shared.nodes, processes)
     permitted = os.sched_getaffinity(0)
     if shared.timing.mode == "lockstep":
-        is_apart = [GROUPS.get(declared(group[0]).name) == INNER for group in groups]
-        policy = [WAITING]
+        apart, policy = {name for name, group in GROUPS.items() if group == INNER}, [WAITING]
     elif len(permitted) >= FEWEST and fifo_is_granted(shared.timing.fifo_priority):
-        is_apart = [any(declared(entry).name == "driver" for entry in group) for group in groups]
-        policy = []
+        apart, policy = {"driver"}, []
     else:
         return [(group, {}) for group in groups]
-    apart, others = divided(idle_parts(permitted))
-    places = [" ".join([*map(str, apart if one else others), *policy]) for one in is_apart]
-    return [(group, {PROCESSORS: place}) for group, place in zip(groups, places, strict=True)]
+    idlest, rest = (" ".join([*map(str, part), *policy]) for part in divided(idle_parts(permitted)))
+    is_apart = (any(declared(entry).name in apart for entry in group) for group in groups)
+    return [(group, {PROCESSORS: idlest if one else rest}) for group, one in zip(groups, is_apart, strict=True)]
 
 
 def divided(idle: Mapping[int, float]) -> tuple[set[int], set[int]]:
