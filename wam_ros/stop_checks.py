@@ -24,7 +24,10 @@ def _repetition(bench: DriverBench) -> str:
     bench.enable()
     old = bench.probe.answered
     bench.probe.wanted = lambda _, currents: bench.probe.command(old, currents)
-    return bench.stops(old, STOP) or bench.in_mode("fault")
+    wrong = bench.stops(old, STOP) or bench.in_mode("fault")
+    if not wrong and bench.probe.longest_pause > STOP:
+        raise Untested(f"no command was sent for {1e3 * bench.probe.longest_pause:.0f} ms, which stops any driver")
+    return wrong
 
 
 def _fault(bench: DriverBench) -> str:
