@@ -40,9 +40,9 @@ def plant_of(arm: Arm, step: float = STEP, springs: Springs = NO_SPRINGS, **effe
     return made
 
 
-def drive(plant: Plant, seconds: float, torque: list[float], step: float = STEP) -> None:
-    for _ in range(round(seconds / step)):
-        plant.step(torque)
+def drive(plant: Plant, seconds: float, torque: list[float], step: float = STEP, together: int = 1) -> None:
+    for _ in range(round(seconds / step / together)):
+        plant.step(torque, together)
 
 
 def load(plant: Plant, torque: list[float]) -> None:
@@ -188,11 +188,11 @@ def test_arm_that_hangs_in_slack_cables_starts_at_rest(pretension: float) -> Non
 # creep and loss
 
 
-def turn(plant: Plant, way: float, seconds: float, torque: float) -> tuple[float, float, float]:
+def turn(plant: Plant, way: float, seconds: float, torque: float, together: int = 1) -> tuple[float, float, float]:
     """Turn the rotor smoothly by an angle against a load; travel, work put in, work got out at the joint."""
     begin, speed = plant.theta[0], 0.0
     travel = put_in = got_out = 0.0
-    steps = round(seconds / STEP)
+    steps = round(seconds / STEP / together)
     for k in range(1, steps + 1):
         s = k / steps
         goal = begin + way * (s - math.sin(2 * math.pi * s) / (2 * math.pi))
@@ -200,7 +200,7 @@ def turn(plant: Plant, way: float, seconds: float, torque: float) -> tuple[float
         before = plant.theta[0], plant.q[0]
         speed = plant.thetad[0]
         tau = torque + 5.0 * (goal - before[0]) + 0.02 * (goal_speed - speed)
-        plant.step([tau])
+        plant.step([tau], together)
         travel += abs(plant.theta[0] - before[0])
         put_in += tau * (plant.theta[0] - before[0])
         got_out += torque * N * (plant.q[0] - before[1])
@@ -219,14 +219,16 @@ def loaded(torque: float, creep: bool, **joints: tuple[float, ...]) -> Plant:
 
 
 @pytest.mark.parametrize("torque", [4.0, -1.5])
-@pytest.mark.parametrize("creep", [True, False])
-def test_rotor_that_goes_out_and_back_leaves_the_joint_where_its_load_pulls_it(torque: float, creep: bool) -> None:
+@pytest.mark.parametrize(("creep", "together"), [(True, 1), (True, 2), (False, 1)])
+def test_rotor_that_goes_out_and_back_leaves_the_joint_where_its_load_pulls_it(
+    torque: float, creep: bool, together: int
+) -> None:
     """(6.19): the joint yields by travel x tau/(r EA)/N; strand length 1 m, so that EA is its stiffness."""
     plant = loaded(torque, creep)
     before = plant.theta[0], plant.q[0]
     travel = 0.0
     for way in (1.5, -1.5):
-        travel += turn(plant, way, 2.0, torque)[0]
+        travel += turn(plant, way, 2.0, torque, together)[0]
     assert travel == pytest.approx(3.0, rel=0.01)
     plant.brake(True)
     drive(plant, 1.0, [torque])
@@ -500,24 +502,40 @@ def test_rotor_breaks_away_at_a_friction_in_proportion_to_both_tensions(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("together", [1, 2])
 @pytest.mark.parametrize(("pretension", "torque", "slack"), TENSIONS)
 def test_turning_rotor_loses_momentum_to_a_friction_in_proportion_to_both_tensions(
-    pretension: float, torque: float, slack: bool
+    pretension: float, torque: float, slack: bool, together: int
 ) -> None:
     """Both inertias slow down together by F; the tension that counts is that of the decelerating link."""
     plant = gripping_under_load(pretension, torque, slack)
     plant.data.qvel[:] = (20.0, 20.0 / N)
-    drive(plant, 0.15, [torque])
+    drive(plant, 0.15, [torque], together=together)
     whole = ROTOR + LINK_INERTIA / N**2
     friction = BASE / 2 + COEFFICIENT * 2 * pretension
     for _ in range(50):  # the link's own inertia takes from the tension what it gives to the motion
         carried = torque - LINK_INERTIA / N**2 * friction / whole
         friction = BASE / 2 + COEFFICIENT * sum_of_tensions(pretension, carried if slack else 0.0)
     momentum = ROTOR * plant.thetad[0] + LINK_INERTIA / N * plant.qd[0]
-    drive(plant, 0.1, [torque])
+    drive(plant, 0.1, [torque], together=together)
     lost = momentum - ROTOR * plant.thetad[0] - LINK_INERTIA / N * plant.qd[0]
     assert plant.thetad[0] > 1.0
     assert lost / 0.1 == pytest.approx(friction, rel=THOUSANDTH)
+
+
+@pytest.mark.parametrize("together", [1, 2])
+def test_friction_of_a_turning_rotor_grows_when_its_cable_becomes_slack(together: int) -> None:
+    """Nothing else changes the friction: the rotor neither stops nor starts."""
+    plant = gripping(20.0)
+    plant.data.qvel[:] = (20.0, 20.0 / N)
+    drive(plant, 0.01, [0.0])
+    assert plant.model.dof_frictionloss[0] == pytest.approx(BASE / 2 + COEFFICIENT * 40.0, rel=THOUSANDTH)
+    load(plant, [-N * 5.0])
+    drive(plant, 0.02, [5.0], together=together)
+    assert plant.thetad[0] > 1.0
+    assert min(plant.tensions[0]) == 0.0
+    expected = BASE / 2 + COEFFICIENT * sum(plant.tensions[0])
+    assert plant.model.dof_frictionloss[0] == pytest.approx(expected, rel=0.01)  # the tension of a step before
 
 
 @pytest.mark.slow

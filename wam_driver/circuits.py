@@ -81,24 +81,34 @@ class CableCircuits:
                 self._slack_ends[4 * i + 1] -= more
                 self._slack_ends[4 * i + 2] += more
 
-    def follow(self, direction: Sequence[int]) -> None:
+    def follow(self, direction: Sequence[int], count: int) -> bool:
         """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; look for slack strands.
+
+        Creep is slow and moves no more than where a strand goes slack, friction by tension begins with 0 there, so
+        that once for the steps of a control period is enough.
 
         Parameters
         ----------
         direction : sign of the velocity of each rotor, 0 while it is stuck.
+        count : steps since the last time.
+
+        Returns
+        -------
+        bool
+            `is_slack`.
         """
-        ends = self._slack_ends
-        self.is_slack = False
+        ends, is_slack = self._slack_ends, False
         for (i, rate, most), way, speed, pull in zip(  # noqa: B905 - costs 1 % of a step
             self.each, direction, self._speed.tolist(), self._pull.tolist()
         ):
             if way:
-                crept = rate * abs(speed) * pull
+                crept = count * rate * abs(speed) * pull
                 ends[i] -= crept
                 ends[i + 1] -= crept
             if abs(pull) > most:
-                self.is_slack = True
+                is_slack = True
+        self.is_slack = is_slack
+        return is_slack
 
     @property
     def elastic_torque(self) -> list[float]:

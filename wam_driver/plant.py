@@ -95,6 +95,7 @@ class Plant:
         self._circuits = CableCircuits(self.data, arm, effects, step)
         self._friction = DryFriction(arm, effects, friction, step, self.model.dof_invweight0[: 2 * n].tolist())
         self._loads = CoverLoads(self.model, self.data, arm, world.springs)
+        self._pushes = self._loads.pushes
         self._moving = moving_obstacles(self.model, self.data, world)
         self._objects = TrueObjects(self.model, self.data, arm, world, {one.name: one for one in self._moving})
         self._movers: list[Mover] = [*pushers(self.model, self.data, arm, world.pushers, step), *self._moving]
@@ -116,7 +117,7 @@ class Plant:
         self._frictionloss = self.model.dof_frictionloss[: 2 * n]
         self._position, self._plastic, self._warnings = data.qpos, data.plastic, data.warning.number
         is_plain = self._friction.is_steady and not self._movers  # what the steps in C do
-        shared = self._surfaces.laws, self._friction, self._circuits, self._loads.pushes
+        shared = self._surfaces.laws, self._friction, self._circuits, self._pushes
         self._advance = compiled_steps(model, data, *shared, step) if is_plain else None
         self._rest()
         self._kept = self._position.tolist(), self._plastic.tolist()
@@ -235,15 +236,17 @@ class Plant:
         Parameters
         ----------
         torque : torque of each motor on its rotor, N m.
-        count : number of steps with this torque.
+        count : number of steps with this torque; the cables creep once, for all of them.
         """
-        model, data, pushes, circuits = self.model, self.data, self._loads.pushes, self._circuits
+        model, data, pushes, circuits = self.model, self.data, self._pushes, self._circuits
         self._write_torque(0, *torque)
         if self._advance is not None:
             self._velocity = self._advance(count, self._is_set, self._set_friction)
             return
         for _ in range(count):
-            self._set_friction()
+            velocity = self._velocity = self._qvel.tolist()
+            if not (self._is_set and self._friction.remains(velocity)):
+                self._set_friction()
             for mover in self._movers:
                 mover.lead(data.time)
             mj_step1(model, data)
@@ -254,8 +257,8 @@ class Plant:
             mj_step2(model, data)
             if pushes:
                 self._applied.fill(0.0)
-            if circuits.depends_on_torque:
-                circuits.follow(self._friction.direction)
+        if circuits.depends_on_torque and circuits.follow(self._friction.direction, count):
+            self._is_set = False
 
     def _set_friction(self) -> None:
         """Give MuJoCo the level of friction of every shaft for the next step."""
@@ -269,7 +272,7 @@ class Plant:
                 self._applied[:] = friction.elastic
         if changed or circuits.is_slack or not self._is_set:
             levels = friction.levels_with_slack(circuits.elastic_torque) if circuits.is_slack else friction.levels
-            self._is_set = not circuits.is_slack
+            self._is_set = friction.is_steady and not circuits.is_slack
             self._frictionloss[:] = self._brakes + levels[self._n :] if self._braked else levels
 
     def _transmitted_torque(self) -> list[float]:
