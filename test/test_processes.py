@@ -626,6 +626,54 @@ def test_a_fault_ends_the_scenario_where_no_step_comes_any_more(tmp_path: Path, 
         assert failure == "the driver stopped in step 'wait': two publishers send motor_current_command"
 
 
+REPORT_THE_DELIVERY = """
+import time
+from rclpy.node import Node
+from wam_ros.run import SHORT_DELIVERY, end_of_delivery, run
+
+class Sender(Node):
+    def __init__(self, context, namespace):
+        super().__init__("sender", context=context, namespace=namespace)
+        print("made", flush=True)
+
+    def destroy_node(self):
+        print(end_of_delivery(self.context) - time.monotonic() <= SHORT_DELIVERY)
+        super().destroy_node()
+
+run({"sender": Sender})
+"""
+
+
+@pytest.mark.parametrize("listener_gone", [False, True])
+def test_a_node_waits_for_its_listeners_but_not_for_one_that_was_killed(
+    listener_gone: bool, started: Any, domain_id: int
+) -> None:
+    from wam_ros.program import LISTENER_GONE
+
+    stack = started("-c", REPORT_THE_DELIVERY)
+    wait(lambda: "made" in stack.said() or stack.process.poll() is not None, "the node")
+    assert stack.process.poll() is None, stack.said()
+    if listener_gone:
+        stack.process.send_signal(LISTENER_GONE)
+    stack.process.terminate()
+    assert stack.process.wait(LONG) == 0, stack.said()
+    assert stack.said().split() == ["made", str(listener_gone)]
+
+
+@pytest.mark.parametrize(("number", "is_announced"), [(signal.SIGKILL, True), (signal.SIGTERM, False)])
+def test_where_a_node_was_killed_the_others_are_informed_before_they_end(
+    number: signal.Signals, is_announced: bool, recording: Processes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wam_ros.program import LISTENER_GONE
+
+    sent: list[int] = []
+    monkeypatch.setattr(subprocess.Popen, "send_signal", lambda process, number: sent.append(number))
+    os.kill(pid_of(recording, "recorder"), number)
+    recording.wait(bool)
+    recording.stop()
+    assert (LISTENER_GONE in sent) is is_announced
+
+
 def test_a_listener_that_is_frozen_holds_up_the_end_of_all_nodes_once(
     started: Any, domain_id: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,6 +23,7 @@ from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import require_places
 from wam_ros.node import make_node
 from wam_ros.processors import placed_groups
+from wam_ros.program import LISTENER_GONE
 from wam_ros.run import FIRST, LAST, NAMESPACE, PARENT, Connection, prepare_logging_directory, spin
 
 LOGGER: Final = get_logger("wam")
@@ -150,6 +151,9 @@ class Processes:
         """
         deadline = time.monotonic() + PATIENCE
         others = [name for name in self._processes if name not in (self._first, LAST)]
+        if any(code < 0 for code in self.ended().values()):
+            for process in self._processes.values():
+                process.send_signal(LISTENER_GONE)
         for names in ([self._first], others):
             for name in names:
                 self._terminate(name)

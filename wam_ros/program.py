@@ -9,6 +9,7 @@ import os
 import signal
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+LISTENER_GONE = signal.SIGUSR1  # from bring-up, before SIGTERM: a node was killed, which takes no message any more
 
 
 def end_at_once_on_signals(last_words: str = "") -> None:
@@ -25,6 +26,7 @@ def end_at_once_on_signals(last_words: str = "") -> None:
 
     for number in SIGNALS:
         signal.signal(number, end)
+    signal.signal(LISTENER_GONE, signal.SIG_IGN)
     # mujoco would look for GLFW in a child process, which prints a traceback of its own; we open no window
     os.environ.setdefault("MUJOCO_GL", "disable")
 

@@ -28,7 +28,7 @@ from wam_ros.leaving import bound_leaving
 from wam_ros.local_bus import BUSES, LocalBus
 from wam_ros.network import limit_to_this_machine
 from wam_ros.processors import keep_to_processors
-from wam_ros.program import Stop
+from wam_ros.program import LISTENER_GONE, Stop
 
 FIRST = "driver"  # to be stopped: brakes on, before the commands cease and it had to call that a fault
 LAST = "recorder"  # to be stopped: it closes the bag
@@ -37,6 +37,7 @@ PARENT = "WAM_STACK_PARENT"  # environment variable: process that bring-up start
 LONGEST_END = 0.5  # s, for what has arrived before the end
 # s, for the last messages of all nodes of this process together; only a listener that is frozen needs it
 LONGEST_DELIVERY = 4.0
+SHORT_DELIVERY = 0.4  # s, where a listener was killed: the middleware waits for it as for one that is frozen
 PR_SET_PDEATHSIG = 1
 MakeNode = Callable[..., Node]
 
@@ -113,6 +114,7 @@ class Connection:
     Attributes
     ----------
     context, executor : to make nodes with, and to spin.
+    listener_gone : whether one of those that take messages of these nodes was killed.
     """
 
     def __init__(self, arguments: Sequence[str] = (), domain_id: int | None = None) -> None:
@@ -126,6 +128,7 @@ class Connection:
             signal_handler_options=SignalHandlerOptions.NO,
         )
         self.executor = make_executor(self.context)
+        self.listener_gone = False
         self._nodes: list[Node] = []
 
     def add(self, node: Node) -> None:
@@ -135,7 +138,7 @@ class Connection:
 
     def close(self) -> None:
         """Destroy the nodes, driver first, recorder last, and leave the network."""
-        _ENDS[self.context] = time.monotonic() + LONGEST_DELIVERY
+        _ENDS[self.context] = time.monotonic() + (SHORT_DELIVERY if self.listener_gone else LONGEST_DELIVERY)
         for node in sorted(self._nodes, key=lambda node: (node.get_name() == LAST) - (node.get_name() == FIRST)):
             self.executor.remove_node(node)
             node.destroy_node()
@@ -167,6 +170,7 @@ def run(makers: Mapping[str, MakeNode], arguments: Sequence[str] | None = None) 
     except RuntimeError as error:
         reason = str(error).split(", at /")[0]
         raise SystemExit(f"error: ROS does not start with {' '.join(given[1:]) or 'no arguments'}: {reason}") from None
+    signal.signal(LISTENER_GONE, lambda *_: setattr(connection, "listener_gone", True))
     BUSES[connection.context] = LocalBus(connection.executor, makers)
     nodes: dict[str, Node] = {}
 
