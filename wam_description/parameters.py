@@ -116,19 +116,28 @@ def one_each(names: str, value: bool | int | float | str) -> Callable[[Mapping[s
     return lambda others: (value,) * len(others[names])
 
 
-def fields(cls: type, prefix: str = "") -> Iterator[Field]:
+_FIELDS: dict[type, tuple[Field, ...]] = {}
+
+
+def fields(cls: type) -> tuple[Field, ...]:
     """Every parameter of a class, nested classes as dotted names, in order of declaration."""
+    if cls not in _FIELDS:
+        _FIELDS[cls] = tuple(_declared(cls))
+    return _FIELDS[cls]
+
+
+def _declared(cls: type) -> Iterator[Field]:
     hints = get_type_hints(cls)
     for item in dataclasses.fields(cls):
         hint = hints[item.name]
-        name = prefix + item.name
         if dataclasses.is_dataclass(hint):
             assert isinstance(hint, type)
-            yield from fields(hint, name + ".")
+            for field in fields(hint):
+                yield field._replace(name=f"{item.name}.{field.name}")
             continue
         is_array = get_origin(hint) is tuple
         kind = get_args(hint)[0] if is_array else hint
-        yield Field(name, kind, is_array, **item.metadata)
+        yield Field(item.name, kind, is_array, **item.metadata)
 
 
 def flatten(tree: Mapping[str, Any]) -> dict[str, Any]:
