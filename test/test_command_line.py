@@ -67,7 +67,10 @@ def test_one_number_is_changed_in_one_word(capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("arm.links.mas=[2.5]", "to set to [2.5]; did you mean 'arm.links.mass'? it has"),
+        ("arm.links.mas=[2.5]", "to set to [2.5]; did you mean 'arm.links.mass'?"),
+        ("force_gain=[0.01]", "did you mean 'force_loop:force_gain'?"),
+        ("force_loop.force_gain=[0.01]", "did you mean 'force_loop:force_gain'?"),
+        ("foo=1", "it has: ages.command, "),
         ("nothing", "write [node:]parameter=value"),
         ("timing.period=[", "is no value of YAML"),
         ("drivr:seed=1", "no section '/**/drivr'"),
@@ -264,3 +267,12 @@ def test_the_help_fits_a_narrow_terminal(capsys: pytest.CaptureFixture[str], mon
     for words in [[], *([name] for name in COMMANDS)]:
         out = said(capsys, *words, "--help")[1]
         assert max(map(len, out.splitlines())) <= 60, words
+
+
+def test_values_are_those_of_the_usual_configuration_where_none_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    values = ("--set", "force_loop:force_gain=[0.5]")
+    found = said(capsys, "guard", *values)
+    assert found == said(capsys, "guard", "--config", "wam", *values)
+    assert found[0] == 1
+    code, _, err = said(capsys, "guard", *values, "--gain", "1.0")
+    assert (code, "leave out --config and --set" in err) == (1, True)

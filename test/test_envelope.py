@@ -119,6 +119,27 @@ def test_a_message_without_a_push_ends_those_of_messages_and_not_that_of_the_pro
     assert [load.cover for load in hardware.plant.loads()] == ["outer_link"]
 
 
+def test_a_message_is_the_one_push_of_messages_so_that_one_on_another_cover_ends_it() -> None:
+    hardware = driver()
+    none, force = (0.0, 0.0, 0.0), (0.0, 5.0, 0.0)
+    hardware.disturb(Wrench("inner_link", force, none))
+    hardware.disturb(Wrench("outer_link", force, none))
+    assert [load.cover for load in hardware.plant.loads()] == ["outer_link"]
+    with pytest.raises(ValueError, match="frame_id is 'base'; push on one of inner_link, outer_link"):
+        hardware.disturb(Wrench(BASE, force, none))
+    assert [load.cover for load in hardware.plant.loads()] == ["outer_link"]
+
+
+def test_pushes_on_two_covers_end_each_by_itself() -> None:
+    hardware = driver()
+    periods = round(WAM.shared.ages.command / WAM.shared.timing.period)
+    hardware.push("inner_link", (0.0, 5.0, 0.0), (0.0, 0.0, 1.0))
+    for _ in range(periods + 2):
+        hardware.push("outer_link", (0.0, 5.0, 0.0), (0.0, 0.0, 1.0))
+        hardware.advance(0.0)
+    assert [load.cover for load in hardware.plant.loads()] == ["outer_link"]
+
+
 def test_a_push_that_nobody_repeats_ends_after_the_age_of_a_command() -> None:
     hardware = driver()
     periods = round(WAM.shared.ages.command / WAM.shared.timing.period)

@@ -111,14 +111,29 @@ class Configuration(NamedTuple):
             flat = sections[self._section(node) if colon else SHARED]
             if parameter not in flat and (colon or parameter not in _DERIVED):
                 where = f"node '{node}'" if colon else "section '/**'"
-                near = difflib.get_close_matches(parameter, flat, n=1)
-                meant = f"did you mean '{near[0]}'? " if near else ""
+                meant = self._meant(key, parameter, flat)
                 raise ParameterError(
                     f"{self.path}: {where} has no parameter '{parameter}' to set to {value!r}; "
-                    f"{meant}it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
+                    + (
+                        f"did you mean {meant}?"
+                        if meant
+                        else f"it has: {', '.join(sorted(flat)) or 'none'} (write node:parameter for one of a node)"
+                    )
                 )
             flat[parameter] = like(flat.get(parameter), value)
         return Configuration(self.path, _frozen(sections))
+
+    def _meant(self, key: str, parameter: str, flat: Mapping[str, Any]) -> str:
+        """Parameters that `key` may mean: of this name in another section, or with a similar one in `flat`."""
+        keys = {
+            name if section == SHARED else f"{section.rpartition('/')[2]}:{name}"
+            for section, names in self.sections.items()
+            for name in names
+        }
+        found = {one for one in keys if one.rpartition(":")[2] == parameter} | {key.replace(".", ":", 1)} & keys
+        place = key[: key.rfind(":") + 1]
+        near = [place + name for name in difflib.get_close_matches(parameter, flat, n=1)]
+        return " or ".join(f"'{one}'" for one in sorted(found) or near)
 
     def _overlaid(self, path: Path, changes: Mapping[str, Mapping[str, Any]]) -> "Configuration":
         """The configuration of `path`: this one with changed values and further sections."""

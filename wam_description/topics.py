@@ -289,7 +289,8 @@ TOPICS: Final = (
         "sim/disturbance",
         WRENCH,
         "outer",
-        "a push: force at and torque about the origin of the cover named by frame_id; it ends `ages.command` after the last one",
+        "a push: force at and torque about the origin of the cover named by frame_id; it ends with one on another cover, and "
+        "`ages.command` after the last one",
     ),
     Topic("robot_description", "std_msgs/msg/String", "latched", "URDF of the arm"),
     Topic("status", "diagnostic_msgs/msg/DiagnosticStatus", "latched", "state of each node, latched by each"),

@@ -100,8 +100,8 @@ class Driver:
         self._watch = LimitWatch(arm, parameters.cover_speed_limit, parameters.tip_speed_limit)
         self._zero = [0.0] * len(arm.motors.names)
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
-        self._push_end = 0  # last tick of the present push
-        self._disturbed: set[str] = set()  # covers that are pushed by messages
+        self._push_ends: dict[str, int] = {}  # last tick of the present push on each cover
+        self._disturbed = ""  # cover that is pushed by messages
         self._pretension_share = parameters.effects.pretension_share
         self._begin_period(1)
         self._release()
@@ -139,8 +139,8 @@ class Driver:
         arrival_age : time since the last command arrived, s, on the steady clock; 0 in lockstep.
         """
         enabled = self.safety.mode is Mode.ENABLED
-        if self._push_end and self._tick > self._push_end:
-            self._end_pushes()
+        for cover in [cover for cover, last in self._push_ends.items() if self._tick > last]:
+            self._end_push(cover)
         if enabled:
             age = max((self._tick - self._command_tick) * self._timing.period, arrival_age)
             if age >= self._parameters.watchdog:
@@ -217,27 +217,30 @@ class Driver:
         if excess := self._push_excess(force, torque):
             raise ValueError(f"{excess}; the last push remains")
         self.plant.push(cover, np.array(force), np.array(torque))
-        self._push_end = self._tick + self._push_ticks
+        self._push_ends[cover] = self._tick + self._push_ticks
 
     def disturb(self, wrench: Wrench) -> None:
-        """Take a message of `sim/disturbance`; one in the base frame ends the pushes of messages, and no others.
+        """Take a message of `sim/disturbance`: the one push of messages, in the base frame none.
+
+        It ends the push of the message before where that was on another cover, and no other pushes.
 
         Raises
         ------
         ValueError
-            as `push`.
+            as `push`, and for a force or torque in the base frame.
         """
-        if wrench.frame != BASE:
-            self.push(wrench.frame, wrench.force, wrench.torque)
-            self._disturbed.add(wrench.frame)
-            return
-        for cover in self._disturbed:
-            self.plant.push(cover, np.zeros(3), np.zeros(3))
-        self._disturbed.clear()
+        cover = "" if wrench.frame == BASE else wrench.frame
+        if cover:
+            self.push(cover, wrench.force, wrench.torque)
+        elif any(wrench.force) or any(wrench.torque):
+            raise ValueError(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
+        if self._disturbed not in ("", cover):
+            self._end_push(self._disturbed)
+        self._disturbed = cover
 
-    def _end_pushes(self) -> None:
-        self._push_end = 0
-        self.plant.release()
+    def _end_push(self, cover: str) -> None:
+        self._push_ends.pop(cover, None)
+        self.plant.push(cover, np.zeros(3), np.zeros(3))
 
     def set_added_friction(self, friction: Sequence[float]) -> None:
         """Set the added Coulomb friction of the joints, (n,), N m, like the Teflon rod of section 5.6."""

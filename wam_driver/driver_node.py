@@ -146,8 +146,6 @@ class DriverNode(TolerantNode):
         self._announce()
 
     def _take_push(self, stamp: int, wrench: Wrench) -> None:
-        if wrench.frame == BASE and any(wrench.force):
-            raise Refused(f"frame_id is '{BASE}'; push on one of {', '.join(self._arm.covers.names)}")
         refusal = ""
         try:
             self.driver.disturb(wrench)

@@ -8,6 +8,7 @@ from pathlib import Path
 from wam_analysis.findings.finding import shown
 from wam_analysis.identification.recorded_loop import LoopNumber, RecordedLoop, recorded_loop
 from wam_cli.commands import (
+    BASE_CONFIGURATION,
     at_least,
     configuration_of,
     take_configuration,
@@ -63,11 +64,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Print the two tables, 1 where a set was accepted that diverges; or assess a loop, 1 where it is not safe.
 
-    With a configuration, its force loop is assessed as at its start.
+    With a configuration or values of one, its force loop is assessed as at its start.
+
+    Raises
+    ------
+    ValueError
+        for options of a loop of your own and of a configuration together, and a picture without a loop.
     """
-    if given.config:
+    is_own = given.bag or any(getattr(given, name) is not None for name in PLANT)
+    if is_own and (given.config or given.values):
+        raise ValueError(f"--bag and --{', --'.join(PLANT)} give a loop of your own; leave out --config and --set")
+    if given.config or given.values:
+        given.config = given.config or BASE_CONFIGURATION
         return _assess_configuration(configuration_of(given))
-    if given.bag or any(getattr(given, name) is not None for name in PLANT):
+    if is_own:
         return _assess(given)
     if given.picture:
         raise ValueError(f"--picture shows a loop of your own; give --{', --'.join(PLANT)}")
