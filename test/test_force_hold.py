@@ -645,6 +645,17 @@ def test_a_force_that_is_commanded_limits_what_pushes_wherever_it_does(
     assert ("limits.whole_force, 1.5 times the commanded 8 N" in found.contact_force) is gives_way
 
 
+@pytest.mark.parametrize(
+    ("measured", "words"),
+    [(None, "with at least"), (lambda: 20.0, "with 20 N in all, if it acts where the commanded force does")],
+)
+def test_a_force_at_an_assumed_position_is_not_given_as_a_lower_bound(measured: Any, words: str) -> None:
+    limits = MotionLimits(ARM, BODY, replace(OWN.limits, whole_force=1.5), 1.5)
+    torques = BODY.tool_jacobian(POSE).T @ np.array([0.0, 14.0, 0.0])
+    found = limits.step([0.0] * 4, POSE, pushed(torques), DT, WholeForce(8.0, measured))
+    assert words in found.contact_force
+
+
 def test_what_pushes_moves_the_arm_no_further_than_it_may_go_for_nothing() -> None:
     """A measured torque that no force gives: the arm comes to rest, and gives way again after it has gone."""
     limits = MotionLimits(ARM, BODY, replace(OWN.limits, contact_force=60.0, free_travel=0.1), 1.5)

@@ -50,6 +50,7 @@ class CommandAdmission:
 
     def __init__(self, joints: Joints, covers: Covers, command_age: float) -> None:
         self._joints, self._covers, self._command_age = joints, covers, command_age
+        self._last = f"the last good command remains in force for {command_age:g} s"
         self._force_age = self._torque_age = 0.0
         self.posture: list[float] = []
         self._present = NO_FORCE
@@ -82,7 +83,7 @@ class CommandAdmission:
         if force is not None and commanded < NOTHING and force.force != ZERO:
             force = force._replace(force=ZERO)
         if commanded > parameters.force_limit:
-            refusals["force_command"] = _refusal(commanded, "force_limit", parameters.force_limit, "N")
+            refusals["force_command"] = self._refusal(commanded, "force_limit", parameters.force_limit, "N")
         elif force is not None and (unpinned := self._unpinned(force)):
             refusals["force_command"] = unpinned
         if "force_command" in refusals:
@@ -93,7 +94,7 @@ class CommandAdmission:
             self._force, self._force_age = force, 0.0
         commanded = _largest(torque)
         if commanded > parameters.torque_limit:
-            refusals["joint_torque_command"] = _refusal(commanded, "torque_limit", parameters.torque_limit, "N m")
+            refusals["joint_torque_command"] = self._refusal(commanded, "torque_limit", parameters.torque_limit, "N m")
             self._torque_age += dt
             if self._torque_age > self._command_age or _largest(self._torque) > parameters.torque_limit:
                 self._torque = None
@@ -116,12 +117,15 @@ class CommandAdmission:
             refusals,
         )
 
+    def _refusal(self, commanded: float, name: str, limit: float, unit: str) -> str:
+        return f"{commanded:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} {unit}; {self._last}"
+
     def _unpinned(self, command: ForceCommand) -> str:
         """Why the torque of a command is refused: not that of its force at a position on a cover; '' if it is."""
         if not any(command.torque):
             return ""
         covers, pinned = self._covers, pinned_position(command)
-        last = "; the last good command remains in force"
+        last = f"; {self._last}"
         if pinned is None or command.frame not in covers.names:
             return (
                 f"torque {command.torque} N m is commanded in frame '{command.frame}'; a torque pins the position of a "
@@ -175,10 +179,3 @@ def _size(command: ForceCommand | None) -> float:
 
 def _largest(torque: Sequence[float] | None) -> float:
     return max(map(abs, torque)) if torque is not None else 0.0
-
-
-def _refusal(commanded: float, name: str, limit: float, unit: str) -> str:
-    return (
-        f"{commanded:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} {unit}; "
-        "the last good command remains in force"
-    )

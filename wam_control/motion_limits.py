@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +79,10 @@ class LimitParameters:
     )
 
 
+AT_LEAST: Final = "at least {} N in all"
+AT_COMMANDED: Final = "{} N in all, if it acts where the commanded force does"
+
+
 class WholeForce(NamedTuple):
     """A force that presses on something.
 
@@ -117,6 +121,7 @@ class MotionLimits:
     def __init__(self, arm: Arm, body: RigidBody, parameters: LimitParameters, fastest: float) -> None:
         self._joints, self._body, self._parameters, self._fastest = arm.joints, body, parameters, fastest
         self._given = self._pushed = 0.0  # m by which the arm has given way, N in the present push
+        self._how_known = ""  # that force: a lower bound, or the one at an assumed position
 
     def step(
         self,
@@ -146,7 +151,7 @@ class MotionLimits:
         self, velocity: list[float], q: Sequence[float], push: ArmPush, dt: float, whole: WholeForce | None
     ) -> tuple[list[float], str]:
         """Against a force that has come near the largest one no faster than the force law towards that one."""
-        force, allowed = self._push(q, push, whole)
+        force, allowed, how_known = self._push(q, push, whole)
         if not self._pushed and force <= BEGIN * allowed:
             return velocity, ""
         has_room = self._given < self._parameters.free_travel
@@ -156,7 +161,8 @@ class MotionLimits:
         if not is_bound and force <= BEGIN * allowed:
             self._given = self._pushed = 0.0
             return velocity, ""
-        self._pushed = max(self._pushed, force)
+        if force > self._pushed:
+            self._pushed, self._how_known = force, how_known
         limited: list[float] = (np.array(velocity) + missing).tolist()
         if force > allowed:
             self._given += float(np.linalg.norm(push.jacobian(self._body, q) @ limited)) * dt
@@ -164,21 +170,21 @@ class MotionLimits:
             return limited, ""
         limit = self._in_words(allowed, whole)
         return limited, (
-            f"the world pushes with at least {brief(self._pushed)} N in all; allowed: {limit}; the arm does not move "
-            "against it, and gives way by limits.free_travel at most: command a direction or a posture away from it, "
-            "or less force"
+            f"the world pushes with {self._how_known.format(brief(self._pushed))}; allowed: {limit}; the arm does not "
+            "move against it, and gives way by limits.free_travel at most: command a direction or a posture away from "
+            "it, or less force"
         )
 
-    def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float]:
-        """Force, N, and the largest one allowed: of those that count here the one that is nearest to it."""
+    def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float, str]:
+        """Force, N, the largest one allowed, of those that count here the one that is nearest to it, and its words."""
         own = self._parameters
         most, allowed = own.contact_force, own.whole_force * whole.desired if whole else math.inf
         least = push.least(self._body, q, BEGIN * min(most, allowed))
         if whole and allowed < most:
-            force = whole.measured() if whole.measured else least
+            force, words = (whole.measured(), AT_COMMANDED) if whole.measured else (least, AT_LEAST)
             if force * most >= least * allowed:
-                return force, allowed
-        return least, most
+                return force, allowed, words
+        return least, most, AT_LEAST
 
     def _in_words(self, allowed: float, whole: WholeForce | None) -> str:
         own = self._parameters
