@@ -47,6 +47,7 @@ TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a 
 ZERO: Final[Triple] = (0.0, 0.0, 0.0)
 NO_FORCE = ForceCommand("base", ZERO)
 ROUNDING = 1e-9  # s, of a sum of periods
+FASTEST: Final = 1.875  # speed in the middle of a minimum-jerk path, of its mean
 
 
 @dataclass(frozen=True)
@@ -225,6 +226,8 @@ class Scenario:
         self._motion = None
         if step.trajectory is not None or step.tip is not None:
             self._plan(step)
+        elif step.posture and self._shared is not None and (wrong := too_fast(step, self._from, self._shared)):
+            self.done, self.failure = True, wrong
 
     def _plan(self, step: ScenarioStep) -> None:
         """Plan the motion of a step as a whole; where that is not possible, the scenario fails before it moves."""
@@ -274,6 +277,31 @@ class Scenario:
         s = min(self._elapsed / step.seconds, 1.0)
         blend = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
         return [a + (b - a) * blend for a, b in zip(self._from, step.posture, strict=True)]
+
+
+def too_fast(step: ScenarioStep, start: Sequence[float], shared: Shared) -> str:
+    """Why the posture of a step cannot be reached in its time from joint angles (n,), rad; '' where it can."""
+    each = zip(shared.arm.joints.names, start, step.posture, shared.motion.joint_speed, strict=True)
+    needed, name, a, b, most = max((FASTEST * abs(b - a) / most, name, a, b, most) for name, a, b, most in each)
+    if needed <= step.seconds + ROUNDING:
+        return ""
+    return (
+        f"step '{step.name}': {name} goes from {a:.4g} to {b:.4g} rad in {step.seconds:g} s, at up to "
+        f"{most * needed / step.seconds:.3g} rad/s; allowed: up to motion.joint_speed, {most:g} rad/s; give the step "
+        f"at least {needed:.3g} s"
+    )
+
+
+def _require_time(where: str, steps: Sequence[ScenarioStep], shared: Shared) -> None:
+    """Refuse postures that cannot be reached in the time of their step, as far as it is known where they begin."""
+    start: Sequence[float] = shared.arm.joints.start
+    for step in steps:
+        if step.posture:
+            wrong = too_fast(step, start, shared) if start else ""
+            require(not wrong, f"{where}, {wrong}")
+            start = step.posture
+        if step.until_force or step.trajectory or step.tip or step.force != NO_FORCE or step.task is not None:
+            start = ()
 
 
 def planned(step: ScenarioStep, start: Sequence[float], shared: Shared) -> PostureMotion | LineMotion:
@@ -328,7 +356,9 @@ def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:
         raise ParameterError(f"scenario {path} has no list 'steps'")
     known(f"scenario {path}", tree, ("steps",), ("steps",))
     require(len(tree["steps"]) > 0, f"scenario {path} has no steps; give at least one")
-    return [_step(f"{path}, step {i + 1}", body, shared) for i, body in enumerate(tree["steps"])]
+    steps = [_step(f"{path}, step {i + 1}", body, shared) for i, body in enumerate(tree["steps"])]
+    _require_time(str(path), steps, shared)
+    return steps
 
 
 def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
