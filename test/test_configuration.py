@@ -46,6 +46,18 @@ def test_shared_part_and_nodes_become_parameter_objects(file: Path) -> None:
     assert len(configuration.sha256) == 64
 
 
+def test_lists_of_whole_and_other_numbers_become_what_ros_reads(file: Path, tmp_path: Path) -> None:
+    overlay = tmp_path / "overlay.yaml"
+    overlay.write_text("base: mine.yaml\n/**: {ros__parameters: {arm.gravity: [0, 0.5, -9]}}\n")
+    whole = tmp_path / "whole.yaml"
+    whole.write_text(file.read_text().replace("gravity: [0.0, 0.0, -9.80665]", "gravity: [0, 0.5, -9]"))
+    set_later = Configuration.load(file).with_values({"arm.gravity": [0, 0.5, -9]})
+    for configuration in (Configuration.load(overlay), Configuration.load(whole), set_later):
+        written = yaml.safe_load(configuration.text)["/**"]["ros__parameters"]["arm"]["gravity"]
+        assert [repr(value) for value in written] == ["0.0", "0.5", "-9.0"]
+        assert configuration.shared.arm.gravity == (0.0, 0.5, -9.0)
+
+
 @pytest.mark.slow
 def test_replaced_values_leave_the_original_alone(file: Path) -> None:
     original = Configuration.load(file)

@@ -650,7 +650,7 @@ def test_a_lower_bound_of_the_force_is_drawn_as_one():
 def test_a_failed_task_leaves_a_report_and_a_picture(tmp_path, capsys):
     steps = [
         {"name": "enable", "seconds": 0.1, "request": "enable"},
-        {"name": "lower onto nothing", "seconds": 0.2, "posture": POSE, "until_force": 1.5},
+        {"name": "lower onto nothing", "seconds": 0.3, "posture": POSE, "until_force": 1.5},
     ]
     task = load("follow-surface")
     script, bag = tmp_path / "script.yaml", tmp_path / "bag"

@@ -585,7 +585,7 @@ def test_motor_without_a_stage_and_circuit_without_compliance_are_refused() -> N
 def test_one_joint_may_have_two_springs() -> None:
     """One pushes from each side, so that both together hold the joint: 1000 N/m on 1 m, pressed by 0.1 rad each."""
     springs: dict[str, list[Any]] = {
-        "joints": ["joint1", "joint1"],
+        "joints": ["joint3", "joint3"],
         "stiffness": [1000.0, 1000.0],
         "lever": [1.0, 1.0],
         "rest": [0.1, -0.1],
@@ -593,7 +593,14 @@ def test_one_joint_may_have_two_springs() -> None:
     }
     hardware = built({f"driver:world.springs.{key}": value for key, value in springs.items()})
     hardware.plant.brake(True)
-    assert abs(hardware.plant.cable_torque[0]) < 1e-9
+    assert abs(hardware.plant.cable_torque[2]) < 1e-9
+
+
+def test_a_spring_whose_force_no_message_could_contain_is_refused() -> None:
+    with pytest.raises(
+        ParameterError, match=r"acts on joint1, whose link \w+ has no cover, .* joint3, joint4, or give"
+    ):
+        built({"driver:world.springs.stiffness": [10.0]})
 
 
 def test_added_friction_on_the_wrong_number_of_joints_is_refused() -> None:

@@ -158,7 +158,7 @@ def test_a_force_that_is_commanded_while_the_arm_moves_fast_waits_until_it_is_at
     down = triple(-10.0 * RigidBody(WAM).cover_pose(DEMO, "outer_link").rotation[:, 1])
     steps = [
         ScenarioStep("release", RELEASE, request="enable"),
-        ScenarioStep("move", 0.4, posture=DEMO),
+        ScenarioStep("move", 0.43, posture=DEMO),
         ScenarioStep("press", 1.1, posture=DEMO, force=ForceCommand("base", down)),
     ]
     run = Simulation(with_accepted_gain(CONFIGURATION.with_values(given)), steps)

@@ -335,25 +335,27 @@ def test_a_file_that_is_no_scenario_is_refused_by_name(tree: Any, text: str, tmp
     assert str(path) in str(refusal.value)
 
 
-TOO_FAST = "'go': joint2 goes from -0.6 to -1 rad in 0.2 s, at up to 3.75 rad/s; .*joint_speed, 1.2 rad/s; .*0.625 s"
+TOO_FAST = (
+    "'go': joint2 goes from -0.6 to -1 rad in 0.1 s, at up to 7.5 rad/s; .*joints.speed_limit, 4 rad/s; .*0.188 s"
+)
 
 
 def test_a_posture_that_cannot_be_reached_in_its_time_is_refused_where_its_start_is_known(tmp_path: Path) -> None:
-    go = {"name": "go", "seconds": 0.2, "posture": GOAL}
+    go = {"name": "go", "seconds": 0.1, "posture": GOAL}
     there = {"name": "there", "seconds": 1.0, "posture": START}
     for steps in ([there, go], [{**there, "posture": GOAL}, {**there, "name": "back"}, go]):
         with pytest.raises(ParameterError, match=TOO_FAST):
             load(write(tmp_path, {"steps": steps}), SHARED)
-    load(write(tmp_path, {"steps": [there, {**go, "seconds": 0.63}]}), SHARED)
+    load(write(tmp_path, {"steps": [there, {**go, "seconds": 0.19}]}), SHARED)
     load(write(tmp_path, {"steps": [there, {**there, "until_force": 1.0}, go]}), SHARED)  # it may stop before START
 
 
 def test_a_posture_too_far_from_where_the_arm_is_fails_before_it_moves() -> None:
-    step = ScenarioStep("go", 0.2, tuple(GOAL))
+    step = ScenarioStep("go", 0.1, tuple(GOAL))
     outs = play(Scenario([step], SHARED), 3)
     assert re.search(TOO_FAST, outs[-1].failure)
     assert outs[-1].posture == START
-    assert not play(Scenario([step._replace(seconds=0.63)], SHARED), 3)[-1].failure
+    assert not play(Scenario([step._replace(seconds=0.19)], SHARED), 3)[-1].failure
 
 
 def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) -> None:
@@ -374,7 +376,7 @@ def test_a_file_that_is_missing_or_no_text_is_refused_by_name(tmp_path: Path) ->
 FOR_NOTHING = "step 'go': it commanded the arm, and the brakes were on; give it, or a step before it, 'request: enable'"
 
 
-@pytest.mark.parametrize("step", [ScenarioStep("go", 0.7, tuple(GOAL)), ScenarioStep("go", 0.1, force=PRESS)])
+@pytest.mark.parametrize("step", [ScenarioStep("go", 0.2, tuple(GOAL)), ScenarioStep("go", 0.1, force=PRESS)])
 def test_a_scenario_that_commands_an_arm_which_nobody_has_enabled_fails(step: ScenarioStep) -> None:
     run = Simulation(CONFIGURATION, [ScenarioStep("wait", 0.05), step, ScenarioStep("never", 1.0)])
     assert run.play().startswith(FOR_NOTHING)

@@ -281,14 +281,14 @@ class Scenario:
 
 def too_fast(step: ScenarioStep, start: Sequence[float], shared: Shared) -> str:
     """Why the posture of a step cannot be reached in its time from joint angles (n,), rad; '' where it can."""
-    each = zip(shared.arm.joints.names, start, step.posture, shared.motion.joint_speed, strict=True)
+    each = zip(shared.arm.joints.names, start, step.posture, shared.arm.joints.speed_limit, strict=True)
     needed, name, a, b, most = max((FASTEST * abs(b - a) / most, name, a, b, most) for name, a, b, most in each)
     if needed <= step.seconds + ROUNDING:
         return ""
     return (
         f"step '{step.name}': {name} goes from {a:.4g} to {b:.4g} rad in {step.seconds:g} s, at up to "
-        f"{most * needed / step.seconds:.3g} rad/s; allowed: up to motion.joint_speed, {most:g} rad/s; give the step "
-        f"at least {needed:.3g} s"
+        f"{most * needed / step.seconds:.3g} rad/s; allowed: up to arm.joints.speed_limit, {most:g} rad/s; give the "
+        f"step at least {needed:.3g} s"
     )
 
 

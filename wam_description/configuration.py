@@ -34,7 +34,7 @@ class Configuration(NamedTuple):
     path : of the file.
     sections : flat ``{dotted name: value}`` of every section; '/**' is shared, the others are
         named like their node.
-    written : the text of the file if nothing was replaced, '' otherwise.
+    written : the text of the file if nothing was replaced and ROS can read it, '' otherwise.
     """
 
     path: Path
@@ -64,7 +64,9 @@ class Configuration(NamedTuple):
             raise ParameterError(f"configuration {path} is not a text file: {error}") from error
         tree = _tree(path, text)
         if not isinstance(tree, dict) or BASE not in tree:
-            return cls(path, _sections(path, tree), text)
+            sections = _sections(path, tree)
+            is_mixed = any(_is_mixed(value) for flat in sections.values() for value in flat.values())
+            return cls(path, sections, "" if is_mixed else text)
         base = cls.load(_base(path, tree.pop(BASE), _above), (*_above, path.resolve()))
         return base._overlaid(path, _sections(path, tree, whole=False))
 
@@ -75,7 +77,7 @@ class Configuration(NamedTuple):
 
     @property
     def text(self) -> str:
-        """YAML with these values; the file's own text if nothing was replaced."""
+        """YAML with these values, as ROS reads them; the file's own text if nothing was replaced."""
         return self.written or _text(self.sections)
 
     @property
@@ -316,8 +318,14 @@ def _frozen(sections: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[s
     return MappingProxyType({name: MappingProxyType(dict(flat)) for name, flat in sections.items()})
 
 
+def _is_mixed(value: Any) -> bool:
+    """Whether a value is a list of whole and other numbers, which ROS refuses."""
+    return isinstance(value, list) and {int, float} == {type(each) for each in value}
+
+
 def _text(sections: Mapping[str, Mapping[str, Any]]) -> str:
-    tree = {
-        (name if name == SHARED else f"{SHARED}/{name}"): {PARAMETERS: nested(flat)} for name, flat in sections.items()
-    }
+    tree = {}
+    for name, flat in sections.items():
+        values = {key: list(map(float, value)) if _is_mixed(value) else value for key, value in flat.items()}
+        tree[name if name == SHARED else f"{SHARED}/{name}"] = {PARAMETERS: nested(values)}
     return yaml_text.dump(tree)

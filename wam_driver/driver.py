@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_description.arm import Shared
+from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
 from wam_description.mismatch import ModelMismatch, true_arm
-from wam_description.parameters import lengths, parameter
+from wam_description.parameters import lengths, parameter, require
 from wam_description.signals import BASE, NO_LOAD, Answer, Load, State, Table, Wrench
 from wam_description.world import World
 from wam_driver.amplifier import Amplifier
@@ -62,6 +62,18 @@ class DriverSample(NamedTuple):
     actual: list[float]
 
 
+def _require_covers(arm: Arm, world: World) -> None:
+    """Refuse a spring on a link without a cover: no message could give its force."""
+    links = dict(zip(arm.joints.names, arm.links.names, strict=True))
+    for joint, stiffness in zip(world.springs.joints, world.springs.stiffness, strict=True):
+        covered = [name for name, link in links.items() if link in arm.covers.links]
+        require(
+            stiffness == 0.0 or joint in covered,
+            f"world.springs acts on {joint}, whose link {links[joint]} has no cover, so that sim/contact could not "
+            f"contain its force; allowed: {', '.join(covered)}, or give the link a cover in arm.covers",
+        )
+
+
 class Driver:
     """Steps the plant with the last valid command, as long as it is safe to do so.
 
@@ -91,6 +103,7 @@ class Driver:
             parameters.friction,
             parameters.brake_torque,
         )
+        _require_covers(arm, parameters.world)
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random, true.motors.torque_constant)
         self._sensors = Sensors(arm, parameters.sensors, random)
         self._recent: deque[tuple[Any, ...]] = deque(maxlen=parameters.post_mortem_samples)
