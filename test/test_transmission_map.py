@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError
 from wam_description.transmission_map import TransmissionMap
 
 N1, N2, N4 = 29.97, 30.40, 19.15
@@ -86,3 +87,10 @@ def test_impossible_matrix_is_refused(matrix: list[list[float]], message: str) -
 def test_wrong_number_of_values_is_refused(transmission: TransmissionMap) -> None:
     with pytest.raises(ValueError, match="got 3 values for 4 motors and joints"):
         transmission.joint_positions([1.0, 2.0, 3.0])
+
+
+def test_an_arm_whose_motors_do_not_move_every_joint_by_itself_is_refused_by_name() -> None:
+    matrix = [1.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0]
+    configuration = Configuration.load(packaged("wam")).with_values({"arm.joint_from_motor": matrix})
+    with pytest.raises(ParameterError, match=r"'arm\.joint_from_motor' is singular .condition number"):
+        configuration.shared  # noqa: B018 - built when it is read

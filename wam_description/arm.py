@@ -17,6 +17,7 @@ from wam_description.parameters import lengths, one_each, parameter, require, tu
 from wam_description.parts import Joints, Links, Motors, distinct
 from wam_description.units import STANDARD_GRAVITY
 
+LARGEST_CONDITION = 1e8  # of joint_from_motor
 TOLERANCE = 1e-3  # m, by which numbers that describe the same point may differ
 
 
@@ -105,6 +106,12 @@ class Arm:
         require(
             len(self.joint_from_motor) == motors * joints,
             f"parameter 'arm.joint_from_motor' has {len(self.joint_from_motor)} values; it needs {motors * joints}",
+        )
+        condition = float(np.linalg.cond(np.reshape(self.joint_from_motor, (joints, motors))))
+        require(
+            condition < LARGEST_CONDITION,
+            f"parameter 'arm.joint_from_motor' is singular (condition number {condition:.3g}, allowed below "
+            f"{LARGEST_CONDITION:g}): each joint needs its own combination of motors",
         )
         require(
             len(self.links.names) == joints,

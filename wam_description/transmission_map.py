@@ -5,9 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wam_description.arm import Arm
-
-LARGEST_CONDITION = 1e8
+from wam_description.arm import LARGEST_CONDITION, Arm
 
 
 class TransmissionMap:
