@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.command_gaps import command_gaps
 from wam_analysis.contact_comparison import StepContact, compared_contacts, uncompared_contacts
 from wam_analysis.contact_list import (
     ListedContact,
@@ -167,6 +168,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
     received, dropped = _counts(bag.metadata.get(RECORDING, {}))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
+    gaps = command_gaps(run, traces.stamp, lost, steps)
     return DemoSummary(
         namespace=run.namespace,
         period=period,
@@ -178,7 +180,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         touches=touches,
         contacts=listed_contacts(traces, certainty, steps),
         missed=missed_contacts(traces, steps),
-        unplanned=unplanned_contacts(run, traces, steps),
+        unplanned=unplanned_contacts(run, traces, steps, gaps),
         uncompared=uncompared_contacts(traces, touches),
         reactions=reactions,
         false_contact=int(np.sum(false)) * period,
@@ -188,7 +190,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         received=received,
         dropped=dropped,
         gone=lost.gone,
-        lost=tuple(lost.sentences(bag.first_ns)),
+        lost=(*lost.sentences(bag.first_ns), *(gap.sentence(traces.zero) for gap in gaps)),
         moment=_moment(run, traces, presses),
         notes=(*notes, *run.parameters.notes, *driver_faults(run, traces.zero)),
     )
