@@ -660,10 +660,24 @@ def test_contacts_are_counted_by_link_wherever_they_are():
 def test_without_truth_the_estimate_shows_what_was_too_hard():
     recording = without_truth(Recording())
     recording.set(recording.estimated, 9.4, 9.5, "outer_link", (0.0, 115.0, 0.0), 0.25)
-    assert summarize(with_limits(recording)).unplanned.hard == ()  # of a simulated arm, which may have been pushed
-    recording.recording = {"mode": "realtime"}
-    (hard,) = summarize(with_limits(recording)).unplanned.hard
+    for mode in ("lockstep", "realtime"):  # of a simulated arm, which may have been pushed
+        recording.recording = {"mode": mode}
+        assert summarize(with_limits(recording)).unplanned.hard == ()
+    bag = with_limits(recording)
+    of_bus = yaml.safe_load(bag.attachments["parameters.yaml"])
+    own = of_bus["/wam/force_loop"]["ros__parameters"]
+    own["nodes"] = ["bus_driver:BusInterface" if node == "driver" else node for node in own["nodes"]]
+    (hard,) = summarize(bag._replace(attachments={"parameters.yaml": yaml.safe_dump(of_bus).encode()})).unplanned.hard
     assert (hard.force, hard.allowed, hard.source) == (115.0, 90.0, "estimated")
+
+
+def test_without_parameters_lockstep_and_topics_of_the_simulator_show_a_simulation():
+    recording = without_truth(Recording())
+    for mode, is_simulated in (("lockstep", True), ("realtime", False)):
+        recording.recording = {"mode": mode}
+        assert recorded_run(recording.bag()).is_simulated is is_simulated
+    bag = recording.bag()._replace(counts={"/wam/sim/disturbance": 3})  # in the bag, and not read
+    assert recorded_run(bag).is_simulated
 
 
 def test_what_a_step_sets_is_what_is_allowed_from_then_on():

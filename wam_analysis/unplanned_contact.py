@@ -98,9 +98,7 @@ def unplanned_contacts(
 
 def _lacking(run: RecordedRun) -> list[str]:
     """Topics of commands that were not recorded; the arm itself has no disturbance."""
-    topics = {*run.bag.topics, *run.bag.counts}
-    is_simulated = run.mode == "lockstep" or any(name.startswith(f"{run.namespace}/sim/") for name in topics)
-    names = ["force_command", "task_command", *["sim/disturbance"][:is_simulated]]
+    names = ["force_command", "task_command", *["sim/disturbance"][: run.is_simulated]]
     return [name for name in names if f"{run.namespace}/{name}" not in run.bag.topics]
 
 
