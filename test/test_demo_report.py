@@ -714,10 +714,17 @@ def test_a_reaction_to_what_pushes_states_how_hard_it_became():
     recording.set(recording.true, 9.3, 9.8, "outer_link", (0.0, 89.0, 0.0), 0.25)
     recording.set(recording.true, 9.6, 9.7, "outer_link", (0.0, 157.0, 0.0), 0.25)
     recording.set(recording.estimated, 9.3, 9.8, "outer_link", (0.0, 85.0, 0.0), 0.25)
-    shown = " ".join(text(summarize(with_limits(recording))).split())
-    assert (
-        "at least 81 N; the largest force until its end: 157 N (true, at 9.80 s), 85 N (estimated, at 9.50 s)" in shown
-    )
+    bag = with_limits(recording)
+    largest = "at least 81 N; the largest force until its end: 157 N (true, at 9.80 s), 85 N (estimated, at 9.50 s)"
+    shown = " ".join(text(summarize(bag)).split())
+    assert f"{largest}; at its end: none" in shown
+    for series, newtons in ((recording.true, 155.0), (recording.estimated, 11.0)):
+        recording.set(series, 9.7, 10.0, "outer_link", (0.0, newtons, 0.0), 0.25)
+    ended = status("force_loop", "", stamp=str(START + 9900 * MS))
+    bag = with_limits(recording)
+    stated = messages([*bag.topics["/wam/status"].messages, ended])
+    shown = " ".join(text(summarize(bag._replace(topics={**bag.topics, "/wam/status": stated}))).split())
+    assert f"{largest}; at its end: 155 N (true), 11 N (estimated)" in shown
 
 
 def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():
