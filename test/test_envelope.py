@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wam_control.force_command import CommandAdmission
-from wam_control.force_loop_parameters import ForceLoopParameters, require_fit
+from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ForceCommand, Wrench
@@ -272,4 +272,4 @@ def test_force_and_torque_rise_no_faster_than_their_limits() -> None:
 )
 def test_parameters_of_the_force_loop_that_the_arm_cannot_bear_are_refused(values: dict[str, Any], text: str) -> None:
     with pytest.raises(ParameterError, match=text):
-        require_fit(WAM.with_values(values).node("force_loop", ForceLoopParameters), ARM)
+        WAM.with_values(values).node("force_loop", ForceLoopParameters).require_fit(ARM)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_description.arm import Shared
+from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
 from wam_description.mismatch import ModelMismatch, true_arm
 from wam_description.parameters import lengths, parameter
@@ -50,6 +50,10 @@ class DriverParameters:
     tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0, high=100.0)
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
+
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse live parameters that do not fit the arm."""
+        self.effects.require_fit(arm)
 
 
 class DriverSample(NamedTuple):
@@ -246,7 +250,7 @@ class Driver:
 
     def set_effects(self, effects: Effects) -> None:
         """Take the effects that can change while the arm runs: added friction, active pretension."""
-        effects.require_pretension(self._arm)
+        effects.require_fit(self._arm)
         self.set_added_friction(effects.added_coulomb_friction)
         if effects.pretension_share != self._pretension_share:
             self.plant.set_pretension(effects.pretension_share)
