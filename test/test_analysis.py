@@ -48,6 +48,7 @@ CYCLING = [
     {"name": "brake", "seconds": 0.2, "request": "disable"},
 ]
 STICTION = {"arm.joints.static_friction": [4.0], "arm.joints.dynamic_friction": [1.0]}
+LOADS = ("sim/joint_states", "joint_sensors")  # topics that have the load of the motors
 RIPPLE = 0.012  # N m at motor1, 24 cycles a turn
 MOVING = [
     {"name": "release", "seconds": 0.1, "request": "enable"},
@@ -233,6 +234,27 @@ def test_a_ripple_is_found_at_its_order(moving: Recorded) -> None:
     assert found.measured == pytest.approx(RIPPLE, rel=0.05)
     assert found.predicted == RIPPLE
     assert found.note.startswith("24 cycles per turn")
+
+
+def test_a_push_is_in_no_friction_and_no_ripple_where_only_gravity_is_known(moving: Recorded) -> None:
+    def seen(*left_out: str) -> tuple[Section, Section]:
+        topics = {name: one for name, one in moving.bag.topics.items() if not name.endswith((*LOADS, *left_out))}
+        sections = analyse_bag(moving.bag._replace(topics=topics), lambda doing: None).sections
+        friction, ripple = (section for section in sections if section.key in ("friction", "ripple"))
+        return friction, ripple
+
+    for unknown in ((), ("contact/wrench",)):
+        friction, ripple = seen(*unknown)
+        said = " ".join(friction.sentences)
+        assert "in which something pushed or touched the arm" in said
+        assert ("not recorded (contact/wrench)" in said) is bool(unknown)
+        (found,) = (one for one in friction.findings if one.name == "motor4: dynamic friction")
+        assert found.measured == pytest.approx(found.predicted, rel=0.1)
+        assert not ripple.findings
+        assert "Ripple was not measured" in ripple.sentences[0]
+    said = " ".join(seen("contact/wrench", "sim/disturbance")[0].sentences)
+    assert "not recorded (contact/wrench, sim/disturbance)" in said
+    assert "gravity alone" not in " ".join(section_of(moving, "friction").sentences)
 
 
 def test_the_efficiency_is_that_of_the_friction_that_is_configured(moving: Recorded) -> None:

@@ -41,7 +41,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
 from wam_description.status import CHANGES
-from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS
+from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS, TASK_COLUMNS
 from wam_experiments.thesis.definition import load
 from wam_sim.recorded_parameters import recorded_parameters
 from wam_sim.recording import recorded_run
@@ -517,6 +517,89 @@ def test_a_hard_contact_that_may_have_been_commanded_is_not_shown_to_be_too_hard
     assert summarize(bag).unplanned == ((), "")  # allowed in any case
 
 
+def without_rows(bag: Bag, topic: str, begin: float, end: float) -> Bag:
+    """A bag without the messages of a topic between two times, s."""
+    columns = bag.topics[f"/wam/{topic}"]
+    time = (columns.stamp_ns - START) / 1e9
+    kept = np.flatnonzero((time < begin) | (time >= end))
+    if isinstance(columns, TableColumns):
+        frames = tuple(columns.frames[i] for i in kept)
+        rows = np.isin(columns.message, kept)
+        message = np.searchsorted(kept, columns.message[rows])
+        values = {name: column[rows] for name, column in columns.columns.items()}
+        left: Columns = TableColumns(STAMPS[kept], STAMPS[kept], frames, message, values)
+    else:
+        left = thinned(columns, kept)
+    return bag._replace(topics={**bag.topics, f"/wam/{topic}": left})
+
+
+@pytest.mark.parametrize("topic", ["sim/disturbance", "force_command", "task_command"])
+def test_within_a_gap_of_a_command_it_is_not_known_what_was_commanded(topic):
+    hit = (3.0, 4.0, "outer_link", 120.0)
+    recording = nothing_but(hit, hit)
+    hard_as_well = (6.0, 6.5, "outer_link", 110.0)
+    for series in (recording.true, recording.estimated):
+        recording.set(series, *hard_as_well[:3], (0.0, hard_as_well[3], 0.0), 0.28)
+    recording.statuses = [(said_of, at, 0) for said_of, at in (("move", START), ("done", START + 10_000 * MS))]
+    bag = without_rows(with_limits(recording), topic, 2.0, 5.0)
+    summary = summarize(bag)
+    assert [(hard.force, hard.step) for hard in summary.unplanned.hard] == [(110.0, "move")]  # outside of the gap
+    assert (
+        f"one had 120 N, and what may have been commanded then was not recorded ({topic})" in summary.unplanned.unknown
+    )
+    gap = f"{topic} was not recorded from 2.19 to 5.20 s: what was commanded then is not known."
+    assert summary.lost == (gap,)
+    assert f"INCOMPLETE: {gap}" in " ".join(text(summary).split())
+    happened = next(one for one in analyse_bag(bag, lambda doing: None).sections if one.key == "happened")
+    assert f"INCOMPLETE: {gap}" in happened.verdict
+
+
+def test_at_the_ends_of_a_scenario_a_missing_command_is_a_gap_too():
+    bag = with_limits(Recording())
+    assert summarize(bag).lost == ()
+    early, late = (summarize(without_rows(bag, "force_command", *span)).lost for span in ((0.0, 1.0), (8.0, 10.0)))
+    assert early == ("force_command was not recorded from 0.20 to 1.20 s: what was commanded then is not known.",)
+    assert late == ("force_command was not recorded from 8.20 to 10.20 s: what was commanded then is not known.",)
+
+
+def test_a_program_that_pauses_leaves_no_gap():
+    """What ends with a zero force is over, and the recorder has counted every message of what ends without one."""
+    hit = (3.0, 4.0, "outer_link", 120.0)
+    recording = nothing_but(hit, hit)
+    recording.statuses = []
+    paused = without_rows(with_limits(recording), "force_command", 2.0, 5.0)
+    assert (summarize(paused).lost, len(summarize(paused).unplanned.hard)) == ((), 1)
+    recording.set(recording.commanded, 1.0, 2.0, "outer_link", (0.0, -5.0, 0.0))
+    killed = without_rows(with_limits(recording), "force_command", 2.0, 5.0)
+    assert (len(summarize(killed).lost), summarize(killed).unplanned.hard) == (1, ())
+    number = len(killed.topics["/wam/force_command"].stamp_ns)
+    for received, dropped, gaps in ((number, 0, 0), (number + 3, 0, 1), (number, 3, 1)):
+        counts = {"/wam/force_command press received": str(received), "/wam/force_command press dropped": str(dropped)}
+        counted = killed._replace(metadata={"recording": counts}, counts={"/wam/force_command": number})
+        summary = summarize(counted)
+        assert sum("is not known" in line for line in summary.lost) == gaps
+        assert len(summary.unplanned.hard) == 1 - gaps
+
+
+def test_a_force_is_not_held_through_a_gap_of_its_command():
+    bag = without_rows(with_limits(Recording()), "force_command", 5.5, 6.5)
+    holds = analyse_bag(bag, lambda doing: None).recording.holds
+    times = [((hold.begin - START) / 1e9, (hold.end - START) / 1e9) for hold in holds]
+    assert times == [(5.0, 5.5), (6.5, 7.0), (7.0, 9.0)]
+
+
+def test_the_force_of_a_task_is_not_held_through_a_gap_of_its_command():
+    sections = Configuration.load(packaged("wam")).sections
+    content = yaml.safe_dump({"/wam/driver": {"ros__parameters": {**sections["/**"], **sections["driver"]}}})
+    row = dict(zip(TASK_COLUMNS, (1.0, -1.0, 1.0, 0.25, 0.0, -1.0, 0.0, 8.0, 0.0, 0.0, 0.0), strict=True))
+    columns = {name: np.full(len(STAMPS), value) for name, value in row.items()}
+    task = TableColumns(STAMPS, STAMPS, ("outer_link",) * len(STAMPS), np.arange(len(STAMPS)), columns)
+    bag = Recording().bag()._replace(attachments={"parameters.yaml": content.encode()})
+    bag = without_rows(bag._replace(topics={**bag.topics, "/wam/task_command": task}), "task_command", 2.0, 5.0)
+    times = [((one.begin - START) // MS, (one.end - START) // MS) for one in summarize(bag).tasks]
+    assert times == [(0, 1995), (5000, 9995)]
+
+
 @pytest.mark.parametrize("every", [1, 2, 3, 5])
 def test_a_lower_bound_stays_one_where_positions_are_recorded_less_often(every):
     bag = Recording().bag()
@@ -577,10 +660,24 @@ def test_contacts_are_counted_by_link_wherever_they_are():
 def test_without_truth_the_estimate_shows_what_was_too_hard():
     recording = without_truth(Recording())
     recording.set(recording.estimated, 9.4, 9.5, "outer_link", (0.0, 115.0, 0.0), 0.25)
-    assert summarize(with_limits(recording)).unplanned.hard == ()  # of a simulated arm, which may have been pushed
-    recording.recording = {"mode": "realtime"}
-    (hard,) = summarize(with_limits(recording)).unplanned.hard
+    for mode in ("lockstep", "realtime"):  # of a simulated arm, which may have been pushed
+        recording.recording = {"mode": mode}
+        assert summarize(with_limits(recording)).unplanned.hard == ()
+    bag = with_limits(recording)
+    of_bus = yaml.safe_load(bag.attachments["parameters.yaml"])
+    own = of_bus["/wam/force_loop"]["ros__parameters"]
+    own["nodes"] = ["bus_driver:BusInterface" if node == "driver" else node for node in own["nodes"]]
+    (hard,) = summarize(bag._replace(attachments={"parameters.yaml": yaml.safe_dump(of_bus).encode()})).unplanned.hard
     assert (hard.force, hard.allowed, hard.source) == (115.0, 90.0, "estimated")
+
+
+def test_without_parameters_lockstep_and_topics_of_the_simulator_show_a_simulation():
+    recording = without_truth(Recording())
+    for mode, is_simulated in (("lockstep", True), ("realtime", False)):
+        recording.recording = {"mode": mode}
+        assert recorded_run(recording.bag()).is_simulated is is_simulated
+    bag = recording.bag()._replace(counts={"/wam/sim/disturbance": 3})  # in the bag, and not read
+    assert recorded_run(bag).is_simulated
 
 
 def test_what_a_step_sets_is_what_is_allowed_from_then_on():
@@ -617,10 +714,17 @@ def test_a_reaction_to_what_pushes_states_how_hard_it_became():
     recording.set(recording.true, 9.3, 9.8, "outer_link", (0.0, 89.0, 0.0), 0.25)
     recording.set(recording.true, 9.6, 9.7, "outer_link", (0.0, 157.0, 0.0), 0.25)
     recording.set(recording.estimated, 9.3, 9.8, "outer_link", (0.0, 85.0, 0.0), 0.25)
-    shown = " ".join(text(summarize(with_limits(recording))).split())
-    assert (
-        "at least 81 N; the largest force until its end: 157 N (true, at 9.80 s), 85 N (estimated, at 9.50 s)" in shown
-    )
+    bag = with_limits(recording)
+    largest = "at least 81 N; the largest force until its end: 157 N (true, at 9.80 s), 85 N (estimated, at 9.50 s)"
+    shown = " ".join(text(summarize(bag)).split())
+    assert f"{largest}; at its end: none" in shown
+    for series, newtons in ((recording.true, 155.0), (recording.estimated, 11.0)):
+        recording.set(series, 9.7, 10.0, "outer_link", (0.0, newtons, 0.0), 0.25)
+    ended = status("force_loop", "", stamp=str(START + 9900 * MS))
+    bag = with_limits(recording)
+    stated = messages([*bag.topics["/wam/status"].messages, ended])
+    shown = " ".join(text(summarize(bag._replace(topics={**bag.topics, "/wam/status": stated}))).split())
+    assert f"{largest}; at its end: 155 N (true), 11 N (estimated)" in shown
 
 
 def test_unobservable_place_is_said_in_the_estimators_words_and_not_judged():

@@ -1,6 +1,7 @@
 """What the arm cannot bear or cannot be is refused by name: commands, pushes, configurations, steps of the plant."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,18 +11,20 @@ import numpy as np
 import pytest
 
 from wam_control.force_command import CommandAdmission
-from wam_control.force_loop_parameters import ForceLoopParameters, require_fit
+from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
+from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, ForceCommand, Wrench
-from wam_driver.driver import Driver, DriverParameters
+from wam_description.transmission_map import TransmissionMap
+from wam_driver.driver import RECENT, Driver, DriverParameters
 from wam_driver.limit_watch import LimitWatch, WatchedLimit
 from wam_driver.safety import Mode
 
 WAM, TESTBED = (Configuration.load(packaged(name)) for name in ("wam", "testbed"))
 ARM = WAM.shared.arm
 N = len(ARM.joints.names)
-DT = 0.005
+DT, PERIOD = 0.005, 0.001
 
 
 def driver(configuration: Configuration = WAM, **values: Any) -> Driver:
@@ -190,9 +193,38 @@ def test_a_simulation_that_fails_is_a_fault_with_brakes_and_a_finite_state(
 
 def test_a_quantity_warns_at_nine_tenths_of_its_limit_and_is_a_fault_above_it() -> None:
     near, above = (WatchedLimit("travel", value, 2.0, "rad") for value in (1.81, 2.01))
-    assert near.fault == ""
+    assert near.excess == ""
     assert near.warning == "travel 1.81 rad is near its limit 2"
-    assert above.fault == "travel 2.01 rad is above its limit 2; command less"
+    assert above.excess == "travel 2.01 rad is above its limit 2"
+
+
+@pytest.mark.parametrize("ended", [0.0, 0.05, 0.5])
+def test_a_fault_names_the_push_that_acts_or_has_just_acted(ended: float) -> None:
+    hardware = enabled(**{"driver:tip_speed_limit": 0.5})
+    carried = TransmissionMap.of(ARM).motor_torques(RigidBody(ARM).gravity_torque(ARM.joints.start).tolist())
+    at_rest = [torque / k for torque, k in zip(carried, ARM.motors.torque_constant, strict=True)]
+
+    def play(seconds: float, currents: list[float]) -> None:
+        for _ in range(round(seconds / PERIOD)):
+            hardware.command(hardware.stamp, currents)
+            hardware.advance(0.0)
+
+    play(0.02, at_rest)
+    hardware.disturb(Wrench("outer_link", (0.0, 0.0, 1.2), (0.0, -0.3, 0.0)))
+    play(0.02, at_rest)
+    if ended:
+        hardware.disturb(Wrench(BASE, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+        play(ended, at_rest)
+    assert hardware.safety.mode is Mode.ENABLED, hardware.safety.fault
+    play(0.1, [2.0 * current + 2.0 for current in at_rest])
+    reason, _, advice = hardware.safety.fault.partition("; ")
+    assert reason.startswith("speed of the tip ")
+    if ended > RECENT:
+        assert advice == "command less"
+    elif ended:
+        assert re.fullmatch(r"a push acted until 0.\d\d s before \(1.2 N on outer_link\): push or command less", advice)
+    else:
+        assert advice == "a push acts (1.2 N on outer_link): push or command less"
 
 
 def watched(watch: LimitWatch, q: Sequence[float], currents: Sequence[float] = (0.0,) * N) -> dict[str, WatchedLimit]:
@@ -208,10 +240,10 @@ def test_joint_limits_and_currents_are_watched() -> None:
     at[1] = 0.95 * ARM.joints.lower[1]
     assert list(watched(watch, at)) == [name]
     at[1] = ARM.joints.lower[1] - 0.001
-    assert watched(watch, at)[name].fault
+    assert watched(watch, at)[name].excess
     near = watched(watch, ARM.joints.start, [0.0, -0.95 * ARM.motors.peak_torque[1] / 0.25, 0.0, 0.0])
     assert list(near) == ["current of motor2"]
-    assert watched(watch, [math.nan] * N)[name].fault
+    assert watched(watch, [math.nan] * N)[name].excess
 
 
 def test_an_arm_that_is_enabled_beyond_a_stop_can_come_back_and_no_further() -> None:
@@ -219,9 +251,9 @@ def test_an_arm_that_is_enabled_beyond_a_stop_can_come_back_and_no_further() -> 
     at, name = list(ARM.joints.start), "travel of joint2 from the middle of its range"
     at[1] = ARM.joints.upper[1] + 0.02
     watch.begin(np.linalg.solve(np.reshape(ARM.joint_from_motor, (N, N)), at).tolist())
-    assert not watched(watch, at)[name].fault
+    assert not watched(watch, at)[name].excess
     at[1] += 0.06
-    assert watched(watch, at)[name].fault
+    assert watched(watch, at)[name].excess
 
 
 def test_an_arm_that_is_driven_into_a_stop_is_stopped() -> None:
@@ -293,4 +325,4 @@ def test_force_and_torque_rise_no_faster_than_their_limits() -> None:
 )
 def test_parameters_of_the_force_loop_that_the_arm_cannot_bear_are_refused(values: dict[str, Any], text: str) -> None:
     with pytest.raises(ParameterError, match=text):
-        require_fit(WAM.with_values(values).node("force_loop", ForceLoopParameters), ARM)
+        WAM.with_values(values).node("force_loop", ForceLoopParameters).require_fit(ARM)

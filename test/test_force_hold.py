@@ -657,19 +657,24 @@ def test_a_force_at_an_assumed_position_is_not_given_as_a_lower_bound(measured: 
 
 
 def test_what_pushes_moves_the_arm_no_further_than_it_may_go_for_nothing() -> None:
-    """A measured torque that no force gives: the arm comes to rest, and gives way again after it has gone."""
+    """A measured torque that no force gives: the arm comes to rest, and gives way again after it has gone.
+
+    What pushes is reported as long as it does.
+    """
     limits = MotionLimits(ARM, BODY, replace(OWN.limits, contact_force=60.0, free_travel=0.1), 1.5)
     torques = BODY.tool_jacobian(POSE).T @ np.array([0.0, 0.0, 120.0])
     away: list[float] = []
     for _ in range(2):
         q, way = np.array(POSE), 0.0
         for _ in range(1000):
-            velocity = np.array(limits.step([0.0] * 4, q.tolist(), pushed(torques), DT).velocity)
+            limited = limits.step([0.0] * 4, q.tolist(), pushed(torques), DT)
+            velocity = np.array(limited.velocity)
+            assert "the world pushes with at least" in limited.contact_force
             way += float(np.linalg.norm(BODY.tool_jacobian(q) @ velocity)) * DT
             q = q + velocity * DT
         assert not velocity.any()
         away.append(way)
-        limits.step([0.0] * 4, POSE, pushed(np.zeros(4)), DT)
+        assert not limits.step([0.0] * 4, POSE, pushed(np.zeros(4)), DT).contact_force
     assert away == pytest.approx([0.1] * 2, rel=0.1)
 
 
@@ -798,7 +803,8 @@ def test_a_force_that_swings_about_the_commanded_one_is_reported_until_it_rests(
 
 # ------------------------------------------------------------------------------------- commands
 def test_a_slow_swing_is_reported_too() -> None:
-    own = replace(OWN, limits=replace(OWN.limits, settling_time=0.5), force_gain=(0.0,), contact_source="pinned")
+    limits = replace(OWN.limits, settling_time=0.5, whole_force=1e9)  # else its peaks are reported as pushes
+    own = replace(OWN, limits=limits, force_gain=(0.0,), contact_source="pinned")
     loop, reported = force_loop(ARM, own), []
     for k in range(400):
         ask(loop, World(400.0, force=5.0 + 3.0 * math.sin(2.0 * math.pi * k * DT / 0.9)), down(5.0))

@@ -710,7 +710,7 @@ def test_each_effect_makes_a_difference(effect: str) -> None:
 def test_a_pretension_without_room_for_the_load_is_refused_by_name() -> None:
     arm = Configuration.load(packaged("wam")).shared.arm
     fine = dataclasses.replace(no_effects(arm), pretension_share=(1.9,))
-    fine.require_pretension(arm)
+    fine.require_fit(arm)
     for shares in ((2.0,), (1.0, 1.0, 7.0, 1.0)):
         with pytest.raises(ParameterError, match=r"pretension_share of motor\d is .*; allowed: up to 1.98"):
-            dataclasses.replace(fine, pretension_share=shares).require_pretension(arm)
+            dataclasses.replace(fine, pretension_share=shares).require_fit(arm)

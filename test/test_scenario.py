@@ -20,10 +20,11 @@ from wam_control.scenario import (
     ScenarioOutput,
     ScenarioParameters,
     ScenarioStep,
-    Setting,
     load,
+    load_for,
 )
 from wam_control.scenario_node import ScenarioNode
+from wam_control.scenario_settings import Setting
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -323,6 +324,7 @@ def test_a_step_that_is_wrong_is_refused_with_file_step_and_value(step: Any, tex
         ),
         ("- 1", "has no list 'steps'"),
         ("", "has no list 'steps'"),
+        ({"step": [{"name": "a", "seconds": 1}]}, "unknown key 'step'; allowed: steps"),
         ({"steps": {"name": "a"}}, "has no list 'steps'"),
         ({"steps": []}, "has no steps; give at least one"),
         ({"steps": [{"name": "a", "seconds": 1}], "loops": 3}, "unknown key 'loops'; allowed: steps"),
@@ -437,6 +439,20 @@ def test_settings_are_made_once_when_their_step_begins() -> None:
     assert [out.settings for out in play(scenario, 6)] == [(), (), settings, (), (), ()]
 
 
+def test_a_setting_that_does_not_fit_the_other_values_is_refused_where_these_are_known(tmp_path: Path) -> None:
+    rods = [{"effects.added_coulomb_friction": [0.5] * joints} for joints in (4, 3)]
+    steps = [{"name": "rod", "seconds": 1.0, "set": {"driver": rod}} for rod in rods]
+    path = write(tmp_path, {"steps": steps})
+    assert len(load(path, SHARED)) == 2
+    with pytest.raises(ParameterError, match=f"{path}, step 2: set, driver: .*added_coulomb_friction.* has 3 values"):
+        load_for(CONFIGURATION, str(path))
+    write(tmp_path, {"steps": steps[:1]})
+    assert len(load_for(CONFIGURATION, str(path))) == 1
+    without = CONFIGURATION.with_values({"nodes": ["transform", "velocity_loop", "gravity", "force_loop"]})
+    with pytest.raises(ParameterError, match="step 1: set, driver: no node is named so; nodes: transform, "):
+        load(path, without.shared)
+
+
 def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) -> None:
     def read(**body: Any) -> ScenarioStep:
         file = tmp_path / "one.yaml"
@@ -456,6 +472,16 @@ def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) 
         read(set={"velocity_loop": {"proportional_gain": [1.0]}})
     with pytest.raises(ParameterError, match="set, driver is 3; give names and values"):
         read(set={"driver": 3})
+    assert isinstance(read(set={"force_loop": {"posture_gain": 2}}).settings[0].value, float), "ROS takes no other type"
+    for body, reason in (
+        ({"force_loop": {"posture_gain": -1.0}}, "set, force_loop: parameter 'posture_gain' is -1.0 1/s; allowed: "),
+        ({"force_loop": {"force_gain": 0.01}}, "set, force_loop: parameter 'force_gain' is 0.01; it must be a list of"),
+        ({"force_loop": {"feedback": "guess"}}, "'feedback' is 'guess'; allowed: one of joint_sensors, "),
+        ({"force_loop": {"posture_gian": 1.0}}, "no parameter 'posture_gian' that may change while it runs; did you "),
+        ({"driver": {"seed": 3}}, "set, driver: it has no parameter 'seed' that may change while it runs; it has: eff"),
+    ):
+        with pytest.raises(ParameterError, match=f"{tmp_path}/one.yaml, step 1: .*{reason}"):
+            read(set=body)
     with pytest.raises(ParameterError, match="it must begin above 0 and rise"):
         read(force=force, chirp={"newtons": 1, "from": 9, "to": 2})
     with pytest.raises(ParameterError, match="chirp needs a force above 0 N"):

@@ -486,6 +486,18 @@ def test_less_than_a_turn_has_no_spectrum():
     assert not len(ripple_spectrum(np.linspace(0.0, 6.0, 1000), np.zeros(1000), 10).order)
 
 
+def test_angles_with_a_gap_in_every_turn_have_no_spectrum():
+    """The orders are not independent there: what is no ripple at all came out as thousands of times its size."""
+    angle = np.linspace(0.0, 4.0 * np.pi, 20_000)
+    torque = 0.01 * np.tanh(angle - 6.0) + draws(18, len(angle), 1e-3)
+    whole = ripple_spectrum(angle, torque, 48)
+    assert np.max(whole.amplitude) < 0.005
+    seen = angle % (2.0 * np.pi) > 0.6
+    found = ripple_spectrum(angle[seen], torque[seen], 48)
+    assert not len(found.order)
+    assert found.turns == pytest.approx(2.0, abs=0.1)
+
+
 # timing
 
 

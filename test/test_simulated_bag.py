@@ -18,7 +18,8 @@ from wam_bag.bag import JointColumns, TableColumns, WrenchColumns, read
 from wam_bag.bag_writer import exact_cdr
 from wam_bag.cdr_encoder import encoded
 from wam_bag.contents import contents
-from wam_control.scenario import Push, ScenarioStep, Setting
+from wam_control.scenario import Push, ScenarioStep
+from wam_control.scenario_settings import Setting
 from wam_description.configuration import Configuration, packaged
 from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record

@@ -107,7 +107,7 @@ def test_settings_and_chirps_are_the_same_over_topics_and_without_ros(tmp_path: 
 
 def test_a_setting_that_is_refused_ends_the_scenario_with_the_reason(tmp_path: Path, domain_id: int) -> None:
     configured = configured_testbed(tmp_path, "scenario")
-    body = {"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [-1.0]}}}
+    body = {"name": "rub", "seconds": 0.3, "set": {"driver": {"effects.added_coulomb_friction": [1.0] * 2}}}
     (tmp_path / "script.yaml").write_text(yaml.safe_dump({"steps": [body]}))
     with Composition(configured, domain_id=domain_id) as composition:
         scenario = composition.nodes["scenario"]

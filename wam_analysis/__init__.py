@@ -6,6 +6,8 @@ findings            the analysis behind `wam analyse`: sections of sentences and
 foreign             recordings of other robots: any bag with joints, wrenches or mapped topics
 identification      from a recording of free motion to the controllers' model, behind `wam identify`
 demo_traces         forces and contacts of a run on one time base
+held_messages       for how long a recorded message is held, and the gaps of a topic
+command_gaps        when a command was not recorded, so that it is not known
 contact_list        the contacts one by one, each estimated one compared with the true one
 contact_comparison  the true contacts one by one, each with what was estimated of it
 unplanned_contact   contacts while no force is commanded that are harder than allowed

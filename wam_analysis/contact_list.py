@@ -18,9 +18,9 @@ from wam_analysis.demo_traces import (
     Numbers,
     Times,
     Traces,
-    held_rows,
     most_probable,
 )
+from wam_analysis.held_messages import held_rows
 from wam_analysis.measures.runs import runs
 from wam_control.contact_inference import CERTAIN_SECOND, REASONS, SECOND
 from wam_sim.recording import RecordedRun, RecordedStep

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wam_analysis.command_gaps import command_gaps
 from wam_analysis.contact_comparison import StepContact, compared_contacts, uncompared_contacts
 from wam_analysis.contact_list import (
     ListedContact,
@@ -157,7 +158,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     missing = [name for name in RECORDED if not _length(run, name)]
     if missing:
         notes.append(f"not recorded: {', '.join(missing)}")
-    reactions = tuple(_with_largest(one, traces) for one in reactions_of(run, _end(traces, steps)))
+    reactions = tuple(_with_forces(one, traces) for one in reactions_of(run, _end(traces, steps)))
     presses = tuple(press for step in steps for press in _presses(run, traces, tasks, step, reactions))
     certainty = certainty_of(run, traces)
     refused = {press.step for press in presses if press.is_refused}
@@ -167,6 +168,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
     received, dropped = _counts(bag.metadata.get(RECORDING, {}))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
+    gaps = command_gaps(run, traces.stamp, lost, steps)
     return DemoSummary(
         namespace=run.namespace,
         period=period,
@@ -178,7 +180,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         touches=touches,
         contacts=listed_contacts(traces, certainty, steps),
         missed=missed_contacts(traces, steps),
-        unplanned=unplanned_contacts(run, traces, steps),
+        unplanned=unplanned_contacts(run, traces, steps, gaps),
         uncompared=uncompared_contacts(traces, touches),
         reactions=reactions,
         false_contact=int(np.sum(false)) * period,
@@ -188,7 +190,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         received=received,
         dropped=dropped,
         gone=lost.gone,
-        lost=tuple(lost.sentences(bag.first_ns)),
+        lost=(*lost.sentences(bag.first_ns), *(gap.sentence(traces.zero) for gap in gaps)),
         moment=_moment(run, traces, presses),
         notes=(*notes, *run.parameters.notes, *driver_faults(run, traces.zero)),
     )
@@ -199,18 +201,24 @@ def _length(run: RecordedRun, topic: str) -> int:
     return 0 if columns is None else len(columns.log_time_ns)
 
 
-def _with_largest(reaction: RecordedReaction, traces: Traces) -> RecordedReaction:
-    """A reaction to what pushes, with how hard it pushed at most: its reason is that of its first moment."""
+def _with_forces(reaction: RecordedReaction, traces: Traces) -> RecordedReaction:
+    """A reaction to what pushes, with how hard it did at most and in the end: its reason is that of its first moment.
+
+    It ends where the loop no longer knows of more than is allowed; a push that its estimate does not show may go on.
+    """
     rows = np.flatnonzero(traces.during(reaction.begin, reaction.end))
-    sizes = {name: signal.size[rows] for name, signal in (("true", traces.true), ("estimated", traces.estimated))}
-    known = {name: size for name, size in sizes.items() if np.any(size > 0.0)}
+    sizes = {name: signal.size for name, signal in (("true", traces.true), ("estimated", traces.estimated))}
+    known = {name: size for name, size in sizes.items() if np.any(size[rows] > 0.0)}
     if reaction.name != ForceReaction.CONTACT_FORCE.name.lower() or not known:
         return reaction
+    hardest = {name: rows[np.nanargmax(size[rows])] for name, size in known.items()}
     largest = [
-        f"{np.nanmax(size):.3g} N ({name}, at {(traces.stamp[rows[np.nanargmax(size)]] - traces.zero) / 1e9:.2f} s)"
-        for name, size in known.items()
+        f"{known[name][row]:.3g} N ({name}, at {(traces.stamp[row] - traces.zero) / 1e9:.2f} s)"
+        for name, row in hardest.items()
     ]
-    return reaction._replace(reason=f"{reaction.reason}; the largest force until its end: {', '.join(largest)}")
+    left = [f"{size[rows[-1]]:.3g} N ({name})" for name, size in known.items() if size[rows[-1]] > 0.0]
+    reason = f"{reaction.reason}; the largest force until its end: {', '.join(largest)}"
+    return reaction._replace(reason=f"{reason}; at its end: {', '.join(left) or 'none'}")
 
 
 def _end(traces: Traces, steps: Sequence[RecordedStep]) -> int:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.held_messages import held_rows, with_holes
 from wam_analysis.task_forces import TaskForce, arm_of
 from wam_bag.bag import TableColumns
 from wam_description.rigid_body import RigidBody
@@ -18,8 +19,6 @@ Times = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 NAN = float("nan")
-HELD = 100_000_000  # ns for which a message is held; after that the signal is unknown
-THINNED, FEWEST = 2, 10  # periods of a thinned topic for which a message is held, and messages of which one is known
 CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
 HYPOTHESIS = ("probability", "position", "position_sd", "force_sd", "reasons")  # columns that are read
@@ -140,7 +139,7 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
     base = np.empty(0, np.int64)
     for name in ("sim/contact/wrench", "contact/wrench", "force_command"):
         if (columns := run.wrench(name)) is not None:
-            base = _with_holes(columns.stamp_ns)
+            base = with_holes(columns.stamp_ns)
             break
     commanded, measured = signal("force_command"), signal("force_measured")
     true = signal("sim/contact/wrench", _points(run, "sim/contact/point"))
@@ -228,23 +227,3 @@ def _on_links(
         frame[rows[of_base]], force[rows[of_base]] = covers[rows[of_base]], turned[of_base]
         found.append(signal._replace(frame=frame.astype(np.str_), force=force))
     return found[0], found[1]
-
-
-def held_rows(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
-    """Row of the last message at or before each instant, and whether there is one and it is still held."""
-    row = np.searchsorted(stamps, base, side="right") - 1
-    known = row >= 0
-    row = np.maximum(row, 0)
-    return row, known & (base - stamps[row] <= _held(stamps))
-
-
-def _held(stamps: Times) -> int:
-    """For how long a message of these is held, ns: `HELD`, or longer where a recording was thinned."""
-    return max(HELD, THINNED * int(np.median(np.diff(stamps)))) if len(stamps) > FEWEST else HELD
-
-
-def _with_holes(stamps: Times) -> Times:
-    """These and, where none comes for longer than one is held, an instant at which it is not held any more."""
-    held = _held(stamps)
-    last = stamps[:-1][np.diff(stamps) > held]
-    return np.sort(np.concatenate([stamps, last + held + 1])) if len(last) else stamps

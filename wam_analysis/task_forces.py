@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wam_analysis.held_messages import rows_before_gaps
 from wam_bag.bag import BagError, TableColumns
 from wam_control.task import AxisKind, task_of
 from wam_description.arm import Arm
@@ -54,9 +55,17 @@ def task_forces(run: RecordedRun) -> list[TaskForce]:
     if not isinstance(columns, TableColumns) or not len(columns.stamp_ns) or arm is None:
         return []
     stamps = columns.stamp_ns.tolist()
-    parts = [next(part) for _, part in groupby(zip(stamps, tables(columns), strict=True), lambda one: str(one[1]))]
-    ends = [*(stamp for stamp, _ in parts[1:]), stamps[-1]]
-    return [force for (begin, table), end in zip(parts, ends, strict=True) for force in _of(table, begin, end, arm)]
+    gaps = rows_before_gaps(columns.stamp_ns)
+    stretch = np.searchsorted(gaps, np.arange(len(stamps))).tolist()
+    messages = zip(stamps, tables(columns), stretch, strict=True)
+    parts = [next(part) for _, part in groupby(messages, lambda one: (str(one[1]), one[2]))]
+    lasts = [*(stamps[row] for row in gaps), stamps[-1]]  # of each stretch
+    ends = [*(begin for begin, *_ in parts[1:]), stamps[-1]]
+    return [
+        force
+        for (begin, table, number), end in zip(parts, ends, strict=True)
+        for force in _of(table, begin, min(end, lasts[number]), arm)
+    ]
 
 
 def _of(table: Table, begin: int, end: int, arm: Arm) -> list[TaskForce]:

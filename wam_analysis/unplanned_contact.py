@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam_analysis.demo_traces import NAN, Mask, Numbers, Traces, held_rows
+from wam_analysis.command_gaps import CommandGap
+from wam_analysis.demo_traces import NAN, Mask, Numbers, Times, Traces
+from wam_analysis.held_messages import held_rows
 from wam_bag.bag import BagError, TableColumns
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_sim.recording import RecordedRun, RecordedStep
@@ -60,11 +62,16 @@ class UnplannedContacts(NamedTuple):
         return (*(one.sentence for one in self.hard), *[unknown][: bool(self.unknown)])
 
 
-def unplanned_contacts(run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep]) -> UnplannedContacts:
-    """Those of all the time that was recorded; with the true force where it is known in a step, else the estimated."""
+def unplanned_contacts(
+    run: RecordedRun, traces: Traces, steps: Sequence[RecordedStep], gaps: Sequence[CommandGap]
+) -> UnplannedContacts:
+    """Those of all the time that was recorded; with the true force where it is known in a step, else the estimated.
+
+    Within gaps of a command it is not known what was planned.
+    """
     found: list[HardContact] = []
     unknown: list[str] = []
-    lacking = _lacking(run)
+    everywhere = _lacking(run)
     is_planned, allowed = _planned(run, traces), _allowed(run, traces, steps)
     for name, begin, end in _parts(traces, steps):
         rows = begin + np.flatnonzero(~is_planned[begin:end])
@@ -75,25 +82,35 @@ def unplanned_contacts(run: RecordedRun, traces: Traces, steps: Sequence[Recorde
         if np.any(np.isnan(allowed[rows])):
             unknown.append(f"{LIMIT} of the force loop was not recorded, or cannot be read")
         rows = rows[signal.size[rows] > allowed[rows]]
-        if not len(rows):
-            continue
-        hardest = int(rows[np.argmax(signal.size[rows])])
-        seconds = (int(traces.stamp[hardest]) - traces.zero) / 1e9
-        hard = HardContact(name, seconds, float(signal.size[hardest]), float(allowed[hardest]), source)
-        if lacking:
-            unknown.append(f"one had {hard.force:.3g} N, and what may have been commanded then was not recorded "
-                           f"({', '.join(lacking)})")  # fmt: skip
-        else:
-            found.append(hard)
+        for lacking, part in _by_what_is_lacking(traces.stamp[rows], everywhere, gaps):
+            if not np.any(part):
+                continue
+            hardest = int(rows[part][np.argmax(signal.size[rows[part]])])
+            seconds = (int(traces.stamp[hardest]) - traces.zero) / 1e9
+            hard = HardContact(name, seconds, float(signal.size[hardest]), float(allowed[hardest]), source)
+            if lacking:
+                unknown.append(f"one had {hard.force:.3g} N, and what may have been commanded then was not recorded "
+                               f"({', '.join(lacking)})")  # fmt: skip
+            else:
+                found.append(hard)
     return UnplannedContacts(tuple(found), "; ".join(dict.fromkeys(unknown)))
 
 
 def _lacking(run: RecordedRun) -> list[str]:
     """Topics of commands that were not recorded; the arm itself has no disturbance."""
-    topics = {*run.bag.topics, *run.bag.counts}
-    is_simulated = run.mode == "lockstep" or any(name.startswith(f"{run.namespace}/sim/") for name in topics)
-    names = ["force_command", "task_command", *["sim/disturbance"][:is_simulated]]
+    names = ["force_command", "task_command", *["sim/disturbance"][: run.is_simulated]]
     return [name for name in names if f"{run.namespace}/{name}" not in run.bag.topics]
+
+
+def _by_what_is_lacking(
+    stamps: Times, everywhere: Sequence[str], gaps: Sequence[CommandGap]
+) -> list[tuple[list[str], Mask]]:
+    """Commands that were not recorded, and the stamps at which they were not; the last is where none is lacking."""
+    within = {topic: np.full(len(stamps), True) for topic in everywhere}
+    for gap in gaps:
+        within[gap.topic] = within.get(gap.topic, np.full(len(stamps), False)) | gap.covers(stamps, AFTER)
+    lacks = np.any([*within.values(), np.full(len(stamps), False)], axis=0)
+    return [([topic for topic, part in within.items() if np.any(part)], lacks), ([], ~lacks)]
 
 
 def _parts(traces: Traces, steps: Sequence[RecordedStep]) -> list[tuple[str, int, int]]:

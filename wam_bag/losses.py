@@ -68,6 +68,7 @@ class Losses(NamedTuple):
     at_end : messages that were announced and did not come before the recorder ended, by 'topic from publisher'.
     unfinished : nodes that gave no final count, so that it is not known what is lost of them at the end.
     uncounted : whether the recorder of this project ended without writing its counts.
+    complete : topics of which every message that was sent is in the bag up to its end, by the recorder's counts.
     """
 
     repaired: dict[str, FileLosses | None]
@@ -76,6 +77,7 @@ class Losses(NamedTuple):
     uncounted: bool
     at_end: Mapping[str, int] = MappingProxyType({})
     unfinished: str = ""
+    complete: frozenset[str] = frozenset()
 
     @property
     def by_topic(self) -> dict[str, int]:
@@ -143,6 +145,7 @@ def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts:
     if is_part:
         received = Counter()
     missing = {topic: count - counts.get(topic, 0) for topic, count in sorted(received.items())}
+    lost_on_the_way = {where.split(" ")[0] for where in dropped}
     return Losses(
         repaired,
         {topic: count for topic, count in missing.items() if count > 0},
@@ -150,6 +153,7 @@ def losses(path: Path, metadata: Metadata, attachments: Collection[str], counts:
         bool(counts) and PARAMETERS in attachments and not recording,
         at_end,
         recording.get(UNFINISHED, ""),
+        frozenset(topic for topic, count in missing.items() if count <= 0 and topic not in lost_on_the_way),
     )
 
 

@@ -61,5 +61,6 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``scenario``                      steps of a task, as data
 ``task_text``                     - the axes of a task in its file
 ``scenario_values``               - values of its file, refused with a reason
+``scenario_settings``             - the live parameters that its steps set, checked against their declarations
 ================================  ==============================================================================
 """

@@ -23,7 +23,7 @@ from wam_control.force_case import ForceCase
 from wam_control.force_command import CommandAdmission
 from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction
 from wam_control.force_law import DelayLine
-from wam_control.force_loop_parameters import ForceLoopParameters, require_fit, sensing_of
+from wam_control.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
 from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
@@ -183,7 +183,7 @@ class ForceLoop:
         self._take(servo, self.parameters)
 
     def _take(self, servo: Servo, parameters: ForceLoopParameters) -> None:
-        require_fit(parameters, self._arm)
+        parameters.require_fit(self._arm)
         self._supervision = Supervision(self._arm, servo, self._timing, parameters, self._joints)
         self._servo, self.parameters = servo, parameters
         sensing = sensing_of(parameters)

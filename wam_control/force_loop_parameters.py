@@ -122,43 +122,41 @@ class ForceLoopParameters:
         """Whether the estimated torques are fed back, in place of those of sensors."""
         return self.feedback == "contact_estimate"
 
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse parameters that do not fit the arm.
+
+        Raises
+        ------
+        ParameterError
+            names the parameter and what is allowed.
+        """
+        covers = arm.covers.names
+        require(
+            self.contact_cover in covers,
+            f"contact_cover is '{self.contact_cover}'; allowed: {', '.join(covers)}",
+        )
+        length = arm.covers.length_of(self.contact_cover)
+        require(
+            self.contact_position <= length,
+            f"contact_position is {self.contact_position:g} m; allowed: 0 to {length:g}, on {self.contact_cover}",
+        )
+        slowest = min(arm.joints.speed_limit)
+        require(
+            self.joint_speed_limit <= slowest or self.guard.mode in ("off", "warn"),
+            f"joint_speed_limit is {self.joint_speed_limit:g} rad/s; the driver stops the arm at "
+            f"arm.joints.speed_limit; allowed: 0 to {slowest:g}",
+        )
+        require(
+            self.is_estimated or arm.joint_sensors,
+            f"feedback is '{self.feedback}' but arm.joint_sensors is false; use 'contact_estimate'",
+        )
+        springs = {"spring_stiffness": self.spring_stiffness, "spring_rest": self.spring_rest}
+        lengths("force_loop", arm.joints.names, springs)
+
 
 def sensing_of(parameters: ForceLoopParameters) -> SensingParameters:
     """How the force is sensed with the feedback of a parameter set."""
     return parameters.sensing.of_estimate if parameters.is_estimated else parameters.sensing
-
-
-def require_fit(parameters: ForceLoopParameters, arm: Arm) -> None:
-    """Refuse parameters that do not fit the arm.
-
-    Raises
-    ------
-    ParameterError
-        names the parameter and what is allowed.
-    """
-    covers = arm.covers.names
-    require(
-        parameters.contact_cover in covers,
-        f"contact_cover is '{parameters.contact_cover}'; allowed: {', '.join(covers)}",
-    )
-    length = arm.covers.length_of(parameters.contact_cover)
-    require(
-        parameters.contact_position <= length,
-        f"contact_position is {parameters.contact_position:g} m; allowed: 0 to {length:g}, "
-        f"on {parameters.contact_cover}",
-    )
-    slowest = min(arm.joints.speed_limit)
-    require(
-        parameters.joint_speed_limit <= slowest or parameters.guard.mode in ("off", "warn"),
-        f"joint_speed_limit is {parameters.joint_speed_limit:g} rad/s; the driver stops the arm at "
-        f"arm.joints.speed_limit; allowed: 0 to {slowest:g}",
-    )
-    require(
-        parameters.is_estimated or arm.joint_sensors,
-        f"feedback is '{parameters.feedback}' but arm.joint_sensors is false; use 'contact_estimate'",
-    )
-    springs = {"spring_stiffness": parameters.spring_stiffness, "spring_rest": parameters.spring_rest}
-    lengths("force_loop", arm.joints.names, springs)
 
 
 def force_law(parameters: ForceLoopParameters) -> ForceLaw:

@@ -166,8 +166,8 @@ class MotionLimits:
         limited: list[float] = (np.array(velocity) + missing).tolist()
         if force > allowed:
             self._given += float(np.linalg.norm(push.jacobian(self._body, q) @ limited)) * dt
-        if not is_bound:
-            return limited, ""
+        if not is_bound and (force <= allowed or float(push.torques @ limited) > 0.0):
+            return limited, ""  # by itself, the arm gives way fast enough
         limit = self._in_words(allowed, whole)
         return limited, (
             f"the world pushes with {self._how_known.format(brief(self._pushed))}; allowed: {limit}; the arm does not "

@@ -1,7 +1,7 @@
 """A scenario: the steps of a task as data, played at the outer rate."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -10,13 +10,14 @@ import yaml
 
 from wam_control.contact_position import torque_of_position
 from wam_control.motion import LineMotion, PostureMotion
+from wam_control.scenario_settings import Setting, require_settings, settings_of
 from wam_control.scenario_values import known, number, numbers
 from wam_control.task import TaskCommand
 from wam_control.task_text import task_of_text, torque_task
 from wam_description import yaml_text
 from wam_description.arm import Arm, Shared
-from wam_description.configuration import packaged
-from wam_description.parameters import ParameterError, flatten, parameter, require
+from wam_description.configuration import Configuration, packaged
+from wam_description.parameters import ParameterError, parameter, require
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import BASE, Contact, ForceCommand, PathPoint, PosturePath, Triple
 
@@ -43,7 +44,6 @@ STEP_KEYS = {  # of a step in the file, with what each means; docs/running.md ha
 MOTIONS = ("posture", "trajectory", "tip")  # keys of a step, one of which it may have
 FORCES = ("force", "task", "torque")
 REQUESTS = ("", "enable", "disable")
-TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
 ZERO: Final[Triple] = (0.0, 0.0, 0.0)
 NO_FORCE = ForceCommand("base", ZERO)
 ROUNDING = 1e-9  # s, of a sum of periods
@@ -97,14 +97,6 @@ class Chirp(NamedTuple):
     newtons: float  # amplitude
     start: float  # Hz
     end: float  # Hz
-
-
-class Setting(NamedTuple):
-    """A live parameter of a node and its new value."""
-
-    node: str
-    name: str
-    value: float | int | bool | str | tuple[float | int | bool | str, ...]
 
 
 class ScenarioStep(NamedTuple):
@@ -352,12 +344,27 @@ def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:
         tree = yaml_text.parse(path.read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ParameterError(f"scenario {path} is not YAML: {error}") from error
-    if not isinstance(tree, dict) or not isinstance(tree.get("steps"), list):
+    if isinstance(tree, dict):
+        known(f"scenario {path}", tree, ("steps",), ("steps",))
+    if not isinstance(tree, dict) or not isinstance(tree["steps"], list):
         raise ParameterError(f"scenario {path} has no list 'steps'")
-    known(f"scenario {path}", tree, ("steps",), ("steps",))
     require(len(tree["steps"]) > 0, f"scenario {path} has no steps; give at least one")
     steps = [_step(f"{path}, step {i + 1}", body, shared) for i, body in enumerate(tree["steps"])]
     _require_time(str(path), steps, shared)
+    return steps
+
+
+def load_for(configuration: Configuration, script: str) -> list[ScenarioStep]:
+    """Read the steps of a scenario as a configuration plays it: `load`, and what they set fits its other values.
+
+    Parameters
+    ----------
+    configuration : of all nodes.
+    script : as in `ScenarioParameters`.
+    """
+    path = script_file(script)
+    steps = load(path, configuration.shared)
+    require_settings(str(path), [step.settings for step in steps], configuration)
     return steps
 
 
@@ -389,7 +396,7 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
         push=_push(where, body["push"], shared, seconds) if "push" in body else None,
         request=request,
         chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
-        settings=tuple(_settings(where, body["set"])) if "set" in body else (),
+        settings=tuple(settings_of(where, body["set"], shared)) if "set" in body else (),
         task=_task(where, body, arm),
         trajectory=_trajectory(where, body["trajectory"], arm) if "trajectory" in body else None,
         tip=_tip(where, body["tip"]) if "tip" in body else None,
@@ -451,14 +458,6 @@ def _chirp(where: str, body: Any) -> Chirp:
     newtons, start, end = (number(where + ", chirp", key, body[key]) for key in keys)
     require(0.0 < start < end, f"{where}: chirp goes from {start:g} to {end:g} Hz; it must begin above 0 and rise")
     return Chirp(newtons, start, end)
-
-
-def _settings(where: str, body: Any) -> Iterator[Setting]:
-    known(where + ", set", body, TUNABLE, ())
-    for node, values in body.items():
-        require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
-        for name, value in flatten(values).items():
-            yield Setting(node, name, tuple(value) if isinstance(value, list) else value)
 
 
 def _push(where: str, body: Any, shared: Shared, seconds: float) -> Push:

@@ -3,7 +3,8 @@
 from typing import Any
 
 from wam_control.contact_table import contact_of
-from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, Setting, load, script_file
+from wam_control.scenario import Scenario, ScenarioOutput, ScenarioParameters, load, script_file
+from wam_control.scenario_settings import Setting
 from wam_control.task import table_of
 from wam_description.arm import Shared
 from wam_description.signals import BASE, Level, NodeStatus, State, Wrench

@@ -68,8 +68,8 @@ class Effects:
         """Part of the pretension of this motor's circuit that is set."""
         return self.pretension_share[motor if len(self.pretension_share) > 1 else 0]
 
-    def require_pretension(self, arm: Arm) -> None:
-        """Refuse a pretension that leaves a cable no margin for its load up to its breaking strength.
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse effects that do not fit the arm, as a pretension that leaves a cable no margin up to its strength.
 
         The load at full torque is that for which the configured pretension was chosen, half of it on each strand.
 
@@ -79,6 +79,7 @@ class Effects:
             naming motor, value and what is allowed.
         """
         motors, cables = arm.motors.names, arm.cables
+        lengths("effects", arm.joints.names, {"added_coulomb_friction": self.added_coulomb_friction})
         if len(self.pretension_share) != 1:
             lengths("effects", motors, {"pretension_share": self.pretension_share})
         for i, (name, pretension, strength) in enumerate(

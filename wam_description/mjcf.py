@@ -89,7 +89,7 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
     lengths("effects", motors, {"tension_friction": effects.tension_friction})
     if len(effects.backlash) != 1:
         lengths("effects", motors, {"backlash": effects.backlash})
-    effects.require_pretension(arm)
+    effects.require_fit(arm)
     lengths("effects", joints, {"added_coulomb_friction": effects.added_coulomb_friction})
 
 

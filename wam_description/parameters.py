@@ -199,8 +199,7 @@ def build(cls: type[T], flat: Mapping[str, Any]) -> T:
         parts = [f"missing parameter '{name}'" for name in missing]
         parts += [f"unknown parameter '{name}'" for name in unknown]
         raise ParameterError("; ".join(parts) + " (compare with docs/parameters.md)")
-    checked = {name: _checked(field, flat[name]) for name, field in known.items()}
-    return _assemble(cls, checked, "")
+    return _assemble(cls, {name: checked(field, flat[name]) for name, field in known.items()}, "")
 
 
 def _derived(known: Iterable[Field], flat: Mapping[str, Any]) -> dict[str, Any]:
@@ -246,7 +245,14 @@ def _assemble(cls: type[T], flat: Mapping[str, Value], prefix: str) -> T:
     return cls(**arguments)
 
 
-def _checked(field: Field, value: Any) -> Value:
+def checked(field: Field, value: Any) -> Value:
+    """A value of a parameter in its type, or a refusal of what is none, or out of range.
+
+    Raises
+    ------
+    ParameterError
+        names the parameter, the value and what is allowed.
+    """
     if field.is_array:
         if isinstance(value, (str, bytes, Mapping, Set)) or not hasattr(value, "__iter__"):
             raise ParameterError(

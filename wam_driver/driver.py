@@ -21,6 +21,8 @@ from wam_driver.plant import Plant
 from wam_driver.safety import Mode, Safety
 from wam_driver.sensors import Sensors
 
+RECENT = 0.2  # s, for which a push that has ended may be the cause of what the arm does
+
 
 @dataclass(frozen=True)
 class DriverParameters:
@@ -50,6 +52,10 @@ class DriverParameters:
     tip_speed_limit: float = parameter("speed of the tool above which there is a fault", "m/s", low=0.0, high=100.0)
     post_mortem_samples: int = parameter("number of samples kept from before a fault", low=1, high=100_000)
     post_mortem_directory: str = parameter("directory for these samples; empty: they are not written")
+
+    def require_fit(self, arm: Arm) -> None:
+        """Refuse live parameters that do not fit the arm."""
+        self.effects.require_fit(arm)
 
 
 class DriverSample(NamedTuple):
@@ -115,6 +121,7 @@ class Driver:
         self._push_ticks = max(shared.ages.limit_ns("command"), timing.outer_period_ns) // timing.period_ns
         self._push_ends: dict[str, int] = {}  # last tick of the present push on each cover
         self._disturbed = ""  # cover that is pushed by messages
+        self._pushed, self._pushed_tick = "", 0  # the last pushes of an enabled arm, in words, and when they acted
         self._pretension_share = parameters.effects.pretension_share
         self._begin_period(1)
         self._release()
@@ -170,7 +177,7 @@ class Driver:
             self.plant.recover()
             self._trip(
                 f"the simulation of the arm failed: {trouble}; the arm is where it was before; "
-                "press or command less, or lower timing.period"
+                f"{self._advice}, or lower timing.period"
             )
             enabled = False
         self._begin_period(self._tick + 1)
@@ -187,6 +194,8 @@ class Driver:
 
     def _watch_limits(self) -> None:
         """Trip on the first quantity above its limit; warn of those near it."""
+        if pushed := self.plant.pushes_in_words():
+            self._pushed, self._pushed_tick = pushed, self._tick
         tensions = self._largest_tensions()
         watched = self._watch.watched(*self._turned, self.currents, tensions)
         self.warnings = [limit.warning for limit in watched]
@@ -195,8 +204,19 @@ class Driver:
             for name, heat in zip(self._arm.motors.names, self.amplifier.heat, strict=True)
             if heat > WARNING
         ]
-        if watched and (fault := next(filter(None, (limit.fault for limit in watched)), "")):
-            self._trip(fault)
+        if watched and (excess := next(filter(None, (limit.excess for limit in watched)), "")):
+            self._trip(f"{excess}; {self._advice}")
+
+    @property
+    def _advice(self) -> str:
+        """What to do about an arm that moves or is loaded beyond a limit: less of what it is commanded, or pushed."""
+        now = self.plant.pushes_in_words()
+        since = (self._tick - self._pushed_tick) * self._timing.period
+        if now:
+            return f"a push acts ({now}): push or command less"
+        if self._pushed and since <= RECENT:
+            return f"a push acted until {since:.2f} s before ({self._pushed}): push or command less"
+        return "command less"
 
     def _watch_braking(self) -> None:
         """Name the first cable that breaks under the brakes."""
@@ -262,7 +282,7 @@ class Driver:
 
     def set_effects(self, effects: Effects) -> None:
         """Take the effects that can change while the arm runs: added friction, active pretension."""
-        effects.require_pretension(self._arm)
+        effects.require_fit(self._arm)
         self.set_added_friction(effects.added_coulomb_friction)
         if effects.pretension_share != self._pretension_share:
             self.plant.set_pretension(effects.pretension_share)

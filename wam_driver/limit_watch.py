@@ -26,15 +26,10 @@ class WatchedLimit(NamedTuple):
 
     @property
     def excess(self) -> str:
-        """That the quantity is above its limit, '' while it is not."""
+        """That the quantity is above its limit, which is a fault; '' while it is not."""
         if self.value <= self.limit:
             return ""
         return f"{self.quantity} {self.value:.2f} {self.unit} is above its limit {self.limit:g}"
-
-    @property
-    def fault(self) -> str:
-        """Why the driver stops, '' while the quantity is within its limit."""
-        return f"{self.excess}; command less" if self.excess else ""
 
 
 class LimitWatch:

@@ -103,6 +103,14 @@ class CoverLoads:
         """End every push."""
         self.pushes.clear()
 
+    def pushes_in_words(self) -> str:
+        """How hard which covers are pushed; '' where none is."""
+        sizes = (
+            (cover, one.force, "N") if any(one.force) else (cover, one.torque, "N m")
+            for cover, one in self.pushes.items()
+        )
+        return ", ".join(f"{math.hypot(*size):.4g} {unit} on {cover}" for cover, size, unit in sizes)
+
     def apply_pushes(self) -> None:
         """Add the pushes to MuJoCo's applied forces, between the two halves of a step."""
         for _, body, (x, y, z), (u, v, w), rows, origin, _ in self.pushes.values():

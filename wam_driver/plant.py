@@ -208,6 +208,10 @@ class Plant:
         """End every push."""
         self._loads.release()
 
+    def pushes_in_words(self) -> str:
+        """How hard which covers are pushed; '' where none is."""
+        return self._loads.pushes_in_words()
+
     def carry(self, mass: float) -> None:
         """Carry a mass at the tool, kg, from now on, besides `arm.payload`: a point that already moves with it."""
         if mass != self._carried:

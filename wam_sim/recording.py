@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from wam_bag.bag import Bag, JointColumns, Messages, PointColumns, WrenchColumns
+from wam_bag.bag import Bag, BagError, JointColumns, Messages, PointColumns, WrenchColumns
 from wam_bag.contents import mode_of
 from wam_bag.losses import PARAMETERS as ATTACHMENT
 from wam_description.parameter_history import present_name
@@ -69,6 +69,19 @@ class RecordedRun(NamedTuple):
 
     def __repr__(self) -> str:
         return f"RecordedRun({self.bag!r}, {self.namespace!r}, {len(self.steps)} steps, {self.outcome!r}, {self.mode})"
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the arm was simulated: a driver of another arm is named as 'module:Class' among the nodes.
+
+        Without the parameters, lockstep and the topics of the simulator are evidence of it.
+        """
+        topics = {*self.bag.topics, *self.bag.counts}
+        try:
+            has_own = "driver" not in self.parameters.shared.nodes
+        except BagError:
+            has_own = self.mode != "lockstep"
+        return not has_own or any(name.startswith(f"{self.namespace}/sim/") for name in topics)
 
     def changes(self, node: str) -> list[RecordedChange]:
         """Live parameters that a node took while it ran, by 'node:parameter', as it reported them itself."""

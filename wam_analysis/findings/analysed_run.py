@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_analysis.demo_summary import DemoSummary, summary_of
+from wam_analysis.held_messages import rows_before_gaps
 from wam_analysis.reactions import BRIEF, RecordedReaction, within
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_bag.bag import Bag, JointColumns
@@ -30,7 +31,6 @@ class Hold(NamedTuple):
     frame : of the force.
     force : (3,), N, of the arm on the world, in that frame.
     commanded : its magnitude, N.
-    before : force commanded before, along the same direction, N.
     disturbed : whether the scenario pushed the arm meanwhile.
     cover : on which a task commands it, '' where none does.
     axis : of a task with several forces, from 0; -1 where it is the only force.
@@ -43,7 +43,6 @@ class Hold(NamedTuple):
     frame: str
     force: Numbers
     commanded: float
-    before: float
     disturbed: bool
     cover: str = ""
     axis: int = -1
@@ -120,18 +119,16 @@ def _forces(run: RecordedRun, summary: DemoSummary) -> Iterator[Hold]:
     frames = np.array(commands.frames)
     changed = np.any(np.abs(np.diff(commands.force, axis=0)) > SMALL, axis=1) | (frames[1:] != frames[:-1])
     steps = np.searchsorted(commands.stamp_ns, [step.begin for step in summary.steps])
-    inner = {*(np.flatnonzero(changed) + 1).tolist(), *steps.tolist()} - {0, len(frames)}
+    gaps = (rows_before_gaps(commands.stamp_ns) + 1).tolist()
+    inner = {*(np.flatnonzero(changed) + 1).tolist(), *steps.tolist(), *gaps} - {0, len(frames)}
     bounds = [0, *sorted(inner), len(frames)]
     period = int(np.median(np.diff(commands.stamp_ns))) if len(frames) > 1 else 0
-    before = np.zeros(3)
     for a, b in itertools.pairwise(bounds):
         force = commands.force[a]
         commanded = float(np.linalg.norm(force))
         begin, end = int(commands.stamp_ns[a]), int(commands.stamp_ns[b - 1]) + period
         if commanded > SMALL and end - begin >= SHORTEST_HOLD * 1e9:
-            along = float(before @ force) / commanded
-            yield Hold("", begin, end, str(frames[a]), force, commanded, along, False)
-        before = force
+            yield Hold("", begin, end, str(frames[a]), force, commanded, False)
 
 
 def _forces_of_tasks(summary: DemoSummary) -> Iterator[Hold]:
@@ -143,7 +140,7 @@ def _forces_of_tasks(summary: DemoSummary) -> Iterator[Hold]:
         for begin, end in itertools.pairwise(bounds):
             if commanded > SMALL and end - begin >= SHORTEST_HOLD * 1e9:
                 axis = -1 if task.is_only else task.number
-                yield Hold("", begin, end, task.frame, task.force, commanded, 0.0, False, task.cover, axis)
+                yield Hold("", begin, end, task.frame, task.force, commanded, False, task.cover, axis)
 
 
 def at_stamps(columns: JointColumns, stamps: Times) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:

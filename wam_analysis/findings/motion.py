@@ -11,7 +11,7 @@ from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, deviations, shown, times
 from wam_analysis.findings.frequency import frequency_section
 from wam_analysis.findings.power import power_section
-from wam_analysis.findings.transmission_signals import CABLE, TransmissionSignals, transmission_signals
+from wam_analysis.findings.transmission_signals import CABLE, GRAVITY, TransmissionSignals, transmission_signals
 from wam_analysis.measures.friction import Friction, identify_friction
 from wam_analysis.measures.ripple import Ripple, ripple_spectrum
 from wam_analysis.measures.stick_slip_phases import Phases, stick_slip_phases, without_turns
@@ -25,6 +25,7 @@ JOINT_REST = 0.002  # rad/s
 SHORTEST = 0.01  # s; a shorter stick or slip is chatter
 WINDOW = 0.03  # s over which friction is averaged
 ORDERS = 48  # of the ripple, cycles per turn
+ENOUGH = 1.2  # turns that determine it where they have no gaps
 FAINT = 3.0  # times the median order; smaller ripple is not reported
 SLIGHT = 0.05  # of the dry friction; smaller ripple is not reported either
 UNSURE = 0.25  # of a friction; with a larger standard error it is not identifiable
@@ -65,7 +66,7 @@ def motion_sections(recording: AnalysedRun) -> MotionFindings:
     sections = (
         stick,
         _friction_section(recording, arm, signals, friction, joints),
-        _ripple_section(ripple, friction, recording.parameters.effects),
+        _ripple_section(signals.load_from, ripple, friction, recording.parameters.effects),
         power_section(arm, signals, friction, joints),
         frequency_section(recording, arm),
     )
@@ -199,7 +200,7 @@ def _friction_section(
         sentences.append(f"Too little motion, or more than friction in the torque, for that of {', '.join(still)}.")
     lacking = recording.lacking("joint_sensors", "sim/joint_states")
     flagged = deviations(tuple(findings))
-    return Section("friction", "Friction", (*sentences, *flagged), tuple(findings), lacking, flagged)
+    return Section("friction", "Friction", (*signals.caveats, *sentences, *flagged), tuple(findings), lacking, flagged)
 
 
 def _breakaway(found: Friction) -> str:
@@ -259,7 +260,12 @@ def _friction_findings(name: str, found: Friction, configured: tuple[float, floa
 
 
 def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Friction]) -> dict[str, Ripple]:
-    """Ripple of each motor over its own angle, without friction and inertia."""
+    """Ripple of each motor over its own angle, without friction and inertia; none where the load is only computed.
+
+    The cables take most of a fast ripple, and what accelerates the links, as a push does, would be a slow one.
+    """
+    if signals.load_from == GRAVITY:
+        return {}
     found = {}
     for i, name in enumerate(arm.motors.names):
         known = friction[name]
@@ -275,11 +281,14 @@ def _ripples(signals: TransmissionSignals, arm: Arm, friction: dict[str, Frictio
     return found
 
 
-def _ripple_section(ripple: dict[str, Ripple], friction: dict[str, Friction], effects: Effects | None) -> Section:
+def _ripple_section(
+    load_from: str, ripple: dict[str, Ripple], friction: dict[str, Friction], effects: Effects | None
+) -> Section:
     sentences, findings = [], []
     for name, found in ripple.items():
         if not len(found.order):
-            sentences.append(f"{name} made {found.turns:.2f} turns, too few to identify its ripple.")
+            why = "too few" if found.turns < ENOUGH else "with too large gaps"
+            sentences.append(f"{name} made {found.turns:.2f} turns, {why} to identify its ripple.")
             continue
         top = int(np.argmax(found.amplitude))
         order, amplitude = int(found.order[top]), float(found.amplitude[top])
@@ -299,7 +308,9 @@ def _ripple_section(ripple: dict[str, Ripple], friction: dict[str, Friction], ef
             if clear
             else f"{name}: no significant ripple; the largest order has {shown(amplitude, 'N m')}."
         )
-    if not ripple:
+    if load_from == GRAVITY:
+        sentences.append("Ripple was not measured: of the motors' load only that of gravity is known in this bag.")
+    elif not ripple:
         sentences.append("No motor turned enough to identify its ripple.")
     return Section("ripple", "Torque ripple by pulley angle", tuple(sentences), tuple(findings))
 

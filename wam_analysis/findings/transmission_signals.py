@@ -1,5 +1,6 @@
 """Torques and velocities of motors, cables and joints on one time base."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,10 @@ STRAIN = "strain gauges"
 RELEASE = 200_000_000  # ns after the brakes were released
 SLOWEST = 0.006  # s; with a longer period, cable torques do not show what a resonance does between samples
 GRAVITY = "gravity alone, while nothing touches"
+AROUND = (
+    200_000_000  # ns before and after a push or an estimated contact: it begins before it is detected, cables swing
+)
+TOUCHES = ("contact/wrench", "sim/disturbance")  # the second is of a simulated arm
 SOURCES = {CABLE: "sim/joint_states", STRAIN: "joint_sensors", GRAVITY: "gravity_effort"}
 
 
@@ -33,6 +38,7 @@ class TransmissionSignals(NamedTuple):
     joint_velocity : (k, n), rad/s; NaN if not recorded.
     cable_torque : (k, n), of the cables on the joints, N m; NaN if not recorded.
     strain : (k, n), torque on the link side of the joints' friction, N m; NaN if not recorded.
+    caveats : what else the motors' friction holds, or may hold, a sentence each.
     """
 
     time: Numbers
@@ -46,6 +52,7 @@ class TransmissionSignals(NamedTuple):
     joint_velocity: Numbers
     cable_torque: Numbers
     strain: Numbers
+    caveats: tuple[str, ...]
 
 
 def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignals | None:
@@ -79,11 +86,11 @@ def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignal
     rows = np.flatnonzero(np.all(np.isfinite(at_joints), axis=1) & forward)
     matrix = TransmissionMap.of(arm).joint_from_motor
     use = ~_braked(recording, stamps[rows])
+    caveats: tuple[str, ...] = ()
     if load_from == GRAVITY:
-        estimated = recording.run.wrench("contact/wrench")
-        if estimated is not None:
-            row = np.maximum(np.searchsorted(estimated.stamp_ns, stamps[rows], side="right") - 1, 0)
-            use &= ~np.any(estimated.force[row] != 0.0, axis=1)
+        touched = _touched(recording, stamps[rows])
+        caveats = tuple(_caveats(recording, float(np.mean(touched[use])) if np.any(use) else 0.0))
+        use &= ~touched
     return TransmissionSignals(
         time=stamps[rows] / 1e9,
         angle=angle[rows],
@@ -96,6 +103,7 @@ def transmission_signals(recording: AnalysedRun, arm: Arm) -> TransmissionSignal
         joint_velocity=speed[rows],
         cable_torque=cable[rows],
         strain=strain[rows],
+        caveats=caveats,
     )
 
 
@@ -112,6 +120,32 @@ def _braked(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.boo
         elif status.mode != "enabled" and since is None:
             since = status.stamp
     return braked if since is None else braked | (stamps >= since)
+
+
+def _touched(recording: AnalysedRun, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether something pushes or touches the arm, or does shortly before or after."""
+    touched = np.zeros(len(stamps), dtype=np.bool_)
+    for topic in TOUCHES:
+        forces = recording.run.wrench(topic)
+        if forces is None:
+            continue
+        acting = forces.stamp_ns[np.any(forces.force != 0.0, axis=1)]
+        near = np.searchsorted(acting, [stamps - AROUND, stamps + AROUND])
+        touched |= near[1] > near[0]
+    return touched
+
+
+def _caveats(recording: AnalysedRun, left_out: float) -> Iterator[str]:
+    """About a load from gravity alone; `left_out` is the fraction of the time in which something touched the arm."""
+    yield "The motors' load is that of gravity alone: what accelerates the links is in their friction, too."
+    if left_out > 0.0:
+        yield f"Left out is {100.0 * left_out:.0f} % of the time, in which something pushed or touched the arm."
+    lacking = recording.lacking(*TOUCHES[: 1 + recording.run.is_simulated])
+    if lacking:
+        yield (
+            f"Whether something pushed or touched the arm is not known: not recorded ({', '.join(lacking)}). "
+            "If so, it is in their friction."
+        )
 
 
 def _period(recording: AnalysedRun) -> float:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.float64]
 
 CELLS = 4  # per turn and order, into which angles are binned
+DETERMINED = 100.0  # condition number above which the angles have gaps that make ripple of any error of the torque
 
 
 class Ripple(NamedTuple):
@@ -19,7 +20,7 @@ class Ripple(NamedTuple):
     order : (k,), cycles per turn, 1 to k.
     amplitude : (k,), N m (half of the peak to peak of each).
     phase : (k,), rad: torque = amplitude sin(order angle + phase).
-    turns : range of the angle in turns; at least 1 is needed.
+    turns : range of the angle in turns; at least 1 is needed, in practice 1.2.
     rest : standard deviation of the residual, N m.
     """
 
@@ -48,7 +49,7 @@ def ripple_spectrum(angle: Numbers, torque: Numbers, orders: int) -> Ripple:
     Returns
     -------
     Ripple
-        without any order if the pulley made less than one turn or there are too few angles.
+        without any order if the pulley made less than one turn, there are too few angles, or gaps between them.
     """
     if not len(angle):
         return NO_RIPPLE
@@ -66,7 +67,9 @@ def ripple_spectrum(angle: Numbers, torque: Numbers, orders: int) -> Ripple:
     steady = np.polynomial.chebyshev.chebvander(2.0 * (at - at.min()) / np.ptp(at) - 1.0, drift - 1)
     columns = np.hstack([np.sin(np.outer(at, k)), np.cos(np.outer(at, k)), steady])
     weight = np.sqrt(number)[:, np.newaxis]
-    solution = np.linalg.lstsq(weight * columns, weight[:, 0] * mean, rcond=1e-6)[0]
+    solution, _, _, singular = np.linalg.lstsq(weight * columns, weight[:, 0] * mean, rcond=None)
+    if singular[0] > DETERMINED * singular[-1]:
+        return NO_RIPPLE._replace(turns=turns)
     sine, cosine = solution[:orders], solution[orders : 2 * orders]
     rest = mean - columns @ solution
     return Ripple(

@@ -19,8 +19,7 @@ from wam_cli.commands import (
     writable_directory,
 )
 from wam_cli.commands.demo_nodes import play
-from wam_control.scenario import ScenarioStep, script_file
-from wam_control.scenario import load as steps_of
+from wam_control.scenario import ScenarioStep, load_for, script_file
 from wam_description.configuration import Configuration
 from wam_description.status import DONE
 from wam_experiments.thesis.definition import Experiment, load, tasks, with_run
@@ -102,13 +101,13 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     ParameterError
         which names the file, the step and the value.
     """
-    script = script_file(str(configuration.sections["scenario"]["script"]))
-    steps = steps_of(script, configuration.shared)
+    script = str(configuration.sections["scenario"]["script"])
+    steps = load_for(configuration, script)
     seconds = sum(step.seconds for step in steps)
     pushes = [step.push for step in steps if step.push]
     presses = [math.hypot(*step.force.force) for step in steps if any(step.force.force)]
     pushed = ", ".join(f"{math.hypot(*push.force):g} N on the {push.cover.replace('_', ' ')}" for push in pushes)
-    print(f"Task {task or script.stem}: {len(steps)} steps, up to {seconds:g} s of the arm's time")
+    print(f"Task {task or script_file(script).stem}: {len(steps)} steps, up to {seconds:g} s of the arm's time")
     if pushes:
         print(f"  the simulator pushes the arm: {pushed}; the contact estimator has to find where, from the torques")
     if presses:

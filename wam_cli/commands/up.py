@@ -13,7 +13,7 @@ from wam_cli.commands import (
     timed,
 )
 from wam_cli.commands.live import page_next_to
-from wam_control.scenario import load, script_file
+from wam_control.scenario import load_for
 from wam_description.configuration import Configuration
 from wam_description.nodes import EACH, GROUPED, ONE
 from wam_ros.bring_up import start
@@ -62,7 +62,7 @@ def run(given: argparse.Namespace) -> int:
     configuration = configuration.with_values({"nodes": [*configuration.shared.nodes, *extra]})
     if given.scenario:
         configuration = configuration.with_values({"scenario:script": given.scenario})
-        load(script_file(given.scenario), configuration.shared)  # refused before any node starts
+        load_for(configuration, given.scenario)  # refused before any node starts
     end_at_once_on_signals()
     import_nodes(configuration, given)
     stop = Stop()

@@ -55,7 +55,7 @@ def outcome(point: ExperimentPoint) -> ExperimentOutcome:
         try:
             for run in runs:
                 configuration = configured(experiment, run, Path(folder))
-                steps = scenario.load(Path(folder, f"{run.name}.yaml"), configuration.shared)
+                steps = scenario.load_for(configuration, f"{folder}/{run.name}.yaml")
                 record(configuration, steps, Path(folder, run.name))
             rows = evaluate(experiment, Path(folder)).rows
         except (ParameterError, BagError) as error:

@@ -1,0 +1,34 @@
+"""For how long a recorded message is held, and where a topic has none for longer."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Times = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+HELD = 100_000_000  # ns for which a message is held; after that the signal is unknown
+THINNED, FEWEST = 2, 10  # periods of a thinned topic for which a message is held, and messages of which one is known
+
+
+def held_for(stamps: Times) -> int:
+    """For how long a message of these is held, ns: `HELD`, or longer where a recording was thinned."""
+    return max(HELD, THINNED * int(np.median(np.diff(stamps)))) if len(stamps) > FEWEST else HELD
+
+
+def held_rows(stamps: Times, base: Times) -> tuple[NDArray[np.intp], Mask]:
+    """Row of the last message at or before each instant, and whether there is one and it is still held."""
+    row = np.searchsorted(stamps, base, side="right") - 1
+    known = row >= 0
+    row = np.maximum(row, 0)
+    return row, known & (base - stamps[row] <= held_for(stamps))
+
+
+def rows_before_gaps(stamps: Times) -> NDArray[np.intp]:
+    """Rows of the messages after which none comes for longer than one is held."""
+    return np.flatnonzero(np.diff(stamps) > held_for(stamps))
+
+
+def with_holes(stamps: Times) -> Times:
+    """These and, where none comes for longer than one is held, an instant at which it is not held any more."""
+    last = stamps[rows_before_gaps(stamps)]
+    return np.sort(np.concatenate([stamps, last + held_for(stamps) + 1])) if len(last) else stamps

@@ -1,0 +1,80 @@
+"""Live parameters that a step of a scenario sets, checked against their declarations before anything moves."""
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from wam_control.scenario_values import known
+from wam_description.arm import Shared
+from wam_description.configuration import Configuration
+from wam_description.interface import declared
+from wam_description.parameters import ParameterError, build, checked, fields, flatten, require
+
+TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
+
+
+class Setting(NamedTuple):
+    """A live parameter of a node and its new value."""
+
+    node: str
+    name: str
+    value: float | int | bool | str | tuple[float | int | bool | str, ...]
+
+
+def settings_of(where: str, body: Any, shared: Shared) -> Iterator[Setting]:
+    """Those of a step: each is a live parameter of its node, with a value of its type and range.
+
+    Raises
+    ------
+    ParameterError
+        names the node, the parameter and what is allowed.
+    """
+    known(where + ", set", body, TUNABLE, ())
+    for node, values in body.items():
+        require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
+        live = {field.name: field for field in fields(_parameter_class(where, node, shared)) if field.live}
+        for name, value in flatten(values).items():
+            near = difflib.get_close_matches(name, live, n=1)
+            meant = f"did you mean '{near[0]}'? " if near else ""
+            require(
+                name in live,
+                f"{where}: set, {node}: it has no parameter '{name}' that may change while it runs; {meant}"
+                f"it has: {', '.join(sorted(live)) or 'none'}",
+            )
+            try:
+                yield Setting(node, name, checked(live[name], value))
+            except ParameterError as error:
+                raise ParameterError(f"{where}: set, {node}: {error}") from None
+
+
+def require_settings(where: str, settings: Sequence[Sequence[Setting]], configuration: Configuration) -> None:
+    """Refuse settings, those of each step, that do not fit the other values that their node has by then.
+
+    What a class of parameters refuses itself is refused; where it has a method `require_fit`, with the arm.
+
+    Raises
+    ------
+    ParameterError
+        names the step, the node and the value.
+    """
+    shared = configuration.shared
+    sections: dict[str, dict[str, Any]] = {}
+    for i, of_step in enumerate(settings):
+        for setting in of_step:
+            present = sections.setdefault(setting.node, dict(configuration.sections.get(setting.node, {})))
+            present[setting.name] = setting.value
+        for node in dict.fromkeys(setting.node for setting in of_step):
+            try:
+                own = build(_parameter_class(where, node, shared), sections[node])
+                getattr(own, "require_fit", lambda arm: None)(shared.arm)
+            except ParameterError as error:
+                raise ParameterError(f"{where}, step {i + 1}: set, {node}: {error}") from None
+
+
+def _parameter_class(where: str, node: str, shared: Shared) -> Any:
+    """Of the node of this name: that of the package, or one of your own, 'module:Class'."""
+    entries = [node] if node in shared.nodes else [entry for entry in shared.nodes if ":" in entry]
+    for entry in entries:
+        if (declaration := declared(entry)).name == node:
+            return declaration.parameter_class
+    raise ParameterError(f"{where}: set, {node}: no node is named so; nodes: {', '.join(shared.nodes)}")
