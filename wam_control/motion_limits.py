@@ -79,6 +79,7 @@ class LimitParameters:
     )
 
 
+REPORTED: Final = 0.2  # s, for which what pushes too hard is reported after the last time: a swing is one report
 AT_LEAST: Final = "at least {} N in all"
 AT_COMMANDED: Final = "{} N in all, if it acts where the commanded force does"
 
@@ -122,6 +123,7 @@ class MotionLimits:
         self._joints, self._body, self._parameters, self._fastest = arm.joints, body, parameters, fastest
         self._given = self._pushed = 0.0  # m by which the arm has given way, N in the present push
         self._how_known = ""  # that force: a lower bound, or the one at an assumed position
+        self._reason, self._reported = "", 0.0  # the last one, and for how long, s, it is reported still
 
     def step(
         self,
@@ -145,7 +147,11 @@ class MotionLimits:
             return Limited([], "", "")
         slowed, force = self._against_the_world(list(velocity), q, push, dt, whole)
         stopped, end = self._before_the_ends(slowed, q)
-        return Limited(stopped, end, force)
+        if force:
+            self._reason, self._reported = force, REPORTED
+        else:
+            self._reported = max(self._reported - dt, 0.0)
+        return Limited(stopped, end, self._reason if self._reported else "")
 
     def _against_the_world(
         self, velocity: list[float], q: Sequence[float], push: ArmPush, dt: float, whole: WholeForce | None
