@@ -219,6 +219,22 @@ def test_steady_state_is_the_last_second_of_a_long_step_and_the_last_half_of_a_s
     assert recording.summary().presses[-1].begin == START + 8700 * MS
 
 
+@pytest.mark.parametrize("seconds", [0.15, 0.5, 0.9])
+def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(seconds):
+    recording = Recording()
+    recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 2.0, 0.0), 0.25)  # not yet 4 N
+    recording.statuses[5] = ("lift", START + round(1e9 * (7.0 + seconds)), 0)
+    recording.set(recording.commanded, 7.0 + seconds, 9.0, "base", (0.0, 0.0, 0.0))
+    shown = text(recording.summary())
+    assert "force within 10 %: NOT SHOWN, 1 of 2 commanded for less than 1 s" in shown
+    row = next(line.split() for line in shown.splitlines() if line.startswith("  press 4 N   "))
+    assert row[3:9] == ["4.00", "-", "-", "short", "-", "short"]
+    analysis = " ".join(analysis_text(analyse_bag(recording.bag(), lambda doing: None), 100).split())
+    assert "the worst true one in the steady state is +5.0 % off (press 8 N, 8 N commanded)." in analysis
+    assert ("press 4 N: 4 N commanded on outer_link for less than 1 s, so" in analysis) == (seconds > 0.3)
+    assert "press 4 N: bias" not in analysis
+
+
 def test_force_of_the_world_counts_with_the_opposite_sign_of_the_command():
     recording = Recording()
     recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, -4.0, 0.0), 0.25)  # pulls

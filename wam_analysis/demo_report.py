@@ -160,7 +160,10 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
         ripple = f"{ripples[errors.index(worst)]:.1f}"
         return f"{worst:.1f} %" + (f", {ripple} % of it ripple" if float(ripple) else "")
 
-    return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, of)
+    answer = _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, of)
+    short = sum(press.is_short for press in presses)
+    remark = f"{short} of {len(presses)} commanded for less than {STEADY:g} s" * bool(short)
+    return answer._replace(remark=remark)
 
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
@@ -209,7 +212,7 @@ def _played(summary: DemoSummary) -> str:
 
 
 def _presses(presses: Sequence[SteadyPress]) -> list[str]:
-    title = f"Force along the commanded one, mean of the last {STEADY:g} s of each step [N]"
+    title = f"Force along the commanded one, mean of the last {STEADY:g} s of each step, at most its second half [N]"
     if not presses:
         return [title, "  no pressing step was recorded"]
     head = ["step", "commanded", "true", "+-", "error", "measured", "error", "estimated", "error"]
@@ -228,6 +231,7 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
         *_table(rows, head),
         "  true: of all that acts on the link (simulator), the part along the commanded force; +-: half of",
         "    its range; measured: force loop; estimated: contact estimator",
+        *[f"  short: commanded for less than {STEADY:g} s: no steady state"][: any(p.is_short for p in presses)],
         *["  refused: the arm did not follow the command, see below"][: any(p.is_refused for p in presses)],
     ]
 
@@ -399,6 +403,8 @@ def _per_cent(press: SteadyPress, force: float) -> str:
     error = press.error(force)
     if press.is_refused:
         return "refused"
+    if press.is_short:
+        return "short"
     return "-" if math.isnan(error) else f"{error:+.1f} %"
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_summary import DemoSummary, summary_of
+from wam_analysis.demo_summary import STEADY, DemoSummary, summary_of
 from wam_analysis.reactions import BRIEF, RecordedReaction, within
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_bag.bag import Bag, JointColumns
@@ -48,6 +48,11 @@ class Hold(NamedTuple):
     cover: str = ""
     axis: int = -1
     reactions: tuple[RecordedReaction, ...] = ()
+
+    @property
+    def is_short(self) -> bool:
+        """Whether the force was commanded too briefly for a steady state."""
+        return self.end - self.begin < STEADY * 1e9
 
     @property
     def is_refused(self) -> bool:
