@@ -30,7 +30,7 @@ from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.reactions import RecordedReaction, sentences
 from wam_analysis.recorded import RecordedArm, recorded_arm
-from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_cli.commands.demo import _report
 from wam_cli.main import main
 from wam_control.contact_inference import REASONS, SECOND
@@ -1104,6 +1104,22 @@ def test_signal_that_stops_is_unknown_after_a_while():
     summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": cut}))
     assert math.isnan(summary.presses[1].estimated)
     assert summary.presses[0].estimated == pytest.approx(7.84)
+
+
+def test_of_several_arms_one_is_chosen_and_the_others_are_named():
+    recording, other = Recording(), Recording()
+    recording.namespace, other.namespace = "/left", "/right"
+    other.set(other.true, 7.0, 9.0, "outer_link", (0.0, 5.0, 0.0), 0.25)
+    bag = recording.bag()
+    bag = bag._replace(topics=other.bag().topics | bag.topics, types=other.bag().types | bag.types)
+    assert summary_of(recorded_run(bag)).presses[1].true == pytest.approx(4.2)
+    chosen = summary_of(recorded_run(bag, "right"))
+    assert (chosen.namespace, chosen.presses[1].true) == ("/right", pytest.approx(5.0))
+    assert "this is /right alone; other arms in this bag: --namespace left" in chosen.notes
+    verdict_of = analyse_bag(bag, lambda doing: None, "right").sections[0]
+    assert "This is /right alone; other arms in this bag: --namespace left." in verdict_of.sentences
+    with pytest.raises(BagError, match="has no arm in the namespace /middle; its arms: /left, /right"):
+        recorded_run(bag, "middle")
 
 
 @pytest.mark.parametrize("namespace", ["", "/left", "/lab/left"])

@@ -64,13 +64,14 @@ class DemoReport(NamedTuple):
     unmet: tuple[VerdictAnswer, ...]
 
 
-def report(bag: Path, picture: Path | None = None) -> DemoReport:
+def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoReport:
     """Evaluate a recorded demonstration, and draw it.
 
     Parameters
     ----------
     bag : directory of the bag, or its .mcap file.
     picture : PNG file to write, None for no picture.
+    namespace : of the arm, '' for the one with the most topics.
 
     Raises
     ------
@@ -78,7 +79,7 @@ def report(bag: Path, picture: Path | None = None) -> DemoReport:
         if the bag cannot be read or holds no demonstration; then nothing is written.
     """
     bag = Path(bag)
-    run = recorded_run(read(bag, TOPICS_READ, may_lack=True))
+    run = recorded_run(read(bag, TOPICS_READ, may_lack=True), namespace)
     summary = summary_of(run)
     if not summary.steps:
         raise BagError(

@@ -157,8 +157,8 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     tasks = task_forces(run)
     traces = traces_of(run, tasks)
     notes = []
-    if len(run.arms) > 1:
-        notes.append(f"arms in this bag: {', '.join(run.arms)}; this is {run.namespace}")
+    if run.others:
+        notes.append(run.others)
     if not steps:
         notes.append("no step of a scenario was recorded (status of node scenario)")
     missing = [name for name in RECORDED if not _length(run, name)]

@@ -96,9 +96,9 @@ class AnalysedRun(NamedTuple):
         return self.summary.loop.mode
 
 
-def analysed_run(bag: Bag) -> AnalysedRun:
-    """Prepare a bag for the analyses, whatever is in it."""
-    run = recorded_run(bag)
+def analysed_run(bag: Bag, namespace: str = "") -> AnalysedRun:
+    """Prepare a bag for the analyses, whatever is in it; `namespace` as for `recorded_run`."""
+    run = recorded_run(bag, namespace)
     summary = summary_of(run)
     return AnalysedRun(run, summary, prediction_parameters(run.parameters), _holds(run, summary))
 
