@@ -720,7 +720,8 @@ def test_good_run_has_a_good_verdict_in_narrow_lines():
     summary = Recording().summary()
     assert verdict(summary) == (
         "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
-        f"position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | {NO_LIMIT}"
+        "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | "
+        f"false detections within 10 % of the time without contact: YES (1.4 %) | {NO_LIMIT}"
     )
     assert all(len(line) <= 100 for line in text(summary).splitlines())
 
@@ -932,10 +933,24 @@ def test_without_contact_topics_the_estimate_is_not_recorded_and_not_none():
     assert shown[shown.index("Estimated contacts, medians over each") + 1] == "  none"
 
 
+@pytest.mark.parametrize(("seconds", "answer"), [(0.3, "YES (9.5 %)"), (0.35, "NO (10.8 %)"), (0.9, "NO (25.7 %)")])
+def test_contacts_that_are_estimated_where_none_is_are_part_of_the_verdict(seconds, answer):
+    recording = Recording()
+    recording.set(recording.estimated, 1.6, 1.6 + seconds, "inner_link", (0.0, 5.0, 0.0), 0.2)
+    assert f"false detections within 10 % of the time without contact: {answer}" in verdict(recording.summary())
+
+
+def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detection():
+    recording = Recording()
+    recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
+    recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
+    assert "of the time without contact: YES (25.0 %)" in verdict(recording.summary())
+
+
 def test_answers_that_are_no_are_those_and_not_a_text():
     recording = Recording()
     recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
-    force, link, position, _ = demo_report.verdict(recording.summary())
+    force, link, position, _, _ = demo_report.verdict(recording.summary())
     assert (force.result, force.worst) == (VerdictResult.NO, "12.5 %")
     assert (link.result, position.result) == (VerdictResult.YES, VerdictResult.YES)
     assert position.remark == "unknown for 1 of 5 contacts"

@@ -24,6 +24,8 @@ from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
 POSITION_TOLERANCE = 0.04  # m
+FALSE_TOLERANCE = 10.0  # % of the time without contact, in which one may be estimated
+ENDING = 0.2  # s, for which one may be in any case: that of a short recording that has just ended
 MISSED = 2.0  # of an answer about the link: worse than another link, which is 1
 WIDTH, STEP = 100, 24  # columns of the report, and of the name of a step
 
@@ -139,7 +141,12 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
 
 def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, ...]:
     """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
-    answers = _force_verdict(summary.presses), _link_verdict(summary), _position_verdict(summary)
+    answers = (
+        _force_verdict(summary.presses),
+        _link_verdict(summary),
+        _position_verdict(summary),
+        *_false_verdict(summary),
+    )
     hard, unknown = summary.unplanned
     question = "without a commanded force no contact above"
     if hard:
@@ -191,6 +198,16 @@ def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
     unknown = len(touches) - len(errors)
     answer = _answer(question, errors, lambda error: error <= POSITION_TOLERANCE, lambda far: f"{100.0 * far:.1f} cm")
     return answer._replace(remark=f"unknown for {unknown} of {len(touches)} contacts" * bool(unknown))
+
+
+def _false_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
+    """Whether a contact was estimated where none is; none where that is not known."""
+    if not summary.free:
+        return []
+    question = f"false detections within {FALSE_TOLERANCE:g} % of the time without contact"
+    part = 100.0 * summary.false_contact / summary.free
+    is_right = part <= FALSE_TOLERANCE or summary.false_contact <= ENDING
+    return [VerdictAnswer(question, VerdictResult.YES if is_right else VerdictResult.NO, f"{part:.1f} %")]
 
 
 def _answer(
