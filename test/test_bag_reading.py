@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+import zstandard
 from bag_mutations import break_bags
 from bag_samples import CLOUD, FOREIGN, OURS, STORE, WAYS, Sample, Way, random_cloud, random_samples, write
 from mcap.data_stream import ReadDataStream
@@ -24,6 +25,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
+from wam_analysis.findings.analysis import analyse
 from wam_bag import bag_file, safe_yaml
 from wam_bag.bag import (
     Bag,
@@ -38,7 +40,7 @@ from wam_bag.bag import (
     raw,
     read,
 )
-from wam_bag.contents import mode_of
+from wam_bag.contents import contents, mode_of
 from wam_bag.cut import Cut, cut
 from wam_bag.errors import BROKEN
 from wam_bag.losses import losses
@@ -629,6 +631,29 @@ def test_bags_of_rosbags_are_read(tmp_path: Path, mode: CompressionMode) -> None
     bag = read(tmp_path / "bag")
     for topic, expected in in_order(samples).items():
         assert_columns(bag.topics[topic], expected)
+
+
+def test_files_that_were_compressed_as_a_whole_are_refused_and_read_once_they_are_decompressed(tmp_path: Path) -> None:
+    split_bag(bag := tmp_path / "bag")
+    whole = len(read(bag).topics["/js"].log_time_ns)
+    files = sorted(bag.glob("*.mcap"))
+    for file in files:
+        file.with_name(f"{file.name}.zstd").write_bytes(zstandard.compress(file.read_bytes()))
+        file.unlink()
+    described = bag / "metadata.yaml"
+    described.write_text(described.read_text().replace(".mcap", ".mcap.zstd"))
+    commands = rf"decompress it with 'zstd -d --rm {bag}/\*.mcap.zstd', then 'wam bag repair {bag}'"
+    for use in (read, contents, lambda path: analyse(path, lambda doing: None)):
+        with pytest.raises(BagError, match=commands):
+            use(bag)
+    with pytest.raises(BagError, match=r"compressed as a whole"):
+        read(bag / f"{files[0].name}.zstd")
+    for file in files:
+        compressed = file.with_name(f"{file.name}.zstd")
+        file.write_bytes(zstandard.decompress(compressed.read_bytes()))
+        compressed.unlink()
+    repair(bag)
+    assert len(read(bag).topics["/js"].log_time_ns) == whole
 
 
 def _with(sample: Sample, change: Callable[[bytearray], None]) -> Sample:

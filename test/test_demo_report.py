@@ -30,7 +30,7 @@ from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.reactions import RecordedReaction, sentences
 from wam_analysis.recorded import RecordedArm, recorded_arm
-from wam_bag.bag import Bag, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
+from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_cli.commands.demo import _report
 from wam_cli.main import main
 from wam_control.contact_inference import REASONS, SECOND
@@ -217,6 +217,22 @@ def test_steady_state_is_the_last_second_of_a_long_step_and_the_last_half_of_a_s
     assert long.true == pytest.approx(4.2)
     recording.statuses[3] = ("press", START + 8400 * MS, 0)
     assert recording.summary().presses[-1].begin == START + 8700 * MS
+
+
+@pytest.mark.parametrize("seconds", [0.15, 0.5, 0.9])
+def test_a_force_that_is_commanded_for_less_than_a_second_has_no_steady_state(seconds):
+    recording = Recording()
+    recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 2.0, 0.0), 0.25)  # not yet 4 N
+    recording.statuses[5] = ("lift", START + round(1e9 * (7.0 + seconds)), 0)
+    recording.set(recording.commanded, 7.0 + seconds, 9.0, "base", (0.0, 0.0, 0.0))
+    shown = text(recording.summary())
+    assert "force within 10 %: NOT SHOWN, 1 of 2 commanded for less than 1 s" in shown
+    row = next(line.split() for line in shown.splitlines() if line.startswith("  press 4 N   "))
+    assert row[3:9] == ["4.00", "-", "-", "short", "-", "short"]
+    analysis = " ".join(analysis_text(analyse_bag(recording.bag(), lambda doing: None), 100).split())
+    assert "the worst true one in the steady state is +5.0 % off (press 8 N, 8 N commanded)." in analysis
+    assert ("press 4 N: 4 N commanded on outer_link for less than 1 s, so" in analysis) == (seconds > 0.3)
+    assert "press 4 N: bias" not in analysis
 
 
 def test_force_of_the_world_counts_with_the_opposite_sign_of_the_command():
@@ -808,7 +824,8 @@ def test_good_run_has_a_good_verdict_in_narrow_lines():
     summary = Recording().summary()
     assert verdict(summary) == (
         "force within 10 %: YES (5.0 %) | right link: YES (98 %) | "
-        f"position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | {NO_LIMIT}"
+        "position within 4 cm: YES (2.0 cm), unknown for 1 of 5 contacts | "
+        f"false detections within 10 % of the time without contact: YES (1.4 %) | {NO_LIMIT}"
     )
     assert all(len(line) <= 100 for line in text(summary).splitlines())
 
@@ -1020,10 +1037,24 @@ def test_without_contact_topics_the_estimate_is_not_recorded_and_not_none():
     assert shown[shown.index("Estimated contacts, medians over each") + 1] == "  none"
 
 
+@pytest.mark.parametrize(("seconds", "answer"), [(0.3, "YES (9.5 %)"), (0.35, "NO (10.8 %)"), (0.9, "NO (25.7 %)")])
+def test_contacts_that_are_estimated_where_none_is_are_part_of_the_verdict(seconds, answer):
+    recording = Recording()
+    recording.set(recording.estimated, 1.6, 1.6 + seconds, "inner_link", (0.0, 5.0, 0.0), 0.2)
+    assert f"false detections within 10 % of the time without contact: {answer}" in verdict(recording.summary())
+
+
+def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detection():
+    recording = Recording()
+    recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
+    recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
+    assert "of the time without contact: YES (25.0 %)" in verdict(recording.summary())
+
+
 def test_answers_that_are_no_are_those_and_not_a_text():
     recording = Recording()
     recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
-    force, link, position, _ = demo_report.verdict(recording.summary())
+    force, link, position, _, _ = demo_report.verdict(recording.summary())
     assert (force.result, force.worst) == (VerdictResult.NO, "12.5 %")
     assert (link.result, position.result) == (VerdictResult.YES, VerdictResult.YES)
     assert position.remark == "unknown for 1 of 5 contacts"
@@ -1192,6 +1223,22 @@ def test_signal_that_stops_is_unknown_after_a_while():
     summary = summarize(bag._replace(topics={**bag.topics, "/wam/contact/wrench": cut}))
     assert math.isnan(summary.presses[1].estimated)
     assert summary.presses[0].estimated == pytest.approx(7.84)
+
+
+def test_of_several_arms_one_is_chosen_and_the_others_are_named():
+    recording, other = Recording(), Recording()
+    recording.namespace, other.namespace = "/left", "/right"
+    other.set(other.true, 7.0, 9.0, "outer_link", (0.0, 5.0, 0.0), 0.25)
+    bag = recording.bag()
+    bag = bag._replace(topics=other.bag().topics | bag.topics, types=other.bag().types | bag.types)
+    assert summary_of(recorded_run(bag)).presses[1].true == pytest.approx(4.2)
+    chosen = summary_of(recorded_run(bag, "right"))
+    assert (chosen.namespace, chosen.presses[1].true) == ("/right", pytest.approx(5.0))
+    assert "this is /right alone; other arms in this bag: --namespace left" in chosen.notes
+    verdict_of = analyse_bag(bag, lambda doing: None, "right").sections[0]
+    assert "This is /right alone; other arms in this bag: --namespace left." in verdict_of.sentences
+    with pytest.raises(BagError, match="has no arm in the namespace /middle; its arms: /left, /right"):
+        recorded_run(bag, "middle")
 
 
 @pytest.mark.parametrize("namespace", ["", "/left", "/lab/left"])

@@ -502,6 +502,35 @@ def test_a_command_in_another_frame_is_named(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("frames", [("tool", "tool"), ("base", "tool"), ("", "tool")])
+def test_a_frame_that_changes_with_the_force_neither_hides_its_steps_nor_makes_gaps(
+    frames: tuple[str, str], tmp_path: Path
+) -> None:
+    time = np.arange(0.0, 12.0, 0.004)
+    force = np.zeros((len(time), 3))
+    force[:, 2] = np.where(time % 4.0 >= 2.0, 10.0, 0.0)
+    sent = [
+        one._replace(frame=frames[bool(np.any(one.fields["force"]))])
+        for topic in ("/force_command", "/ft/wrench")
+        for one in wrenches(topic, time, force)
+    ]
+    found = quiet(by_rosbags(tmp_path / "bag", sent))
+    assert len(section(found, "force")) == 5
+    assert section(found, "timing") == ("Every period has its message.",)
+
+
+def test_a_sender_that_goes_over_to_another_frame_has_no_gaps(tmp_path: Path) -> None:
+    time, names = np.arange(0.0, 9.0, 0.01), ["a", "b"]
+    force, moving = np.tile([0.0, 0.0, 5.0], (len(time), 1)), cycling(time, 2.2, 0.02)
+    frames = np.where((time > 3.0) & (time < 6.0), "tool", "base").tolist()
+    sent = [*wrenches("/ft/wrench", time, force), *joints("/joint_states", time, names, position=moving)]
+    found = quiet(
+        by_rosbags(tmp_path / "bag", [one._replace(frame=frame) for one, frame in zip(sent, 2 * frames, strict=True)])
+    )
+    assert section(found, "timing") == ("Every period has its message.",)
+    assert "from 0.0 to 9.0 s" in section(found, "stability")[0]
+
+
 # ways in
 
 

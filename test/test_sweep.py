@@ -1,6 +1,7 @@
 """Sweeps: parameter sets, equal results on every executor, what was finished is kept, a refused set fails alone."""
 
 import csv
+import math
 import subprocess
 import sys
 import warnings
@@ -14,7 +15,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_experiments.thesis import definition, sweeping
 from wam_sim import batch
-from wam_sim.sweep import Axis, SweepPoint, drawn, grid, listed, points, sweep
+from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points, sweep
 
 ROOT = Path(__file__).resolve().parents[1]
 GAIN = "force_loop:force_gain"
@@ -60,6 +61,26 @@ def test_an_unknown_parameter_is_refused_before_anything_runs(script: Path) -> N
     configuration = Configuration.load(packaged("testbed"))
     with pytest.raises(ParameterError, match="no parameter 'nothing'"):
         points(configuration, load(script, configuration.shared), [Axis("force_loop:nothing", (1,))], [(1,)])
+
+
+def pressed(tmp_path: Path, frame: str, newtons: list[float]) -> SweepResult:
+    file = tmp_path / "force.yaml"
+    file.write_text(STEPS.replace("link", frame).replace("[0.0, -20.0, 0.0]", str(newtons)))
+    return outcome(runs(file, (0.004,))[0])
+
+
+def test_the_error_is_the_same_in_every_frame_and_all_of_the_force_where_nothing_is_touched(tmp_path: Path) -> None:
+    on_link, in_base = pressed(tmp_path, "link", [0.0, -20.0, 0.0]), pressed(tmp_path, "base", [0.0, 0.0, -20.0])
+    assert in_base.force_rms == pytest.approx(on_link.force_rms, rel=0.02) != pytest.approx(20.0)
+    away = pressed(tmp_path, "link", [0.0, 20.0, 0.0])
+    assert away.force_rms == pytest.approx(20.0, abs=0.2)
+    assert not any(one.failure for one in (on_link, in_base, away))
+
+
+def test_a_force_that_the_loop_refuses_is_a_failure_and_no_error(tmp_path: Path) -> None:
+    found = pressed(tmp_path, "link", [20.0, 0.0, 0.0])
+    assert found.failure.startswith("20 N in link refused: the force is measured with a standard deviation of inf N")
+    assert math.isnan(found.force_rms)
 
 
 @pytest.mark.slow

@@ -24,6 +24,8 @@ from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
 POSITION_TOLERANCE = 0.04  # m
+FALSE_TOLERANCE = 10.0  # % of the time without contact, in which one may be estimated
+ENDING = 0.2  # s, for which one may be in any case: that of a short recording that has just ended
 MISSED = 2.0  # of an answer about the link: worse than another link, which is 1
 WIDTH, STEP = 100, 24  # columns of the report, and of the name of a step
 
@@ -64,13 +66,14 @@ class DemoReport(NamedTuple):
     unmet: tuple[VerdictAnswer, ...]
 
 
-def report(bag: Path, picture: Path | None = None) -> DemoReport:
+def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoReport:
     """Evaluate a recorded demonstration, and draw it.
 
     Parameters
     ----------
     bag : directory of the bag, or its .mcap file.
     picture : PNG file to write, None for no picture.
+    namespace : of the arm, '' for the one with the most topics.
 
     Raises
     ------
@@ -78,7 +81,7 @@ def report(bag: Path, picture: Path | None = None) -> DemoReport:
         if the bag cannot be read or holds no demonstration; then nothing is written.
     """
     bag = Path(bag)
-    run = recorded_run(read(bag, TOPICS_READ, may_lack=True))
+    run = recorded_run(read(bag, TOPICS_READ, may_lack=True), namespace)
     summary = summary_of(run)
     if not summary.steps:
         raise BagError(
@@ -138,7 +141,12 @@ def text(summary: DemoSummary, notes: Sequence[str] = ()) -> str:
 
 def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, ...]:
     """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
-    answers = _force_verdict(summary.presses), _link_verdict(summary), _position_verdict(summary)
+    answers = (
+        _force_verdict(summary.presses),
+        _link_verdict(summary),
+        _position_verdict(summary),
+        *_false_verdict(summary),
+    )
     hard, unknown = summary.unplanned
     question = "without a commanded force no contact above"
     if hard:
@@ -160,7 +168,10 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
         ripple = f"{ripples[errors.index(worst)]:.1f}"
         return f"{worst:.1f} %" + (f", {ripple} % of it ripple" if float(ripple) else "")
 
-    return _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, of)
+    answer = _answer(question, errors, lambda error: error <= FORCE_TOLERANCE, of)
+    short = sum(press.is_short for press in presses)
+    remark = f"{short} of {len(presses)} commanded for less than {STEADY:g} s" * bool(short)
+    return answer._replace(remark=remark)
 
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:
@@ -189,6 +200,16 @@ def _position_verdict(summary: DemoSummary) -> VerdictAnswer:
     return answer._replace(remark=f"unknown for {unknown} of {len(touches)} contacts" * bool(unknown))
 
 
+def _false_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
+    """Whether a contact was estimated where none is; none where that is not known."""
+    if not summary.free:
+        return []
+    question = f"false detections within {FALSE_TOLERANCE:g} % of the time without contact"
+    part = 100.0 * summary.false_contact / summary.free
+    is_right = part <= FALSE_TOLERANCE or summary.false_contact <= ENDING
+    return [VerdictAnswer(question, VerdictResult.YES if is_right else VerdictResult.NO, f"{part:.1f} %")]
+
+
 def _answer(
     question: str, values: Sequence[float], good: Callable[[float], bool], worst: Callable[[float], str]
 ) -> VerdictAnswer:
@@ -209,7 +230,7 @@ def _played(summary: DemoSummary) -> str:
 
 
 def _presses(presses: Sequence[SteadyPress]) -> list[str]:
-    title = f"Force along the commanded one, mean of the last {STEADY:g} s of each step [N]"
+    title = f"Force along the commanded one, mean of the last {STEADY:g} s of each step, at most its second half [N]"
     if not presses:
         return [title, "  no pressing step was recorded"]
     head = ["step", "commanded", "true", "+-", "error", "measured", "error", "estimated", "error"]
@@ -228,6 +249,7 @@ def _presses(presses: Sequence[SteadyPress]) -> list[str]:
         *_table(rows, head),
         "  true: of all that acts on the link (simulator), the part along the commanded force; +-: half of",
         "    its range; measured: force loop; estimated: contact estimator",
+        *[f"  short: commanded for less than {STEADY:g} s: no steady state"][: any(p.is_short for p in presses)],
         *["  refused: the arm did not follow the command, see below"][: any(p.is_refused for p in presses)],
     ]
 
@@ -399,6 +421,8 @@ def _per_cent(press: SteadyPress, force: float) -> str:
     error = press.error(force)
     if press.is_refused:
         return "refused"
+    if press.is_short:
+        return "short"
     return "-" if math.isnan(error) else f"{error:+.1f} %"
 
 

@@ -29,14 +29,15 @@ from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS, diagnosed_na
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 
 UNFINISHED = "not finished: the recording ends before the scenario does"
-STEADY = 1.0  # s at the end of a step, taken as its steady state
+STEADY = 1.0  # s at the end of a step, taken as its steady state; a force that is commanded for less has none
 
 
 class SteadyPress(NamedTuple):
-    """A pressing step in its steady state: means along the commanded force, N; NaN if unknown.
+    """A pressing step in its steady state: means along the commanded force, N; NaN if unknown, or without one.
 
     Attributes
     ----------
+    commanded_for : s in this step.
     ripple : half of the range of the true force.
     positions : what the same torques are at the configured, at the estimated and at the true position.
     reactions : what the force loop did meanwhile instead of what was commanded, in the whole step.
@@ -50,8 +51,14 @@ class SteadyPress(NamedTuple):
     ripple: float
     measured: float
     estimated: float
+    commanded_for: float
     positions: PressPositions = NOWHERE
     reactions: tuple[RecordedReaction, ...] = ()
+
+    @property
+    def is_short(self) -> bool:
+        """Whether the force was commanded too briefly for a steady state."""
+        return self.commanded_for < STEADY
 
     @property
     def is_refused(self) -> bool:
@@ -151,8 +158,8 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     tasks = task_forces(run)
     traces = traces_of(run, tasks)
     notes = []
-    if len(run.arms) > 1:
-        notes.append(f"arms in this bag: {', '.join(run.arms)}; this is {run.namespace}")
+    if run.others:
+        notes.append(run.others)
     if not steps:
         notes.append("no step of a scenario was recorded (status of node scenario)")
     missing = [name for name in RECORDED if not _length(run, name)]
@@ -165,13 +172,12 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     touches = compared_contacts(traces, certainty, steps, refused)
     known = traces.true.is_known & traces.estimated.is_known
     false = known & ~traces.true.acts & traces.estimated.acts
-    period = float(np.median(np.diff(traces.stamp))) / 1e9 if len(traces.stamp) > 1 else 0.0
     received, dropped = _counts(bag.metadata.get(RECORDING, {}))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts)
     gaps = command_gaps(run, traces.stamp, lost, steps)
     return DemoSummary(
         namespace=run.namespace,
-        period=period,
+        period=traces.period,
         outcome=run.outcome or UNFINISHED,
         steps=steps,
         traces=traces,
@@ -183,9 +189,9 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         unplanned=unplanned_contacts(run, traces, steps, gaps),
         uncompared=uncompared_contacts(traces, touches),
         reactions=reactions,
-        false_contact=int(np.sum(false)) * period,
-        longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * period,
-        free=int(np.sum(known & ~traces.true.acts)) * period,
+        false_contact=int(np.sum(false)) * traces.period,
+        longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * traces.period,
+        free=int(np.sum(known & ~traces.true.acts)) * traces.period,
         loop=_loop(run),
         received=received,
         dropped=dropped,
@@ -240,9 +246,18 @@ def _presses(
     for task in tasks:
         if not task.is_only and task.begin < step.end and task.end > begin:
             name, size = f"{step.name}, axis {task.number + 1}", float(np.linalg.norm(task.force))
-            _, measured = measured_force(run, task.number, max(begin, task.begin), min(step.end, task.end))
-            presses.append(SteadyPress(name, begin, step.end, size, NAN, NAN, _mean(measured), NAN))
-    return [press._replace(reactions=during) for press in presses if press]
+            since, until = max(step.begin, task.begin), min(step.end, task.end)
+            _, measured = measured_force(run, task.number, max(begin, task.begin), until)
+            seconds = (until - since) / 1e9
+            presses.append(SteadyPress(name, begin, step.end, size, NAN, NAN, _mean(measured), NAN, seconds))
+    return [_steady(press)._replace(reactions=during) for press in presses if press]
+
+
+def _steady(press: SteadyPress) -> SteadyPress:
+    """Without forces where there is no steady state."""
+    if not press.is_short:
+        return press
+    return press._replace(true=NAN, ripple=NAN, measured=NAN, estimated=NAN, positions=NOWHERE)
 
 
 def _press(run: RecordedRun, traces: Traces, step: RecordedStep, begin: int) -> SteadyPress | None:
@@ -263,6 +278,7 @@ def _press(run: RecordedRun, traces: Traces, step: RecordedStep, begin: int) -> 
         ripple=float(np.ptp(true)) / 2.0,
         measured=measured,
         estimated=_mean(traces.along(traces.estimated, -1.0)[steady]),
+        commanded_for=float(np.ptp(traces.stamp[whole])) / 1e9 + traces.period,
         positions=press_positions(run, traces, steady, measured),
     )
 

@@ -107,6 +107,11 @@ class Traces(NamedTuple):
         """From which times are counted, ns: 0, as the arm's time begins with the run, unless it is a system's clock."""
         return int(self.stamp[0]) if len(self.stamp) and self.stamp[0] > CLOCK else 0
 
+    @property
+    def period(self) -> float:
+        """Time between two instants, s."""
+        return float(np.median(np.diff(self.stamp))) / 1e9 if len(self.stamp) > 1 else 0.0
+
     def during(self, begin: int, end: int) -> Mask:
         """The instants from begin up to end, ns."""
         return (self.stamp >= begin) & (self.stamp < end)

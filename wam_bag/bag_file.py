@@ -19,6 +19,7 @@ from wam_bag.message_search import NEVER, Found, MessageBatch, together
 from wam_bag.message_text import Fields, definitions
 
 PROFILES = ("ros2", "")  # of MCAP files that are read; some writers name none
+COMPRESSED = ".mcap.zstd"
 LARGEST_METADATA = 2**26  # bytes of metadata.yaml
 LARGEST_BOMB, LARGEST_RATIO = 2**29, 1000  # bytes, and times the file, that are decompressed; recordings have 5 to 100
 _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.MULTILINE)
@@ -26,6 +27,8 @@ _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.
 
 def files(path: Path) -> list[Path]:
     """The MCAP files of a bag directory in the order of recording, or the one file."""
+    if path.name.endswith(COMPRESSED):
+        raise _compressed(path)
     if path.is_file():
         return [path]
     if not path.exists():
@@ -44,6 +47,8 @@ def files(path: Path) -> list[Path]:
         )
     if named:
         return [path / name for name in named]
+    if not found and any(path.glob(f"*{COMPRESSED}")):
+        raise _compressed(path)
     if not found:
         raise BagError(f"{path} has no .mcap file and no .db3 file; give the directory of a bag")
     return found
@@ -69,11 +74,21 @@ def _listed_files(path: Path) -> list[str]:
                 f"{file} lists {name}, which is outside the bag; 'wam bag repair {path}' writes metadata.yaml again "
                 "from the files in the directory"
             )
+        if name.endswith(COMPRESSED):
+            raise _compressed(path)
         if not name.endswith(".mcap"):
-            raise BagError(f"{path} is recorded as {name}; only storage 'mcap' without compressed files is read")
+            raise BagError(f"{path} is recorded as {name}; only storage 'mcap' is read")
     if len(set(listed)) < len(listed):
         raise BagError(f"{file} lists a file twice; 'wam bag repair {path}' writes it again")
     return listed
+
+
+def _compressed(path: Path) -> BagError:
+    file, bag = (path, path.parent) if path.is_file() else (path / f"*{COMPRESSED}", path)
+    return BagError(
+        f"{path} was compressed as a whole by rosbag2 (compression mode 'file') and is not read; decompress it with "
+        f"'zstd -d --rm {file}', then 'wam bag repair {bag}' writes its metadata.yaml again"
+    )
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """When the force loop holds its position instead of controlling the commanded force, and why."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from wam_control.force_measurement import STEADY, LowPass
 from wam_control.force_swing import Reversals, Shake
 from wam_control.sensing_advice import TURNS, Advice, OtherForces
 from wam_description.number_text import brief
+from wam_description.status import REFUSED
 
 Array = NDArray[np.float64]
 TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
@@ -83,6 +84,12 @@ class ForceReaction(IntEnum):
             ForceReaction.TOO_SLOW,
             ForceReaction.SECOND_CONTACT,
         )
+
+
+def is_refused(facts: Mapping[str, str]) -> bool:
+    """Whether the force loop does not control what is commanded, by the facts of its status."""
+    held = {one.name.lower() for one in ForceReaction if one.holds}
+    return facts.get("reaction", "") in held or bool(facts.get(REFUSED))
 
 
 class Refusal(NamedTuple):

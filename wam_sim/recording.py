@@ -83,6 +83,13 @@ class RecordedRun(NamedTuple):
             has_own = self.mode != "lockstep"
         return not has_own or any(name.startswith(f"{self.namespace}/sim/") for name in topics)
 
+    @property
+    def others(self) -> str:
+        """A sentence about the other arms in the bag, '' if there are none."""
+        others = [name.strip("/") for name in self.arms if name and name != self.namespace]
+        text = f"this is {self.namespace or '/'} alone; other arms in this bag: --namespace {' or '.join(others)}"
+        return text if others else ""
+
     def changes(self, node: str) -> list[RecordedChange]:
         """Live parameters that a node took while it ran, by 'node:parameter', as it reported them itself."""
         found: list[RecordedChange] = []
@@ -133,9 +140,24 @@ class RecordedRun(NamedTuple):
         return messages_of(self.bag, f"{self.namespace}/{topic}")
 
 
-def recorded_run(bag: Bag) -> RecordedRun:
-    """The run in a bag, which may lack anything; of several arms the one with the most topics."""
-    namespace, arms = namespaces(bag)
+def recorded_run(bag: Bag, namespace: str = "") -> RecordedRun:
+    """The run in a bag, which may lack anything.
+
+    Parameters
+    ----------
+    bag : of one arm or of several.
+    namespace : of the arm, '' for the one with the most topics.
+
+    Raises
+    ------
+    BagError
+        if the bag has no such arm.
+    """
+    found, arms = namespaces(bag)
+    chosen = f"/{namespace.strip('/')}" if namespace else found
+    if chosen not in (found, *arms):
+        raise BagError(f"{bag.path} has no arm in the namespace {chosen}; its arms: {', '.join(arms) or 'none'}")
+    namespace = chosen
     parameters = recorded_parameters(bag, namespace)
     statuses = tuple(status_of(message) for message in messages_of(bag, f"{namespace}/status"))
     commands = bag.topics.get(f"{namespace}/force_command")

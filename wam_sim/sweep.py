@@ -3,19 +3,25 @@
 import math
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from itertools import product
+from itertools import groupby, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from wam_control.force_hold import is_refused
 from wam_control.scenario import ScenarioStep
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
+from wam_description.rigid_body import RigidBody
+from wam_description.signals import BASE, NodeStatus
+from wam_description.topics import STATUS
 from wam_description.wiring import raised
 from wam_sim.batch import Report, results
+from wam_sim.bus import TopicValue
 from wam_sim.simulation import Simulation
 
+FORCE_LOOP = "force_loop"
 SETTLED = 0.5  # part of the time of one commanded force, after which the error counts as settled
 
 
@@ -38,9 +44,10 @@ class SweepResult(NamedTuple):
 
     Attributes
     ----------
-    failure : why the scenario failed or the parameters were refused, '' where neither.
+    failure : why the scenario failed, or the parameters or a force were refused, '' where nothing was.
     duration : of the arm's time, s.
-    force_rms, force_worst : of commanded minus true force in the settled part of each commanded force, N.
+    force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
+        refused there, N.
     force_peak : largest true force, N.
     """
 
@@ -111,34 +118,57 @@ def points(
 def outcome(point: SweepPoint) -> SweepResult:
     """Play the scenario and measure; refused parameters are a failure of this run alone."""
     nothing = math.nan
+    statuses: list[tuple[int, NodeStatus]] = []
     try:
         run = Simulation(point.configuration, point.steps)
+        if FORCE_LOOP in run.nodes:
+            run.listen(STATUS, lambda stamp, status: statuses.append((stamp, status)), FORCE_LOOP)
         failure = run.play()
     except ParameterError as error:
         return SweepResult(str(error), 0.0, nothing, nothing, nothing)
     except Exception as error:  # other runs go on
         return SweepResult(f"unexpected {raised(error)}", 0.0, nothing, nothing, nothing)
-    return _measured(run, failure)
+    return _measured(run, RigidBody(point.configuration.shared.arm), statuses, failure)
 
 
-def _measured(run: Simulation, failure: str) -> SweepResult:
+def _measured(
+    run: Simulation, body: RigidBody, statuses: Sequence[tuple[int, NodeStatus]], failure: str
+) -> SweepResult:
     truth = {row.stamp: row for row in run.rows.get("sim/contact/wrench", [])}
+    joints = {row.stamp: row.values[: len(body.arm.joints.names)] for row in run.rows.get("sim/joint_states", [])}
     errors: list[float] = []
-    held: list[float] = []
-    commanded: tuple[Any, ...] = ()
-    for row in run.rows.get("force_command", []):
-        force, found = row.values[:3], truth.get(row.stamp)
-        size = math.hypot(*force)
-        if (row.frame, *row.values) != commanded:
-            errors += held[int(SETTLED * len(held)) :]
-            held, commanded = [], (row.frame, *row.values)
-        if size and found and found.frame == row.frame:
-            true = -sum(a * b for a, b in zip(force, found.values, strict=False)) / size
-            held.append(size - true)
-    errors += held[int(SETTLED * len(held)) :]
+    refusals: list[str] = []
+    commands = [row for row in run.rows.get("force_command", []) if row.stamp in truth]
+    for (_, *force), rows in groupby(commands, key=lambda row: (row.frame, *row.values)):
+        held = list(rows)
+        settled = held[int(SETTLED * len(held)) :]
+        if not any(force[:3]):
+            continue
+        if refusal := _refusal(statuses, settled[0].stamp, settled[-1].stamp):
+            refusals.append(f"{math.hypot(*force[:3]):.3g} N in {held[0].frame} refused: {refusal}")
+            continue
+        errors += [_error(body, joints[row.stamp], row, truth[row.stamp]) for row in settled]
     peak = max((math.hypot(*row.values[:3]) for row in truth.values()), default=0.0)
     rms = math.sqrt(sum(e * e for e in errors) / len(errors)) if errors else math.nan
+    failure = "; ".join(filter(None, (failure, *dict.fromkeys(refusals))))
     return SweepResult(failure, run.driver.stamp * 1e-9, rms, max(map(abs, errors), default=math.nan), peak)
+
+
+def _refusal(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> str:
+    """Why the force loop did not control a force between two times, ns; '' where it did."""
+    before = [one for stamp, one in statuses if stamp <= begin]
+    during = [one for stamp, one in statuses if begin < stamp <= end]
+    return next((one.message for one in (*before[-1:], *during) if is_refused(one.facts)), "")
+
+
+def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: TopicValue) -> float:
+    """Commanded minus true force along the commanded one, N; nothing that is touched holds nothing."""
+    force, acting = (
+        np.array(row.values[:3]) if row.frame == BASE else body.cover_pose(q, row.frame).rotation @ row.values[:3]
+        for row in (command, true)
+    )
+    size = float(np.linalg.norm(force))
+    return size + float(force @ acting) / size
 
 
 def sweep(

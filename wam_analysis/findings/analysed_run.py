@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_summary import DemoSummary, summary_of
+from wam_analysis.demo_summary import STEADY, DemoSummary, summary_of
 from wam_analysis.held_messages import rows_before_gaps
 from wam_analysis.reactions import BRIEF, RecordedReaction, within
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
@@ -47,6 +47,11 @@ class Hold(NamedTuple):
     cover: str = ""
     axis: int = -1
     reactions: tuple[RecordedReaction, ...] = ()
+
+    @property
+    def is_short(self) -> bool:
+        """Whether the force was commanded too briefly for a steady state."""
+        return self.end - self.begin < STEADY * 1e9
 
     @property
     def is_refused(self) -> bool:
@@ -90,9 +95,9 @@ class AnalysedRun(NamedTuple):
         return self.summary.loop.mode
 
 
-def analysed_run(bag: Bag) -> AnalysedRun:
-    """Prepare a bag for the analyses, whatever is in it."""
-    run = recorded_run(bag)
+def analysed_run(bag: Bag, namespace: str = "") -> AnalysedRun:
+    """Prepare a bag for the analyses, whatever is in it; `namespace` as for `recorded_run`."""
+    run = recorded_run(bag, namespace)
     summary = summary_of(run)
     return AnalysedRun(run, summary, prediction_parameters(run.parameters), _holds(run, summary))
 

@@ -65,7 +65,7 @@ class Analysis(NamedTuple):
         return f"Analysis({self.recording.run.bag!r}, {self.duration:.1f} s, {len(self.sections)} sections)"
 
 
-def analyse(path: str | Path, progress: Progress, given: TopicMap = NOTHING_GIVEN) -> Analysis:
+def analyse(path: str | Path, progress: Progress, given: TopicMap = NOTHING_GIVEN, namespace: str = "") -> Analysis:
     """Read a bag and analyse it.
 
     Parameters
@@ -73,6 +73,7 @@ def analyse(path: str | Path, progress: Progress, given: TopicMap = NOTHING_GIVE
     path : bag directory or file, of this stack or of another robot with JointState, WrenchStamped or mapped topics.
     progress : called with each stage of the work.
     given : topics, joints, fields and units of another robot's bag.
+    namespace : of an arm of this stack, '' for the one with the most topics.
 
     Raises
     ------
@@ -84,7 +85,9 @@ def analyse(path: str | Path, progress: Progress, given: TopicMap = NOTHING_GIVE
     path = Path(path)
     progress(f"reading {path}")
     if not given.is_given and _is_own(path):
-        return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress)
+        return analyse_bag(read(path, TOPICS_READ, may_lack=True), progress, namespace)
+    if namespace:
+        raise ValueError(f"--namespace chooses an arm of this stack, and {path} is analysed as of another robot")
     progress("it is of another robot")
     return analyse_foreign_bag(foreign_bag(path, given), given)
 
@@ -115,10 +118,10 @@ def _is_own(path: Path) -> bool:
     return any(spaces.count(space) > 1 for space in spaces)
 
 
-def analyse_bag(bag: Bag, progress: Progress) -> Analysis:
+def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
     """Analyse a bag of this stack that has been read, see `analyse`."""
     progress("forces and contacts")
-    recording = analysed_run(bag)
+    recording = analysed_run(bag, namespace)
     held = held_forces(recording)
     middle = (force_section(recording, held), cycle_section(recording, held), contact_section(recording))
     progress("friction, ripple, power and frequency")
@@ -154,7 +157,8 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
         sentences.append(f"No predictions for some parts: {recording.parameters.note}.")
     sentences += [_brief(f"{note[0].upper()}{note[1:]}.") for note in recording.run.parameters.notes]
     lacking = recording.lacking("motor_states", "joint_states", "force_command", "contact/wrench", "status")
-    verdict = [f"INCOMPLETE: {line}" for line in summary.lost]
+    others = [f"{recording.run.others[0].upper()}{recording.run.others[1:]}."] if recording.run.others else []
+    verdict = [*others, *(f"INCOMPLETE: {line}" for line in summary.lost)]
     verdict += [f"STOPPED: {fault}." for fault in faults]
     if summary.steps and summary.outcome != DONE and not faults:
         verdict.append(f"Of the scenario: {summary.outcome}.")

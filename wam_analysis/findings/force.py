@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wam_analysis.findings.analysed_run import AnalysedRun
+from wam_analysis.demo_summary import STEADY
+from wam_analysis.findings.analysed_run import SHORTEST_HOLD, AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.guarded import Guarded
 from wam_analysis.findings.guarded import sentence as guard_sentence
@@ -22,6 +23,7 @@ from wam_theory.verdicts import Verdict
 
 SURE = 0.8  # confidence from which a limit cycle is reported as one
 UNLIKE = "The prediction leaves out friction, inertia and feed-forward."
+NO_FORCE = f"No constant force was commanded for {SHORTEST_HOLD:g} s"
 SEEN = 0.02  # of the force; a smaller cycle is not reported
 
 
@@ -34,7 +36,7 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
         sentences += [f"{text}." for text in reaction_sentences(one.hold.name, one.hold.reactions, zero)]
         findings += _press_findings(one)
     if not held:
-        sentences.append("No constant force was commanded.")
+        sentences.append(f"{NO_FORCE}.")
     other = _other_reactions(recording)
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
     range_stated, range_findings = _dynamic_range(held)
@@ -71,6 +73,7 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
 
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:
     """How far the held forces were from the commanded ones, in a sentence."""
+    held = [one for one in held if not one.hold.is_short]
     known = [(one, accuracy.bias) for one in held if math.isfinite((accuracy := _accuracy(one)).bias)]
     if not known:
         return ()
@@ -129,6 +132,8 @@ def _press_sentence(one: HeldForce) -> str:
     )
     if hold.is_refused:
         return f"{text}, and not controlled, so nothing of it is measured."
+    if hold.is_short:
+        return f"{text} for less than {STEADY:g} s, so it has no steady state."
     if math.isnan(accuracy.bias):
         return f"{text}; the resulting force was not recorded."
     text += f", {whose} force {shown(hold.commanded + accuracy.bias, 'N')} in the steady state"
@@ -180,7 +185,7 @@ def _press_findings(one: HeldForce) -> list[Finding]:
         ("true", one.true_accuracy, len(one.true)),
         ("measured", one.measured_accuracy, len(one.measured)),
     ):
-        if there:
+        if there and not one.hold.is_short:
             found += [
                 Finding(f"{name}: bias of the {whose} force", "N", accuracy.bias),
                 Finding(f"{name}: ripple of the {whose} force", "N", accuracy.ripple),
@@ -203,7 +208,7 @@ def cycle_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
         verdict += filter(None, [_fate(one)[1]])
         findings += [*_cycle_findings(one), *_theory_findings(one, seen)]
     if not held and not refused:
-        sentences.append("No constant force was commanded, so stability cannot be evaluated.")
+        sentences.append(f"{NO_FORCE}, so stability cannot be evaluated.")
     settled = sum(one.is_recorded and one.stability.verdict is Verdict.SETTLED for one in held)
     if settled and not verdict:
         verdict.append(f"{settled} of {len(held)} forces settle, none cycles.")

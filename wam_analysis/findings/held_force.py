@@ -121,8 +121,8 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
         true=true,
         response=response,
         touched=touched,
-        measured_accuracy=force_accuracy(np.full(int(np.sum(late)), hold.commanded), measured[late]),
-        true_accuracy=force_accuracy(np.full(int(np.sum(late_true)), hold.commanded), true[late_true]),
+        measured_accuracy=_accuracy(hold, measured[late]),
+        true_accuracy=_accuracy(hold, true[late_true]),
         cycle=_cycle(time_true[swings_true], true[swings_true], dither)
         or _cycle(time[swings], measured[swings], dither)
         or NO_CYCLE,
@@ -135,6 +135,11 @@ def _held(recording: AnalysedRun, hold: Hold) -> HeldForce:
         swinging=swung,
         moved_at_contact=_moved(recording, theory.node, swung),
     )
+
+
+def _accuracy(hold: Hold, force: Numbers) -> ForceAccuracy:
+    """Of the force in the steady part, which a short hold lacks."""
+    return UNMEASURED if hold.is_short else force_accuracy(np.full(len(force), hold.commanded), force)
 
 
 def _moved(recording: AnalysedRun, node: Node | None, found: Swinging | None) -> float:

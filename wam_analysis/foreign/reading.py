@@ -28,10 +28,10 @@ SECONDS = 1e17  # an integer time below this is in seconds or less, above it in 
 
 
 def needs_rosbags(path: Path) -> bool:
-    """Whether a bag is of ROS 1, of SQLite or compressed as a whole, which rosbags reads."""
+    """Whether a bag is of ROS 1 or of SQLite, which rosbags reads."""
     if path.is_file():
         return path.suffix in ROSBAGS
-    return any(path.glob("*.db3*")) or any(path.glob("*.mcap.zstd"))
+    return any(path.glob("*.db3*"))
 
 
 def foreign_bag(path: Path, given: TopicMap) -> Bag:

@@ -324,19 +324,22 @@ def _friction(states: Sequence[Source]) -> Section:
 
 
 def _timing(found: Sequence[Source]) -> Section:
-    clocks: dict[tuple[str, str, int, float], list[Source]] = {}
+    clocks: dict[tuple[str, bytes], list[Source]] = {}
     for one in found:
         if len(one.time) < FEWEST:
             continue
-        clocks.setdefault((one.topic, one.frame, len(one.time), float(one.time[0])), []).append(one)
+        clocks.setdefault((one.topic, one.sent.tobytes()), []).append(one)
     sentences, findings, verdict = [], [], []
-    topics = [key[0] for key in clocks]
-    for (topic, frame, *_), those in clocks.items():
+    topics = [topic for topic, _ in clocks]
+    frames = [those[0].frame for those in clocks.values()]
+    for (topic, _), those in clocks.items():
+        frame = those[0].frame
         name = topic
         if topics.count(topic) > 1:
-            name += f" ({frame})" if frame and all(key[1] != frame for key in clocks if key[0] != topic) else ""
+            others = [one for one, of in zip(frames, topics, strict=True) if of != topic]
+            name += f" ({frame})" if frame and frame not in others else ""
             name += f" of {', '.join(one.name for one in those)}" if those[0].is_joint else ""
-        timing = stamp_timing((those[0].time * 1e9).round().astype("int64"), (those[0].received * 1e9).astype("int64"))
+        timing = stamp_timing((those[0].sent * 1e9).round().astype("int64"), (those[0].received * 1e9).astype("int64"))
         findings += [
             Finding(f"{name}: period", "ms", 1e3 * timing.period),
             Finding(f"{name}: missed periods", "", float(timing.missed)),

@@ -1,4 +1,4 @@
-"""One joint or one wrench of one sender: gaps, doubled stamps and lacking velocities handled."""
+"""One joint or one wrench of one sender and frame: gaps, doubled stamps and lacking velocities handled."""
 
 import math
 import re
@@ -13,8 +13,10 @@ from wam_bag.bag import Bag, JointColumns, WrenchColumns
 
 Numbers = NDArray[np.float64]
 Times = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 FEWEST = 20  # messages of what was measured, and of a piece of it; a command may be sent once and hold
+ABSENT = 1.5  # periods between two messages of a frame, from which one is absent
 ALTERNATES = 5.0  # times the change over two messages: the change over one, where two publishers take turns
 FILLED = 5.5  # periods of the longest gap that is filled by interpolation
 IRREGULAR = 0.01  # of a period: stamps that differ more are put on a constant rate
@@ -37,7 +39,7 @@ class Source(NamedTuple):
     topic, name, frame : where it comes from; `name` is that of the joint, '' for a wrench.
     is_command : whether the values are commanded.
     time : (n,), s from the first stamp of the recording, rising.
-    received : (n,), s from the first stamp, when the recorder got them.
+    sent, received : (m,), s from the first stamp, all stamps of its sender and when the recorder got them.
     values : (n,) by quantity: position, velocity, effort, or the axes of the wrench; all finite.
     units : by quantity.
     """
@@ -48,6 +50,7 @@ class Source(NamedTuple):
     frame: str
     is_command: bool
     time: Numbers
+    sent: Numbers
     received: Numbers
     values: dict[str, Numbers]
     units: dict[str, str]
@@ -78,7 +81,7 @@ class Piece(NamedTuple):
 
 
 def sources(bag: Bag, given: TopicMap) -> list[Source]:
-    """The joints and wrenches of a bag, each once for each topic and frame."""
+    """The joints of a bag, each once for each topic and sender, and the wrenches, each once for each frame, too."""
     found: list[Source] = []
     enough = {
         topic: (columns, rising(columns.stamp_ns, columns.log_time_ns))
@@ -89,15 +92,39 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
     origin = min((int(stamps.min()) for _, stamps in enough.values()), default=0)
     for topic, (columns, stamps) in enough.items():
         is_command = _is_command(topic, given)
-        frames = np.asarray(columns.frames, dtype=str)
         time, received = (stamps - origin) / 1e9, (columns.log_time_ns - origin) / 1e9
-        for frame in dict.fromkeys(frames.tolist()):
-            rows = frames == frame
+        for frame, rows, sent in _frames(columns, time, is_command):
             for name, values, units in _parts(columns, given):
-                one = Source(topic, topic, name, frame, is_command, time[rows], received[rows], values, units)
+                given_by = (time[rows], time[sent], received[sent])
+                one = Source(topic, topic, name, frame, is_command, *given_by, values, units)
                 if (whole := _whole(one, rows)) is not None:
                     found.append(whole)
     return _labelled(found)
+
+
+def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bool) -> list[tuple[str, Mask, Mask]]:
+    """Each frame of a topic, the messages that are known in it, and all of its sender.
+
+    A frame that comes in the place of another one is of the same sender: a joint is the same in both, and so is a
+    wrench of zero, which a sender may give in any frame.  One that comes besides is of another sender.
+    """
+    frames = np.asarray(columns.frames, dtype=str)
+    masks = {frame: frames == frame for frame in dict.fromkeys(frames.tolist())}
+    if len(masks) > 1 and not is_command and _is_besides(time, max(masks.values(), key=np.count_nonzero)):
+        return [(frame, mask, mask) for frame, mask in masks.items()]
+    every = np.ones(len(frames), dtype=bool)
+    if isinstance(columns, JointColumns) or len(masks) == 1:
+        return [(next(iter(masks)), every, every)]
+    nothing = ~np.any(np.hstack([columns.force, columns.torque]), axis=1)
+    acting = {frame: mask | nothing for frame, mask in masks.items() if not np.all(nothing[mask])}
+    return [(frame, mask, every) for frame, mask in (acting or {next(iter(masks)): every}).items()]
+
+
+def _is_besides(time: Numbers, own: Mask) -> bool:
+    """Whether the messages of a frame go on at their period while those of others come."""
+    rows = np.flatnonzero(own)
+    steps, has_others = np.diff(time[rows]), np.diff(rows) > 1
+    return bool(np.any(has_others)) and float(np.median(steps[has_others])) < ABSENT * float(np.median(steps))
 
 
 def _is_command(topic: str, given: TopicMap) -> bool:
@@ -162,7 +189,9 @@ def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
     if len(rows) < (1 if one.is_command else FEWEST):
         return None
     values = {q: v[rows].astype(np.float64) for q, v in kept.items()}
-    return one._replace(time=one.time[rows], received=one.received[rows], values=values)
+    # a joint may be in some messages of a topic only, a wrench is in all
+    sent = rows if one.is_joint else np.unique(one.sent, return_index=True)[1]
+    return one._replace(time=one.time[rows], sent=one.sent[sent], received=one.received[sent], values=values)
 
 
 def _labelled(found: list[Source]) -> list[Source]:

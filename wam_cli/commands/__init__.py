@@ -81,6 +81,11 @@ def take_configuration(parser: argparse.ArgumentParser) -> None:
     take_values(parser)
 
 
+def take_arm(parser: argparse.ArgumentParser) -> None:
+    """Give a command that reads a bag the option --namespace."""
+    parser.add_argument("--namespace", type=namespace, help="of the arm in the bag; default: that with the most topics")
+
+
 def take_values(parser: argparse.ArgumentParser) -> None:
     """Give a command the option --set."""
     parser.add_argument(

@@ -8,7 +8,7 @@ from pathlib import Path
 from wam_analysis.findings.analysis import analyse
 from wam_analysis.findings.page import page
 from wam_analysis.findings.text import json_text, text
-from wam_cli.commands import take_topic_map, topic_map_of, writable_file
+from wam_cli.commands import take_arm, take_topic_map, topic_map_of, writable_file
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +23,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--json", metavar="FILE", help="also write the numbers as JSON; '-' prints JSON instead of the text"
     )
     parser.add_argument("--quiet", action="store_true", help="no progress output")
+    take_arm(parser)
     take_topic_map(parser)
 
 
@@ -39,7 +40,7 @@ def run(given: argparse.Namespace) -> int:
         if not given.quiet:
             print(f"{time.monotonic() - begin:5.1f} s  {doing}", file=sys.stderr, flush=True)
 
-    analysis = analyse(given.bag, progress, mapped)
+    analysis = analyse(given.bag, progress, mapped, given.namespace or "")
     if given.json == "-":
         print(json_text(analysis))
     else:
