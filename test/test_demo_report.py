@@ -933,6 +933,26 @@ def test_without_contact_topics_the_estimate_is_not_recorded_and_not_none():
     assert shown[shown.index("Estimated contacts, medians over each") + 1] == "  none"
 
 
+@pytest.mark.parametrize("sensors", [True, False])
+def test_under_the_brakes_no_contact_is_missed_where_the_motors_alone_are_observed(sensors):
+    recording = Recording()
+    recording.set(recording.true, 8.0, 10.0, "outer_link", (0.0, 4.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.0, 10.0, "base", (0.0, 0.0, 0.0))
+    bag = recording.bag()
+    braked = status("driver", "braked", mode="braked", stamp=str(START + 9000 * MS))
+    stated = messages([*itertools.starmap(said, recording.statuses), braked])
+    sections = Configuration.load(packaged("wam")).sections
+    own = {**sections["/**"], **sections["contact_estimator"], "use_joint_sensors": sensors}
+    content = yaml.safe_dump({"/wam/contact_estimator": {"ros__parameters": own}})
+    summary = summarize(
+        bag._replace(topics={**bag.topics, "/wam/status": stated}, attachments={"parameters.yaml": content.encode()})
+    )
+    assert ("right link: NO (missed)" in verdict(summary)) == sensors
+    assert ("right link: YES (98 %)" in verdict(summary)) != sensors
+    assert ([touch.step for touch in summary.touches][-1] == "lift") == sensors
+    assert any("contacts under the brakes are not compared" in note for note in summary.notes) != sensors
+
+
 @pytest.mark.parametrize(("seconds", "answer"), [(0.3, "YES (9.5 %)"), (0.35, "NO (10.8 %)"), (0.9, "NO (25.7 %)")])
 def test_contacts_that_are_estimated_where_none_is_are_part_of_the_verdict(seconds, answer):
     recording = Recording()
