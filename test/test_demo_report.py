@@ -967,6 +967,18 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     assert "of the time without contact: YES (25.0 %)" in verdict(recording.summary())
 
 
+def test_what_did_not_happen_is_stated_in_words():
+    recording = Recording()
+    for series in (recording.true, recording.estimated):
+        recording.set(series, 0.0, 10.0, "base", (0.0, 0.0, 0.0))
+    sentences = [line for one in analyse_bag(recording.bag(), lambda doing: None).sections for line in one.sentences]
+    assert "Nothing touched the arm." in sentences
+    assert any("s of /wam, not known whether in lockstep or in realtime." in line for line in sentences)
+    recording.without = without_truth(recording).without
+    sentences = [line for one in analyse_bag(recording.bag(), lambda doing: None).sections for line in one.sentences]
+    assert "No contact was estimated." in sentences
+
+
 def test_answers_that_are_no_are_those_and_not_a_text():
     recording = Recording()
     recording.set(recording.true, 7.0, 9.0, "outer_link", (0.0, 4.5, 0.0), 0.25)
@@ -1265,7 +1277,7 @@ def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
             for connection in connections:
                 writer.write(connection, stamp, store.serialize_cdr(message, kind))
     before = sorted((tmp_path / "bag").iterdir())
-    first = "Demonstration of /wam: 1 steps, 1.0 s, unknown, done"
+    first = "Demonstration of /wam: 1 step, 1.0 s, mode not known, done"
     assert first in report(tmp_path / "bag").text
     assert sorted((tmp_path / "bag").iterdir()) == before
     assert str(tmp_path / "drawn.png") in report(tmp_path / "bag", tmp_path / "drawn.png").text

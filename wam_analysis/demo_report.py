@@ -226,7 +226,9 @@ def _played(summary: DemoSummary) -> str:
         return summary.outcome
     seconds = (summary.steps[-1].end - summary.steps[0].begin) / 1e9
     ended = DONE if summary.outcome == DONE else f"FAILED: {summary.outcome}"
-    return f"{len(summary.steps)} steps, {seconds:.1f} s, {summary.loop.mode}, {ended}"
+    steps = f"{len(summary.steps)} step{'s' * (len(summary.steps) != 1)}"
+    mode = summary.loop.mode if summary.loop.mode != "unknown" else "mode not known"
+    return f"{steps}, {seconds:.1f} s, {mode}, {ended}"
 
 
 def _presses(presses: Sequence[SteadyPress]) -> list[str]:

@@ -66,7 +66,7 @@ def timing_section(recording: AnalysedRun) -> Section:
         ]
         sentences.append(
             f"Latency from state to current command, at the recorder: median {shown(1e6 * answer.p50, 'us')}, "
-            f"worst {shown(1e6 * answer.worst, 'us')}; "
+            f"worst {shown(1e3 * answer.worst, 'ms')}; "
             f"{answer.unanswered} of {answer.answered + answer.unanswered} states got no command."
         )
     loop = recording.summary.loop
