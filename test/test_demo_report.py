@@ -28,6 +28,7 @@ from wam_analysis.demo_summary import DemoSummary, summarize, summary_of
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.findings.text import text as analysis_text
+from wam_analysis.press_positions import PositionedForce, PressPositions
 from wam_analysis.reactions import RecordedReaction, sentences
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
@@ -965,6 +966,15 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
     recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
     assert "of the time without contact: YES (25.0 %)" in verdict(recording.summary())
+
+
+@pytest.mark.parametrize("true", [PositionedForce(0.26, 4.0), PositionedForce()])
+def test_a_position_that_is_not_shown_has_a_reason(true):
+    summary = Recording().summary()
+    at = PositionedForce(0.28, 4.1)
+    presses = tuple(one._replace(positions=PressPositions(at, at, true, 0.28, 0.01)) for one in summary.presses)
+    shown = text(summary._replace(presses=presses))
+    assert ("  -: not known, on another link or beyond the ends of this one" in shown) == math.isnan(true.force)
 
 
 def test_what_did_not_happen_is_stated_in_words():

@@ -276,10 +276,12 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
     first = ["", "", "configured", "[cm]", "", "estimated", "[cm]", "", "true", "[cm]", ""]
     head = ["step", "true", "at", "[N]", "error", "at", "[N]", "error", "at", "[N]", "error"]
     title = "Force from the same torques, for three assumed contact positions"
-    error = "  error: relative to the true force; at the true position it is that of the torques alone"
+    error = ["  error: relative to the true force; at the true position it is that of the torques alone"]
+    if any("-" in row for row in rows):
+        error.append("  -: not known, on another link or beyond the ends of this one")
     places = _wrapped(f"  position used by the force loop, +- its standard deviation [cm]: {', '.join(used)}", "    ")
     other = "  the measured force above allows for that uncertainty, so it is none of these three"
-    return ["", title, *_table(rows, first, head), error, *places, other]
+    return ["", title, *_table(rows, first, head), *error, *places, other]
 
 
 def _reactions(summary: DemoSummary) -> list[str]:
