@@ -306,6 +306,21 @@ def test_latency_and_jitter_of_a_real_clock_come_from_the_times_of_reception(mov
     assert [plot.section for plot in timing_plots(found)] == ["timing"]
 
 
+def test_no_latency_is_measured_where_the_recorder_lagged(moving: Recorded) -> None:
+    """Every 50 ms of the run were received at once, state and command within a microsecond."""
+    topics = dict(moving.bag.topics)
+    for name, after in (("/wam/motor_states", 0), ("/wam/motor_current_command", 500)):
+        columns = topics[name]
+        assert isinstance(columns, JointColumns)
+        burst = columns.stamp_ns // 50_000_000 * 50_000_000 + 10**18 + np.arange(len(columns.stamp_ns)) % 50 * 1000
+        topics[name] = columns._replace(log_time_ns=burst + after)
+    metadata = {**moving.bag.metadata, "recording": {**moving.bag.metadata["recording"], "mode": "realtime"}}
+    found = analyse_bag(moving.bag._replace(topics=topics, metadata=metadata), lambda doing: None)
+    (timing,) = [section for section in found.sections if section.key == "timing"]
+    assert not [finding.name for finding in timing.findings if "latency, state to current" in finding.name]
+    assert "The recorder lagged: motor_states and motor_current_command came in bursts" in " ".join(timing.sentences)
+
+
 def test_provenance_names_the_parameters_and_the_counts(moving: Recorded) -> None:
     said = moving.analysis.provenance
     total = sum(len(columns.log_time_ns) for columns in moving.bag.topics.values())

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from wam_bag.bag import BagError, JointColumns, read
+from wam_cli.commands.demo import report_task
 from wam_cli.main import ALIASES, COMMANDS, EXTRAS, main
 from wam_description.configuration import Configuration, packaged
 from wam_sim.recording import recorded_run
@@ -276,3 +277,15 @@ def test_values_are_those_of_the_usual_configuration_where_none_is_named(capsys:
     assert found[0] == 1
     code, _, err = said(capsys, "guard", *values, "--gain", "1.0")
     assert (code, "leave out --config and --set" in err) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("left_out", "who"), [((), "the force loop presses with"), (("force_loop",), "commanded forces:")]
+)
+def test_the_force_loop_is_named_only_where_it_runs(
+    left_out: tuple[str, ...], who: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    base = Configuration.load(packaged("wam"))
+    without = [name for name in base.shared.nodes if name not in left_out]
+    report_task(base.with_values({"nodes": without}), Path("bag"))
+    assert f"  {who} 5, 10, 5 N" in capsys.readouterr().out

@@ -28,6 +28,7 @@ from wam_analysis.demo_summary import DemoSummary, summarize, summary_of
 from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.findings.text import text as analysis_text
+from wam_analysis.press_positions import PositionedForce, PressPositions
 from wam_analysis.reactions import RecordedReaction, sentences
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
@@ -1037,6 +1038,26 @@ def test_without_contact_topics_the_estimate_is_not_recorded_and_not_none():
     assert shown[shown.index("Estimated contacts, medians over each") + 1] == "  none"
 
 
+@pytest.mark.parametrize("sensors", [True, False])
+def test_under_the_brakes_no_contact_is_missed_where_the_motors_alone_are_observed(sensors):
+    recording = Recording()
+    recording.set(recording.true, 8.0, 10.0, "outer_link", (0.0, 4.0, 0.0), 0.25)
+    recording.set(recording.estimated, 9.0, 10.0, "base", (0.0, 0.0, 0.0))
+    bag = recording.bag()
+    braked = status("driver", "braked", mode="braked", stamp=str(START + 9000 * MS))
+    stated = messages([*itertools.starmap(said, recording.statuses), braked])
+    sections = Configuration.load(packaged("wam")).sections
+    own = {**sections["/**"], **sections["contact_estimator"], "use_joint_sensors": sensors}
+    content = yaml.safe_dump({"/wam/contact_estimator": {"ros__parameters": own}})
+    summary = summarize(
+        bag._replace(topics={**bag.topics, "/wam/status": stated}, attachments={"parameters.yaml": content.encode()})
+    )
+    assert ("right link: NO (missed)" in verdict(summary)) == sensors
+    assert ("right link: YES (98 %)" in verdict(summary)) != sensors
+    assert ([touch.step for touch in summary.touches][-1] == "lift") == sensors
+    assert any("contacts under the brakes are not compared" in note for note in summary.notes) != sensors
+
+
 @pytest.mark.parametrize(("seconds", "answer"), [(0.3, "YES (9.5 %)"), (0.35, "NO (10.8 %)"), (0.9, "NO (25.7 %)")])
 def test_contacts_that_are_estimated_where_none_is_are_part_of_the_verdict(seconds, answer):
     recording = Recording()
@@ -1049,6 +1070,27 @@ def test_a_contact_that_ends_late_in_a_short_time_without_one_is_no_false_detect
     recording.set(recording.true, 0.0, 9.2, "outer_link", (0.0, 12.0, 0.0), 0.25)
     recording.set(recording.estimated, 0.0, 9.4, "outer_link", (0.0, 12.0, 0.0), 0.25)
     assert "of the time without contact: YES (25.0 %)" in verdict(recording.summary())
+
+
+@pytest.mark.parametrize("true", [PositionedForce(0.26, 4.0), PositionedForce()])
+def test_a_position_that_is_not_shown_has_a_reason(true):
+    summary = Recording().summary()
+    at = PositionedForce(0.28, 4.1)
+    presses = tuple(one._replace(positions=PressPositions(at, at, true, 0.28, 0.01)) for one in summary.presses)
+    shown = text(summary._replace(presses=presses))
+    assert ("  -: not known, on another link or beyond the ends of this one" in shown) == math.isnan(true.force)
+
+
+def test_what_did_not_happen_is_stated_in_words():
+    recording = Recording()
+    for series in (recording.true, recording.estimated):
+        recording.set(series, 0.0, 10.0, "base", (0.0, 0.0, 0.0))
+    sentences = [line for one in analyse_bag(recording.bag(), lambda doing: None).sections for line in one.sentences]
+    assert "Nothing touched the arm." in sentences
+    assert any("s of /wam, not known whether in lockstep or in realtime." in line for line in sentences)
+    recording.without = without_truth(recording).without
+    sentences = [line for one in analyse_bag(recording.bag(), lambda doing: None).sections for line in one.sentences]
+    assert "No contact was estimated." in sentences
 
 
 def test_answers_that_are_no_are_those_and_not_a_text():
@@ -1349,7 +1391,7 @@ def test_report_reads_a_bag_from_disk_and_draws_where_it_is_told_to(tmp_path):
             for connection in connections:
                 writer.write(connection, stamp, store.serialize_cdr(message, kind))
     before = sorted((tmp_path / "bag").iterdir())
-    first = "Demonstration of /wam: 1 steps, 1.0 s, unknown, done"
+    first = "Demonstration of /wam: 1 step, 1.0 s, mode not known, done"
     assert first in report(tmp_path / "bag").text
     assert sorted((tmp_path / "bag").iterdir()) == before
     assert str(tmp_path / "drawn.png") in report(tmp_path / "bag", tmp_path / "drawn.png").text

@@ -516,6 +516,7 @@ def test_a_frame_that_changes_with_the_force_neither_hides_its_steps_nor_makes_g
     ]
     found = quiet(by_rosbags(tmp_path / "bag", sent))
     assert len(section(found, "force")) == 5
+    assert section(found, "verdict")[0].startswith("5 force steps; ")
     assert section(found, "timing") == ("Every period has its message.",)
 
 

@@ -226,7 +226,9 @@ def _played(summary: DemoSummary) -> str:
         return summary.outcome
     seconds = (summary.steps[-1].end - summary.steps[0].begin) / 1e9
     ended = DONE if summary.outcome == DONE else f"FAILED: {summary.outcome}"
-    return f"{len(summary.steps)} steps, {seconds:.1f} s, {summary.loop.mode}, {ended}"
+    steps = f"{len(summary.steps)} step{'s' * (len(summary.steps) != 1)}"
+    mode = summary.loop.mode if summary.loop.mode != "unknown" else "mode not known"
+    return f"{steps}, {seconds:.1f} s, {mode}, {ended}"
 
 
 def _presses(presses: Sequence[SteadyPress]) -> list[str]:
@@ -274,10 +276,12 @@ def _positions(presses: Sequence[SteadyPress]) -> list[str]:
     first = ["", "", "configured", "[cm]", "", "estimated", "[cm]", "", "true", "[cm]", ""]
     head = ["step", "true", "at", "[N]", "error", "at", "[N]", "error", "at", "[N]", "error"]
     title = "Force from the same torques, for three assumed contact positions"
-    error = "  error: relative to the true force; at the true position it is that of the torques alone"
+    error = ["  error: relative to the true force; at the true position it is that of the torques alone"]
+    if any("-" in row for row in rows):
+        error.append("  -: not known, on another link or beyond the ends of this one")
     places = _wrapped(f"  position used by the force loop, +- its standard deviation [cm]: {', '.join(used)}", "    ")
     other = "  the measured force above allows for that uncertainty, so it is none of these three"
-    return ["", title, *_table(rows, first, head), error, *places, other]
+    return ["", title, *_table(rows, first, head), *error, *places, other]
 
 
 def _reactions(summary: DemoSummary) -> list[str]:

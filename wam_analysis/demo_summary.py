@@ -16,16 +16,16 @@ from wam_analysis.contact_list import (
     median,
     missed_contacts,
 )
-from wam_analysis.demo_traces import NAN, RECORDED, Numbers, Traces, traces_of
+from wam_analysis.demo_traces import NAN, RECORDED, Mask, Numbers, Traces, traces_of
 from wam_analysis.measures.runs import runs
 from wam_analysis.press_positions import NOWHERE, PressPositions, press_positions
 from wam_analysis.reactions import RecordedReaction, reactions_of, within
 from wam_analysis.task_forces import TaskForce, measured_force, task_forces
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
-from wam_bag.bag import Bag
+from wam_bag.bag import Bag, BagError
 from wam_bag.losses import RECORDING, losses
 from wam_control.force_hold import ForceReaction
-from wam_description.status import BEHIND, REAL_TIME_FACTOR, SLIPS, diagnosed_name
+from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 
 UNFINISHED = "not finished: the recording ends before the scenario does"
@@ -169,7 +169,13 @@ def summary_of(run: RecordedRun) -> DemoSummary:
     presses = tuple(press for step in steps for press in _presses(run, traces, tasks, step, reactions))
     certainty = certainty_of(run, traces)
     refused = {press.step for press in presses if press.is_refused}
-    touches = compared_contacts(traces, certainty, steps, refused)
+    blind = _blind(run, traces)
+    if np.any(blind & traces.true.acts):
+        notes.append(
+            "contacts under the brakes are not compared: the motors, which alone are observed, sense none then"
+        )
+    seen = traces._replace(true=traces.true.unknown(blind), push=traces.push.unknown(blind))
+    touches = compared_contacts(seen, certainty, steps, refused)
     known = traces.true.is_known & traces.estimated.is_known
     false = known & ~traces.true.acts & traces.estimated.acts
     received, dropped = _counts(bag.metadata.get(RECORDING, {}))
@@ -185,9 +191,9 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         presses=presses,
         touches=touches,
         contacts=listed_contacts(traces, certainty, steps),
-        missed=missed_contacts(traces, steps),
+        missed=missed_contacts(seen, steps),
         unplanned=unplanned_contacts(run, traces, steps, gaps),
-        uncompared=uncompared_contacts(traces, touches),
+        uncompared=uncompared_contacts(seen, touches),
         reactions=reactions,
         false_contact=int(np.sum(false)) * traces.period,
         longest_false_contact=max((end - begin for begin, end in runs(false).tolist()), default=0) * traces.period,
@@ -200,6 +206,20 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         moment=_moment(run, traces, presses),
         notes=(*notes, *run.parameters.notes, *driver_faults(run, traces.zero)),
     )
+
+
+def _blind(run: RecordedRun, traces: Traces) -> Mask:
+    """Whether nothing can be estimated at each instant, (k,): under the brakes, where the motors alone are observed."""
+    blind = np.zeros(len(traces.stamp), dtype=bool)
+    try:
+        if run.parameters.node("contact_estimator").get("use_joint_sensors", True):
+            return blind
+    except BagError:
+        return blind
+    for stamp, status in run.stamped_statuses():
+        if status.node == "driver" and status.mode:
+            blind[traces.stamp >= stamp] = status.mode != ENABLED
+    return blind
 
 
 def _length(run: RecordedRun, topic: str) -> int:

@@ -69,6 +69,12 @@ class ForceSignal(NamedTuple):
         unknown: Mask = self.acts & self.is_placed & np.isnan(self.position)
         return unknown
 
+    def unknown(self, rows: Mask) -> "ForceSignal":
+        """The same without its values in some rows, (k,)."""
+        return self._replace(
+            force=np.where(rows[:, np.newaxis], NAN, self.force), position=np.where(rows, NAN, self.position)
+        )
+
 
 class Traces(NamedTuple):
     """A run over time: k instants, ns of the arm's time.

@@ -35,7 +35,7 @@ class CableCircuits:
         self._friction_counts = friction_counts
         self._nominal = self._circuits = arm.circuits
         # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
-        self._speed, self._pull = data.qvel[:n], data.qfrc_spring[:n]
+        self._pull = data.qfrc_spring[:n]
         self._stretch_rate = data.ten_velocity[: 2 * n : 2]
         # two of each strand: it is slack between them; the tight strand comes first and pulls beyond the second, the
         # loose one beyond the first
@@ -81,16 +81,13 @@ class CableCircuits:
                 self._slack_ends[4 * i + 1] -= more
                 self._slack_ends[4 * i + 2] += more
 
-    def follow(self, direction: Sequence[int], count: int) -> bool:
+    def follow(self, direction: Sequence[int], speeds: Sequence[float]) -> bool:
         """Let the cables creep on their pulleys, dc = loss |d theta| tau, (6.19) corrected; look for slack strands.
-
-        Creep is slow and moves no more than where a strand goes slack, friction by tension begins with 0 there, so
-        that once for the steps of a control period is enough.
 
         Parameters
         ----------
         direction : sign of the velocity of each rotor, 0 while it is stuck.
-        count : steps since the last time.
+        speeds : of the rotors, rad/s; more may follow.
 
         Returns
         -------
@@ -99,10 +96,10 @@ class CableCircuits:
         """
         ends, is_slack = self._slack_ends, False
         for (i, rate, most), way, speed, pull in zip(  # noqa: B905 - costs 1 % of a step
-            self.each, direction, self._speed.tolist(), self._pull.tolist()
+            self.each, direction, speeds, self._pull.tolist()
         ):
             if way:
-                crept = count * rate * abs(speed) * pull
+                crept = rate * abs(speed) * pull
                 ends[i] -= crept
                 ends[i + 1] -= crept
             if abs(pull) > most:

@@ -89,13 +89,13 @@ static int may_leave(const Plant *plant) {
 static PyObject *number(PyObject *circuit, int place) { return PyTuple_GET_ITEM(circuit, place); }
 
 /* CableCircuits.follow; -1 with an exception where the flag cannot be set. */
-static int follow(const Plant *plant, long count, int *slack) {
+static int follow(const Plant *plant, int *slack) {
   int found = 0;
   for (Py_ssize_t i = 0; i < PyList_GET_SIZE(plant->each); i++) {
     PyObject *circuit = PyList_GET_ITEM(plant->each, i);
     const double pull = plant->data->qfrc_spring[i];
     if (PyObject_IsTrue(PyList_GET_ITEM(plant->direction, i))) {
-      const double crept = (double)count * PyFloat_AS_DOUBLE(number(circuit, 1)) * fabs(plant->data->qvel[i]) * pull;
+      const double crept = PyFloat_AS_DOUBLE(number(circuit, 1)) * fabs(plant->data->qvel[i]) * pull;
       mjtNum *ends = plant->data->plastic + PyLong_AsLong(number(circuit, 0));
       ends[0] -= crept;
       ends[1] -= crept;
@@ -233,8 +233,8 @@ static PyObject *advance(PyObject *Py_UNUSED(self), PyObject *const *args, Py_ss
     if (data->ncon && apply_surfaces(plant)) goto failed;
     if (half_step(plant, 0)) goto failed;
     if (PyDict_GET_SIZE(plant->pushes)) memset(data->qfrc_applied, 0, plant->model->nv * sizeof(mjtNum));
+    if (PyList_GET_SIZE(plant->each) && follow(plant, &slack)) goto failed;
   }
-  if (PyList_GET_SIZE(plant->each) && follow(plant, count, &slack)) goto failed;
   return velocity;
 failed:
   Py_DECREF(velocity);

@@ -240,19 +240,21 @@ class Plant:
         Parameters
         ----------
         torque : torque of each motor on its rotor, N m.
-        count : number of steps with this torque; the cables creep once, for all of them.
+        count : number of steps with this torque.
         """
         model, data, pushes, circuits = self.model, self.data, self._pushes, self._circuits
         self._write_torque(0, *torque)
         if self._advance is not None:
             self._velocity = self._advance(count, self._is_set, self._set_friction)
             return
+        friction, velocities = self._friction, self._qvel.tolist
+        velocity = velocities()
         for _ in range(count):
-            velocity = self._velocity = self._qvel.tolist()
-            if not (self._is_set and self._friction.remains(velocity)):
+            if not (self._is_set and friction.remains(velocity)):
                 self._set_friction()
             for mover in self._movers:
                 mover.lead(data.time)
+            self._velocity = velocity
             mj_step1(model, data)
             if pushes:
                 self._loads.apply_pushes()
@@ -261,8 +263,9 @@ class Plant:
             mj_step2(model, data)
             if pushes:
                 self._applied.fill(0.0)
-        if circuits.depends_on_torque and circuits.follow(self._friction.direction, count):
-            self._is_set = False
+            velocity = velocities()
+            if circuits.depends_on_torque and circuits.follow(friction.direction, velocity):
+                self._is_set = False
 
     def _set_friction(self) -> None:
         """Give MuJoCo the level of friction of every shaft for the next step."""

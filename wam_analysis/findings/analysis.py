@@ -143,7 +143,8 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
     """What happened, in a few sentences."""
     summary = recording.summary
     sentences = [f"INCOMPLETE: {line}" for line in summary.lost]
-    sentences.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {recording.mode}.")
+    mode = recording.mode if recording.mode != "unknown" else "not known whether in lockstep or in realtime"
+    sentences.append(f"{shown(duration, 's')} of {summary.namespace or '/'}, {mode}.")
     if summary.steps:
         ended = " to its end" if summary.outcome == DONE else f"; {summary.outcome}"
         sentences.append(f"A scenario of {_count(len(summary.steps), 'step')} was played{ended}.")
@@ -167,9 +168,13 @@ def _happened(recording: AnalysedRun, duration: float) -> Section:
 
 def _touched(traces: Traces) -> Iterator[str]:
     """How often something touched the arm, each link by itself, as far as that was recorded."""
-    for signal, touched in ((traces.true, "Something touched the arm"), (traces.estimated, "A contact was estimated")):
+    for signal, touched, never in (
+        (traces.true, "Something touched the arm", "Nothing touched the arm."),
+        (traces.estimated, "A contact was estimated", "No contact was estimated."),
+    ):
         if np.any(signal.is_known):
-            yield f"{touched} {times(len(contacts_by_link(traces.stamp, signal)))}."
+            number = len(contacts_by_link(traces.stamp, signal))
+            yield f"{touched} {times(number)}." if number else never
             return
 
 

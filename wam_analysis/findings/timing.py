@@ -8,7 +8,7 @@ import numpy as np
 
 from wam_analysis.findings.analysed_run import AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, shown
-from wam_analysis.measures.loop_timing import latency, stamp_timing
+from wam_analysis.measures.loop_timing import has_lagged, latency, stamp_timing
 from wam_bag.bag import Columns, JointColumns, PointColumns, WrenchColumns
 from wam_bag.losses import RECORDING
 
@@ -46,7 +46,17 @@ def timing_section(recording: AnalysedRun) -> Section:
             )
             verdict.append(sentences[-1])
     states, answers = recording.run.joints("motor_states"), recording.run.joints("motor_current_command")
-    if real and states is not None and answers is not None:
+    lagging = [
+        name
+        for name, one in ((TIMED[0], states), (TIMED[1], answers))
+        if real and one is not None and has_lagged(one.stamp_ns, one.log_time_ns)
+    ]
+    if lagging:
+        sentences.append(
+            f"The recorder lagged: {' and '.join(lagging)} came in bursts, so no latency is measured from the times of "
+            "reception."
+        )
+    elif real and states is not None and answers is not None:
         answer = latency(states.stamp_ns, states.log_time_ns, answers.stamp_ns, answers.log_time_ns)
         findings += [
             Finding("latency, state to current at the recorder: median", "us", 1e6 * answer.p50),
@@ -56,7 +66,7 @@ def timing_section(recording: AnalysedRun) -> Section:
         ]
         sentences.append(
             f"Latency from state to current command, at the recorder: median {shown(1e6 * answer.p50, 'us')}, "
-            f"worst {shown(1e6 * answer.worst, 'us')}; "
+            f"worst {shown(1e3 * answer.worst, 'ms')}; "
             f"{answer.unanswered} of {answer.answered + answer.unanswered} states got no command."
         )
     loop = recording.summary.loop

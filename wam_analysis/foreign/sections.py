@@ -169,7 +169,8 @@ def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
     if steps:
         worst = max(steps, key=lambda step: abs(step.response.final - step.commanded))
         error = shown(abs(worst.response.final - worst.commanded), "N")
-        verdict = f"{len(steps)} force steps; the largest steady error is {error} of {shown(worst.commanded, 'N')}."
+        number = f"{len(steps)} force step{'s' * (len(steps) != 1)}"
+        verdict = f"{number}; the largest steady error is {error} of {shown(worst.commanded, 'N')}."
         return Section("force", "Force", (*sentences, *doubts), tuple(findings), (), (verdict, *doubts))
     stated = tuple(doubts) or ("No step of a commanded force was recorded.",)
     return Section("force", "Force", stated, (), (), tuple(doubts))

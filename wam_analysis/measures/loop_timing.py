@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 Times = NDArray[np.int64]
 Numbers = NDArray[np.float64]
 
+BURST = 0.1  # of a period: messages that come so soon after the one before waited for their reader
+LAGGED = 0.1  # of the messages, from which the times of reception are those of a reader that lagged
+
 
 class StampTiming(NamedTuple):
     """Regularity of a topic.
@@ -101,6 +104,19 @@ def _skipped(steps: Numbers) -> Times:
     around = np.convolve(np.pad(steps, 1, "edge"), np.ones(3), "valid")
     skipped[(steps < 2.0) & (around < 3.5)] = 0
     return skipped
+
+
+def has_lagged(stamp: Times, received: Times) -> bool:
+    """Whether messages were received in bursts, so that the times of reception are not those of their arrival.
+
+    Parameters
+    ----------
+    stamp, received : (n,), ns.
+    """
+    if len(stamp) < 2:
+        return False
+    period = float(np.median(np.diff(np.sort(stamp))))
+    return float(np.mean(np.diff(np.sort(received)) < round(BURST * period))) > LAGGED
 
 
 def latency(stamp: Times, received: Times, answer_stamp: Times, answer_received: Times) -> Latency:

@@ -107,11 +107,13 @@ def report_task(configuration: Configuration, bag: Path, task: str = "") -> list
     pushes = [step.push for step in steps if step.push]
     presses = [math.hypot(*step.force.force) for step in steps if any(step.force.force)]
     pushed = ", ".join(f"{math.hypot(*push.force):g} N on the {push.cover.replace('_', ' ')}" for push in pushes)
-    print(f"Task {task or script_file(script).stem}: {len(steps)} steps, up to {seconds:g} s of the arm's time")
+    count = f"{len(steps)} step{'s' * (len(steps) != 1)}"
+    print(f"Task {task or script_file(script).stem}: {count}, up to {seconds:g} s of the arm's time")
     if pushes:
         print(f"  the simulator pushes the arm: {pushed}; the contact estimator has to find where, from the torques")
     if presses:
-        print(f"  the force loop presses with {', '.join(f'{newtons:g}' for newtons in presses)} N")
+        who = "the force loop presses with" if "force_loop" in configuration.shared.nodes else "commanded forces:"
+        print(f"  {who} {', '.join(f'{newtons:g}' for newtons in presses)} N")
     print(f"  every topic is recorded in {bag}", flush=True)
     return list(steps)
 
