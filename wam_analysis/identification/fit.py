@@ -2,12 +2,14 @@
 
 The residuals are coloured, and what the model lacks does not average out: the variance of white residuals would be far
 too small.  So parts of the motion are left out in turn (delete-a-group jackknife, Efron & Stein 1981), and each is
-predicted from all others.
+predicted from all others.  What is wrong alike in all parts is added: what the law of friction leaves out, and how much
+the estimate depends on the filter of the motion.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wam_analysis.identification.motion import MotionSamples
@@ -27,6 +29,7 @@ HUBER = 1.5  # standard deviations from which a residual counts less
 LAW = 0.003  # standard deviation of friction, per friction, by what its law leaves out
 ASYMMETRY = 0.1  # sd of the part of a shared joint's load friction that has one sign, per load friction
 WARM = 2  # iterations that start near the solution
+AVERAGED = 5  # windows, over which equations are averaged to see what the estimate depends on
 IDENTIFIED = 0.3  # standard deviation per prior one, up to which the motion shows a parameter
 NOT_NEGATIVE = ("motors.static_", "motors.load_", "motors.viscous", "joints.")
 PINNED = 1e-6  # prior standard deviation, of its own, of a parameter at its limit
@@ -239,7 +242,38 @@ def _uncertainty(sought: Unknowns, best: _Estimate, through: Array, asymmetric: 
     weighted = equations.columns * _weights(equations, best.values)[..., None]
     size = ASYMMETRY * best.values[sought.places("joints.load")]
     taken = white @ np.einsum("knp,knj->pj", weighted, asymmetric * size)
-    return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T)
+    moved = _moved_by_averaging(best)
+    return Uncertainty(best.without, white, np.diag(variance) + taken @ taken.T + np.outer(moved, moved))
+
+
+def _moved_by_averaging(best: _Estimate) -> Array:
+    """By how much the estimate differs, (p,), where neighbouring equations are averaged, from that of the same ones.
+
+    Of a right model it would not.  Torque ripple accelerates the rotors within a window, the cables give way to it and
+    the servo follows, so that it is correlated with the acceleration: a part of it counts as inertia, with the same
+    sign in all parts of the motion.  Averaging takes most of it out.
+    """
+    equations, weights = best.equations, _weights(best.equations, best.values)
+    bell = np.hanning(AVERAGED + 2)[1:-1]
+    edge = AVERAGED // 2
+    middle = slice(edge, len(weights) - edge)
+    if len(weights) <= AVERAGED:
+        return np.zeros_like(best.values)
+    span = equations.time[2 * edge :] - equations.time[: -2 * edge]
+    follow = span < (AVERAGED - 0.5) * np.median(np.diff(equations.time))
+    whole = sliding_window_view(equations.is_used, AVERAGED, 0).all(-1) & follow[:, None]
+
+    def solved(torque: Array, columns: Array) -> Array:
+        weighted = columns * (weights[middle] * whole)[..., None]
+        information = np.einsum("knp,knq->pq", weighted, columns, optimize=True)
+        return _solve(information, np.einsum("knp,kn->p", weighted, torque), best.prior_sd**-2, best.values)
+
+    averaged = [
+        np.asarray(sliding_window_view(each, AVERAGED, 0) @ (bell / bell.sum()), np.float64)
+        for each in (equations.torque, equations.columns)
+    ]
+    found: Array = solved(*averaged) - solved(equations.torque[middle], equations.columns[middle])
+    return found
 
 
 def _result(

@@ -20,7 +20,7 @@ class Uncertainty(NamedTuple):
     ----------
     without : (parts, p), estimates without each part of the motion.
     white : (p, p), covariance if residuals were white.
-    law : (p, p), covariance by what the law of friction leaves out, which each part has alike.
+    law : (p, p), covariance by what the model leaves out, which each part of the motion has alike.
     """
 
     without: Array
