@@ -1,6 +1,5 @@
 """Live parameters that a step of a scenario sets, checked against their declarations before anything moves."""
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -8,7 +7,7 @@ from wam_control.scenario_values import known
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.interface import declared
-from wam_description.parameters import ParameterError, build, checked, fields, flatten, require
+from wam_description.parameters import ParameterError, build, checked, fields, flatten, meant, require
 
 TUNABLE = ("driver", "force_loop")  # in lockstep they wait for the scenario: a setting takes effect at its own stamp
 
@@ -34,11 +33,9 @@ def settings_of(where: str, body: Any, shared: Shared) -> Iterator[Setting]:
         require(isinstance(values, Mapping), f"{where}: set, {node} is {values!r}; give names and values")
         live = {field.name: field for field in fields(_parameter_class(where, node, shared)) if field.live}
         for name, value in flatten(values).items():
-            near = difflib.get_close_matches(name, live, n=1)
-            meant = f"did you mean '{near[0]}'? " if near else ""
             require(
                 name in live,
-                f"{where}: set, {node}: it has no parameter '{name}' that may change while it runs; {meant}"
+                f"{where}: set, {node}: it has no parameter '{name}' that may change while it runs; {meant(name, live)}"
                 f"it has: {', '.join(sorted(live)) or 'none'}",
             )
             try:

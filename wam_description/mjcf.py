@@ -90,7 +90,6 @@ def _refuse_misfits(arm: Arm, world: World, effects: Effects) -> None:
     if len(effects.backlash) != 1:
         lengths("effects", motors, {"backlash": effects.backlash})
     effects.require_fit(arm)
-    lengths("effects", joints, {"added_coulomb_friction": effects.added_coulomb_friction})
 
 
 def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:

@@ -7,6 +7,7 @@ nowhere else.  The same classes check the values, describe the parameters to ROS
 
 import contextlib
 import dataclasses
+import difflib
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Set
@@ -138,6 +139,12 @@ def _declared(cls: type) -> Iterator[Field]:
         is_array = get_origin(hint) is tuple
         kind = get_args(hint)[0] if is_array else hint
         yield Field(item.name, kind, is_array, **item.metadata)
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """A question after the known name that is most like a wrong one, to begin a clause with; '' if none is."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean '{near[0]}'? " if near else ""
 
 
 def flatten(tree: Mapping[str, Any]) -> dict[str, Any]:

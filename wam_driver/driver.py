@@ -71,8 +71,8 @@ class DriverSample(NamedTuple):
 def _require_covers(arm: Arm, world: World) -> None:
     """Refuse a spring on a link without a cover: no message could give its force."""
     links = dict(zip(arm.joints.names, arm.links.names, strict=True))
+    covered = [name for name, link in links.items() if link in arm.covers.links]
     for joint, stiffness in zip(world.springs.joints, world.springs.stiffness, strict=True):
-        covered = [name for name, link in links.items() if link in arm.covers.links]
         require(
             stiffness == 0.0 or joint in covered,
             f"world.springs acts on {joint}, whose link {links[joint]} has no cover, so that sim/contact could not "

@@ -1,6 +1,5 @@
 """A ROS node that no message, request or timer ends: what a callback raises is a fault with the node's name."""
 
-import difflib
 import functools
 import time
 import traceback
@@ -15,6 +14,7 @@ from rclpy.parameter import Parameter
 
 from wam_bag.printable import printable
 from wam_description.defects import UnusableOutput
+from wam_description.parameters import meant
 from wam_description.wiring import raised
 from wam_ros.leaving import leaving
 
@@ -127,10 +127,8 @@ class TolerantNode(Node):
     def _unknown(self, name: str) -> str:
         names = sorted(self.list_parameters([], 0).names)
         live = [one for one in names if not self.describe_parameter(one).read_only]
-        near = difflib.get_close_matches(name, live, 1)
-        meant = f"did you mean '{near[0]}'? " if near else ""
         return (
-            f"unknown parameter '{printable(name, 100)}'; {meant}allowed, as they can change while node "
+            f"unknown parameter '{printable(name, 100)}'; {meant(name, live)}allowed, as they can change while node "
             f"{self.get_name()} runs: {', '.join(live) or 'none'}"
         )
 
