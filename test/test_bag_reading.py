@@ -648,6 +648,8 @@ def test_files_that_were_compressed_as_a_whole_are_refused_and_read_once_they_ar
             use(bag)
     with pytest.raises(BagError, match=r"compressed as a whole"):
         read(bag / f"{files[0].name}.zstd")
+    with pytest.raises(BagError, match=commands):
+        repair(bag)
     for file in files:
         compressed = file.with_name(f"{file.name}.zstd")
         file.write_bytes(zstandard.decompress(compressed.read_bytes()))

@@ -56,6 +56,10 @@ def enabled(**values: Any) -> Driver:
             r"link4: arm.links.centre is 1.36 m .* arm is 0.965 m long",
         ),
         ({"arm.links.inertia": [20.0] * 12}, r"link1: arm.links.inertia 20 kg m\^2 is more than 7.68 kg have at the"),
+        (
+            {"arm.links.inertia": [0.01, 0.02, 0.04] * 4},
+            r"link1: .* inertias 0.01, 0.02 and 0.04 kg m\^2; of no body .* above the sum of the others, 0.03 kg m\^2",
+        ),
         ({"arm.gravity": [0.0, 0.0, 9.80665]}, r"arm.gravity points upwards in the base frame: z is 9.80665"),
         ({"arm.gravity": [0.0, 0.0, -980.665]}, r"'arm.gravity' is -980.665 m/s\^2; allowed: -20 to 20"),
         ({"arm.joints.speed_limit": [1e308] * 4}, r"'arm.joints.speed_limit' is 1e\+308 rad/s; allowed: 0 to 100"),

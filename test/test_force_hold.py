@@ -611,6 +611,27 @@ def test_above_the_largest_contact_force_the_arm_gives_way() -> None:
     assert signs == [1.0, 1.0, -1.0, 1.0], "without the limit one of them presses on"
 
 
+@pytest.mark.parametrize(
+    ("probability", "sd", "gives_way"),
+    [(0.99, 0.02, True), (0.99, math.nan, False), (0.99, 0.2, False), (0.5, 0.02, False), (math.nan, 0.02, False)],
+)
+def test_a_push_on_a_link_that_is_certainly_touched_is_limited_there(
+    probability: float, sd: float, gives_way: bool
+) -> None:
+    """90 N are allowed; 140 N in the middle of the inner link are to the tool as 42 N."""
+    loop = force_loop(ARM, replace(OWN, limits=replace(OWN.limits, contact_force=90.0)))
+    force = BODY.cover_pose(POSE, "inner_link").rotation @ np.array([0.0, 0.0, 140.0])
+    external = BODY.point_jacobian(POSE, "inner_link", (0.3, 0.0, 0.0)).T @ force
+    sensed = State(POSE, STILL, (BODY.gravity_torque(POSE) - external).tolist())
+    contact = Contact("inner_link", 0.3, (0.0, 0.0, 140.0), sd, probability)
+    for estimated in (NO_CONTACT, contact):
+        out = loop.step(State(POSE, STILL, DRIVEN), sensed, estimated, None, None, POSE, None, DT)
+        gave_way = loop.reaction is ForceReaction.CONTACT_FORCE
+        assert gave_way is (gives_way and estimated is contact)
+        assert (float(external @ out.velocity) > 0.0) is gave_way
+    assert ("at least 1" in loop.reason and "if the estimated contact is on the right link" in loop.reason) is gives_way
+
+
 def pushed(torques: np.ndarray, place: tuple[str, float] | None = None) -> ArmPush:
     return ArmPush(torques, np.zeros(4), place, 90.0, 0.01)
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
@@ -273,6 +274,22 @@ def test_joint_torques_converge_in_a_world_of_joint_springs() -> None:
         assert out.effort == STILL, "nothing is fed forward: on a free arm it would be a throw"
         world.move(out.velocity)
     assert stiffness * np.subtract(world.q, POSE) == pytest.approx(commanded, rel=1e-3)
+    assert loop.reaction is ForceReaction.NONE
+
+
+@pytest.mark.parametrize(("taken", "what"), [(0.0, "small"), (1.5, "large")])
+def test_a_joint_torque_that_is_not_reached_is_reported_in_time(taken: float, what: str) -> None:
+    late = 200
+    loop = force_loop(ARM, replace(OWN, mode="joint_torque", limits=replace(OWN.limits, settling_time=late * DT)))
+    for commanded in (-0.5, -1.0):  # another torque takes its time again
+        for period in range(late + 10):
+            external = [0.0, -taken * commanded, 0.0, 0.0]
+            sensors = State(POSE, STILL, (BODY.gravity_torque(POSE) - external).tolist())
+            loop.step(World(1e-9).joints, sensors, NO_CONTACT, None, None, None, [0.0, commanded, 0.0, 0.0], DT)
+            assert period > late - 2 or loop.reaction is ForceReaction.NONE
+        assert loop.reaction is ForceReaction.NOT_REACHED
+        assert f"joint2: {taken * commanded + 0.0:.2g} N m are measured" in loop.reason
+        assert f"{commanded:g} N m commanded; the torque has been too {what} for" in loop.reason
 
 
 def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -> None:

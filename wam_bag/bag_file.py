@@ -28,7 +28,7 @@ _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.
 def files(path: Path) -> list[Path]:
     """The MCAP files of a bag directory in the order of recording, or the one file."""
     if path.name.endswith(COMPRESSED):
-        raise _compressed(path)
+        raise compressed(path)
     if path.is_file():
         return [path]
     if not path.exists():
@@ -48,7 +48,7 @@ def files(path: Path) -> list[Path]:
     if named:
         return [path / name for name in named]
     if not found and any(path.glob(f"*{COMPRESSED}")):
-        raise _compressed(path)
+        raise compressed(path)
     if not found:
         raise BagError(f"{path} has no .mcap file and no .db3 file; give the directory of a bag")
     return found
@@ -75,7 +75,7 @@ def _listed_files(path: Path) -> list[str]:
                 "from the files in the directory"
             )
         if name.endswith(COMPRESSED):
-            raise _compressed(path)
+            raise compressed(path)
         if not name.endswith(".mcap"):
             raise BagError(f"{path} is recorded as {name}; only storage 'mcap' is read")
     if len(set(listed)) < len(listed):
@@ -83,7 +83,8 @@ def _listed_files(path: Path) -> list[str]:
     return listed
 
 
-def _compressed(path: Path) -> BagError:
+def compressed(path: Path) -> BagError:
+    """The error for a bag, or a file of one, that was compressed as a whole."""
     file, bag = (path, path.parent) if path.is_file() else (path / f"*{COMPRESSED}", path)
     return BagError(
         f"{path} was compressed as a whole by rosbag2 (compression mode 'file') and is not read; decompress it with "

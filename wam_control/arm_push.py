@@ -23,6 +23,7 @@ class ArmPush(NamedTuple):
     position : cover and position, m, where it pushes; None where that is not known, and the tool is assumed.
     allowed : N, up to which the arm does not give way.
     gain : speed of the tool per force above it, m/s/N: near the base the arm is stiffer and moves less.
+    is_estimated : whether the position is that of an estimated contact, as far out as it may be.
     """
 
     torques: Array
@@ -30,6 +31,7 @@ class ArmPush(NamedTuple):
     position: tuple[str, float] | None
     allowed: float
     gain: float
+    is_estimated: bool = False
 
     def least(self, body: RigidBody, q: Sequence[float], above: float = 0.0) -> float:
         """Smallest force, N, that explains the torques there, less what is uncertain of them.

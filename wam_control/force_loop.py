@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_control.arm_push import ArmPush
+from wam_control.arm_push import CERTAIN, ArmPush
 from wam_control.bumpless_transfer import BumplessTransfer
 from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.feed_forward import FeedForward
@@ -36,6 +36,7 @@ from wam_control.sensing_advice import OtherForces, Turnable
 from wam_control.stability_guard import GuardAssessment
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_control import AxisRow, TaskControl
+from wam_control.torque_watch import TorqueWatch
 from wam_description.arm import Arm, Servo, Timing
 from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
@@ -293,7 +294,7 @@ class ForceLoop:
         else:
             out = self._force(joints.position, contact, commands.force, commands.posture, dt)
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
-        push = self._push(joints.position, _known_position(out.point, task))
+        push = self._push_on_arm(joints.position, contact, _known_position(out.point, task))
         limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
         if limited.contact_force and not self.reaction.holds:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
@@ -330,6 +331,7 @@ class ForceLoop:
         self._delay.reset()
         self._feed_forward.reset()
         self._torque_before, self._q_before, self._free_at = [], [], []
+        self._torques = [TorqueWatch(name) for name in self._arm.joints.names]
         self._external = self._external[0], self._external[0]
         self._resting = None
         self._axes = axes
@@ -561,9 +563,23 @@ class ForceLoop:
         torques = self._external[0] - self._unknown[0]
         if own.feedback == "joint_sensors":
             torques = torques + self._force_axes.inertia(q).dot(self._acceleration)
-        sd = np.array(self._external_sd) if self._external_sd else self._torque_sd
         gain = self._supervision.present * max(own.force_gain)
-        return ArmPush(torques, sd, where, own.limits.contact_force, gain)
+        return ArmPush(torques, self._push_sd, where, own.limits.contact_force, gain)
+
+    def _push_on_arm(self, q: Sequence[float], contact: Contact, where: tuple[str, float] | None) -> ArmPush:
+        """What pushes the arm: where the commanded force acts, or no nearer to the base than a contact is estimated."""
+        probable = self.parameters.link_probability_limit
+        if where is not None or not contact.cover or not contact.probability >= probable:
+            return self._push(q, where)
+        length = self._arm.covers.length_of(contact.cover)
+        farthest = contact.position + CERTAIN * contact.position_sd
+        where = contact.cover, min(length if math.isnan(farthest) else farthest, length)
+        return self._push(q, where)._replace(is_estimated=True)
+
+    @property
+    def _push_sd(self) -> Array:
+        """Standard deviations of the torques of the world on the joints (n,), N m."""
+        return np.array(self._external_sd) if self._external_sd else self._torque_sd
 
     def _pushed_position(self, contact: Contact, where: tuple[str, float] | None) -> tuple[str, float] | None:
         """Where an arm that holds is pushed: estimated, if on another cover than that of the known position."""
@@ -668,6 +684,7 @@ class ForceLoop:
             return ForceOutput([0.0] * self._n, [0.0] * self._n)
         measured = [-torque for torque in self._measurement.external]
         before, self._torque_before = self._torque_before or measured, measured
+        self._watch_torques(torque, measured, dt)
         errors, errors_before = ([a - b for a, b in zip(torque, values, strict=True)] for values in (measured, before))
         velocity = self._supervision.torque_law.velocities(errors, errors_before, dt)
         velocity = self._delay.step(velocity, self.parameters.delay_samples)
@@ -675,6 +692,13 @@ class ForceLoop:
         factor = self._gain_factor(point, None, 0.0, dt)
         share = self.parameters.force_feedforward
         return ForceOutput([factor * v for v in velocity], [share * value for value in torque])
+
+    def _watch_torques(self, desired: Sequence[float], measured: Sequence[float], dt: float) -> None:
+        """Report the first joint whose torque, N m, is not reached in the time for it."""
+        lasting = self.parameters.limits.settling_time
+        for watch, wanted, found, sd in zip(self._torques, desired, measured, self._push_sd.tolist(), strict=True):
+            if (reason := watch.step(wanted, found, sd, lasting, dt)) and not self.reason:
+                self._react(ForceReaction.NOT_REACHED, reason)
 
     def _point(self, contact: Contact, command: ForceCommand, direction: Array) -> ForcePoint:
         """Point of action of the force; where the loop relies on the estimate, a rejected one counts as refused."""

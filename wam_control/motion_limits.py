@@ -82,6 +82,7 @@ class LimitParameters:
 REPORTED: Final = 0.2  # s, for which what pushes too hard is reported after the last time: a swing is one report
 AT_LEAST: Final = "at least {} N in all"
 AT_COMMANDED: Final = "{} N in all, if it acts where the commanded force does"
+AT_ESTIMATED: Final = "at least {} N in all, if the estimated contact is on the right link"
 
 
 class WholeForce(NamedTuple):
@@ -139,7 +140,7 @@ class MotionLimits:
         ----------
         velocity : commanded (n,), rad/s; empty for torque only, which is not limited.
         q : joint angles (n,), rad.
-        push : what pushes, where the commanded force acts if that is known.
+        push : what pushes, where the commanded force, or else an estimated contact acts, if that is known.
         dt : outer period, s.
         whole : the commanded force, if something is pressed.
         """
@@ -190,7 +191,7 @@ class MotionLimits:
             force, words = (whole.measured(), AT_COMMANDED) if whole.measured else (least, AT_LEAST)
             if force * most >= least * allowed:
                 return force, allowed, words
-        return least, most, AT_LEAST
+        return least, most, AT_ESTIMATED if push.is_estimated else AT_LEAST
 
     def _in_words(self, allowed: float, whole: WholeForce | None) -> str:
         own = self._parameters

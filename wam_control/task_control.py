@@ -20,6 +20,7 @@ from wam_control.hybrid_velocity import followed, posture_velocity
 from wam_control.stability_guard import GuardedContact, GuardedForces
 from wam_control.task import AxisKind, TaskCommand
 from wam_control.task_frame import HAND, AxisState, TaskFrame, force_speed
+from wam_control.torque_watch import TorqueWatch
 from wam_description.arm import Arm
 from wam_description.rigid_body import RigidBody
 from wam_description.signals import Contact
@@ -84,6 +85,7 @@ class TaskControl:
         self._task: TaskCommand | None = None
         self._anchors: dict[object, float] = {}
         self._holds: list[ForceHold] = []
+        self._torques: list[TorqueWatch] = []
         # by cover and position: m since something is touched or approached there, s since it is no more
         self._slid: dict[tuple[str, float], tuple[float, float]] = {}
         self._q_before: list[float] = []
@@ -130,7 +132,7 @@ class TaskControl:
         reaction, reason = (
             (ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")
             if self._refusal
-            else self._watch(states, forces, torques[0], dt, unknown)
+            else self._watch(states, forces, torques[0], push.torque_sd, dt, unknown)
         )
         if reaction.holds != self._held.is_holding:
             has_changed = True
@@ -176,6 +178,7 @@ class TaskControl:
             return False
         self._anchors = {key: self._anchors[key] for key in _axes(task) if key in self._anchors}
         self._holds = [ForceHold() for _ in task.axes]
+        self._torques = [TorqueWatch(axis.name) for axis in task.axes]
         return True
 
     def _slide(self, q: Sequence[float], dt: float) -> None:
@@ -243,14 +246,19 @@ class TaskControl:
         states: Sequence[AxisState],
         forces: Sequence[float],
         external: Array,
+        external_sd: Array,
         dt: float,
         unknown: tuple[Array, str],
     ) -> tuple[ForceReaction, str]:
         """What the force axes report, the most serious first."""
         found = [(ForceReaction.NONE, "")]
-        for state, force, hold in zip(states, forces, self._holds, strict=True):
+        for state, force, hold, torque in zip(states, forces, self._holds, self._torques, strict=True):
             desired = _desired(state)
-            if state.sensed and state.point and desired:
+            if (joint := state.axis.joint) >= 0:
+                lasting, sd = self._parameters.limits.settling_time, float(external_sd[joint])
+                if reason := torque.step(desired, force, sd, lasting, dt):
+                    found.append((ForceReaction.NOT_REACHED, reason))
+            elif state.sensed and state.point and desired:
                 error = -float(state.sensed.sense @ unknown[0])
                 case = ForceCase(state.sensed, state.point, desired, unknown=error, meaning=unknown[1])
                 found.append(hold.step(case, external, force, self._parameters, dt))

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from wam_description.parameters import lengths, parameter, require
 
+ROUNDED = 1e-6  # of an inertia, by which it may be rounded
+
 
 def _no_products(others: Mapping[str, Any]) -> tuple[float, ...]:
     return (0.0,) * (3 * len(others["arm.links.names"]))
@@ -124,10 +126,16 @@ class Links:
         spatial = {"centre": self.centre, "inertia": self.inertia, "product": self.product}
         lengths("arm.links", self.names, spatial, width=3)
         for i, name in enumerate(self.names):
-            least = float(np.linalg.eigvalsh(self.tensor(i))[0])
+            least, middle, largest = np.linalg.eigvalsh(self.tensor(i)).tolist()
             require(
                 least >= 0.0,
                 f"{name}: arm.links.inertia and product give a principal inertia of {least:.3g} kg m^2, below 0",
+            )
+            require(
+                largest <= (least + middle) * (1.0 + ROUNDED),
+                f"{name}: arm.links.inertia and product give the principal inertias {least:.4g}, {middle:.4g} and "
+                f"{largest:.4g} kg m^2; of no body is the largest one above the sum of the others, "
+                f"{least + middle:.4g} kg m^2",
             )
 
     def tensor(self, i: int) -> NDArray[np.float64]:

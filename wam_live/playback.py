@@ -130,7 +130,7 @@ def play(
     port : to listen on.
     at : time that is shown, s since the first state; None: it plays from there.
     until : whether it is over.
-    say : called with lines for people.
+    notify : called with lines for people.
     """
     source = BagSource(recording)
     server = serve(port)

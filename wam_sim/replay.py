@@ -96,7 +96,8 @@ class ChangedValue(NamedTuple):
 class Replay(NamedTuple):
     """A replay: mode of the recording, how each topic of the node came out, gaps in its inputs, what the bag lacks.
 
-    `changed` are the parameters of the node that a configuration has otherwise than the recording, its own first.
+    `changed` are the parameters of the node that a configuration has otherwise than the recording, its own first,
+    `others` a sentence about other arms in the bag.
     """
 
     node: str
@@ -105,6 +106,7 @@ class Replay(NamedTuple):
     gaps: tuple[Gap, ...]
     lost: tuple[str, ...]
     changed: tuple[ChangedValue, ...] = ()
+    others: str = ""
 
     @property
     def is_same(self) -> bool:
@@ -117,7 +119,11 @@ REPLAYED = tuple(name for name in NODES if name not in ("driver", "scenario", "r
 
 
 def replay(
-    path: str | Path, node: str, configuration: Configuration | None = None, values: Mapping[str, Any] = NOTHING
+    path: str | Path,
+    node: str,
+    configuration: Configuration | None = None,
+    values: Mapping[str, Any] = NOTHING,
+    namespace: str = "",
 ) -> Replay:
     """Feed the recorded inputs of a node through it and compare its outputs with the recorded ones.
 
@@ -126,10 +132,11 @@ def replay(
 
     Parameters
     ----------
-    path : bag; of several arms in it the first is taken.
+    path : bag.
     node : one of `REPLAYED`, or 'module:Class' of a node of your own.
     configuration : values to use instead of those in the bag.
     values : to be replaced among those in the bag, by 'node:parameter' or the name of a shared parameter.
+    namespace : of the arm, as for `recorded_run`.
 
     Raises
     ------
@@ -147,7 +154,7 @@ def replay(
     bag = read(path, [*inputs, *outputs, STATUS], may_lack=True)
     if not any(name.endswith(f"/{topic}") for name in bag.topics for topic in (*inputs, *outputs)):
         raise BagError(f"{bag.path} has no topic of the node {node}; it has no arm, or another one recorded it")
-    run = recorded_run(bag)
+    run = recorded_run(bag, namespace)
     run = run._replace(parameters=run.parameters.with_options(values))
     namespace = run.namespace
     _require_types(bag, namespace, [rows[topic] for topic in (*inputs, *outputs)])
@@ -177,7 +184,7 @@ def replay(
     gaps = tuple(gap for topic in inputs for gap in _gaps(topic, bag.topics.get(f"{namespace}/{topic}")))
     lost = losses(bag.path, bag.metadata, bag.attachments, bag.counts).sentences(bag.first_ns)
     changed = _changed_values(run, declaration, shared, own) if configuration else ()
-    return Replay(declaration.name, mode, tuple(compared), gaps, (*lost, *lost_changes), changed)
+    return Replay(declaration.name, mode, tuple(compared), gaps, (*lost, *lost_changes), changed, run.others)
 
 
 def _require_types(bag: Bag, namespace: str, topics: Sequence[Topic]) -> None:

@@ -14,7 +14,14 @@ from wam_analysis.identification.motion import recorded_motion
 from wam_analysis.identification.overlay import estimator_values, impossibility, model_values, write_overlay
 from wam_analysis.identification.report import report
 from wam_bag.bag import read
-from wam_cli.commands import at_least, configuration_of, take_configuration, writable_directory, writable_file
+from wam_cli.commands import (
+    at_least,
+    configuration_of,
+    take_arm,
+    take_configuration,
+    writable_directory,
+    writable_file,
+)
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
@@ -43,6 +50,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only-write", action="store_true", help="with --excite: write the scenario, play nothing")
     parser.add_argument("--directory", type=Path, default=Path("bags"), help="with --excite: of the bag, default bags")
     parser.add_argument("--write", type=Path, metavar="YAML", help="configuration to write, for --config or base:")
+    take_arm(parser)
     take_configuration(parser)
 
 
@@ -59,7 +67,9 @@ def run(given: argparse.Namespace) -> int:
         bag = _excite(configuration, given)
         if bag is None:
             return 0 if given.only_write else 130
-    run_in_bag = recorded_run(read(bag, TOPICS, may_lack=True))
+    run_in_bag = recorded_run(read(bag, TOPICS, may_lack=True), given.namespace or "")
+    if run_in_bag.others:
+        print(f"{run_in_bag.others}\n", flush=True)
     shared = configuration.shared
     _refuse_other_arm(run_in_bag, shared)
     found = identify(shared, recorded_motion(run_in_bag, shared.arm))

@@ -2,7 +2,7 @@
 
 import argparse
 
-from wam_cli.commands import configuration_of, take_values
+from wam_cli.commands import configuration_of, take_arm, take_values
 from wam_description.configuration import option_values
 from wam_sim.replay import REPLAYED, Compared, Replay, replay
 
@@ -18,14 +18,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config", help="values instead of those in the bag: a YAML file, or the name of an installed one"
     )
+    take_arm(parser)
     take_values(parser)
 
 
 def run(given: argparse.Namespace) -> int:
     """Replay and print the comparison of each topic; 0 if all are the same bit for bit, else 1."""
     configuration = configuration_of(given) if given.config else None
-    done = replay(given.bag, given.node, configuration, {} if given.config else option_values(given.values))
+    values = {} if given.config else option_values(given.values)
+    done = replay(given.bag, given.node, configuration, values, given.namespace or "")
     for line in (
+        *([done.others] * bool(done.others)),
         *(f"INCOMPLETE: {line}" for line in done.lost),
         *other_values(done),
         *map(stated, done.topics),
