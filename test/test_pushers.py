@@ -48,7 +48,12 @@ def test_a_hand_presses_with_its_force_at_its_place(shape: str, sizes: tuple[flo
     plant = plant_of(hand(shapes=shape, sizes=sizes, angles=angle))
     run(plant, 0.045)
     assert plant.loads() == []
+    assert plant.pushes_in_words() == ""
     run(plant, 0.155)
+    assert plant.pushes_in_words() == "8 N on outer_link by hand"
+    plant.push("inner_link", np.array((0.0, 0.0, 3.0)), np.zeros(3))
+    assert plant.pushes_in_words() == "3 N on inner_link, 8 N on outer_link by hand"
+    plant.push("inner_link", np.zeros(3), np.zeros(3))
     (load,) = plant.loads()
     force = 8.0 * np.array((0.0, math.cos(angle), math.sin(angle)))
     assert load.cover == "outer_link"
@@ -59,6 +64,7 @@ def test_a_hand_presses_with_its_force_at_its_place(shape: str, sizes: tuple[flo
     assert np.abs(np.subtract(load.moment, np.cross((load.position, 0.0, 0.0), force))).max() < 0.02
     run(plant, 0.25)
     assert plant.loads() == []
+    assert plant.pushes_in_words() == ""
 
 
 def test_on_the_inner_link_the_moment_is_that_of_its_tilted_axis() -> None:

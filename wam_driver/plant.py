@@ -98,7 +98,8 @@ class Plant:
         self._pushes = self._loads.pushes
         self._moving = moving_obstacles(self.model, self.data, world)
         self._objects = TrueObjects(self.model, self.data, arm, world, {one.name: one for one in self._moving})
-        self._movers: list[Mover] = [*pushers(self.model, self.data, arm, world.pushers, step), *self._moving]
+        self._pushers = pushers(self.model, self.data, arm, world.pushers, step)
+        self._movers: list[Mover] = [*self._pushers, *self._moving]
         self._surfaces = Surfaces(self.model, self.data, arm, world, self._movers, step)
         # views into MuJoCo's memory: to fetch them in each step costs more than the step's own work
         data, model = self.data, self.model
@@ -209,8 +210,9 @@ class Plant:
         self._loads.release()
 
     def pushes_in_words(self) -> str:
-        """How hard which covers are pushed; '' where none is."""
-        return self._loads.pushes_in_words()
+        """How hard which covers are pushed, by whom if a pusher does; '' where none is."""
+        pressing = [pusher.words for pusher in self._pushers if pusher.is_pressing]
+        return ", ".join([self._loads.pushes_in_words(), *pressing] if self._pushes else pressing)
 
     def carry(self, mass: float) -> None:
         """Carry a mass at the tool, kg, from now on, besides `arm.payload`: a point that already moves with it."""

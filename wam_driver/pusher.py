@@ -27,12 +27,15 @@ class Pusher:
     Attributes
     ----------
     name : of the body and its geom.
+    words : how hard which cover is pushed, and by whom.
+    is_pressing : whether it pushes now.
     surface : stiffness, N/m, damping, N s/m, hardening, 1/m, of its surface.
     velocity : (3,), m/s, of its surface in the base frame.
     """
 
     def __init__(self, model: Any, data: Any, arm: Arm, given: Pushers, i: int, step: float) -> None:
         self.name = given.names[i]
+        self.words, self.is_pressing = f"{given.force[i]:.4g} N on {given.covers[i]} by {self.name}", False
         self.surface = (given.stiffness[i], given.damping[i], 0.0)
         self.velocity = np.zeros(3)
         self._model, self._data, self._step = model, data, step
@@ -60,10 +63,11 @@ class Pusher:
         if not self._begin - self._rise <= time <= self._end + self._rise:
             if not self._is_away:
                 data.mocap_pos[self._mocap] = self._away
-                self._is_away = True
+                self._is_away, self.is_pressing = True, False
             return
         self._is_away = False
         depth, sinking = self.depth(time)
+        self.is_pressing = depth > 0.0
         force, across = self._directions(self._angle + self._turn * (time - self._begin))
         at = self._origin + (self._position + self._slide * (time - self._begin)) * self._slope
         rotation = data.site_xmat[self._site].reshape(3, 3)
