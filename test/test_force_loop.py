@@ -9,6 +9,7 @@ import pytest
 
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.torque_watch import TorqueWatch
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError, build, values
@@ -290,6 +291,14 @@ def test_a_joint_torque_that_is_not_reached_is_reported_in_time(taken: float, wh
         assert loop.reaction is ForceReaction.NOT_REACHED
         assert f"joint2: {taken * commanded + 0.0:.2g} N m are measured" in loop.reason
         assert f"{commanded:g} N m commanded; the torque has been too {what} for" in loop.reason
+
+
+def test_a_joint_torque_that_rises_slowly_in_free_air_is_reported() -> None:
+    watch, rising = TorqueWatch("joint2"), np.linspace(0.0, 4.0, 400).tolist()
+    reports = [watch.step(desired, 0.0, 0.02, 1.0, 0.01) for desired in rising]
+    assert not any(reports[:100])
+    assert all(reports[110:])
+    assert not any(watch.step(desired, 0.95 * desired, 0.02, 1.0, 0.01) for desired in rising)
 
 
 def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -> None:

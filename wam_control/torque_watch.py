@@ -33,9 +33,8 @@ class TorqueWatch:
         """
         allowed = max(TOLERANCE * abs(desired), UNSURE * sd)
         error = desired - measured
-        if abs(desired - self._desired) > allowed:
-            self._desired, self._missed = desired, 0.0  # another torque takes its time again
-        if not desired or abs(error) <= allowed or error * self._missed < 0.0:
+        is_other, self._desired = abs(desired - self._desired) > allowed, desired  # that takes its time again
+        if is_other or not desired or abs(error) <= allowed or error * self._missed < 0.0:
             self._missed = 0.0
         if not desired or abs(error) <= allowed:
             return ""
