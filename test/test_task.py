@@ -399,13 +399,13 @@ def test_joint_torques_are_axes_too() -> None:
 
 def test_a_joint_torque_that_nothing_takes_is_reported_in_time() -> None:
     """The joint turns on until its end, which is far."""
-    world, wanted, late = Springs(), [0.0, 0.5, 0.0, 0.0], round(OWN.limits.settling_time / DT)
+    world, wanted, late = Springs(), [0.0, 1.0, 0.0, 0.0], round(OWN.limits.settling_time / DT)
     world.step(base(*joint_axes(AxisKind.FORCE, wanted)), late - 5)
     assert world.loop.reaction is ForceReaction.NONE
     world.step(base(*joint_axes(AxisKind.FORCE, wanted)), 10)
     assert world.loop.reaction is ForceReaction.NOT_REACHED
     assert world.loop.reason.startswith(
-        "force of joint 2: 0 N m are measured and 0.5 N m commanded; the torque has been"
+        "force of joint 2: 0 N m are measured and 1 N m commanded; the torque has been"
     )
     spring = world.q.copy()
     for _ in range(300):

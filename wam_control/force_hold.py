@@ -1,7 +1,7 @@
 """When the force loop holds its position instead of controlling the commanded force, and why."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -84,6 +84,12 @@ class ForceReaction(IntEnum):
             ForceReaction.TOO_SLOW,
             ForceReaction.SECOND_CONTACT,
         )
+
+
+def most_serious(found: Sequence[tuple[ForceReaction, str]]) -> tuple[ForceReaction, str]:
+    """The first reaction that holds, else the first one that there is, with its reason."""
+    none = ForceReaction.NONE, ""
+    return max([none, *found], key=lambda one: (one[0].holds, one[0] is not ForceReaction.NONE))
 
 
 def is_refused(facts: Mapping[str, str]) -> bool:

@@ -21,7 +21,7 @@ from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force_case import ForceCase
 from wam_control.force_command import CommandAdmission
-from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction
+from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction, most_serious
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
@@ -529,6 +529,12 @@ class ForceLoop:
         meaning = carried or "not the force of a surface that is touched there"
         self._resting, self._unknown = None, (np.zeros(self._n), "") if is_contact else (resting, meaning)
 
+    def _judge_load(self, q: Sequence[float]) -> None:
+        """The same for no direction: what no mass at the tool explains may be surfaces that are touched already."""
+        if (resting := self._resting) is not None:
+            carried = self._carried(q, resting)
+            self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
+
     def _carried(self, q: Sequence[float], resting: Array) -> str:
         """What a mass at the tool would be called that explains torques at rest (n,), N m; '' where none does."""
         sd = math.hypot(sensing_of(self.parameters).torque_sd, ALIKE * float(np.abs(resting).max()))
@@ -658,10 +664,7 @@ class ForceLoop:
         if self._axes != TASK:
             self._begin(TASK)
             self._tasks.restart()
-        if (resting := self._resting) is not None:
-            # what no mass at the tool explains may be several surfaces that are touched already
-            carried = self._carried(q, resting)
-            self._resting, self._unknown = None, (resting if carried else np.zeros(self._n), carried)
+        self._judge_load(q)
         push = self._push(q, self._pushed_position(contact, _known_position(None, task)))
         found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown, push)
         self._react(found.reaction, found.reason)
@@ -684,7 +687,11 @@ class ForceLoop:
             return ForceOutput([0.0] * self._n, [0.0] * self._n)
         measured = [-torque for torque in self._measurement.external]
         before, self._torque_before = self._torque_before or measured, measured
-        self._watch_torques(torque, measured, dt)
+        self._judge_load(self._joints)
+        self._watch_torques(torque, dt)
+        if self.reaction.holds:
+            self._delay.reset()
+            return ForceOutput([0.0] * self._n, [0.0] * self._n)
         errors, errors_before = ([a - b for a, b in zip(torque, values, strict=True)] for values in (measured, before))
         velocity = self._supervision.torque_law.velocities(errors, errors_before, dt)
         velocity = self._delay.step(velocity, self.parameters.delay_samples)
@@ -693,12 +700,14 @@ class ForceLoop:
         share = self.parameters.force_feedforward
         return ForceOutput([factor * v for v in velocity], [share * value for value in torque])
 
-    def _watch_torques(self, desired: Sequence[float], measured: Sequence[float], dt: float) -> None:
-        """Report the first joint whose torque, N m, is not reached in the time for it."""
-        lasting = self.parameters.limits.settling_time
-        for watch, wanted, found, sd in zip(self._torques, desired, measured, self._push_sd.tolist(), strict=True):
-            if (reason := watch.step(wanted, found, sd, lasting, dt)) and not self.reason:
-                self._react(ForceReaction.NOT_REACHED, reason)
+    def _watch_torques(self, desired: Sequence[float], dt: float) -> None:
+        """React to the torques of the joints, N m, by the most serious of what they show."""
+        values = (values.tolist() for values in (-self._external[0], self._push_sd, -self._unknown[0]))
+        found = [
+            watch.step(torque, measured, sd, self.parameters, dt, unknown, self._unknown[1])
+            for watch, torque, measured, sd, unknown in zip(self._torques, desired, *values, strict=True)
+        ]
+        self._react(*most_serious(found))
 
     def _point(self, contact: Contact, command: ForceCommand, direction: Array) -> ForcePoint:
         """Point of action of the force; where the loop relies on the estimate, a rejected one counts as refused."""

@@ -12,7 +12,7 @@ from wam_control.contact_position import ForcePoint, position_is_certain, slid_p
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, PressedForce
 from wam_control.force_case import ForceCase
-from wam_control.force_hold import ForceHold, ForceReaction
+from wam_control.force_hold import ForceHold, ForceReaction, most_serious
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
 from wam_control.held_arm import HeldArm, RetreatForce
@@ -251,18 +251,18 @@ class TaskControl:
         unknown: tuple[Array, str],
     ) -> tuple[ForceReaction, str]:
         """What the force axes report, the most serious first."""
-        found = [(ForceReaction.NONE, "")]
+        found = []
         for state, force, hold, torque in zip(states, forces, self._holds, self._torques, strict=True):
             desired = _desired(state)
             if (joint := state.axis.joint) >= 0:
-                lasting, sd = self._parameters.limits.settling_time, float(external_sd[joint])
-                if reason := torque.step(desired, force, sd, lasting, dt):
-                    found.append((ForceReaction.NOT_REACHED, reason))
+                sd, error = float(external_sd[joint]), -float(unknown[0][joint])
+                if state.axis.kind is AxisKind.FORCE:
+                    found.append(torque.step(desired, force, sd, self._parameters, dt, error, unknown[1]))
             elif state.sensed and state.point and desired:
                 error = -float(state.sensed.sense @ unknown[0])
                 case = ForceCase(state.sensed, state.point, desired, unknown=error, meaning=unknown[1])
                 found.append(hold.step(case, external, force, self._parameters, dt))
-        return max(found, key=lambda one: (one[0].holds, one[0] is not ForceReaction.NONE))
+        return most_serious(found)
 
     def _points(self, task: TaskCommand, contact: Contact) -> list[ForcePoint]:
         """Where each axis acts; an estimated position is the last certain one, at first the middle of the link."""
