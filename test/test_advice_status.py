@@ -18,3 +18,16 @@ def test_the_status_of_a_refused_force_states_what_would_help() -> None:
     refused = [status.message for status in seen if status.facts.get("reaction") == "not_sensed"]
     assert refused[0].endswith("the arm holds its position")  # at once
     assert refused[-1].startswith(f"{refused[0]}: turn joint")
+
+
+def test_a_refusal_is_reported_for_each_command_with_its_own_number() -> None:
+    def pressing(newtons: float) -> ScenarioStep:
+        return ScenarioStep("press", 0.1, force=ForceCommand("outer_link", (0.0, -newtons, 0.0)))
+
+    steps = [ScenarioStep("release", 0.05, request="enable"), pressing(70.0), pressing(90.0)]
+    run = Simulation(Configuration.load(packaged("wam")), steps)
+    seen: list[str] = []
+    run.listen("status", lambda _, status: seen.append(status.message), "force_loop")
+    assert run.play() == ""
+    refusals = [message.partition(";")[0] for message in seen if "force_limit" in message]
+    assert refusals == [f"{newtons} N is commanded" for newtons in (70, 90)]

@@ -700,6 +700,17 @@ def test_what_pushes_moves_the_arm_no_further_than_it_may_go_for_nothing() -> No
     assert away == pytest.approx([0.1] * 2, rel=0.1)
 
 
+def test_what_pushed_on_one_link_is_no_push_on_another() -> None:
+    limits = MotionLimits(ARM, BODY, replace(OWN.limits, contact_force=30.0), 1.5)
+    torques = BODY.tool_jacobian(POSE).T @ np.array([0.0, 0.0, 40.0])
+    reports = [
+        limits.step([0.0] * 4, POSE, pushed(torques, place)._replace(allowed=30.0), DT).contact_force
+        for place in (("inner_link", 0.3), ("outer_link", 0.35))
+    ]
+    near, far = (float(report.split(" at least ")[1].split()[0]) for report in reports)
+    assert near > 2.0 * far
+
+
 def test_the_least_force_is_a_lower_bound() -> None:
     random = np.random.default_rng(3)
     for _ in range(200):

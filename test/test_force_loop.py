@@ -353,6 +353,26 @@ def test_torques_at_rest_of_an_undeclared_mass_are_no_torques_of_the_joints() ->
     assert out.velocity == STILL
 
 
+def test_a_command_that_has_no_effect_in_a_mode_is_refused() -> None:
+    loop = force_loop(ARM, WATCHING)
+    moved = [angle + 0.01 for angle in POSE]
+    for given, refused in (
+        ({"posture": POSE, "torque": [1.0, 0.0, 0.0, 0.0]}, set()),
+        ({"posture": POSE}, set()),
+        ({"posture": moved}, {"joint_posture_command"}),
+        ({"posture": moved}, {"joint_posture_command"}),  # until it ends
+        ({}, set()),
+        ({"command": ForceCommand("base", down(5.0))}, {"force_command"}),
+        ({"command": ForceCommand("base", down(0.0))}, set()),
+    ):
+        ask(loop, World(400.0), None, **given)
+        assert set(loop.refusals) == refused
+    hybrid = force_loop(ARM, OWN)
+    ask(hybrid, World(400.0), None, torque=[1.0, 0.0, 0.0, 0.0], posture=moved)
+    why = "joint_torque_command has no effect in the mode hybrid; set force_loop:mode to joint_torque, or end the"
+    assert hybrid.refusals["joint_torque_command"].startswith(why)
+
+
 def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -> None:
     loop = force_loop(ARM, replace(OWN, mode="joint_torque"))
     assert ask(loop, World(1e-9), None).velocity == [0.0] * 4

@@ -404,9 +404,7 @@ def test_a_joint_torque_that_nothing_takes_is_reported_in_time() -> None:
     assert world.loop.reaction is ForceReaction.NONE
     world.step(base(*joint_axes(AxisKind.FORCE, wanted)), 10)
     assert world.loop.reaction is ForceReaction.NOT_REACHED
-    assert world.loop.reason.startswith(
-        "force of joint 2: 0 N m are measured and 1 N m commanded; the torque has been"
-    )
+    assert world.loop.reason.startswith("force of joint 2: 0 N m are measured and 1 N m commanded; the torque has been")
     spring = world.q.copy()
     for _ in range(300):
         world.hand = -200.0 * (world.q - spring)

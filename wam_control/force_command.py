@@ -57,12 +57,12 @@ class CommandAdmission:
         self._present_torque: Sequence[float] = [0.0] * len(joints.names)
         self._force: ForceCommand | None = None
         self._torque: Sequence[float] | None = None
-        self._is_moved = self._has_lapsed = False
+        self._is_moved = self._has_lapsed = self._is_ignored = False
 
     def restart(self, q: Sequence[float]) -> None:
         """Hold these joint angles (n,), rad, until another posture is commanded; forget every command."""
         self._force = self._torque = None
-        self._is_moved = self._has_lapsed = False
+        self._is_moved = self._has_lapsed = self._is_ignored = False
         self._rising_force(None, 0.0)
         self._rising_torque(None, 0.0)
         self.posture = list(q)
@@ -103,6 +103,7 @@ class CommandAdmission:
         if posture is not None and (beyond := self._joints.beyond(posture)):
             refusals["joint_posture_command"] = beyond
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
+        self._add_without_effect(refusals, parameters.mode, force, posture, torque)
         has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
         if posture is not None and not self._has_lapsed:
@@ -116,6 +117,29 @@ class CommandAdmission:
             self.posture,
             refusals,
         )
+
+    def _add_without_effect(
+        self,
+        refusals: dict[str, str],
+        mode: str,
+        force: ForceCommand | None,
+        posture: Sequence[float] | None,
+        torque: Sequence[float] | None,
+    ) -> None:
+        """Refuse what this mode does not control: a force, a posture that moves, a torque."""
+        is_of_joints = mode == "joint_torque"
+        moves = is_of_joints and posture is not None and self._is_moved and list(posture) != self.posture
+        self._is_ignored = moves or (self._is_ignored and is_of_joints and posture is not None)
+        useless = {
+            "force_command": is_of_joints and bool(_size(force)),
+            "joint_posture_command": self._is_ignored,
+            "joint_torque_command": not is_of_joints and bool(_largest(torque)),
+        }
+        other = "hybrid" if is_of_joints else "joint_torque"
+        for topic in (topic for topic, is_useless in useless.items() if is_useless and topic not in refusals):
+            refusals[topic] = (
+                f"{topic} has no effect in the mode {mode}; set force_loop:mode to {other}, or end the command"
+            )
 
     def _refusal(self, commanded: float, name: str, limit: float, unit: str) -> str:
         return f"{commanded:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} {unit}; {self._last}"

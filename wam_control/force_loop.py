@@ -574,6 +574,8 @@ class ForceLoop:
 
     def _push_on_arm(self, q: Sequence[float], contact: Contact, where: tuple[str, float] | None) -> ArmPush:
         """What pushes the arm: where the commanded force acts, or no nearer to the base than a contact is estimated."""
+        if self.reaction.holds:
+            return self._push(q, self._pushed_position(contact, where))
         probable = self.parameters.link_probability_limit
         if where is not None or not contact.cover or not contact.probability >= probable:
             return self._push(q, where)

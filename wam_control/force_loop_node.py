@@ -9,6 +9,7 @@ from wam_control.guard_report import Report
 from wam_control.task import TaskCommand, task_of
 from wam_control.trajectory_player import TrajectoryPlayer
 from wam_description.arm import Shared
+from wam_description.number_text import brief
 from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Table, Wrench
 from wam_description.status import REFUSED
@@ -35,7 +36,8 @@ class ForceLoopNode:
         self._refusal = ""
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
-        self._reported: tuple[Report, ForceReaction, bool, tuple[str, ...], str, bool] | None = None
+        self._reported: tuple[Report, ForceReaction, bool, tuple[str, ...], str, bool, tuple[str, ...]] | None = None
+        self._commanded: list[float] = []
         self._reaction = ForceReaction.NONE
 
     @reaction(
@@ -69,6 +71,8 @@ class ForceLoopNode:
             posture = self._on_trajectory(inputs)
         if self._refusal:
             command = posture = torque = None  # the arm holds its position
+        self._commanded = [*(command.force if command else ()), *(torque.effort if torque else ())]
+        self._commanded += [axis.value or 0.0 for axis in task.axes] if task else []
         external, hypotheses = inputs["external_joint_torques"], inputs["contact/hypotheses"]
         torque_sd = inputs["external_joint_torques_sd"]
         out = self._loop.step(
@@ -138,7 +142,9 @@ class ForceLoopNode:
         refused = self.refusals
         refused.pop("contact/hypotheses", None)
         advised, other = self._loop.is_advised, self._refusal or self._player.refusal
-        present = report, reaction, self._loop.is_pushed, tuple(refused), other, advised
+        # a reason is that of the command for which it was given
+        commanded = tuple(map(brief, self._commanded)) if self._loop.reason or refused else ()
+        present = report, reaction, self._loop.is_pushed, tuple(refused), other, advised, commanded
         if present == self._reported:
             return {}
         self._reported = present

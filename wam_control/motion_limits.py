@@ -123,6 +123,7 @@ class MotionLimits:
     def __init__(self, arm: Arm, body: RigidBody, parameters: LimitParameters, fastest: float) -> None:
         self._joints, self._body, self._parameters, self._fastest = arm.joints, body, parameters, fastest
         self._given = self._pushed = 0.0  # m by which the arm has given way, N in the present push
+        self._on = ""  # the cover that is pushed, '' where that is not known
         self._how_known = ""  # that force: a lower bound, or the one at an assumed position
         self._reason, self._reported = "", 0.0  # the last one, and for how long, s, it is reported still
 
@@ -158,6 +159,9 @@ class MotionLimits:
         self, velocity: list[float], q: Sequence[float], push: ArmPush, dt: float, whole: WholeForce | None
     ) -> tuple[list[float], str]:
         """Against a force that has come near the largest one no faster than the force law towards that one."""
+        on = push.position[0] if push.position else ""
+        if on != self._on:
+            self._on, self._pushed = on, 0.0  # what pushes elsewhere was not this
         force, allowed, how_known = self._push(q, push, whole)
         if not self._pushed and force <= BEGIN * allowed:
             return velocity, ""
@@ -177,9 +181,9 @@ class MotionLimits:
             return limited, ""  # by itself, the arm gives way fast enough
         limit = self._in_words(allowed, whole)
         return limited, (
-            f"the world pushes with {self._how_known.format(brief(self._pushed))}; allowed: {limit}; the arm does not "
-            "move against it, and gives way by limits.free_travel at most: command a direction or a posture away from "
-            "it, or less force"
+            f"the world pushes with {self._how_known.format(brief(self._pushed))}; allowed: {limit}; from {BEGIN:g} of "
+            "that on the arm is slow against it, above it gives way by limits.free_travel at most: command a direction "
+            "or a posture away from it, or less force"
         )
 
     def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float, str]:

@@ -379,6 +379,7 @@ class Shared:
             "parameter 'nodes' is empty; list the nodes to start, for example "
             "[driver, transform, velocity_loop, gravity, force_loop, contact_estimator]",
         )
+        self.arm.links.require_bodies()
         each = ("joint_speed", "joint_acceleration", "joint_jerk")
         lengths("motion", self.arm.joints.names, {key: getattr(self.motion, key) for key in each})
 

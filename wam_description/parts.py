@@ -126,11 +126,22 @@ class Links:
         spatial = {"centre": self.centre, "inertia": self.inertia, "product": self.product}
         lengths("arm.links", self.names, spatial, width=3)
         for i, name in enumerate(self.names):
-            least, middle, largest = np.linalg.eigvalsh(self.tensor(i)).tolist()
+            least = float(np.linalg.eigvalsh(self.tensor(i))[0])
             require(
                 least >= 0.0,
                 f"{name}: arm.links.inertia and product give a principal inertia of {least:.3g} kg m^2, below 0",
             )
+
+    def require_bodies(self) -> None:
+        """Refuse inertias that no body has; those of an identified model need only move the arm alike.
+
+        Raises
+        ------
+        ParameterError
+            names the link and its inertias.
+        """
+        for i, name in enumerate(self.names):
+            least, middle, largest = np.linalg.eigvalsh(self.tensor(i)).tolist()
             require(
                 largest <= (least + middle) * (1.0 + ROUNDED),
                 f"{name}: arm.links.inertia and product give the principal inertias {least:.4g}, {middle:.4g} and "
