@@ -67,7 +67,7 @@ class TorqueWatch:
     def _not_reached(self, desired: float, measured: float, allowed: float, lasting: float, dt: float) -> str:
         """Why the torque counts as not reached, until it has been right for a while; '' where it does not.
 
-        Another command does not begin anew: one that varies would never be late.
+        The time counts on where another torque is commanded: one that varies would never be late.
         """
         error = desired - measured
         if abs(error) <= allowed:
