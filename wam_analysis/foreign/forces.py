@@ -37,21 +37,28 @@ class ForceStep(NamedTuple):
 
 
 def force_steps(measured: Source, command: Source) -> list[ForceStep]:
-    """The steps of a command of a force, and how the measured force followed; its sign may be that of the reaction."""
+    """The steps of a command of a force, and how the measured force followed; its sign may be that of the reaction.
+
+    A step ends where the sender of either goes over to another frame; one from another frame is none.
+    """
+    known = ~command.is_away(measured.time)
+    if not np.any(known):
+        return []
     desired = np.column_stack([command.values[axis] for axis in FORCE])
     changed = np.flatnonzero(np.any(np.abs(np.diff(desired, axis=0)) > SMALL, axis=1)) + 1
     begins = [0, *changed.tolist()]
     ends = [*command.time[changed].tolist(), float(measured.time[-1])]
     stretches = pieces(measured)
-    rows = np.maximum(np.searchsorted(command.time, measured.time, side="right") - 1, 0)
-    got = np.column_stack([measured.values[axis] for axis in FORCE])
+    rows = np.maximum(np.searchsorted(command.time, measured.time[known], side="right") - 1, 0)
+    got = np.column_stack([measured.values[axis][known] for axis in FORCE])
     sign = np.sign(float(np.sum((got - got.mean(axis=0)) * (desired[rows] - desired[rows].mean(axis=0))))) or 1.0
-    found = []
-    for last, row, end in zip([0, *begins[:-1]], begins, ends, strict=True):
+    found, arrives = [], command.arrives
+    for last, row, until in zip([0, *begins[:-1]], begins, ends, strict=True):
         begin = float(command.time[row])
+        end = min(until, command.leaves(begin), measured.leaves(begin))
         change = desired[row] - desired[last]
         size = float(np.linalg.norm(change))
-        if size <= SMALL or end - begin < SHORTEST:
+        if size <= SMALL or arrives[row] or end - begin < SHORTEST:
             continue
         way = change / size
         for piece in stretches:

@@ -140,17 +140,19 @@ def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], giv
 
 def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
     steps: list[ForceStep] = []
-    for one in states:
-        command = None if one.is_joint else _command_of(one, commands, states)
-        steps += [] if command is None else force_steps(one, command)
-    sentences, findings, doubts = [], [], []
-    for one in (one for one in states if not one.is_joint and _command_of(one, commands, states) is None):
+    sentences, findings, doubts, followed = [], [], [], set()
+    for one in (one for one in states if not one.is_joint):
+        if (command := _command_of(one, commands, states)) is not None:
+            steps += force_steps(one, command)
+            followed.add(command.topic)
+            continue
         doubts += [
             f"{one.label}, in the frame {one.frame}, is not compared with the command {other.topic}, in the frame "
             f"{other.frame}."
             for other in commands
             if not other.is_joint and not _share_frame(one, other)
         ]
+    doubts += [text for one in commands if one.topic in followed and (text := _arrival(one))]
     for step in steps:
         name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
         response = step.response
@@ -174,6 +176,18 @@ def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
         return Section("force", "Force", (*sentences, *doubts), tuple(findings), (), (verdict, *doubts))
     stated = tuple(doubts) or ("No step of a commanded force was recorded.",)
     return Section("force", "Force", stated, (), (), tuple(doubts))
+
+
+def _arrival(command: Source) -> str:
+    """That a command goes over to its frame from another one, '' if it does not."""
+    at = command.time[command.arrives & np.any(np.column_stack([*command.values.values()]), axis=1)]
+    if not len(at):
+        return ""
+    when = f"at {at[0]:.1f} s" if len(at) == 1 else f"{times(len(at))}, first at {at[0]:.1f} s"
+    return (
+        f"{command.topic} goes over to the frame {command.frame or 'without a name'} {when}; that is not evaluated as "
+        "a step, because what was commanded before is in another frame."
+    )
 
 
 def _settled(seconds: float) -> str:
