@@ -532,6 +532,21 @@ def test_a_sender_that_goes_over_to_another_frame_has_no_gaps(tmp_path: Path) ->
     assert "from 0.0 to 9.0 s" in section(found, "stability")[0]
 
 
+def test_why_a_joint_has_no_friction_is_said_where_its_effort_is_often_no_number(tmp_path: Path) -> None:
+    time = times(30.0)
+    q, v, a = swung(time, 2)
+    effort = loaded(q, v, a, 0.0, 3)
+    effort = np.column_stack([effort, np.where(np.arange(len(time)) % 2, math.nan, effort)])
+    position, velocity = np.column_stack([q, q]), np.column_stack([v, v])
+    sent = joints("/joint_states", time, ["whole", "half"], position=position, velocity=velocity, effort=effort)
+    analysis, numbers = found((by_rosbags(tmp_path / "bag", sent), TopicMap()))
+    why = "effort is a number in only 50 % of its messages"
+    assert numbers["whole: dry friction"] == pytest.approx(DRY, rel=CLOSE)
+    assert "half: dry friction" not in numbers
+    assert section(analysis, "happened")[-1] == f"half: {why}; it is not analysed."
+    assert section(analysis, "friction")[-1] == f"half: neither friction nor inertia is given, because its {why}."
+
+
 def following(frame_at: float, measured_at: float, cycle: float = 0.0) -> list[Sent]:
     """A command of 10 N from 4 s and 5 N from 12 s on, and the force that follows it, with a cycle from 12 s on.
 

@@ -43,7 +43,7 @@ def foreign_sections(bag: Bag, given: TopicMap) -> tuple[Section, ...]:
     states = [one for one in found if not one.is_command]
     commands = [one for one in found if one.is_command]
     return (
-        _happened(bag, commands, mixed, given),
+        _happened(bag, found, mixed, given),
         _forces(states, commands),
         _cycles(states, commands),
         _stick_slip(states, commands),
@@ -92,7 +92,7 @@ def _share_frame(one: Source, other: Source) -> bool:
     return one.frame == other.frame or not one.frame or not other.frame
 
 
-def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], given: TopicMap) -> Section:
+def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given: TopicMap) -> Section:
     what = (
         "Analysed as that of another robot, as the options request."
         if given.is_given
@@ -124,15 +124,19 @@ def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], giv
     others = sum(count for name, count in bag.counts.items() if name not in bag.topics and count)
     if others:
         sentences.append(f"{others} messages of other topics were not analysed; --topic and --map name their fields.")
-    if commands:
-        topics = ", ".join(dict.fromkeys(one.topic for one in commands))
+    if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
+    sentences += [f"{one.label}: {_sparse(one, q)}; it is not analysed." for one in found for q in one.sparse]
     verdict = [
         f"{topic}: values jump back and forth from message to message, as where two publishers take turns; "
         f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
         for topic in dict.fromkeys(one.topic for one in mixed)
     ]
     return Section("happened", "What happened", (*sentences, *verdict), (), (), tuple(verdict))
+
+
+def _sparse(one: Source, quantity: str) -> str:
+    return f"{quantity} is a number in only {100.0 * one.sparse[quantity]:.0f} % of its messages"
 
 
 # forces
@@ -290,6 +294,8 @@ def _friction(states: Sequence[Source]) -> Section:
                 f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the two is "
                 f"of another unit or sign, so that neither friction nor inertia is given."
             )
+        if "effort" in one.sparse:
+            doubts.append(f"{one.label}: neither friction nor inertia is given, because its {_sparse(one, 'effort')}.")
         whole = friction(one) if one.is_joint else None
         if whole is None:
             continue

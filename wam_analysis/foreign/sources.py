@@ -43,6 +43,7 @@ class Source(NamedTuple):
     away : (k,), s from the first stamp, rising: stamps of its sender's messages in another frame.
     values : (n,) by quantity: position, velocity, effort, or the axes of the wrench; all finite.
     units : by quantity.
+    sparse : the share of the messages in which a quantity is a number, by those that are left out because it is small.
     """
 
     label: str
@@ -56,6 +57,7 @@ class Source(NamedTuple):
     away: Numbers
     values: dict[str, Numbers]
     units: dict[str, str]
+    sparse: dict[str, float]
 
     @property
     def is_joint(self) -> bool:
@@ -117,7 +119,7 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
         for frame, rows, sent in _frames(columns, time, is_command):
             for name, values, units in _parts(columns, given):
                 given_by = (time[rows], time[sent], received[sent], np.unique(time[sent & ~rows]))
-                one = Source(topic, topic, name, frame, is_command, *given_by, values, units)
+                one = Source(topic, topic, name, frame, is_command, *given_by, values, units, {})
                 if (whole := _whole(one, rows)) is not None:
                     found.append(whole)
     return _labelled(found)
@@ -208,6 +210,7 @@ def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
     kept = {q: v for q, v in values.items() if 2 * int(np.sum(known[q])) > most > 0}
     if not kept:
         return None
+    sparse = {q: share for q, there in known.items() if q not in kept and (share := float(np.sum(there)) / most)}
     rows = np.flatnonzero(np.logical_and.reduce([known[q] for q in kept]))
     rows = rows[np.unique(one.time[rows], return_index=True)[1]]
     if len(rows) < (1 if one.is_command else FEWEST):
@@ -215,7 +218,8 @@ def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
     values = {q: v[rows].astype(np.float64) for q, v in kept.items()}
     # a joint may be in some messages of a topic only, a wrench is in all
     sent = rows if one.is_joint else np.unique(one.sent, return_index=True)[1]
-    return one._replace(time=one.time[rows], sent=one.sent[sent], received=one.received[sent], values=values)
+    given_by = {"time": one.time[rows], "sent": one.sent[sent], "received": one.received[sent]}
+    return one._replace(**given_by, values=values, sparse=sparse)
 
 
 def _labelled(found: list[Source]) -> list[Source]:
