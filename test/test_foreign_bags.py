@@ -592,6 +592,21 @@ def test_a_step_ends_where_command_or_force_goes_over_to_another_frame(
     assert numbers[f"{name}: overshoot"] == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.parametrize("topic", ["/ft/command", "/ft/wrench"])
+@pytest.mark.parametrize("share", [1, 2])
+def test_a_force_of_which_an_axis_is_no_number_is_evaluated_by_the_others(
+    topic: str, share: int, tmp_path: Path
+) -> None:
+    sent = following(99.0, 99.0)
+    for i, one in enumerate(sent):
+        if one.topic == topic and not i % share:
+            one.fields["force"][1] = math.nan
+    found = quiet(by_rosbags(tmp_path / "bag", sent))
+    assert section(found, "verdict")[0].startswith("2 force steps; ")
+    left_out = f"{topic}: force.y is a number in only 50 % of its messages; it is not analysed."
+    assert (left_out in section(found, "happened")) == (share == 2)
+
+
 def test_whether_a_cycle_was_commanded_is_not_known_while_the_command_is_in_another_frame(tmp_path: Path) -> None:
     sent = following(12.0, 99.0, cycle=1.0)
     (cycle,) = section(quiet(by_rosbags(tmp_path / "bag", sent)), "stability")

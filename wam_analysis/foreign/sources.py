@@ -218,8 +218,8 @@ def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
     values = {q: v[rows].astype(np.float64) for q, v in kept.items()}
     # a joint may be in some messages of a topic only, a wrench is in all
     sent = rows if one.is_joint else np.unique(one.sent, return_index=True)[1]
-    given_by = {"time": one.time[rows], "sent": one.sent[sent], "received": one.received[sent]}
-    return one._replace(**given_by, values=values, sparse=sparse)
+    one = one._replace(time=one.time[rows], sent=one.sent[sent], received=one.received[sent])
+    return one._replace(values=values, sparse=sparse)
 
 
 def _labelled(found: list[Source]) -> list[Source]:
