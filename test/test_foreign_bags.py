@@ -532,6 +532,102 @@ def test_a_sender_that_goes_over_to_another_frame_has_no_gaps(tmp_path: Path) ->
     assert "from 0.0 to 9.0 s" in section(found, "stability")[0]
 
 
+def test_why_a_joint_has_no_friction_is_said_where_its_effort_is_often_no_number(tmp_path: Path) -> None:
+    time = times(30.0)
+    q, v, a = swung(time, 2)
+    effort = loaded(q, v, a, 0.0, 3)
+    effort = np.column_stack([effort, np.where(np.arange(len(time)) % 2, math.nan, effort)])
+    position, velocity = np.column_stack([q, q]), np.column_stack([v, v])
+    sent = joints("/joint_states", time, ["whole", "half"], position=position, velocity=velocity, effort=effort)
+    analysis, numbers = found((by_rosbags(tmp_path / "bag", sent), TopicMap()))
+    why = "effort is a number in only 50 % of its messages"
+    assert numbers["whole: dry friction"] == pytest.approx(DRY, rel=CLOSE)
+    assert "half: dry friction" not in numbers
+    assert section(analysis, "happened")[-1] == f"half: {why}; it is not analysed."
+    assert section(analysis, "friction")[-1] == f"half: neither friction nor inertia is given, because its {why}."
+
+
+def following(frame_at: float, measured_at: float, cycle: float = 0.0) -> list[Sent]:
+    """A command of 10 N from 4 s and 5 N from 12 s on, and the force that follows it, with a cycle from 12 s on.
+
+    Both are in `base` until they go over to `tool`, whose z is flipped.
+    """
+    time, tau = np.arange(0.0, 20.0, 0.005), 0.2
+    asked = np.where(time < 4.0, 0.0, np.where(time < 12.0, 10.0, 5.0))
+    force = np.zeros((len(time), 3))
+    for i in range(1, len(time)):
+        force[i, 2] = force[i - 1, 2] + (asked[i - 1] - force[i - 1, 2]) * (1.0 - math.exp(-0.005 / tau))
+    force[:, 2] += cycle * np.sin(4.0 * np.pi * time) * (time >= 12.0)
+    asked = np.column_stack([0.0 * asked, 0.0 * asked, asked])
+    return [
+        one._replace(frame="tool", fields={"force": -one.fields["force"]}) if one.stamp >= goes_over else one
+        for topic, values, goes_over in (("/ft/command", asked, frame_at), ("/ft/wrench", force, measured_at))
+        for one in wrenches(topic, time, values, "base")
+    ]
+
+
+GOES_OVER = (
+    "/ft/command goes over to the frame tool at 12.0 s; that is not evaluated as a step, because what was commanded "
+    "before is in another frame."
+)
+NOT_COMPARED = "/ft/wrench (tool), in the frame tool, is not compared with the command /ft/command, in the frame base."
+
+
+@pytest.mark.parametrize(
+    ("frame_at", "measured_at", "doubt"),
+    [(12.0, 99.0, GOES_OVER), (99.0, 9.0, NOT_COMPARED), (12.0, 12.0, GOES_OVER)],
+)
+def test_a_step_ends_where_command_or_force_goes_over_to_another_frame(
+    frame_at: float, measured_at: float, doubt: str, tmp_path: Path
+) -> None:
+    analysis, numbers = found((by_rosbags(tmp_path / "bag", following(frame_at, measured_at)), TopicMap()))
+    label = "/ft/wrench" if measured_at > 20.0 else "/ft/wrench (base)"
+    name = f"{label}, 10 N at 4.0 s"
+    assert len(section(analysis, "force")) == 2
+    assert section(analysis, "force")[1] == doubt
+    assert section(analysis, "verdict")[0].startswith("1 force step; ")
+    assert section(analysis, "verdict")[1] == doubt
+    assert numbers[f"{name}: rise time 10-90 %"] == pytest.approx(math.log(9.0) * 0.2, rel=0.01)
+    assert numbers[f"{name}: force in the steady state"] == pytest.approx(10.0, abs=1e-3)
+    assert numbers[f"{name}: overshoot"] == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("topic", ["/ft/command", "/ft/wrench"])
+@pytest.mark.parametrize("share", [1, 2])
+def test_a_force_of_which_an_axis_is_no_number_is_evaluated_by_the_others(
+    topic: str, share: int, tmp_path: Path
+) -> None:
+    sent = following(99.0, 99.0)
+    for i, one in enumerate(sent):
+        if one.topic == topic and not i % share:
+            one.fields["force"][1] = math.nan
+    found = quiet(by_rosbags(tmp_path / "bag", sent))
+    assert section(found, "verdict")[0].startswith("2 force steps; ")
+    left_out = f"{topic}: force.y is a number in only 50 % of its messages; it is not analysed."
+    assert (left_out in section(found, "happened")) == (share == 2)
+
+
+def test_whether_a_cycle_was_commanded_is_not_known_while_the_command_is_in_another_frame(tmp_path: Path) -> None:
+    sent = following(12.0, 99.0, cycle=1.0)
+    (cycle,) = section(quiet(by_rosbags(tmp_path / "bag", sent)), "stability")
+    assert cycle.endswith("whether it was commanded to is not in this bag.")
+
+
+def test_commands_of_two_senders_in_two_frames_are_divided(tmp_path: Path) -> None:
+    """Both publish all the time on one topic: neither goes over to the frame of the other."""
+    time = np.arange(0.0, 12.0, 0.005)
+    left, right = np.zeros((2, len(time), 3))
+    left[time >= 4.0, 2], right[time >= 6.0, 2] = 10.0, 7.0
+    sent = [
+        one
+        for frame, force, shift in (("left", left, 0.0), ("right", right, 0.002))
+        for topic in ("/ft/command", "/ft/wrench")
+        for one in wrenches(topic, time + shift, force, frame)
+    ]
+    found = quiet(by_rosbags(tmp_path / "bag", sent))
+    assert section(found, "verdict")[0].startswith("2 force steps; the largest steady error is 0 N of ")
+
+
 # ways in
 
 

@@ -52,6 +52,14 @@ def test_the_arm_that_is_chosen_is_replayed(
     assert f"; 0 only recorded, {MESSAGES['/' + chosen]} only replayed" in printed
 
 
+@pytest.mark.parametrize(("chosen", "length"), [("left", "0.145 s"), ("right", "0.195 s")])
+def test_the_length_is_that_of_the_arm_that_is_analysed(
+    bag: Path, chosen: str, length: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed, _ = ended(capsys, "analyse", bag, "--namespace", chosen)
+    assert f"{length} of /{chosen}, " in printed
+
+
 @pytest.mark.parametrize(
     "command", [("replay", "gravity", "--config", "wam"), ("identify",), ("view", "--save", "x.rrd")]
 )

@@ -10,6 +10,7 @@ Topics of numbers are compared; in_contact and markers follow from the same esti
 import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -114,7 +115,7 @@ class Replay(NamedTuple):
         return all(topic.is_same for topic in self.topics)
 
 
-OF_THE_RUN = ("nodes", "timing.real_time_factor", "timing.timeout")  # no node computes with them
+OF_THE_RUN = ("timing.real_time_factor", "timing.timeout")  # no node computes with them
 REPLAYED = tuple(name for name in NODES if name not in ("driver", "scenario", "recorder"))
 
 
@@ -134,7 +135,7 @@ def replay(
     ----------
     path : bag.
     node : one of `REPLAYED`, or 'module:Class' of a node of your own.
-    configuration : values to use instead of those in the bag.
+    configuration : values to use instead of those in the bag; `nodes`, who runs, remains that of the bag.
     values : to be replaced among those in the bag, by 'node:parameter' or the name of a shared parameter.
     namespace : of the arm, as for `recorded_run`.
 
@@ -212,10 +213,13 @@ def _gaps(topic: str, columns: Columns | None) -> list[Gap]:
 
 
 def _parameters(run: RecordedRun, declaration: Declaration, configuration: Configuration | None) -> tuple[Shared, Any]:
-    """Shared and own parameters of the node, as recorded or from a configuration."""
+    """Shared and own parameters of the node, as recorded or from a configuration; who ran is always as recorded."""
     node, kind = declaration.name, declaration.parameter_class
     if configuration is not None:
-        return configuration.shared, configuration.node(node, kind)
+        shared = configuration.shared
+        if run.parameters.nodes:
+            shared = replace(shared, nodes=run.parameters.shared.nodes)
+        return shared, configuration.node(node, kind)
     try:
         return run.parameters.shared, run.parameters.part(node, kind)
     except BagError as error:

@@ -127,7 +127,8 @@ def analyse_bag(bag: Bag, progress: Progress, namespace: str = "") -> Analysis:
     progress("friction, ripple, power and frequency")
     motion = motion_sections(recording)
     progress("timing")
-    duration = extent(bag.topics)
+    prefix = f"{recording.namespace}/"
+    duration = extent({name: topic for name, topic in bag.topics.items() if name.startswith(prefix)})
     sections = (_happened(recording, duration), *middle, *motion.sections, timing_section(recording))
     return Analysis(recording, held, motion, duration, provenance(recording), (_verdict(sections), *sections))
 

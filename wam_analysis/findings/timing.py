@@ -121,7 +121,7 @@ def _part_of(read: int, all_of_them: int) -> str:
 
 
 def extent(columns: Mapping[str, Columns]) -> float:
-    """Length of a recording, s: from the first to the last log time of its topics."""
+    """Length of what was recorded on some topics, s: from the first to the last stamp, or log time without stamps."""
     times = [topic.log_time_ns for topic in columns.values() if len(topic.log_time_ns)]
     if not times:
         return 0.0

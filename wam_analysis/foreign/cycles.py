@@ -143,6 +143,8 @@ def _without_response(piece: Piece, quantity: str, command: Source) -> Numbers |
     """A signal less what follows its command linearly, at once, late or slowly; None without a moving command."""
     if quantity not in command.values or len(command.time) < FEWEST or command.time[0] > piece.time[0]:
         return None
+    if np.any(command.is_away(piece.time)):
+        return None
     desired = held(command, quantity, piece.time)
     if not np.ptp(desired) > 0.0:
         return None
@@ -173,11 +175,13 @@ def _slowed(value: Numbers, share: float) -> Numbers:
 
 
 def _commanded_frequency(one: Episode, quantity: str, command: Source | None) -> float | None:
-    """Frequency of the command during an episode, Hz, 0 if it does not repeat; None if there was no command."""
+    """Frequency of the command during an episode, Hz, 0 if it does not repeat; None if it is not known."""
     if command is None or not len(command.time) or command.time[0] > one.begin:
         return None
     desired = quantity if quantity in command.values else next(iter(command.values))
     time = np.linspace(one.begin, one.end, max(len(one.cycle.shape), round(40.0 * one.cycle.cycles)))
+    if np.any(command.is_away(time)):
+        return None
     value = held(command, desired, time)
     cycle = limit_cycle(time, value)
     is_small = desired == quantity and cycle.peak_to_peak < COMMANDED * one.cycle.peak_to_peak

@@ -37,25 +37,34 @@ class ForceStep(NamedTuple):
 
 
 def force_steps(measured: Source, command: Source) -> list[ForceStep]:
-    """The steps of a command of a force, and how the measured force followed; its sign may be that of the reaction."""
-    desired = np.column_stack([command.values[axis] for axis in FORCE])
+    """The steps of a command of a force, and how the measured force followed; its sign may be that of the reaction.
+
+    A step ends where the sender of either goes over to another frame; one from another frame is none.  Axes that are
+    not known of both are left out.
+    """
+    known = ~command.is_away(measured.time)
+    axes = [axis for axis in FORCE if axis in command.values and axis in measured.values]
+    if not axes or not np.any(known):
+        return []
+    desired = np.column_stack([command.values[axis] for axis in axes])
     changed = np.flatnonzero(np.any(np.abs(np.diff(desired, axis=0)) > SMALL, axis=1)) + 1
     begins = [0, *changed.tolist()]
     ends = [*command.time[changed].tolist(), float(measured.time[-1])]
     stretches = pieces(measured)
-    rows = np.maximum(np.searchsorted(command.time, measured.time, side="right") - 1, 0)
-    got = np.column_stack([measured.values[axis] for axis in FORCE])
+    rows = np.maximum(np.searchsorted(command.time, measured.time[known], side="right") - 1, 0)
+    got = np.column_stack([measured.values[axis][known] for axis in axes])
     sign = np.sign(float(np.sum((got - got.mean(axis=0)) * (desired[rows] - desired[rows].mean(axis=0))))) or 1.0
-    found = []
-    for last, row, end in zip([0, *begins[:-1]], begins, ends, strict=True):
+    found, arrives = [], command.arrives
+    for last, row, until in zip([0, *begins[:-1]], begins, ends, strict=True):
         begin = float(command.time[row])
+        end = min(until, command.leaves(begin), measured.leaves(begin))
         change = desired[row] - desired[last]
         size = float(np.linalg.norm(change))
-        if size <= SMALL or end - begin < SHORTEST:
+        if size <= SMALL or arrives[row] or end - begin < SHORTEST:
             continue
         way = change / size
         for piece in stretches:
-            value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(FORCE))
+            value = sign * sum(way[i] * piece.values[axis] for i, axis in enumerate(axes))
             before = (piece.time < begin) & (piece.time >= begin - BEFORE)
             after = (piece.time >= begin) & (piece.time < end)
             if not np.any(before) or int(np.sum(after)) < 8 or float(piece.time[after][-1]) < end - BEFORE:

@@ -43,7 +43,7 @@ def foreign_sections(bag: Bag, given: TopicMap) -> tuple[Section, ...]:
     states = [one for one in found if not one.is_command]
     commands = [one for one in found if one.is_command]
     return (
-        _happened(bag, commands, mixed, given),
+        _happened(bag, found, mixed, given),
         _forces(states, commands),
         _cycles(states, commands),
         _stick_slip(states, commands),
@@ -92,7 +92,7 @@ def _share_frame(one: Source, other: Source) -> bool:
     return one.frame == other.frame or not one.frame or not other.frame
 
 
-def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], given: TopicMap) -> Section:
+def _happened(bag: Bag, found: Sequence[Source], mixed: Sequence[Source], given: TopicMap) -> Section:
     what = (
         "Analysed as that of another robot, as the options request."
         if given.is_given
@@ -124,9 +124,9 @@ def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], giv
     others = sum(count for name, count in bag.counts.items() if name not in bag.topics and count)
     if others:
         sentences.append(f"{others} messages of other topics were not analysed; --topic and --map name their fields.")
-    if commands:
-        topics = ", ".join(dict.fromkeys(one.topic for one in commands))
+    if topics := ", ".join(dict.fromkeys(one.topic for one in found if one.is_command)):
         sentences.append(f"Taken as commands: {topics}.")
+    sentences += [f"{one.label}: {_sparse(one, q)}; it is not analysed." for one in found for q in one.sparse]
     verdict = [
         f"{topic}: values jump back and forth from message to message, as where two publishers take turns; "
         f"the topic is not analysed ({', '.join(one.label for one in mixed if one.topic == topic)})."
@@ -135,22 +135,28 @@ def _happened(bag: Bag, commands: Sequence[Source], mixed: Sequence[Source], giv
     return Section("happened", "What happened", (*sentences, *verdict), (), (), tuple(verdict))
 
 
+def _sparse(one: Source, quantity: str) -> str:
+    return f"{quantity} is a number in only {100.0 * one.sparse[quantity]:.0f} % of its messages"
+
+
 # forces
 
 
 def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
     steps: list[ForceStep] = []
-    for one in states:
-        command = None if one.is_joint else _command_of(one, commands, states)
-        steps += [] if command is None else force_steps(one, command)
-    sentences, findings, doubts = [], [], []
-    for one in (one for one in states if not one.is_joint and _command_of(one, commands, states) is None):
+    sentences, findings, doubts, followed = [], [], [], set()
+    for one in (one for one in states if not one.is_joint):
+        if (command := _command_of(one, commands, states)) is not None:
+            steps += force_steps(one, command)
+            followed.add(command.topic)
+            continue
         doubts += [
             f"{one.label}, in the frame {one.frame}, is not compared with the command {other.topic}, in the frame "
             f"{other.frame}."
             for other in commands
             if not other.is_joint and not _share_frame(one, other)
         ]
+    doubts += [text for one in commands if one.topic in followed and (text := _arrival(one))]
     for step in steps:
         name = f"{step.label}, {shown(step.commanded, 'N')} at {step.begin:.1f} s"
         response = step.response
@@ -174,6 +180,18 @@ def _forces(states: Sequence[Source], commands: Sequence[Source]) -> Section:
         return Section("force", "Force", (*sentences, *doubts), tuple(findings), (), (verdict, *doubts))
     stated = tuple(doubts) or ("No step of a commanded force was recorded.",)
     return Section("force", "Force", stated, (), (), tuple(doubts))
+
+
+def _arrival(command: Source) -> str:
+    """That a command goes over to its frame from another one, '' if it does not."""
+    at = command.time[command.arrives & np.any(np.column_stack([*command.values.values()]), axis=1)]
+    if not len(at):
+        return ""
+    when = f"at {at[0]:.1f} s" if len(at) == 1 else f"{times(len(at))}, first at {at[0]:.1f} s"
+    return (
+        f"{command.topic} goes over to the frame {command.frame or 'without a name'} {when}; that is not evaluated as "
+        "a step, because what was commanded before is in another frame."
+    )
 
 
 def _settled(seconds: float) -> str:
@@ -276,6 +294,8 @@ def _friction(states: Sequence[Source]) -> Section:
                 f"{one.label}: the recorded velocity is {factor:.3g} times the rate of the position; one of the two is "
                 f"of another unit or sign, so that neither friction nor inertia is given."
             )
+        if "effort" in one.sparse:
+            doubts.append(f"{one.label}: neither friction nor inertia is given, because its {_sparse(one, 'effort')}.")
         whole = friction(one) if one.is_joint else None
         if whole is None:
             continue

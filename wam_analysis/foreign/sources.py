@@ -40,8 +40,10 @@ class Source(NamedTuple):
     is_command : whether the values are commanded.
     time : (n,), s from the first stamp of the recording, rising.
     sent, received : (m,), s from the first stamp, all stamps of its sender and when the recorder got them.
+    away : (k,), s from the first stamp, rising: stamps of its sender's messages in another frame.
     values : (n,) by quantity: position, velocity, effort, or the axes of the wrench; all finite.
     units : by quantity.
+    sparse : the share of the messages in which a quantity is a number, by those that are left out because it is small.
     """
 
     label: str
@@ -52,13 +54,29 @@ class Source(NamedTuple):
     time: Numbers
     sent: Numbers
     received: Numbers
+    away: Numbers
     values: dict[str, Numbers]
     units: dict[str, str]
+    sparse: dict[str, float]
 
     @property
     def is_joint(self) -> bool:
         """Whether it is a joint, not a wrench."""
         return bool(self.name)
+
+    @property
+    def arrives(self) -> Mask:
+        """Whether the message of its sender before each of its own was in another frame, (n,)."""
+        return _last(self.away, self.time) > np.concatenate([[-math.inf], self.time[:-1]])
+
+    def is_away(self, time: Numbers) -> Mask:
+        """Whether its sender was in another frame at some times, so that its values are not known."""
+        return _last(self.away, time) > _last(self.time, time)
+
+    def leaves(self, begin: float) -> float:
+        """When its sender goes over to another frame after an instant, s; infinite if it does not."""
+        later = self.away[self.away > begin]
+        return float(later[0]) if len(later) else math.inf
 
 
 class Piece(NamedTuple):
@@ -80,6 +98,11 @@ class Piece(NamedTuple):
     recorded: dict[str, Numbers]
 
 
+def _last(stamps: Numbers, time: Numbers) -> Numbers:
+    """The last of rising stamps at or before each time, minus infinity where there is none."""
+    return np.concatenate([[-math.inf], stamps])[np.searchsorted(stamps, time, side="right")]
+
+
 def sources(bag: Bag, given: TopicMap) -> list[Source]:
     """The joints of a bag, each once for each topic and sender, and the wrenches, each once for each frame, too."""
     found: list[Source] = []
@@ -95,8 +118,8 @@ def sources(bag: Bag, given: TopicMap) -> list[Source]:
         time, received = (stamps - origin) / 1e9, (columns.log_time_ns - origin) / 1e9
         for frame, rows, sent in _frames(columns, time, is_command):
             for name, values, units in _parts(columns, given):
-                given_by = (time[rows], time[sent], received[sent])
-                one = Source(topic, topic, name, frame, is_command, *given_by, values, units)
+                given_by = (time[rows], time[sent], received[sent], np.unique(time[sent & ~rows]))
+                one = Source(topic, topic, name, frame, is_command, *given_by, values, units, {})
                 if (whole := _whole(one, rows)) is not None:
                     found.append(whole)
     return _labelled(found)
@@ -106,11 +129,14 @@ def _frames(columns: JointColumns | WrenchColumns, time: Numbers, is_command: bo
     """Each frame of a topic, the messages that are known in it, and all of its sender.
 
     A frame that comes in the place of another one is of the same sender: a joint is the same in both, and so is a
-    wrench of zero, which a sender may give in any frame.  One that comes besides is of another sender.
+    wrench of zero, which a sender may give in any frame.  One that comes besides is of another sender; of commands that
+    are sent now and then it is not known.
     """
     frames = np.asarray(columns.frames, dtype=str)
     masks = {frame: frames == frame for frame in dict.fromkeys(frames.tolist())}
-    if len(masks) > 1 and not is_command and _is_besides(time, max(masks.values(), key=np.count_nonzero)):
+    most = max(masks.values(), key=np.count_nonzero)
+    is_seldom = is_command and np.count_nonzero(most) < FEWEST
+    if len(masks) > 1 and not is_seldom and _is_besides(time, most):
         return [(frame, mask, mask) for frame, mask in masks.items()]
     every = np.ones(len(frames), dtype=bool)
     if isinstance(columns, JointColumns) or len(masks) == 1:
@@ -184,6 +210,7 @@ def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
     kept = {q: v for q, v in values.items() if 2 * int(np.sum(known[q])) > most > 0}
     if not kept:
         return None
+    sparse = {q: share for q, there in known.items() if q not in kept and (share := float(np.sum(there)) / most)}
     rows = np.flatnonzero(np.logical_and.reduce([known[q] for q in kept]))
     rows = rows[np.unique(one.time[rows], return_index=True)[1]]
     if len(rows) < (1 if one.is_command else FEWEST):
@@ -191,7 +218,8 @@ def _whole(one: Source, own: NDArray[np.bool_]) -> Source | None:
     values = {q: v[rows].astype(np.float64) for q, v in kept.items()}
     # a joint may be in some messages of a topic only, a wrench is in all
     sent = rows if one.is_joint else np.unique(one.sent, return_index=True)[1]
-    return one._replace(time=one.time[rows], sent=one.sent[sent], received=one.received[sent], values=values)
+    one = one._replace(time=one.time[rows], sent=one.sent[sent], received=one.received[sent])
+    return one._replace(values=values, sparse=sparse)
 
 
 def _labelled(found: list[Source]) -> list[Source]:
