@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_control.force_hold import is_refused
-from wam_control.scenario import ScenarioStep
+from wam_control.scenario import ScenarioStep, require_playable
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -120,6 +120,7 @@ def outcome(point: SweepPoint) -> SweepResult:
     nothing = math.nan
     statuses: list[tuple[int, NodeStatus]] = []
     try:
+        require_playable("the scenario", point.steps, point.configuration)
         run = Simulation(point.configuration, point.steps)
         if FORCE_LOOP in run.nodes:
             run.listen(STATUS, lambda stamp, status: statuses.append((stamp, status)), FORCE_LOOP)
