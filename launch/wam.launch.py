@@ -20,7 +20,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from wam_control.scenario import load, script_file
+from wam_control.scenario import load_for, script_file
 from wam_description.configuration import Configuration, option_values, packaged
 from wam_description.nodes import EACH, GROUPED, NODES
 from wam_description.urdf import urdf
@@ -117,7 +117,8 @@ def chosen(given: dict[str, str]) -> Configuration:
     more = []
     if given["scenario"]:
         file = script_file(given["scenario"]).resolve()
-        load(file, configuration.shared)  # refused before any node starts
+        # refused before any node starts
+        load_for(configuration.with_values(values) if values else configuration, str(file))
         more.append("scenario")
         values["scenario:script"] = str(file)
     if given["record"] == "true" or given["bag"]:

@@ -601,6 +601,15 @@ def test_a_spring_whose_force_no_message_could_contain_is_refused() -> None:
         built({"driver:world.springs.stiffness": [10.0]})
 
 
+def test_a_spring_beyond_the_end_of_its_link_is_refused() -> None:
+    spring = {"driver:world.springs.joints": ["joint4"], "driver:world.springs.stiffness": [10.0]}
+    with pytest.raises(
+        ParameterError, match=r"lever is 1 m for joint4: .* at 1 m of outer_link; allowed: 0 to 0.4064 m"
+    ):
+        built(spring)
+    built({**spring, "driver:world.springs.lever": [0.4064]})
+
+
 def test_added_friction_on_the_wrong_number_of_joints_is_refused() -> None:
     hardware = driver()
     with pytest.raises(ParameterError, match=r"'effects\.added_coulomb_friction' has 1 values; 4 names need 4"):

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from wam_analysis.demo_report import text
+from wam_analysis.demo_report import text, verdict
 from wam_analysis.demo_summary import DemoSummary, SteadyPress, summarize
 from wam_analysis.findings.analysis import Analysis, analyse_bag
 from wam_analysis.reactions import RecordedReaction, sentences, within
-from wam_bag.bag import TableColumns, read
+from wam_bag.bag import Bag, TableColumns, read
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
 from wam_sim.simulated_bag import record
@@ -41,22 +41,39 @@ REFUSED = {
 }
 
 
-@pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSummary, Analysis]:
-    folder = tmp_path_factory.mktemp("reactions")
+TORQUES = """
+- {name: release the brakes, seconds: 0.3, request: enable}
+- {name: too much, seconds: 0.6, torque: [0, 0, 0, 50]}
+- {name: nothing there, seconds: 3.0, torque: [0, 0, 0, 2]}
+- {name: none, seconds: 1.0, torque: [0, 0, 0, 0]}
+- {name: brake, seconds: 0.2, request: disable}
+"""
+
+
+def recorded(folder: Path, steps: str) -> Bag:
     script = folder / "script.yaml"
-    script.write_text(f"steps:\n{STEPS}", encoding="utf-8")
+    script.write_text(f"steps:\n{steps}", encoding="utf-8")
     base = Configuration.load(packaged("wam"))
     names = [name for name in base.shared.nodes if name not in ("scenario", "recorder")]
     configuration = base.with_values({"nodes": [*names, "scenario"]})
     assert not record(configuration, load(script, base.shared), folder / "bag")
-    bag = read(folder / "bag")
+    return read(folder / "bag")
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSummary, Analysis]:
+    bag = recorded(tmp_path_factory.mktemp("reactions"), STEPS)
     return summarize(bag), analyse_bag(bag, lambda stage: None)
 
 
 def press(summary: DemoSummary, name: str) -> SteadyPress:
     (one,) = (one for one in summary.presses if one.step == name)
     return one
+
+
+def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tmp_path: Path) -> None:
+    (answer,) = (one for one in verdict(summarize(recorded(tmp_path, TORQUES))) if one.result == "NO")
+    assert str(answer) == "joint torques and tasks carried out: NO (1 refused, 1 not reached)"
 
 
 @pytest.mark.slow

@@ -486,3 +486,44 @@ def test_settings_and_chirps_are_read_and_refused_with_a_reason(tmp_path: Path) 
         read(force=force, chirp={"newtons": 1, "from": 9, "to": 2})
     with pytest.raises(ParameterError, match="chirp needs a force above 0 N"):
         read(chirp={"newtons": 1, "from": 2, "to": 9})
+
+
+QUICK = """
+steps:
+  - {name: pose, seconds: 4.0, posture: [0.0, -1.8, 0.0, 1.45]}
+  - {name: slower, seconds: 0.1, set: {force_loop: {joint_speed_limit: LIMIT}}}
+  - {name: quick, seconds: SECONDS, posture: [0.0, -1.8, 0.0, 0.25]}
+"""
+
+
+def quick(folder: Path, seconds: float, limit: float) -> str:
+    path = folder / "quick.yaml"
+    path.write_text(QUICK.replace("SECONDS", str(seconds)).replace("LIMIT", str(limit)))
+    return str(path)
+
+
+@pytest.mark.parametrize(("limit", "allowed", "least"), [(1.5, "1.875", "1.2"), (0.75, "0.9375", "2.4")])
+def test_a_posture_that_the_force_loop_cannot_follow_is_refused(
+    limit: float, allowed: str, least: str, tmp_path: Path
+) -> None:
+    text = rf"joint4 goes from 1.45 to 0.25 rad .* force_loop:joint_speed_limit, {allowed} rad/s; .* at least {least} s"
+    with pytest.raises(ParameterError, match=text):
+        load_for(CONFIGURATION, quick(tmp_path, float(least) - 0.01, limit))
+    load_for(CONFIGURATION, quick(tmp_path, float(least), limit))
+    held = [name for name in CONFIGURATION.shared.nodes if name != "force_loop"]
+    path = write(tmp_path, {"steps": [{"name": "go", "seconds": 0.35, "posture": GOAL}]})
+    load_for(CONFIGURATION.with_values({"nodes": held, "force_loop:joint_speed_limit": 0.1}), str(path))
+
+
+def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_limit() -> None:
+    least, short = 1.2, 0.8
+    pose, goal = (0.0, -1.8, 0.0, 1.45), (0.0, -1.8, 0.0, 0.25)
+
+    def left(seconds: float, limit: float) -> float:
+        steps = [ScenarioStep("pose", 4.0, pose, request="enable"), ScenarioStep("quick", seconds, goal)]
+        run = Simulation(CONFIGURATION.with_values({"force_loop:joint_speed_limit": limit}), steps)
+        assert not run.play()
+        return abs(run.rows["sim/joint_states"][-1].values[3] - goal[3])
+
+    assert left(least, 1.5) == pytest.approx(left(least, 3.9), abs=0.01)
+    assert left(short, 1.5) > left(short, 3.9) + 0.1

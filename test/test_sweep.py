@@ -83,6 +83,30 @@ def test_a_force_that_the_loop_refuses_is_a_failure_and_no_error(tmp_path: Path)
     assert math.isnan(found.force_rms)
 
 
+@pytest.mark.parametrize(
+    ("command", "failure"),
+    [
+        ("torque: [0, 0, 0, 50]", "press refused: force of joint 4: 50 N m is commanded; allowed: up to torque_limit"),
+        ("torque: [0, 0, 0, 2]", "press not reached: force of joint 4: "),
+        (
+            "task: {axes: [{force: 70.0, along: [0, 0, -1], cover: outer_link, contact_position: 0.28}]}",
+            "press refused: force along (0, 0, -1) at 0.28 m of outer_link: 70 N is commanded; allowed: up to",
+        ),
+        ("torque: [0, 0, 0, 0]", ""),
+    ],
+)
+def test_a_task_that_the_loop_refuses_or_does_not_reach_is_a_failure(
+    command: str, failure: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "task.yaml"
+    press = f"- {{name: press, seconds: {3.0 if 'reached' in failure else 0.4}, {command}}}"
+    file.write_text(f"steps:\n- {{name: release, seconds: 0.1, request: enable}}\n{press}\n")
+    configuration = Configuration.load(packaged("wam"))
+    found = outcome(SweepPoint(configuration, tuple(load(file, configuration.shared)))).failure
+    assert found.startswith(failure)
+    assert bool(found) == bool(failure)
+
+
 @pytest.mark.slow
 def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_path: Path) -> None:
     given = runs(script, (0.004, 0.02, -1.0))

@@ -12,9 +12,9 @@ import numpy as np
 from wam_analysis.contact_comparison import NOT_RECORDED, StepContact
 from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy
 from wam_analysis.demo_figure import save
-from wam_analysis.demo_summary import STEADY, DemoSummary, LoopReport, SteadyPress, summary_of
+from wam_analysis.demo_summary import STEADY, DemoSummary, LoopReport, SteadyPress, steady_begin, summary_of
 from wam_analysis.demo_traces import TOPICS_READ
-from wam_analysis.reactions import sentences, within
+from wam_analysis.reactions import BRIEF, FAULT, NOT_REACHED, sentences, within
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import bounded, plain
 from wam_analysis.unplanned_contact import LIMIT
@@ -143,6 +143,7 @@ def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, ...]:
     """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
     answers = (
         _force_verdict(summary.presses),
+        *_task_verdict(summary),
         _link_verdict(summary),
         _position_verdict(summary),
         *_false_verdict(summary),
@@ -172,6 +173,20 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
     short = sum(press.is_short for press in presses)
     remark = f"{short} of {len(presses)} commanded for less than {STEADY:g} s" * bool(short)
     return answer._replace(remark=remark)
+
+
+def _task_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
+    """What no force is known of, as a joint torque: whether it was refused, or in the end not reached; none if not."""
+    forces = {press.begin for press in summary.presses}
+    refused = missed = 0
+    for step in summary.steps:
+        if (begin := steady_begin(step)) not in forces:
+            found = within(summary.reactions, begin, step.end)
+            is_refused = any(one.holds and one.name != FAULT for one in found)
+            is_missed = any(one.name == NOT_REACHED and one.end >= step.end - BRIEF for one in found)
+            refused, missed = refused + is_refused, missed + (is_missed and not is_refused)
+    counts = [f"{count} {what}" for count, what in ((refused, "refused"), (missed, "not reached")) if count]
+    return [VerdictAnswer("joint torques and tasks carried out", VerdictResult.NO, ", ".join(counts))][: len(counts)]
 
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:

@@ -252,6 +252,11 @@ def _end(traces: Traces, steps: Sequence[RecordedStep]) -> int:
     return max([int(stamp) for stamp in traces.stamp[-1:]] + [step.end for step in steps[-1:]], default=0)
 
 
+def steady_begin(step: RecordedStep) -> int:
+    """When what is taken as the steady state of a step begins, ns."""
+    return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
+
+
 def _presses(
     run: RecordedRun,
     traces: Traces,
@@ -261,7 +266,7 @@ def _presses(
 ) -> list[SteadyPress]:
     """The forces of a step: the commanded one, or each one of a task that commands several."""
     during = within(reactions, step.begin, step.end)
-    begin = max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
+    begin = steady_begin(step)
     presses = [_press(run, traces, step, begin)]
     for task in tasks:
         if not task.is_only and task.begin < step.end and task.end > begin:

@@ -9,6 +9,7 @@ from wam_sim.recording import RecordedRun
 
 FAULT, REFUSAL = "fault", "refused"
 BRIEF = 50_000_000  # ns; what lasts no longer into a step belongs to the one before
+NOT_REACHED = ForceReaction.NOT_REACHED.name.lower()
 HOLDING = {*(one.name.lower() for one in ForceReaction if one.holds), FAULT, REFUSAL}
 
 

@@ -48,6 +48,10 @@ ZERO: Final[Triple] = (0.0, 0.0, 0.0)
 NO_FORCE = ForceCommand("base", ZERO)
 ROUNDING = 1e-9  # s, of a sum of periods
 FASTEST: Final = 1.875  # speed in the middle of a minimum-jerk path, of its mean
+FORCE_LOOP, FOLLOWED = "force_loop", "joint_speed_limit"
+CAUGHT_UP: Final = (
+    1.25  # of that limit: on a path up to so fast the arm lags behind, and is there at the end all the same
+)
 
 
 @dataclass(frozen=True)
@@ -271,25 +275,42 @@ class Scenario:
         return [a + (b - a) * blend for a, b in zip(self._from, step.posture, strict=True)]
 
 
-def too_fast(step: ScenarioStep, start: Sequence[float], shared: Shared) -> str:
-    """Why the posture of a step cannot be reached in its time from joint angles (n,), rad; '' where it can."""
-    each = zip(shared.arm.joints.names, start, step.posture, shared.arm.joints.speed_limit, strict=True)
-    needed, name, a, b, most = max((FASTEST * abs(b - a) / most, name, a, b, most) for name, a, b, most in each)
-    if needed <= step.seconds + ROUNDING:
-        return ""
-    return (
-        f"step '{step.name}': {name} goes from {a:.4g} to {b:.4g} rad in {step.seconds:g} s, at up to "
-        f"{most * needed / step.seconds:.3g} rad/s; allowed: up to arm.joints.speed_limit, {most:g} rad/s; give the "
-        f"step at least {needed:.3g} s"
-    )
+def too_fast(step: ScenarioStep, start: Sequence[float], shared: Shared, followed: float = math.inf) -> str:
+    """Why the posture of a step cannot be reached in its time, '' where it can.
+
+    Parameters
+    ----------
+    start : joint angles (n,), rad, from which it goes.
+    shared : of the arm.
+    followed : the force loop's largest joint speed, rad/s.
+    """
+    loop = CAUGHT_UP * followed, f"{CAUGHT_UP:g} times {FORCE_LOOP}:{FOLLOWED}"
+    longest, wrong = step.seconds + ROUNDING, ""
+    joints = shared.arm.joints
+    for name, a, b, fault in zip(joints.names, start, step.posture, joints.speed_limit, strict=True):
+        most, limit = min((fault, "arm.joints.speed_limit"), loop)
+        way = FASTEST * abs(b - a)  # at the largest speed
+        needed = way / most if most else math.inf
+        if way and needed > longest:
+            longest = needed
+            wrong = (
+                f"step '{step.name}': {name} goes from {a:.4g} to {b:.4g} rad in {step.seconds:g} s, at up to "
+                f"{way / step.seconds:.3g} rad/s; allowed: up to {limit}, {most:g} rad/s; "
+                + (f"give the step at least {math.ceil(1e3 * (needed - ROUNDING)) / 1e3:g} s" if most else "raise it")
+            )
+    return wrong
 
 
-def _require_time(where: str, steps: Sequence[ScenarioStep], shared: Shared) -> None:
+def _require_time(where: str, steps: Sequence[ScenarioStep], shared: Shared, followed: float = math.inf) -> None:
     """Refuse postures that cannot be reached in the time of their step, as far as it is known where they begin."""
     start: Sequence[float] = shared.arm.joints.start
     for step in steps:
+        for setting in step.settings:
+            if (setting.node, setting.name) == (FORCE_LOOP, FOLLOWED):
+                assert isinstance(setting.value, (int, float))
+                followed = setting.value
         if step.posture:
-            wrong = too_fast(step, start, shared) if start else ""
+            wrong = too_fast(step, start, shared, followed) if start else ""
             require(not wrong, f"{where}, {wrong}")
             start = step.posture
         if step.until_force or step.trajectory or step.tip or step.force != NO_FORCE or step.task is not None:
@@ -364,8 +385,21 @@ def load_for(configuration: Configuration, script: str) -> list[ScenarioStep]:
     """
     path = script_file(script)
     steps = load(path, configuration.shared)
-    require_settings(str(path), [step.settings for step in steps], configuration)
+    require_playable(str(path), steps, configuration)
     return steps
+
+
+def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: Configuration) -> None:
+    """Refuse steps whose settings or postures do not fit a configuration.
+
+    Raises
+    ------
+    ParameterError
+        names the step, the value and what is allowed.
+    """
+    require_settings(where, [step.settings for step in steps], configuration)
+    loop = configuration.sections.get(FORCE_LOOP, {}) if FORCE_LOOP in configuration.shared.nodes else {}
+    _require_time(where, steps, configuration.shared, float(loop.get(FOLLOWED, math.inf)))
 
 
 def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:

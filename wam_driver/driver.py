@@ -10,6 +10,7 @@ import numpy as np
 from wam_description.arm import Arm, Shared
 from wam_description.effects import Effects
 from wam_description.mismatch import ModelMismatch, true_arm
+from wam_description.mjcf import rotation_xyz
 from wam_description.parameters import lengths, parameter, require
 from wam_description.signals import BASE, NO_LOAD, Answer, Load, State, Table, Wrench
 from wam_description.world import World
@@ -22,6 +23,7 @@ from wam_driver.safety import Mode, Safety
 from wam_driver.sensors import Sensors
 
 RECENT = 0.2  # s, for which a push that has ended may be the cause of what the arm does
+ROUNDING = 1e-9  # m, of a contact position
 
 
 @dataclass(frozen=True)
@@ -68,15 +70,26 @@ class DriverSample(NamedTuple):
     actual: list[float]
 
 
-def _require_covers(arm: Arm, world: World) -> None:
-    """Refuse a spring on a link without a cover: no message could give its force."""
+def _require_springs(arm: Arm, world: World) -> None:
+    """Refuse a spring on a link without a cover, or beyond the ends of it: no message could give its force."""
+    covers, springs = arm.covers, world.springs
     links = dict(zip(arm.joints.names, arm.links.names, strict=True))
-    covered = [name for name, link in links.items() if link in arm.covers.links]
-    for joint, stiffness in zip(world.springs.joints, world.springs.stiffness, strict=True):
+    covered = [name for name, link in links.items() if link in covers.links]
+    for joint, stiffness, lever in zip(springs.joints, springs.stiffness, springs.lever, strict=True):
+        if stiffness == 0.0:
+            continue
         require(
-            stiffness == 0.0 or joint in covered,
+            joint in covered,
             f"world.springs acts on {joint}, whose link {links[joint]} has no cover, so that sim/contact could not "
             f"contain its force; allowed: {', '.join(covered)}, or give the link a cover in arm.covers",
+        )
+        i = covers.links.index(links[joint])
+        offset = np.array([lever, 0.0, 0.0]) - covers.origin[3 * i : 3 * i + 3]
+        place = float(rotation_xyz(*covers.rotation[3 * i : 3 * i + 3])[:, 0] @ offset)
+        require(
+            -ROUNDING <= place <= covers.length[i] + ROUNDING,
+            f"world.springs.lever is {lever:g} m for {joint}: the spring would push at {place:.4g} m of "
+            f"{covers.names[i]}; allowed: 0 to {covers.length[i]:g} m of it",
         )
 
 
@@ -109,7 +122,7 @@ class Driver:
             parameters.friction,
             parameters.brake_torque,
         )
-        _require_covers(arm, parameters.world)
+        _require_springs(arm, parameters.world)
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random, true.motors.torque_constant)
         self._sensors = Sensors(arm, parameters.sensors, random)
         self._recent: deque[tuple[Any, ...]] = deque(maxlen=parameters.post_mortem_samples)

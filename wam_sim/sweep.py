@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_control.force_hold import is_refused
-from wam_control.scenario import ScenarioStep
+from wam_control.force_hold import ForceReaction, is_refused
+from wam_control.scenario import ScenarioStep, require_playable
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -44,7 +44,8 @@ class SweepResult(NamedTuple):
 
     Attributes
     ----------
-    failure : why the scenario failed, or the parameters or a force were refused, '' where nothing was.
+    failure : why the scenario failed, the parameters, a force or a task were refused, or a task (a joint torque is one)
+        did not reach in the end what it commands; '' where nothing was.
     duration : of the arm's time, s.
     force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
         refused there, N.
@@ -119,20 +120,26 @@ def outcome(point: SweepPoint) -> SweepResult:
     """Play the scenario and measure; refused parameters are a failure of this run alone."""
     nothing = math.nan
     statuses: list[tuple[int, NodeStatus]] = []
+    begins: list[int] = []
     try:
+        require_playable("the scenario", point.steps, point.configuration)
         run = Simulation(point.configuration, point.steps)
         if FORCE_LOOP in run.nodes:
             run.listen(STATUS, lambda stamp, status: statuses.append((stamp, status)), FORCE_LOOP)
+        run.listen(STATUS, lambda stamp, status: begins.append(stamp) if status.step else None, "scenario")
         failure = run.play()
     except ParameterError as error:
         return SweepResult(str(error), 0.0, nothing, nothing, nothing)
     except Exception as error:  # other runs go on
         return SweepResult(f"unexpected {raised(error)}", 0.0, nothing, nothing, nothing)
-    return _measured(run, RigidBody(point.configuration.shared.arm), statuses, failure)
+    ends = [*begins[1:], run.driver.stamp]
+    tasks = [one for one in zip(point.steps, begins, ends, strict=False) if one[0].task is not None]
+    unmet = [f"{step.name} {why}" for step, begin, end in tasks if (why := _unmet(statuses, begin, end))]
+    return _measured(run, RigidBody(point.configuration.shared.arm), statuses, [failure, *unmet])
 
 
 def _measured(
-    run: Simulation, body: RigidBody, statuses: Sequence[tuple[int, NodeStatus]], failure: str
+    run: Simulation, body: RigidBody, statuses: Sequence[tuple[int, NodeStatus]], failures: Sequence[str]
 ) -> SweepResult:
     truth = {row.stamp: row for row in run.rows.get("sim/contact/wrench", [])}
     joints = {row.stamp: row.values[: len(body.arm.joints.names)] for row in run.rows.get("sim/joint_states", [])}
@@ -150,15 +157,29 @@ def _measured(
         errors += [_error(body, joints[row.stamp], row, truth[row.stamp]) for row in settled]
     peak = max((math.hypot(*row.values[:3]) for row in truth.values()), default=0.0)
     rms = math.sqrt(sum(e * e for e in errors) / len(errors)) if errors else math.nan
-    failure = "; ".join(filter(None, (failure, *dict.fromkeys(refusals))))
+    failure = "; ".join(filter(None, dict.fromkeys((*failures, *refusals))))
     return SweepResult(failure, run.driver.stamp * 1e-9, rms, max(map(abs, errors), default=math.nan), peak)
+
+
+def _during(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> list[NodeStatus]:
+    """What the force loop stated from one time to another, ns."""
+    before = [one for stamp, one in statuses if stamp <= begin]
+    return [*before[-1:], *(one for stamp, one in statuses if begin < stamp <= end)]
 
 
 def _refusal(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> str:
     """Why the force loop did not control a force between two times, ns; '' where it did."""
-    before = [one for stamp, one in statuses if stamp <= begin]
-    during = [one for stamp, one in statuses if begin < stamp <= end]
-    return next((one.message for one in (*before[-1:], *during) if is_refused(one.facts)), "")
+    return next((one.message for one in _during(statuses, begin, end) if is_refused(one.facts)), "")
+
+
+def _unmet(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> str:
+    """Why the task of a step, ns, was refused in its settled part, or is not reached at its end; '' where it is."""
+    settled, last = begin + int(SETTLED * (end - begin)), end - 1
+    if refusal := _refusal(statuses, settled, last):
+        return f"refused: {refusal}"
+    missed = ForceReaction.NOT_REACHED.name.lower()
+    at_end = _during(statuses, last, last)
+    return next((f"not reached: {one.message}" for one in at_end if one.facts.get("reaction") == missed), "")
 
 
 def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: TopicValue) -> float:
