@@ -186,7 +186,9 @@ def _task_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
             is_missed = any(one.name == NOT_REACHED and one.end >= step.end - BRIEF for one in found)
             refused, missed = refused + is_refused, missed + (is_missed and not is_refused)
     counts = [f"{count} {what}" for count, what in ((refused, "refused"), (missed, "not reached")) if count]
-    return [VerdictAnswer("joint torques and tasks carried out", VerdictResult.NO, ", ".join(counts))][: len(counts)]
+    if not counts:
+        return []
+    return [VerdictAnswer("joint torques and tasks carried out", VerdictResult.NO, ", ".join(counts))]
 
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:

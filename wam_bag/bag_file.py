@@ -28,7 +28,7 @@ _FILE_NAMES = re.compile(r"^  relative_file_paths:.*\n(?:   *(?:-| ).*\n)*", re.
 def files(path: Path) -> list[Path]:
     """The MCAP files of a bag directory in the order of recording, or the one file."""
     if path.name.endswith(COMPRESSED):
-        raise compressed(path)
+        raise _compressed(path)
     if path.is_file():
         return [path]
     if not path.exists():
@@ -47,9 +47,8 @@ def files(path: Path) -> list[Path]:
         )
     if named:
         return [path / name for name in named]
-    if not found and any(path.glob(f"*{COMPRESSED}")):
-        raise compressed(path)
     if not found:
+        refuse_compressed(path)
         raise BagError(f"{path} has no .mcap file and no .db3 file; give the directory of a bag")
     return found
 
@@ -75,7 +74,7 @@ def _listed_files(path: Path) -> list[str]:
                 "from the files in the directory"
             )
         if name.endswith(COMPRESSED):
-            raise compressed(path)
+            raise _compressed(path)
         if not name.endswith(".mcap"):
             raise BagError(f"{path} is recorded as {name}; only storage 'mcap' is read")
     if len(set(listed)) < len(listed):
@@ -83,8 +82,19 @@ def _listed_files(path: Path) -> list[str]:
     return listed
 
 
-def compressed(path: Path) -> BagError:
-    """The error for a bag, or a file of one, that was compressed as a whole."""
+def refuse_compressed(path: Path) -> None:
+    """Refuse a directory whose files were compressed as a whole.
+
+    Raises
+    ------
+    BagError
+        states what to do.
+    """
+    if any(path.glob(f"*{COMPRESSED}")):
+        raise _compressed(path)
+
+
+def _compressed(path: Path) -> BagError:
     file, bag = (path, path.parent) if path.is_file() else (path / f"*{COMPRESSED}", path)
     return BagError(
         f"{path} was compressed as a whole by rosbag2 (compression mode 'file') and is not read; decompress it with "

@@ -13,7 +13,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Schema
 
 from wam_bag import safe_yaml
-from wam_bag.bag_file import COMPRESSED, compressed
+from wam_bag.bag_file import refuse_compressed
 from wam_bag.bag_writer import CHUNK_SIZE, release
 from wam_bag.errors import BROKEN, BagError, Damage, TooLargeError
 from wam_bag.losses import REPAIRED, FileLosses, Hole
@@ -89,9 +89,8 @@ def repair(path: Path) -> list[Repaired]:
     if path.is_file():
         return [_repair_file(path)]
     files = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
-    if not files and any(path.glob(f"*{COMPRESSED}")):
-        raise compressed(path)
     if not files:
+        refuse_compressed(path)
         raise BagError(f"{path} has no .mcap file; give a bag directory or an .mcap file")
     release(path)
     done = []

@@ -136,10 +136,11 @@ class CommandAdmission:
             "joint_torque_command": not is_of_joints and bool(_largest(torque)),
         }
         other = "hybrid" if is_of_joints else "joint_torque"
-        for topic in (topic for topic, is_useless in useless.items() if is_useless and topic not in refusals):
-            refusals[topic] = (
-                f"{topic} has no effect in the mode {mode}; set force_loop:mode to {other}, or end the command"
-            )
+        for topic, is_useless in useless.items():
+            if is_useless and topic not in refusals:
+                refusals[topic] = (
+                    f"{topic} has no effect in the mode {mode}; set force_loop:mode to {other}, or end the command"
+                )
 
     def _refusal(self, commanded: float, name: str, limit: float, unit: str) -> str:
         return f"{commanded:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} {unit}; {self._last}"

@@ -49,6 +49,7 @@ WATCHED = 0.2  # s, for which the shaking is watched before the arm moves
 SOFTER = "where no surface is as stiff, lower guard.contact_stiffness"
 SENSORS = "use joint sensors"
 RESERVE = 1.2  # by how much worse another force may be known, and the arm slower, so that it still would be accepted
+UNLOAD = "the arm holds its position: declare what it carries (arm.payload), or end the command and tare in free space"
 NOT_SLOWED = 0.95  # of the speed along the force
 RESUME = 0.8  # of the largest standard deviation, below which a force is controlled again
 
@@ -675,8 +676,7 @@ def _left_behind(axis: ForceAxis, desired: float, parameters: ForceLoopParameter
 def _loaded(force: float, meaning: str, desired: float) -> str:
     return (
         f"the arm at rest already measures {force:.3g} N along the force of {desired:.3g} N, {meaning}; allowed: "
-        f"{TOLERANCE:g} of the commanded; the arm holds its position: declare what it carries (arm.payload), "
-        "or end the command and tare in free space"
+        f"{TOLERANCE:g} of the commanded; {UNLOAD}"
     )
 
 

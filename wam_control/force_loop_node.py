@@ -37,7 +37,6 @@ class ForceLoopNode:
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
         self._reported: tuple[Report, ForceReaction, bool, tuple[str, ...], str, bool, tuple[str, ...]] | None = None
-        self._commanded: list[float] = []
         self._reaction = ForceReaction.NONE
 
     @reaction(
@@ -71,8 +70,6 @@ class ForceLoopNode:
             posture = self._on_trajectory(inputs)
         if self._refusal:
             command = posture = torque = None  # the arm holds its position
-        self._commanded = [*(command.force if command else ()), *(torque.effort if torque else ())]
-        self._commanded += [axis.value or 0.0 for axis in task.axes] if task else []
         external, hypotheses = inputs["external_joint_torques"], inputs["contact/hypotheses"]
         torque_sd = inputs["external_joint_torques_sd"]
         out = self._loop.step(
@@ -95,7 +92,7 @@ class ForceLoopNode:
             "force_error": Wrench(out.frame, out.error, ZERO),
             "force_error_limited": Wrench(out.frame, out.limited, ZERO),
             **self._force_axis(out, inputs.stamp),
-            **self._status(),
+            **self._status(command, torque, task),
         }
 
     def _on_trajectory(self, inputs: Inputs) -> State | None:
@@ -136,14 +133,17 @@ class ForceLoopNode:
         row = (float(reaction), axis.force_sd, out.sd_limit, lever, axis.apparent_mass, axis.speed_fraction)
         return {"force_axis": Table(point.cover, ((*row, point.position, point.position_sd),))}
 
-    def _status(self) -> Outputs:
+    def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
         report, reaction = self._loop.report, self._loop.reaction
         refused = self.refusals
         refused.pop("contact/hypotheses", None)
         advised, other = self._loop.is_advised, self._refusal or self._player.refusal
-        # a reason is that of the command for which it was given
-        commanded = tuple(map(brief, self._commanded)) if self._loop.reason or refused else ()
+        commanded: tuple[str, ...] = ()
+        if self._loop.reason or refused:  # which is that of the command for which it was given
+            values = [*(command.force if command else ()), *(torque.effort if torque else ())]
+            values += [axis.value or 0.0 for axis in task.axes] if task else []
+            commanded = tuple(map(brief, values))
         present = report, reaction, self._loop.is_pushed, tuple(refused), other, advised, commanded
         if present == self._reported:
             return {}

@@ -49,9 +49,7 @@ NO_FORCE = ForceCommand("base", ZERO)
 ROUNDING = 1e-9  # s, of a sum of periods
 FASTEST: Final = 1.875  # speed in the middle of a minimum-jerk path, of its mean
 FORCE_LOOP, FOLLOWED = "force_loop", "joint_speed_limit"
-CAUGHT_UP: Final = (
-    1.25  # of that limit: on a path up to so fast the arm lags behind, and is there at the end all the same
-)
+CAUGHT_UP: Final = 1.25  # of that limit: on a path up to so fast the arm lags behind, and arrives in time
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import math
 
-from wam_control.force_hold import LEFT, TOLERANCE, ForceReaction
+from wam_control.force_hold import LEFT, TOLERANCE, UNLOAD, ForceReaction
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_description.number_text import brief
 
@@ -48,8 +48,7 @@ class TorqueWatch:
         if abs(unknown) > allowed:
             return ForceReaction.NOT_SENSED, (
                 f"{self._name}: the arm at rest already measures {brief(unknown)} N m, {meaning}; allowed: "
-                f"{brief(allowed)} N m for {brief(desired)} N m; the arm holds its position: declare what it carries "
-                "(arm.payload), or end the command and tare in free space"
+                f"{brief(allowed)} N m for {brief(desired)} N m; {UNLOAD}"
             )
         lasting = parameters.limits.settling_time
         if missed := self._not_reached(desired, measured, allowed, lasting, dt):
@@ -81,7 +80,7 @@ class TorqueWatch:
         if self._off > lasting:
             swings = "" if abs(self._side) > ONE_SIDED * self._off else ", to both sides"
             self._report = (
-                f"{self._name}: {brief(measured + 0.0)} N m are measured and {brief(desired + 0.0)} N m commanded; the "
+                f"{self._name}: {brief(measured)} N m are measured and {brief(desired)} N m commanded; the "
                 f"torque has been off by more than {brief(allowed)} N m{swings} for {brief(self._off)} s: command what "
                 "something that is touched can take, or another posture, or, where it swings, lower torque_gain"
             )

@@ -5,8 +5,8 @@ from typing import Any
 
 
 def brief(value: float) -> str:
-    """A number to two digits, without an exponent from 1e-4 to 1e10: 0.0042, 7.1, 120."""
-    return f"{float(f'{value:.2g}'):.10g}"
+    """A number to two digits, without an exponent from 1e-4 to 1e10, or a sign of zero: 0.0042, 7.1, 120, 0."""
+    return f"{float(f'{value:.2g}') + 0.0:.10g}"
 
 
 def as_number(value: Any) -> str:
