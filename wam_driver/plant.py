@@ -152,6 +152,7 @@ class Plant:
         self._braked = True
         self._is_set = False  # whether MuJoCo has the present levels of friction
         self._set_friction()
+        self._velocity: list[float] = self._qvel.tolist()  # of rotors and joints at the start of the last step, rad/s
         mujoco.mj_step1(self.model, data)
         if data.ncon:
             self._surfaces.apply()
@@ -244,19 +245,21 @@ class Plant:
         torque : torque of each motor on its rotor, N m.
         count : number of steps with this torque.
         """
-        model, data, pushes, circuits = self.model, self.data, self._pushes, self._circuits
         self._write_torque(0, *torque)
         if self._advance is not None:
             self._velocity = self._advance(count, self._is_set, self._set_friction)
             return
+        model, data, pushes, movers = self.model, self.data, self._pushes, self._movers
         friction, velocities = self._friction, self._qvel.tolist
-        velocity = velocities()
+        remains, follow = friction.remains, self._circuits.follow if self._circuits.depends_on_torque else None
+        velocity = before = velocities()
         for _ in range(count):
-            if not (self._is_set and friction.remains(velocity)):
+            if not (self._is_set and remains(velocity)):
                 self._set_friction()
-            for mover in self._movers:
-                mover.lead(data.time)
-            self._velocity = velocity
+            if movers:
+                for mover in movers:
+                    mover.lead(data.time)
+            before = velocity
             mj_step1(model, data)
             if pushes:
                 self._loads.apply_pushes()
@@ -266,17 +269,18 @@ class Plant:
             if pushes:
                 self._applied.fill(0.0)
             velocity = velocities()
-            if circuits.depends_on_torque and circuits.follow(friction.direction, velocity):
+            if follow is not None and follow(friction.direction, velocity):
                 self._is_set = False
+        self._velocity = before
 
     def _set_friction(self) -> None:
         """Give MuJoCo the level of friction of every shaft for the next step."""
         friction, circuits = self._friction, self._circuits
-        self._velocity = self._qvel.tolist()
+        velocity = self._qvel.tolist()
         if friction.is_steady:
-            changed = friction.follow(self._velocity)
+            changed = friction.follow(velocity)
         else:
-            changed = friction.follow(self._velocity, self._transmitted_torque(), self._friction_torque())
+            changed = friction.follow(velocity, self._transmitted_torque(), self._friction_torque())
             if friction.elastic:
                 self._applied[:] = friction.elastic
         if changed or circuits.is_slack or not self._is_set:
