@@ -515,6 +515,53 @@ def test_a_posture_that_the_force_loop_cannot_follow_is_refused(
     load_for(CONFIGURATION.with_values({"nodes": held, "force_loop:joint_speed_limit": 0.1}), str(path))
 
 
+TURNED = [1.0, -0.6, 0.0, 0.5]
+SLOWLY = {"force_loop:joint_speed_limit": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("motion", "advice"),
+    [
+        ({"trajectory": {"postures": [TURNED]}}, "lower motion.joint_speed to 0.3 rad/s"),
+        (
+            {"trajectory": {"postures": [TURNED], "times": [4.0]}},
+            "give it 1.56 times the time, or no times and lower motion.joint_speed to 0.3 rad/s",
+        ),
+        ({"tip": [0.7, 0.5, 0.1]}, "lower motion.joint_speed to 0.3 rad/s"),
+    ],
+)
+def test_a_motion_that_the_force_loop_cannot_follow_is_refused(motion: Any, advice: str, tmp_path: Path) -> None:
+    begin = {"name": "begin", "seconds": 6.0, "posture": START}
+    path = str(write(tmp_path, {"steps": [begin, {"name": "go", "seconds": 9.0, **motion}]}))
+    load_for(CONFIGURATION, path)
+    text = rf"'go': joint\d turns at up to .* rad/s; allowed: up to force_loop:joint_speed_limit, 0.3 rad/s; {advice}$"
+    with pytest.raises(ParameterError, match=text):
+        load_for(CONFIGURATION.with_values(SLOWLY), path)
+    if "times" not in advice:
+        load_for(CONFIGURATION.with_values({**SLOWLY, "motion.joint_speed": [0.3] * 4}), path)
+
+
+@pytest.mark.parametrize("motion", [{"trajectory": {"postures": [TURNED]}}, {"tip": [0.7, 0.5, 0.1]}])
+def test_after_a_trajectory_or_a_line_it_is_known_where_the_next_motion_begins(motion: Any, tmp_path: Path) -> None:
+    steps = [
+        {"name": "begin", "seconds": 2.0, "posture": START},
+        {"name": "away", "seconds": 3.0, **motion},
+        {"name": "back", "seconds": 0.5, "posture": START},
+    ]
+    with pytest.raises(ParameterError, match=r"step 'back': joint1 goes from .* at up to .*joint_speed_limit, 1.875"):
+        load_for(CONFIGURATION, str(write(tmp_path, {"steps": steps})))
+
+
+def test_where_the_arm_begins_is_known_only_of_a_simulated_one(tmp_path: Path) -> None:
+    far = [ARM.joints.start[0] + 1.0, *ARM.joints.start[1:]]
+    path = write(tmp_path, {"steps": [{"name": "go", "seconds": 0.1, "posture": far}]})
+    with pytest.raises(ParameterError, match="'go': joint1 goes from"):
+        load_for(CONFIGURATION, str(path))
+    assert len(load(path, SHARED)) == 1, "played into a stack that runs, by an arm that may be there"
+    others = [name for name in SHARED.nodes if name != "driver"]
+    assert len(load_for(CONFIGURATION.with_values({"nodes": others}), str(path))) == 1
+
+
 def test_the_arm_ends_a_posture_in_the_least_time_where_it_ends_it_without_a_limit() -> None:
     least, short = 1.2, 0.8
     pose, goal = (0.0, -1.8, 0.0, 1.45), (0.0, -1.8, 0.0, 0.25)

@@ -20,6 +20,7 @@ from wam_description.signals import PathPoint, PosturePath, Triple
 
 Array = NDArray[np.float64]
 NODES = 200  # of a line, between which the joint angles are interpolated
+FASTEST = 1.875  # speed in the middle of a minimum-jerk path, of its mean
 STEEPEST = 15.0  # rad/m, of a joint on a line
 EXACT = 1e-10  # m, of the nodes of a line
 ROUNDING = 1e-9
@@ -27,7 +28,7 @@ THERE = 0.02  # rad, between the arm and the first point of a trajectory, if tha
 
 
 class Moving(NamedTuple):
-    """Joint angles (n,), rad, and their velocities (n,), rad/s."""
+    """Joint angles (n,), rad, and their velocities (n,), rad/s; empty where only the angles are commanded."""
 
     position: list[float]
     velocity: list[float]
@@ -44,6 +45,7 @@ class SCurve:
     Attributes
     ----------
     duration : s.
+    fastest : largest speed.
     """
 
     def __init__(self, distance: float, speed: float, acceleration: float, jerk: float) -> None:
@@ -60,6 +62,7 @@ class SCurve:
             self._knots[-1] = (begin, state[0], state[1], state[2], jerk_of_part)
             self._knots.append((begin + time, *_on(state[0], state[1], state[2], jerk_of_part, time), 0.0))
         self.duration, self._distance = self._knots[-1][0], distance
+        self.fastest = max(speed for _, _, speed, _, _ in self._knots)
 
     def at(self, time: float) -> tuple[float, float]:
         """Distance and speed at a time, s, from the start."""
@@ -75,6 +78,32 @@ def _on(s: float, v: float, a: float, j: float, t: float) -> tuple[float, float,
     return s + t * (v + t * (a / 2.0 + t * j / 6.0)), v + t * (a + t * j / 2.0), a + t * j
 
 
+class GoalMotion:
+    """To a posture in a time, along a minimum-jerk path; only its end is promised, so that it has no velocities.
+
+    Parameters
+    ----------
+    start, goal : joint angles (n,), rad.
+    duration : s.
+
+    Attributes
+    ----------
+    fastest : largest speed of each joint (n,), rad/s.
+    """
+
+    def __init__(self, start: Sequence[float], goal: Sequence[float], duration: float) -> None:
+        self._from, self._to, self.duration = list(start), list(goal), duration
+        self.fastest = [FASTEST * abs(b - a) / duration for a, b in zip(start, goal, strict=True)]
+
+    def at(self, time: float) -> Moving:
+        """The posture at a time, s, from the start."""
+        if time >= self.duration:
+            return Moving(list(self._to), [])
+        s = time / self.duration
+        blend = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+        return Moving([a + (b - a) * blend for a, b in zip(self._from, self._to, strict=True)], [])
+
+
 class PostureMotion:
     """Through postures, in the given times or, without times, as fast as the limits allow with a stop at each.
 
@@ -88,6 +117,11 @@ class PostureMotion:
     trajectory : postures, velocities and times.
     arm : with the limits of the joints.
     limits : of the motion.
+
+    Attributes
+    ----------
+    duration : s.
+    fastest : largest speed of each joint (n,), rad/s.
 
     Raises
     ------
@@ -108,6 +142,7 @@ class PostureMotion:
             self._require_inside(posture)
         self._parts = self._timed(postures, points) if any(times) else self._fast(postures)
         self.duration = sum(part.duration for part in self._parts)
+        self.fastest = [max(each) for each in zip(*(part.fastest for part in self._parts), strict=True)]
 
     def at(self, time: float) -> Moving:
         """The posture at a time, s, from the start."""
@@ -186,6 +221,7 @@ class LineMotion:
     Attributes
     ----------
     duration : s.
+    fastest : largest speed of each joint (n,), rad/s.
 
     Raises
     ------
@@ -201,7 +237,7 @@ class LineMotion:
         self._angles = [np.array(start, float)]
         self._slopes: list[Array] = []
         self._profile: SCurve | None = None
-        self.duration = 0.0
+        self.duration, self.fastest = 0.0, [0.0] * len(start)
         if self._length < ROUNDING:
             return
         along = (np.array(goal) - begin) / self._length
@@ -214,6 +250,8 @@ class LineMotion:
         speed = min(limits.speed, *(np.array(limits.joint_speed) / np.maximum(steepest, ROUNDING)).tolist())
         self._profile = SCurve(self._length, speed, limits.acceleration, limits.jerk)
         self.duration = self._profile.duration
+        times = (self.duration * k / NODES for k in range(NODES + 1))
+        self.fastest = np.abs([self.at(time).velocity for time in times]).max(axis=0).tolist()
 
     def at(self, time: float) -> Moving:
         """The posture at a time, s, from the start."""
@@ -273,6 +311,7 @@ class _Straight:
             most = [min(m / way for m, way in zip(limit, ways, strict=True) if way > ROUNDING) for limit in allowed]
             self._profile = SCurve(1.0, *most)
         self.duration = self._profile.duration if self._profile else 0.0
+        self.fastest = [(self._profile.fastest if self._profile else 0.0) * way for way in ways]
 
     def at(self, time: float) -> Moving:
         part, rate = self._profile.at(time) if self._profile else (1.0, 0.0)
@@ -290,6 +329,7 @@ class _Polynomials:
         self._orders = [[_quintic(*ends, duration) for ends in zip(a, va, b, vb, strict=True)]]
         for _ in range(3):
             self._orders.append([one.deriv() for one in self._orders[-1]])
+        self.fastest = self.largest(1)
 
     def at(self, time: float) -> Moving:
         return Moving(*([float(one(time)) for one in order] for order in self._orders[:2]))

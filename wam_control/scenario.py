@@ -9,7 +9,8 @@ from typing import Any, Final, NamedTuple
 import yaml
 
 from wam_control.contact_position import torque_of_position
-from wam_control.motion import LineMotion, PostureMotion
+from wam_control.motion import GoalMotion, LineMotion, PostureMotion
+from wam_control.posture_watch import CAUGHT_UP
 from wam_control.scenario_settings import Setting, require_settings, settings_of
 from wam_control.scenario_values import known, number, numbers
 from wam_control.task import TaskCommand
@@ -47,9 +48,8 @@ REQUESTS = ("", "enable", "disable")
 ZERO: Final[Triple] = (0.0, 0.0, 0.0)
 NO_FORCE = ForceCommand("base", ZERO)
 ROUNDING = 1e-9  # s, of a sum of periods
-FASTEST: Final = 1.875  # speed in the middle of a minimum-jerk path, of its mean
 FORCE_LOOP, FOLLOWED = "force_loop", "joint_speed_limit"
-CAUGHT_UP: Final = 1.25  # of that limit: on a path up to so fast the arm lags behind, and arrives in time
+Motion = GoalMotion | PostureMotion | LineMotion
 
 
 @dataclass(frozen=True)
@@ -123,9 +123,14 @@ class ScenarioStep(NamedTuple):
         return bool(self.posture) or self.trajectory is not None or self.tip is not None
 
     @property
+    def presses(self) -> bool:
+        """Whether a force or a task is commanded, which moves the arm away from the posture."""
+        return self.force != NO_FORCE or self.task is not None
+
+    @property
     def commands_arm(self) -> bool:
         """Whether a motion, a force or a task is commanded."""
-        return self.moves or self.force != NO_FORCE or self.task is not None
+        return self.moves or self.presses
 
 
 class ScenarioOutput(NamedTuple):
@@ -157,11 +162,10 @@ class Scenario:
     def __init__(self, steps: Sequence[ScenarioStep], shared: Shared | None = None) -> None:
         require(len(steps) > 0, "the scenario has no steps")
         self._steps, self._shared = list(steps), shared
-        self._motion: PostureMotion | LineMotion | None = None
+        self._motion: Motion | None = None
         self._rate: tuple[float, ...] = ()
         self._index = -1
         self._elapsed = 0.0
-        self._from: list[float] = []
         self._posture: list[float] = []
         self.failure = ""
         self.done = False
@@ -187,8 +191,6 @@ class Scenario:
         if self._motion is not None and not self.done:
             self._posture, rate = self._motion.at(self._elapsed)
             self._rate = tuple(rate)
-        elif step.posture and not self.done:
-            self._posture = self._on_path(step)
         push = step.push
         pushing = push is not None and push.acts(self._elapsed, dt) and not self.done
         request = "disable" if self.failure else step.request
@@ -210,32 +212,16 @@ class Scenario:
         )
 
     def _begin(self, index: int, q: Sequence[float]) -> None:
+        """Begin a step; where its motion is not possible, the scenario fails before it moves."""
         before = self._steps[self._index] if self._index >= 0 else None
-        pressed = before is not None and (before.force != NO_FORCE or before.task is not None)
         self._index, self._elapsed = index, 0.0
         step = self._steps[index]
-        if pressed and (step.moves or (step.force == NO_FORCE and step.task is None)):
-            self._posture = list(q)  # the arm has moved along the force or the task, away from the posture
-        self._from = list(self._posture)
-        self._motion = None
-        if step.trajectory is not None or step.tip is not None:
-            self._plan(step)
-        elif step.posture and self._shared is not None and (wrong := too_fast(step, self._from, self._shared)):
-            self.done, self.failure = True, wrong
-
-    def _plan(self, step: ScenarioStep) -> None:
-        """Plan the motion of a step as a whole; where that is not possible, the scenario fails before it moves."""
+        if before is not None and before.presses and (step.moves or not step.presses):
+            self._posture = list(q)
         try:
-            if self._shared is None:
-                raise ParameterError("a motion has limits; give them to the scenario: Scenario(steps, shared)")
-            self._motion = motion = planned(step, self._from, self._shared)
-            require(
-                motion.duration <= step.seconds + ROUNDING,
-                f"the motion takes {motion.duration:.3g} s within its limits (motion); seconds is {step.seconds:g}",
-            )
+            self._motion = motion_of(step, self._posture, self._shared)
         except ParameterError as error:
-            self._motion, self.done = None, True
-            self.failure = f"step '{step.name}': {error}"
+            self._motion, self.done, self.failure = None, True, str(error)
 
     def _advance(self, q: Sequence[float], contact: Contact) -> bool:
         """Go on to the next step if this one is over; whether a request may be due."""
@@ -251,8 +237,8 @@ class Scenario:
             )
             self.done = True
             return True
-        if step.posture and not detected:
-            self._posture = list(step.posture)
+        if self._motion is not None and not detected:
+            self._posture = self._motion.at(step.seconds).position
         if self._index + 1 == len(self._steps):
             self.done = True
             return False
@@ -267,66 +253,95 @@ class Scenario:
         tx, ty, tz = (torque * (1.0 + share) for torque in step.force.torque)
         return ForceCommand(step.force.frame, (x, y, z), (tx, ty, tz))
 
-    def _on_path(self, step: ScenarioStep) -> list[float]:
-        s = min(self._elapsed / step.seconds, 1.0)
-        blend = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
-        return [a + (b - a) * blend for a, b in zip(self._from, step.posture, strict=True)]
 
-
-def too_fast(step: ScenarioStep, start: Sequence[float], shared: Shared, followed: float = math.inf) -> str:
-    """Why the posture of a step cannot be reached in its time, '' where it can.
+def motion_of(
+    step: ScenarioStep, start: Sequence[float], shared: Shared | None, followed: float = math.inf
+) -> Motion | None:
+    """The motion of a step from joint angles (n,), rad; None where it has none.
 
     Parameters
     ----------
-    start : joint angles (n,), rad, from which it goes.
-    shared : of the arm.
-    followed : the force loop's largest joint speed, rad/s.
+    shared : of the arm; None where its limits are not known.
+    followed : largest joint speed of the force loop, rad/s, as far as it is known.
+
+    Raises
+    ------
+    ParameterError
+        where it leaves the limits, or does not end in the time of the step.
     """
-    loop = CAUGHT_UP * followed, f"{CAUGHT_UP:g} times {FORCE_LOOP}:{FOLLOWED}"
-    longest, wrong = step.seconds + ROUNDING, ""
-    joints = shared.arm.joints
-    for name, a, b, fault in zip(joints.names, start, step.posture, joints.speed_limit, strict=True):
-        most, limit = min((fault, "arm.joints.speed_limit"), loop)
-        way = FASTEST * abs(b - a)  # at the largest speed
-        needed = way / most if most else math.inf
-        if way and needed > longest:
-            longest = needed
-            wrong = (
-                f"step '{step.name}': {name} goes from {a:.4g} to {b:.4g} rad in {step.seconds:g} s, at up to "
-                f"{way / step.seconds:.3g} rad/s; allowed: up to {limit}, {most:g} rad/s; "
-                + (f"give the step at least {math.ceil(1e3 * (needed - ROUNDING)) / 1e3:g} s" if most else "raise it")
+    try:
+        motion = _planned(step, start, shared)
+        if motion is not None and shared is not None:
+            require(
+                motion.duration <= step.seconds + ROUNDING,
+                f"the motion takes {motion.duration:.3g} s within its limits (motion); seconds is {step.seconds:g}",
             )
-    return wrong
+            _require_speed(step, motion, start, shared, followed)
+    except ParameterError as error:
+        raise ParameterError(f"step '{step.name}': {error}") from None
+    return motion
 
 
-def _require_time(where: str, steps: Sequence[ScenarioStep], shared: Shared, followed: float = math.inf) -> None:
-    """Refuse postures that cannot be reached in the time of their step, as far as it is known where they begin."""
-    start: Sequence[float] = shared.arm.joints.start
+def _planned(step: ScenarioStep, start: Sequence[float], shared: Shared | None) -> Motion | None:
+    if step.posture:
+        return GoalMotion(start, step.posture, step.seconds)
+    if not step.moves:
+        return None
+    if shared is None:
+        raise ParameterError("a motion has limits; give them to the scenario: Scenario(steps, shared)")
+    if step.trajectory is not None:
+        return PostureMotion(start, step.trajectory, shared.arm, shared.motion)
+    assert step.tip is not None
+    return LineMotion(start, step.tip, shared.arm, RigidBody(shared.arm), shared.motion)
+
+
+def _require_speed(step: ScenarioStep, motion: Motion, start: Sequence[float], shared: Shared, followed: float) -> None:
+    """Refuse a motion at which the driver would stop the arm, or with which the force loop would not keep up."""
+    joints, allowed = shared.arm.joints, CAUGHT_UP if step.posture else 1.0
+    loop = allowed * followed, (f"{allowed:g} times " if allowed > 1.0 else "") + f"{FORCE_LOOP}:{FOLLOWED}"
+    found = []
+    for k, (speed, fault) in enumerate(zip(motion.fastest, joints.speed_limit, strict=True)):
+        most, limit = min((fault, "arm.joints.speed_limit"), loop)
+        found.append((speed / most if most else math.copysign(math.inf, speed) if speed else 0.0, k, most, limit))
+    excess, k, most, limit = max(found)
+    if excess <= 1.0 + ROUNDING:
+        return
+    what, advice = "turns", f"lower motion.joint_speed to {most:g} rad/s"
+    if step.posture:
+        what = f"goes from {start[k]:.4g} to {step.posture[k]:.4g} rad in {step.seconds:g} s,"
+        advice = f"give the step at least {math.ceil(1e3 * (excess * step.seconds - ROUNDING)) / 1e3:g} s"
+        if followed == math.inf:
+            advice += f", more where {FORCE_LOOP}:{FOLLOWED} is lower"
+    elif step.trajectory is not None and any(point.time for point in step.trajectory.points):
+        advice = f"give it {excess:.3g} times the time, or no times and {advice}"
+    raise ParameterError(
+        f"{joints.names[k]} {what} at up to {motion.fastest[k]:.3g} rad/s; allowed: up to {limit}, {most:g} rad/s; "
+        + (advice if most else "raise it")
+    )
+
+
+def _require_motions(
+    where: str, steps: Sequence[ScenarioStep], shared: Shared, start: Sequence[float], followed: float
+) -> None:
+    """Refuse motions that are not possible, as far as it is known from where, (n,) rad, and how fast they go.
+
+    A force, a task or a detected contact leaves the arm wherever it is.
+    """
     for step in steps:
         for setting in step.settings:
             if (setting.node, setting.name) == (FORCE_LOOP, FOLLOWED):
                 assert isinstance(setting.value, (int, float))
                 followed = setting.value
-        if step.posture:
-            wrong = too_fast(step, start, shared, followed) if start else ""
-            require(not wrong, f"{where}, {wrong}")
-            start = step.posture
-        if step.until_force or step.trajectory or step.tip or step.force != NO_FORCE or step.task is not None:
+        try:
+            motion = motion_of(step, start, shared, followed) if start else None
+        except ParameterError as error:
+            raise ParameterError(f"{where}, {error}") from None
+        if motion is not None:
+            start = motion.at(step.seconds).position
+        elif step.moves:
+            start = step.posture or (step.trajectory.points[-1].position if step.trajectory else ())
+        if step.until_force or step.presses:
             start = ()
-
-
-def planned(step: ScenarioStep, start: Sequence[float], shared: Shared) -> PostureMotion | LineMotion:
-    """The motion of a step from joint angles (n,), rad.
-
-    Raises
-    ------
-    ParameterError
-        where it leaves the limits.
-    """
-    if step.trajectory is not None:
-        return PostureMotion(start, step.trajectory, shared.arm, shared.motion)
-    assert step.tip is not None
-    return LineMotion(start, step.tip, shared.arm, RigidBody(shared.arm), shared.motion)
 
 
 def swept_sine(chirp: Chirp, elapsed: float, seconds: float) -> float:
@@ -342,7 +357,7 @@ def script_file(script: str) -> Path:
 
 
 def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:
-    """Read the steps of a scenario.
+    """Read the steps of a scenario, for an arm that may be anywhere, with any parameters of the nodes.
 
     Parameters
     ----------
@@ -354,6 +369,12 @@ def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:
     ParameterError
         names the file, the step and the value that is not allowed.
     """
+    steps = _read(path, shared)
+    _require_motions(str(path), steps, shared, (), math.inf)
+    return steps
+
+
+def _read(path: str | Path, shared: Shared) -> list[ScenarioStep]:
     if "\n" in str(path):
         raise ParameterError("the scenario is given as a text of several lines; write it to a file and give its path")
     path = Path(path)
@@ -368,13 +389,11 @@ def load(path: str | Path, shared: Shared) -> list[ScenarioStep]:
     if not isinstance(tree, dict) or not isinstance(tree["steps"], list):
         raise ParameterError(f"scenario {path} has no list 'steps'")
     require(len(tree["steps"]) > 0, f"scenario {path} has no steps; give at least one")
-    steps = [_step(f"{path}, step {i + 1}", body, shared) for i, body in enumerate(tree["steps"])]
-    _require_time(str(path), steps, shared)
-    return steps
+    return [_step(f"{path}, step {i + 1}", body, shared) for i, body in enumerate(tree["steps"])]
 
 
 def load_for(configuration: Configuration, script: str) -> list[ScenarioStep]:
-    """Read the steps of a scenario as a configuration plays it: `load`, and what they set fits its other values.
+    """Read the steps of a scenario as a configuration plays it: what they set and how they move fits its values.
 
     Parameters
     ----------
@@ -382,13 +401,13 @@ def load_for(configuration: Configuration, script: str) -> list[ScenarioStep]:
     script : as in `ScenarioParameters`.
     """
     path = script_file(script)
-    steps = load(path, configuration.shared)
+    steps = _read(path, configuration.shared)
     require_playable(str(path), steps, configuration)
     return steps
 
 
 def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: Configuration) -> None:
-    """Refuse steps whose settings or postures do not fit a configuration.
+    """Refuse steps whose settings or motions do not fit a configuration; its simulated arm begins at its start.
 
     Raises
     ------
@@ -396,8 +415,10 @@ def require_playable(where: str, steps: Sequence[ScenarioStep], configuration: C
         names the step, the value and what is allowed.
     """
     require_settings(where, [step.settings for step in steps], configuration)
-    loop = configuration.sections.get(FORCE_LOOP, {}) if FORCE_LOOP in configuration.shared.nodes else {}
-    _require_time(where, steps, configuration.shared, float(loop.get(FOLLOWED, math.inf)))
+    shared = configuration.shared
+    start = shared.arm.joints.start if "driver" in shared.nodes else ()
+    loop = configuration.sections.get(FORCE_LOOP, {}) if FORCE_LOOP in shared.nodes else {}
+    _require_motions(where, steps, shared, start, float(loop.get(FOLLOWED, math.inf)))
 
 
 def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
@@ -419,6 +440,12 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
     require(len(chosen) <= 1, f"{where}: {' and '.join(chosen)} are given; give one of them")
     moves = [key for key in MOTIONS if key in body]
     require(len(moves) <= 1, f"{where}: {' and '.join(moves)} are given; give one of them")
+    task = _task(where, body, arm)
+    require(
+        not moves or task is None or len(task.axes) < len(arm.joints.names),
+        f"{where}: {' and '.join((*moves, *chosen))} are given; the {' '.join(chosen)} leaves no joint free to move; "
+        "give one of them, or a task with fewer axes",
+    )
     return ScenarioStep(
         name=name,
         seconds=seconds,
@@ -429,7 +456,7 @@ def _step(where: str, body: Any, shared: Shared) -> ScenarioStep:
         request=request,
         chirp=_chirp(where, body["chirp"]) if "chirp" in body else None,
         settings=tuple(settings_of(where, body["set"], shared)) if "set" in body else (),
-        task=_task(where, body, arm),
+        task=task,
         trajectory=_trajectory(where, body["trajectory"], arm) if "trajectory" in body else None,
         tip=_tip(where, body["tip"]) if "tip" in body else None,
     )
