@@ -9,6 +9,7 @@ import pytest
 
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceCommand, ForceLoop, ForceLoopParameters, ForceOutput
+from wam_control.task import AxisKind, TaskAxis, TaskCommand
 from wam_control.torque_watch import TorqueWatch
 from wam_description.arm import Arm
 from wam_description.configuration import Configuration, packaged
@@ -371,6 +372,49 @@ def test_a_command_that_has_no_effect_in_a_mode_is_refused() -> None:
     ask(hybrid, World(400.0), None, torque=[1.0, 0.0, 0.0, 0.0], posture=moved)
     why = "joint_torque_command has no effect in the mode hybrid; set force_loop:mode to joint_torque, or end the"
     assert hybrid.refusals["joint_torque_command"].startswith(why)
+
+
+MOVED = [angle + 0.05 for angle in POSE]
+
+
+@pytest.mark.parametrize("mode", ["joint_torque", "open_loop"])
+def test_a_posture_in_a_mode_that_follows_none_is_refused_if_the_arm_would_have_to_move(mode: str) -> None:
+    for first in (POSE, MOVED):
+        loop = force_loop(ARM, replace(WATCHING, mode=mode))
+        ask(loop, World(400.0), None)
+        for posture in (first, MOVED):
+            out = ask(loop, World(400.0), None, posture=posture)
+            assert not any(out.velocity)
+            refusal = loop.refusals.get("joint_posture_command", "")
+            why = f"joint_posture_command has no effect in the mode {mode}; set force_loop:mode to hybrid, or end"
+            assert refusal.startswith(why) if posture is MOVED else not refusal
+
+
+def test_with_a_task_other_commands_are_refused_as_far_as_it_leaves_nothing_for_them() -> None:
+    force = ForceCommand("base", down(5.0))
+    for count, refused in ((3, {"force_command"}), (4, {"force_command", "joint_posture_command"})):
+        axes = tuple(TaskAxis(AxisKind.POSITION, k, value=None) for k in range(count))
+        loop = force_loop(ARM, OWN)
+        for posture in (POSE, MOVED):
+            world = World(400.0)
+            loop.step(
+                world.joints, world.sensors, NO_CONTACT, None, force, posture, None, DT, TaskCommand("base", axes)
+            )
+        assert set(loop.refusals) == refused
+        text = f"force_command has no effect with a task of {count} axes on 4 joints; end one of them"
+        assert loop.refusals["force_command"] == text
+
+
+@pytest.mark.parametrize(("speed", "is_late"), [(1.0, False), (1.2, False), (1.3, True)])
+def test_a_posture_that_moves_faster_than_the_arm_follows_is_reported(speed: float, is_late: bool) -> None:
+    loop, world = force_loop(ARM, replace(OWN, joint_speed_limit=0.5)), World(1e-9)
+    found = []
+    for k in range(200):
+        posture = [POSE[0] + 0.5 * speed * DT * k, *POSE[1:]]
+        world.move(ask(loop, world, None, posture=posture).velocity)
+        found.append(loop.reaction)
+    assert set(found) == {ForceReaction.NONE, *([ForceReaction.NOT_FOLLOWED] if is_late else [])}
+    assert ("joint1 with 0.65 rad/s; allowed: joint_speed_limit, 0.5 rad/s" in loop.reason) is is_late
 
 
 def test_joint_torque_error_is_limited_and_posture_is_held_without_a_command() -> None:

@@ -76,6 +76,18 @@ def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tm
     assert str(answer) == "joint torques and tasks carried out: NO (1 refused, 1 not reached)"
 
 
+def test_a_posture_that_the_arm_does_not_follow_is_not_as_it_should_be(tmp_path: Path) -> None:
+    """From where a task leaves the arm, which nobody knows before."""
+    turned = Configuration.load(packaged("wam")).shared.arm.joints.start
+    steps = f"""
+- {{name: release the brakes, seconds: 0.3, request: enable, task: {{axes: [{{position: here, joint: joint3}}]}}}}
+- {{name: turn, seconds: 0.4, posture: {[turned[0] + 0.7, *turned[1:]]}}}
+"""
+    summary = summarize(recorded(tmp_path, steps))
+    assert str(next(one for one in verdict(summary) if one.result == "NO")) == "postures followed: NO (1 too fast)"
+    assert "turn: reported (not_followed) from" in text(summary)
+
+
 @pytest.mark.slow
 def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[DemoSummary, Analysis]) -> None:
     summary, analysis = found

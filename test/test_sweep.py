@@ -107,6 +107,23 @@ def test_a_task_that_the_loop_refuses_or_does_not_reach_is_a_failure(
     assert bool(found) == bool(failure)
 
 
+def test_a_posture_that_the_arm_does_not_follow_is_a_failure(tmp_path: Path) -> None:
+    """From where a task leaves the arm, which nobody knows before."""
+    file = tmp_path / "late.yaml"
+    file.write_text("""steps:
+- {name: release, seconds: 0.1, request: enable}
+- {name: task, seconds: 0.1, task: {axes: [{position: here, joint: joint3}]}}
+- {name: turn, seconds: SECONDS, posture: [0.4, -1.2, 0.0, 1.2]}
+""")
+    configuration = Configuration.load(packaged("wam")).with_values({"arm.joints.start": [0.0, -1.2, 0.0, 1.2]})
+    text, found = file.read_text(), []
+    for seconds in (0.3, 0.42):
+        file.write_text(text.replace("SECONDS", str(seconds)))
+        found.append(outcome(SweepPoint(configuration, tuple(load(file, configuration.shared)))).failure)
+    assert found[0].startswith("turn not followed: the commanded posture moves faster than the arm follows, joint1 ")
+    assert not found[1]
+
+
 @pytest.mark.slow
 def test_a_refused_set_fails_alone_and_finished_runs_are_kept(script: Path, tmp_path: Path) -> None:
     given = runs(script, (0.004, 0.02, -1.0))

@@ -14,7 +14,7 @@ from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATE
 from wam_analysis.demo_figure import save
 from wam_analysis.demo_summary import STEADY, DemoSummary, LoopReport, SteadyPress, steady_begin, summary_of
 from wam_analysis.demo_traces import TOPICS_READ
-from wam_analysis.reactions import BRIEF, FAULT, NOT_REACHED, sentences, within
+from wam_analysis.reactions import BRIEF, FAULT, NOT_FOLLOWED, NOT_REACHED, sentences, within
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import bounded, plain
 from wam_analysis.unplanned_contact import LIMIT
@@ -144,6 +144,7 @@ def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, ...]:
     answers = (
         _force_verdict(summary.presses),
         *_task_verdict(summary),
+        *_posture_verdict(summary),
         _link_verdict(summary),
         _position_verdict(summary),
         *_false_verdict(summary),
@@ -189,6 +190,12 @@ def _task_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
     if not counts:
         return []
     return [VerdictAnswer("joint torques and tasks carried out", VerdictResult.NO, ", ".join(counts))]
+
+
+def _posture_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
+    """How often a posture moved faster than the arm follows; none if never."""
+    late = sum(one.name == NOT_FOLLOWED for one in summary.reactions)
+    return [VerdictAnswer("postures followed", VerdictResult.NO, f"{late} too fast")] if late else []
 
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:

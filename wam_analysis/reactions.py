@@ -9,7 +9,7 @@ from wam_sim.recording import RecordedRun
 
 FAULT, REFUSAL = "fault", "refused"
 BRIEF = 50_000_000  # ns; what lasts no longer into a step belongs to the one before
-NOT_REACHED = ForceReaction.NOT_REACHED.name.lower()
+NOT_REACHED, NOT_FOLLOWED = (one.name.lower() for one in (ForceReaction.NOT_REACHED, ForceReaction.NOT_FOLLOWED))
 HOLDING = {*(one.name.lower() for one in ForceReaction if one.holds), FAULT, REFUSAL}
 
 

@@ -6,12 +6,14 @@ from typing import NamedTuple
 
 from wam_control.contact_position import pinned_position, torque_of_position
 from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.task import TaskCommand
 from wam_description.arm import Covers
 from wam_description.parts import Joints
 from wam_description.signals import ZERO, ForceCommand
 
 ASIDE = 1e-3  # m, lever of the part of a torque that is not that of the force at a position on the cover
 NOTHING = 1e-6  # N; a smaller force is none: its direction is a rounding, and nothing can be divided by it
+ELSEWHERE = 0.02  # rad, of a posture from where the arm is, beyond which the arm would have to move
 NO_FORCE = ForceCommand("", (0.0, 0.0, 0.0))
 
 
@@ -75,6 +77,7 @@ class CommandAdmission:
         posture: Sequence[float] | None,
         torque: Sequence[float] | None,
         dt: float,
+        task: TaskCommand | None = None,
     ) -> Commands:
         """Admit the commands of one outer period; arguments as those of `ForceLoop.step`."""
         refusals = {}
@@ -103,7 +106,7 @@ class CommandAdmission:
         if posture is not None and (beyond := self._joints.beyond(posture)):
             refusals["joint_posture_command"] = beyond
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
-        self._add_without_effect(refusals, parameters.mode, force, posture, torque)
+        self._add_without_effect(refusals, parameters.mode, force, posture, torque, task)
         has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
         if posture is not None and not self._has_lapsed:
@@ -125,22 +128,35 @@ class CommandAdmission:
         force: ForceCommand | None,
         posture: Sequence[float] | None,
         torque: Sequence[float] | None,
+        task: TaskCommand | None,
     ) -> None:
-        """Refuse what this mode does not control: a force, a posture that moves, a torque."""
-        is_of_joints = mode == "joint_torque"
-        moves = is_of_joints and posture is not None and self._is_moved and list(posture) != self.posture
-        self._is_ignored = moves or (self._is_ignored and is_of_joints and posture is not None)
+        """Refuse what is not controlled in this mode, or with this task: a force, a posture that moves, a torque."""
+        joints = len(self._joints.names)
+        is_of_force, is_of_torque, is_of_posture = mode != "joint_torque", mode == "joint_torque", mode == "hybrid"
+        if task is not None:
+            is_of_force = is_of_torque = False
+            is_of_posture = len(task.axes) < joints
+        self._is_ignored = not is_of_posture and posture is not None and (self._is_ignored or self._moves(posture))
         useless = {
-            "force_command": is_of_joints and bool(_size(force)),
+            "force_command": not is_of_force and bool(_size(force)),
             "joint_posture_command": self._is_ignored,
-            "joint_torque_command": not is_of_joints and bool(_largest(torque)),
+            "joint_torque_command": not is_of_torque and bool(_largest(torque)),
         }
-        other = "hybrid" if is_of_joints else "joint_torque"
         for topic, is_useless in useless.items():
             if is_useless and topic not in refusals:
+                other = "joint_torque" if topic == "joint_torque_command" else "hybrid"
                 refusals[topic] = (
                     f"{topic} has no effect in the mode {mode}; set force_loop:mode to {other}, or end the command"
+                    if task is None
+                    else f"{topic} has no effect with a task of {len(task.axes)} axes on {joints} joints; end one of "
+                    "them"
                 )
+
+    def _moves(self, posture: Sequence[float]) -> bool:
+        """Whether a posture is another one than before; the first one, whether it is not where the arm is."""
+        if self._is_moved:
+            return list(posture) != self.posture
+        return any(abs(a - b) > ELSEWHERE for a, b in zip(posture, self.posture, strict=True))
 
     def _refusal(self, commanded: float, name: str, limit: float, unit: str) -> str:
         return f"{commanded:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} {unit}; {self._last}"

@@ -72,6 +72,7 @@ class ForceReaction(IntEnum):
     SHAKEN = 12  # holds: the arm shakes by more than the surface gives way under the commanded force
     TOO_SLOW = 13  # holds: towards the surface, or with it, the arm moves too slowly for the commanded force
     SECOND_CONTACT = 14  # holds: a second contact is nearly certain, whose torques are not those of the force
+    NOT_FOLLOWED = 15  # goes on: the commanded posture moves faster than the joints may
 
     @property
     def holds(self) -> bool:

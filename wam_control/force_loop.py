@@ -20,7 +20,7 @@ from wam_control.contact_position import ContactPosition, ForcePoint
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force_case import ForceCase
-from wam_control.force_command import CommandAdmission
+from wam_control.force_command import CommandAdmission, Commands
 from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction, most_serious
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, sensing_of
@@ -31,6 +31,7 @@ from wam_control.guard_watch import Watch
 from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
 from wam_control.motion_limits import MotionLimits, WholeForce
+from wam_control.posture_watch import PostureWatch
 from wam_control.pressed_pose import has_left
 from wam_control.sensing_advice import OtherForces, Turnable
 from wam_control.stability_guard import GuardAssessment
@@ -136,6 +137,7 @@ class ForceLoop:
         self._axes = ""
         self._torque_before: list[float] = []
         self._rate: Sequence[float] | None = None
+        self._posture_watch = PostureWatch(arm.joints.names)
         self.refused = 0
         self.refusals: dict[str, str] = {}
         self.fallback = ""
@@ -275,7 +277,7 @@ class ForceLoop:
         contact = contact or NO_CONTACT
         if task is None and self._axes == TASK:
             self._reset(joints.position)
-        commands = self._admission.step(own, joints.position, command, posture, torque, dt)
+        commands = self._admission.step(own, joints.position, command, posture, torque, dt, task)
         self._rate = posture_rate if posture_rate and commands.posture == posture else None
         if commands.refusals:
             self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
@@ -300,7 +302,18 @@ class ForceLoop:
             self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
         elif limited.joint_end and not self.reaction.holds:
             self._react(ForceReaction.JOINT_END, limited.joint_end)
+        self._watch_posture(commands, joints.position, dt)
         return ForceOutput(limited.velocity, *out[1:])
+
+    def _watch_posture(self, commands: Commands, q: Sequence[float], dt: float) -> None:
+        """React to a posture that moves on faster than the arm follows, if nothing else is to be reported."""
+        if self.reaction.holds or "joint_posture_command" in commands.refusals:
+            self._posture_watch.restart()
+            return
+        limit = self.parameters.joint_speed_limit
+        late = self._posture_watch.step(commands.posture, self._rate is not None, q, limit, dt)
+        if late and self.reaction is ForceReaction.NONE:
+            self._react(ForceReaction.NOT_FOLLOWED, late)
 
     def _whole(self, out: ForceOutput) -> WholeForce | None:
         """The force that presses on something, and how it is known in all; None where none does."""
@@ -317,6 +330,7 @@ class ForceLoop:
     def _reset(self, q: Sequence[float]) -> None:
         """Hold this posture and forget what was before."""
         self._admission.restart(q)
+        self._posture_watch.restart()
         self._transfer.reset()
         self._filter.reset()
         self._begin("")

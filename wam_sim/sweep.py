@@ -44,8 +44,8 @@ class SweepResult(NamedTuple):
 
     Attributes
     ----------
-    failure : why the scenario failed, the parameters, a force or a task were refused, or a task (a joint torque is one)
-        did not reach in the end what it commands; '' where nothing was.
+    failure : why the scenario failed, the parameters, a force or a task were refused, a task (a joint torque is one)
+        did not reach in the end what it commands, or a posture moved too fast for the arm; '' where nothing was.
     duration : of the arm's time, s.
     force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
         refused there, N.
@@ -133,8 +133,10 @@ def outcome(point: SweepPoint) -> SweepResult:
     except Exception as error:  # other runs go on
         return SweepResult(f"unexpected {raised(error)}", 0.0, nothing, nothing, nothing)
     ends = [*begins[1:], run.driver.stamp]
-    tasks = [one for one in zip(point.steps, begins, ends, strict=False) if one[0].task is not None]
+    steps = list(zip(point.steps, begins, ends, strict=False))
+    tasks = [one for one in steps if one[0].task is not None]
     unmet = [f"{step.name} {why}" for step, begin, end in tasks if (why := _unmet(statuses, begin, end))]
+    unmet += [f"{step.name} {why}" for step, begin, end in steps if (why := _late(statuses, begin, end))]
     return _measured(run, RigidBody(point.configuration.shared.arm), statuses, [failure, *unmet])
 
 
@@ -180,6 +182,13 @@ def _unmet(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> 
     missed = ForceReaction.NOT_REACHED.name.lower()
     at_end = _during(statuses, last, last)
     return next((f"not reached: {one.message}" for one in at_end if one.facts.get("reaction") == missed), "")
+
+
+def _late(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> str:
+    """Why the arm did not follow the posture of a step, ns, that began to be too fast then; '' where it did."""
+    late = ForceReaction.NOT_FOLLOWED.name.lower()
+    found = (one for stamp, one in statuses if begin <= stamp < end)
+    return next((f"not followed: {one.message}" for one in found if one.facts.get("reaction") == late), "")
 
 
 def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: TopicValue) -> float:
