@@ -135,6 +135,12 @@ def task_of(table: Table | None, arm: Arm) -> TaskCommand | None:
     )
 
 
+def torque_joints(task: TaskCommand | None) -> tuple[int, ...]:
+    """The joints whose torque a task commands."""
+    axes = task.axes if task else ()
+    return tuple(axis.joint for axis in axes if axis.kind is AxisKind.FORCE and axis.joint >= 0)
+
+
 def is_pressing(table: Table) -> bool:
     """Whether the task of a message commands a force."""
     kind, value = (TASK_COLUMNS.index(name) for name in ("kind", "value"))
