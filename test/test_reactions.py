@@ -95,6 +95,15 @@ def test_a_joint_torque_that_is_too_short_to_be_assessed_is_not_shown_to_be_carr
     assert str(answer) == f"commands carried out: NO (1 refused), {words}"
 
 
+def test_a_spring_at_its_rest_is_no_contact(tmp_path: Path) -> None:
+    spring = {"joints": ["joint3"], "stiffness": [4000.0], "lever": [0.3], "rest": [0.0], "bilateral": [True]}
+    values = {f"driver:world.springs.{key}": value for key, value in spring.items()}
+    summary = summarize(recorded(tmp_path, "- {name: release, seconds: 0.4, request: enable}", values))
+    assert not summary.missed
+    assert not summary.touches
+    assert summary.traces.true.is_known.all()
+
+
 @pytest.mark.slow
 def test_the_analysis_names_what_was_refused_with_time_and_reason(found: tuple[DemoSummary, Analysis]) -> None:
     summary, analysis = found
