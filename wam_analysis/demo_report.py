@@ -180,13 +180,10 @@ def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
     forces = {press.begin for press in summary.presses}
     refused = missed = brief = 0
     for step in summary.steps:
-        why = unmet(summary.reactions, step)
-        if why is None:
-            brief += is_too_short(summary.torques, step, summary.settling_time)
-        elif not why.holds:
-            missed += 1
-        elif steady_begin(step) not in forces:  # that of a force is in its own answer
-            refused += 1
+        holding = [one.holds for one in unmet(summary.reactions, step)]
+        missed += False in holding
+        refused += True in holding and steady_begin(step) not in forces  # that of a force is in its own answer
+        brief += not holding and is_too_short(summary.torques, step, summary.settling_time)
     counts = [f"{count} {what}" for count, what in ((refused, "refused"), (missed, "not reached")) if count]
     if not counts and not brief:
         return []

@@ -44,12 +44,12 @@ def steady_begin(step: RecordedStep) -> int:
     return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
 
 
-def unmet(reactions: Sequence[RecordedReaction], step: RecordedStep) -> RecordedReaction | None:
-    """Why what a step commands is not met: refused in its steady state, or not reached at its end; None where it is."""
+def unmet(reactions: Sequence[RecordedReaction], step: RecordedStep) -> list[RecordedReaction]:
+    """Why what a step commands is not met: refused in its steady state, not reached at its end; nothing where it is."""
     found = within(reactions, steady_begin(step), step.end)
     refused = [one for one in found if one.holds and one.name != FAULT]
     missed = [one for one in found if one.name == NOT_REACHED and one.end >= step.end - BRIEF]
-    return next(iter((*refused, *missed)), None)
+    return [*refused[:1], *missed[:1]]
 
 
 def torque_times(tasks: Iterable[tuple[TaskCommand | None, int, int]]) -> list[tuple[int, int]]:

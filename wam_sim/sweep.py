@@ -176,12 +176,12 @@ def _refusal(reactions: Sequence[RecordedReaction], begin: int, end: int) -> str
 
 def _unmet(reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]) -> list[str]:
     """Why the postures and tasks of steps are not met; a force is measured, and a refused one named there."""
-    found = []
-    for step, begin, end in played:
-        if step.commands_arm and step.force == NO_FORCE:
-            why = unmet(reactions, RecordedStep(step.name, begin, end, {}))
-            found += [f"{step.name} {'refused' if why.holds else 'not reached'}: {why.reason}"] if why else []
-    return found
+    return [
+        f"{step.name} {'refused' if why.holds else 'not reached'}: {why.reason}"
+        for step, begin, end in played
+        if step.commands_arm and step.force == NO_FORCE
+        for why in unmet(reactions, RecordedStep(step.name, begin, end, {}))
+    ]
 
 
 def _unassessed(

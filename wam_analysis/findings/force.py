@@ -74,7 +74,7 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
 def _command_verdict(summary: DemoSummary) -> list[str]:
     """Steps whose command was not reached in the end, and those that are too short to assess, in a sentence each."""
     found = [(step, unmet(summary.reactions, step)) for step in summary.steps]
-    missed = [step.name for step, why in found if why and not why.holds]
+    missed = [step.name for step, why in found if not all(one.holds for one in why)]
     settling = summary.settling_time
     brief = [step.name for step, why in found if not why and is_too_short(summary.torques, step, settling)]
     verdict = [f"NOT REACHED in the end: {'; '.join(missed)}."] if missed else []
