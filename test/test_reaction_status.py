@@ -10,7 +10,7 @@ from wam_control.scenario import ScenarioStep
 from wam_control.task import AxisKind, TaskAxis, TaskCommand, joint_axes
 from wam_description.configuration import Configuration, packaged
 from wam_description.signals import BASE, Level, NodeStatus
-from wam_sim.reactions import RecordedReaction, is_too_short, lasting, torque_times, unmet
+from wam_sim.reactions import RecordedReaction, is_too_short, lasting, unmet, watched_times
 from wam_sim.recording import RecordedStep
 from wam_sim.sweep import SweepPoint, outcome
 
@@ -83,10 +83,14 @@ def test_a_command_is_not_met_that_is_refused_or_in_the_end_not_reached() -> Non
 
 def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
     torques, other = (TaskCommand(BASE, joint_axes(AxisKind.FORCE, (1.0, value))) for value in (2.0, 3.0))
-    place = TaskCommand(BASE, (TaskAxis(AxisKind.POSITION, 0, value=0.0),))
+    press = TaskAxis(AxisKind.FORCE, -1, "outer_link", 0.2, (0.0, 0.0, -1.0), 8.0)
+    place = TaskCommand(BASE, (TaskAxis(AxisKind.POSITION, 0, value=0.0), press._replace(value=0.0)))
     tasks = [torques, other, None, torques, place]
-    times = torque_times((task, i * SECOND, (i + 1) * SECOND) for i, task in enumerate(tasks))
+    times = watched_times((task, i * SECOND, (i + 1) * SECOND) for i, task in enumerate(tasks))
     assert times == [(0, 2 * SECOND), (3 * SECOND, 4 * SECOND)]
+    pressing = [(TaskCommand(BASE, (press,)), 0, SECOND)]
+    assert watched_times(pressing) == [(0, SECOND)]
+    assert not watched_times(pressing, of_joints=True)
     steps = [RecordedStep(str(i), i * SECOND, (i + 1) * SECOND, {}) for i in range(5)]
     assert [one.name for one in steps if is_too_short(times, one, 1.5)] == ["0", "3"]
     assert not any(is_too_short(times, one, math.nan) for one in steps)
@@ -96,7 +100,13 @@ def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
     ("start", "torques", "seconds", "failure", "unassessed"),
     [
         (ELBOW, (0.0, 0.0, 0.0, 3.0), 3.0, "torque not reached: force of joint 4: ", ""),  # at the end of joint4
-        (ELBOW, (0.0, 0.0, 0.0, 3.0), 1.0, "", "torque: not assessed: joint torques commanded for no longer than"),
+        (
+            ELBOW,
+            (0.0, 0.0, 0.0, 3.0),
+            1.0,
+            "",
+            "torque: not assessed: force or torque of a task commanded for no longer than",
+        ),
     ],
 )
 def test_a_sweep_states_each_torque_that_is_not_reached_or_too_short(

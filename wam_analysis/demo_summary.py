@@ -25,7 +25,7 @@ from wam_bag.bag import Bag, BagError
 from wam_bag.losses import RECORDING, losses
 from wam_control.force_hold import ForceReaction
 from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
-from wam_sim.reactions import STEADY, RecordedReaction, reactions_of, steady_begin, torque_times, within
+from wam_sim.reactions import STEADY, RecordedReaction, reactions_of, steady_begin, watched_times, within
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 
 UNFINISHED = "not finished: the recording ends before the scenario does"
@@ -191,7 +191,7 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         steps=steps,
         traces=traces,
         tasks=tuple(tasks),
-        torques=tuple(torque_times(tasks_of(run))),
+        torques=tuple(watched_times(tasks_of(run), of_joints=True)),
         settling_time=_settling_time(run),
         presses=presses,
         touches=touches,

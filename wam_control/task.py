@@ -135,10 +135,10 @@ def task_of(table: Table | None, arm: Arm) -> TaskCommand | None:
     )
 
 
-def torque_joints(task: TaskCommand | None) -> tuple[int, ...]:
-    """The joints whose torque a task commands."""
+def watched_axes(task: TaskCommand | None) -> tuple[TaskAxis, ...]:
+    """The axes of a task along which it is watched whether what is commanded is reached: forces and joint torques."""
     axes = task.axes if task else ()
-    return tuple(axis.joint for axis in axes if axis.kind is AxisKind.FORCE and axis.joint >= 0)
+    return tuple(axis for axis in axes if axis.kind is AxisKind.FORCE and (axis.joint >= 0 or axis.value))
 
 
 def is_pressing(table: Table) -> bool:

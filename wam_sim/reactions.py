@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from wam_control.reaction_status import HOLDING, NOT_REACHED, REFUSAL, stated
-from wam_control.task import TaskCommand, torque_joints
+from wam_control.task import TaskCommand, watched_axes
 from wam_sim.recording import RecordedRun, RecordedStep
 
 FAULT = "fault"
@@ -52,32 +52,38 @@ def unmet(reactions: Sequence[RecordedReaction], step: RecordedStep) -> list[Rec
     return [*refused[:1], *missed[:1]]
 
 
-def torque_times(tasks: Iterable[tuple[TaskCommand | None, int, int]]) -> list[tuple[int, int]]:
-    """Begin and end of each time in which tasks, given with theirs in ns, command torques of the same joints."""
-    times: list[tuple[tuple[int, ...], int, int]] = []
+def watched_times(
+    tasks: Iterable[tuple[TaskCommand | None, int, int]], of_joints: bool = False
+) -> list[tuple[int, int]]:
+    """Begin and end of each time in which tasks, given with theirs in ns, command forces along the same axes.
+
+    With `of_joints` joint torques alone count: how far the force at a link is off, a report has from the simulator.
+    """
+    times: list[tuple[list[str], int, int]] = []
     for task, begin, end in tasks:
-        joints, since = torque_joints(task), begin
-        if times and (times[-1][0], times[-1][2]) == (joints, begin):
+        axes, since = [axis.name for axis in watched_axes(task) if axis.joint >= 0 or not of_joints], begin
+        if times and (times[-1][0], times[-1][2]) == (axes, begin):
             _, since, _ = times.pop()
-        times.append((joints, since, end))
-    return [(begin, end) for joints, begin, end in times if joints]
+        times.append((axes, since, end))
+    return [(begin, end) for axes, begin, end in times if axes]
 
 
-def is_too_short(torques: Sequence[tuple[int, int]], step: RecordedStep, settling_time: float) -> bool:
-    """Whether a step commands torques of joints that are not commanded for long enough to be assessed at its end.
+def is_too_short(times: Sequence[tuple[int, int]], step: RecordedStep, settling_time: float) -> bool:
+    """Whether the task of a step commands a force that lasts too briefly to be assessed at its end.
 
     Parameters
     ----------
-    torques : their times, see `torque_times`.
-    settling_time : of the force loop, s, after which a torque that is off is reported.
+    times : in which forces are commanded, see `watched_times`.
+    settling_time : of the force loop, s, after which a force that is off is reported.
     """
-    parts = ((begin, min(end, step.end)) for begin, end in torques)
+    parts = ((begin, min(end, step.end)) for begin, end in times)
     return any(end > max(begin, step.begin) + BRIEF and end - begin <= 1e9 * settling_time for begin, end in parts)
 
 
 def too_short(settling_time: float) -> str:
-    """In words."""
-    return f"not assessed: joint torques commanded for no longer than limits.settling_time, {settling_time:g} s"
+    """What `is_too_short` means, in words."""
+    limit = f"limits.settling_time, {settling_time:g} s"
+    return f"not assessed: force or torque of a task commanded for no longer than {limit}"
 
 
 def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[str]:

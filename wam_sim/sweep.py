@@ -20,7 +20,7 @@ from wam_description.topics import STATUS
 from wam_description.wiring import raised
 from wam_sim.batch import Report, results
 from wam_sim.bus import TopicValue
-from wam_sim.reactions import RecordedReaction, is_too_short, lasting, too_short, torque_times, unmet
+from wam_sim.reactions import RecordedReaction, is_too_short, lasting, too_short, unmet, watched_times
 from wam_sim.recording import RecordedStep
 from wam_sim.simulation import Simulation
 
@@ -54,7 +54,7 @@ class SweepResult(NamedTuple):
     force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
         refused there, N.
     force_peak : largest true force, N.
-    unassessed : steps whose joint torques were commanded too briefly to be reported as not reached; '' where none was.
+    unassessed : steps whose task commands a force or a torque too briefly to be reported as not reached; '' for none.
     """
 
     failure: str
@@ -187,13 +187,13 @@ def _unmet(reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]) 
 def _unassessed(
     configuration: Configuration, reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]
 ) -> str:
-    """Steps whose joint torques were commanded too briefly to be assessed; '' where none was."""
+    """Steps whose task commands a force or a torque too briefly to be assessed; '' where none was."""
     if FORCE_LOOP not in configuration.shared.nodes:
         return ""
     settling = configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time
-    torques = torque_times((step.task, begin, end) for step, begin, end in played)
+    times = watched_times((step.task, begin, end) for step, begin, end in played)
     steps = [RecordedStep(step.name, begin, end, {}) for step, begin, end in played]
-    brief = [one.name for one in steps if is_too_short(torques, one, settling) and not unmet(reactions, one)]
+    brief = [one.name for one in steps if is_too_short(times, one, settling) and not unmet(reactions, one)]
     return f"{', '.join(brief)}: {too_short(settling)}" if brief else ""
 
 
