@@ -7,11 +7,15 @@ page here with one link, which the site replaces by their text.
 import builtins
 import re
 import sys
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpydoc.docscrape_sphinx
 from docutils import nodes
+from jinja2 import FileSystemBytecodeCache
+from jinja2.sandbox import SandboxedEnvironment
 from sphinx import addnodes
 from sphinx.application import Sphinx
 
@@ -57,11 +61,15 @@ apidoc_modules = [
 autodoc_default_options = {"members": True, "show-inheritance": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
+# the sidebar of every page copies the contents of all pages: with objects in them that took a third of the build
+toc_object_entries = False
 # a mock has no `|`, so what is installed is imported
 OPTIONAL = ("rclpy", "control_msgs", "tf2_msgs", "rerun", "viser", "trimesh", "distributed", "websockets")
 autodoc_mock_imports = [name for name in OPTIONAL if find_spec(name) is None]
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
+# numpydoc has an environment for each docstring, and would compile its template for each
+numpydoc.docscrape_sphinx.SandboxedEnvironment = partial(SandboxedEnvironment, bytecode_cache=FileSystemBytecodeCache())
 
 
 def text_of(app: Sphinx, docname: str, source: list[str]) -> None:

@@ -120,7 +120,7 @@ def test_a_posture_that_the_arm_does_not_follow_is_a_failure(tmp_path: Path) -> 
     for seconds in (0.3, 0.42):
         file.write_text(text.replace("SECONDS", str(seconds)))
         found.append(outcome(SweepPoint(configuration, tuple(load(file, configuration.shared)))).failure)
-    assert found[0].startswith("turn not followed: the commanded posture moves faster than the arm follows, joint1 ")
+    assert found[0].startswith("turn not reached: the commanded posture moves faster than the arm follows, joint1 ")
     assert not found[1]
 
 
