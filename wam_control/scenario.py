@@ -308,7 +308,7 @@ def _require_speed(step: ScenarioStep, motion: Motion, start: Sequence[float], s
         return
     what, advice = "turns", f"lower motion.joint_speed to {most:g} rad/s"
     if step.posture:
-        what = f"goes from {start[k]:.4g} to {step.posture[k]:.4g} rad in {step.seconds:g} s,"
+        what = f"goes from {round(start[k], 6) + 0.0:.4g} to {step.posture[k]:.4g} rad in {step.seconds:g} s,"
         advice = f"give the step at least {math.ceil(1e3 * (excess * step.seconds - ROUNDING)) / 1e3:g} s"
         if followed == math.inf:
             advice += f", more where {FORCE_LOOP}:{FOLLOWED} is lower"
