@@ -29,7 +29,6 @@ from wam_analysis.demo_traces import RECORDED, TOPICS_READ, ForceSignal, Traces
 from wam_analysis.findings.analysis import analyse_bag
 from wam_analysis.findings.text import text as analysis_text
 from wam_analysis.press_positions import PositionedForce, PressPositions
-from wam_analysis.reactions import RecordedReaction, sentences
 from wam_analysis.recorded import RecordedArm, recorded_arm
 from wam_bag.bag import Bag, BagError, Columns, JointColumns, Messages, PointColumns, TableColumns, WrenchColumns, read
 from wam_cli.commands.demo import _report
@@ -44,6 +43,7 @@ from wam_description.signals import Contact
 from wam_description.status import CHANGES
 from wam_description.topics import BY_NAME, HYPOTHESIS_COLUMNS, TASK_COLUMNS
 from wam_experiments.thesis.definition import load
+from wam_sim.reactions import RecordedReaction, sentences
 from wam_sim.recorded_parameters import recorded_parameters
 from wam_sim.recording import recorded_run
 from wam_sim.simulated_bag import record

@@ -301,6 +301,23 @@ def test_a_joint_torque_that_is_not_reached_is_reported_in_time(taken: float) ->
     assert f"joint2: {-taken + 0.0:.2g} N m are measured and -1 N m commanded; the torque has been off" in loop.reason
 
 
+def test_a_joint_torque_that_is_not_reached_is_reported_next_to_one_that_is_uncertain_and_a_joint_at_its_end() -> None:
+    sensing = replace(OWN.sensing, torque_sd=0.04)
+    limits = replace(WATCHING.limits, joint_gain=PACKAGED.limits.joint_gain)
+    loop = force_loop(ARM, replace(WATCHING, sensing=sensing, limits=limits))
+    pose = [*POSE[:3], ARM.joints.upper[3] - limits.joint_margin]
+    sensors = State(pose, STILL, (BODY.gravity_torque(pose) - np.array([0.0, 0.0, -0.3, 0.0])).tolist())
+    for _ in range(LATE + 3):
+        loop.step(State(pose, STILL, DRIVEN), sensors, NO_CONTACT, None, None, None, [0.0, 0.0, 0.3, 2.0], DT)
+    assert list(loop.reactions) == [
+        ForceReaction.NOT_REACHED,
+        ForceReaction.UNCERTAIN,
+        ForceReaction.JOINT_END,
+    ]
+    assert (loop.reaction, loop.reason) == next(iter(loop.reactions.items()))
+    assert [why.partition(":")[0].split(" ")[0] for why in loop.reactions.values()] == ["joint4", "joint3", "joint4"]
+
+
 TIME = np.arange(0.0, 12.0, DT)
 
 

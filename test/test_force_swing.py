@@ -41,6 +41,13 @@ def test_a_shake_is_measured_about_the_course_of_the_motion() -> None:
     assert shake.along(across) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_force_that_cycles_and_is_off_is_reported_as_both() -> None:
+    loop = force_loop(ARM, PINNED)
+    for k in range(420):
+        ask(loop, World(400.0, force=3.0 + 0.4 * math.sin(2.0 * math.pi * k * DT / 0.2)), down(5.0))
+    assert list(loop.reactions)[:2] == [ForceReaction.NOT_REACHED, ForceReaction.CYCLE]
+
+
 def test_a_force_that_cycles_is_reported_by_name_with_its_size() -> None:
     loop = force_loop(ARM, PINNED)
     for k in range(220):

@@ -1,16 +1,18 @@
 """Forces and tasks that were refused or doubted are seen in analysis and report, with reason and time."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from wam_analysis.demo_report import text, verdict
 from wam_analysis.demo_summary import DemoSummary, SteadyPress, summarize
 from wam_analysis.findings.analysis import Analysis, analyse_bag
-from wam_analysis.reactions import RecordedReaction, sentences, within
 from wam_bag.bag import Bag, TableColumns, read
 from wam_control.scenario import load
 from wam_description.configuration import Configuration, packaged
+from wam_sim.reactions import RecordedReaction, sentences, steady_begin, within
 from wam_sim.simulated_bag import record
 
 SAMPLES = Path(__file__).parents[1] / "bags" / "sample"
@@ -50,12 +52,12 @@ TORQUES = """
 """
 
 
-def recorded(folder: Path, steps: str) -> Bag:
+def recorded(folder: Path, steps: str, values: Mapping[str, Any] | None = None) -> Bag:
     script = folder / "script.yaml"
     script.write_text(f"steps:\n{steps}", encoding="utf-8")
     base = Configuration.load(packaged("wam"))
     names = [name for name in base.shared.nodes if name not in ("scenario", "recorder")]
-    configuration = base.with_values({"nodes": [*names, "scenario"]})
+    configuration = base.with_values({"nodes": [*names, "scenario"], **(values or {})})
     assert not record(configuration, load(script, base.shared), folder / "bag")
     return read(folder / "bag")
 
@@ -72,8 +74,34 @@ def press(summary: DemoSummary, name: str) -> SteadyPress:
 
 
 def test_a_joint_torque_that_is_refused_or_not_reached_is_not_as_it_should_be(tmp_path: Path) -> None:
-    (answer,) = (one for one in verdict(summarize(recorded(tmp_path, TORQUES))) if one.result == "NO")
-    assert str(answer) == "joint torques and tasks carried out: NO (1 refused, 1 not reached)"
+    summary = summarize(recorded(tmp_path, TORQUES))
+    (answer,) = (one for one in verdict(summary) if one.result == "NO")
+    assert str(answer) == "commands carried out: NO (1 refused, 1 not reached)"
+    analysis = analyse_bag(read(tmp_path / "bag"), lambda stage: None)
+    sections = {section.key: section for section in analysis.sections}
+    assert "NOT REACHED in the end: nothing there." in sections["verdict"].sentences
+    beside = [  # a force that is right, in the same step
+        SteadyPress(step.name, steady_begin(step), step.end, 8.0, 8.0, 0.0, 8.0, 8.0, 3.0, reactions=())
+        for step in summary.steps
+    ]
+    (answer,) = (one for one in verdict(summary._replace(presses=tuple(beside))) if one.result == "NO")
+    assert str(answer) == "commands carried out: NO (1 not reached)"
+
+
+def test_a_joint_torque_that_is_too_short_to_be_assessed_is_not_shown_to_be_carried_out(tmp_path: Path) -> None:
+    summary = summarize(recorded(tmp_path, TORQUES.replace("seconds: 3.0", "seconds: 1.0").split("- {name: none")[0]))
+    (answer,) = (one for one in verdict(summary) if "commands" in one.question)
+    words = "1 not assessed: force or torque of a task commanded for no longer than limits.settling_time, 2 s"
+    assert str(answer) == f"commands carried out: NO (1 refused), {words}"
+
+
+def test_a_spring_at_its_rest_is_no_contact(tmp_path: Path) -> None:
+    spring = {"joints": ["joint3"], "stiffness": [4000.0], "lever": [0.3], "rest": [0.0], "bilateral": [True]}
+    values = {f"driver:world.springs.{key}": value for key, value in spring.items()}
+    summary = summarize(recorded(tmp_path, "- {name: release, seconds: 0.4, request: enable}", values))
+    assert not summary.missed
+    assert not summary.touches
+    assert summary.traces.true.is_known.all()
 
 
 @pytest.mark.slow

@@ -12,7 +12,6 @@ contact_list        the contacts one by one, each estimated one compared with th
 contact_comparison  the true contacts one by one, each with what was estimated of it
 unplanned_contact   contacts while no force is commanded that are harder than allowed
 task_forces         forces that tasks command, and what was measured of each
-reactions           what the force loop did instead of what was commanded, when and why
 demo_summary        the demonstration in numbers
 press_positions     the force of a press at the configured, the estimated and the true position
 demo_report         its report, as text

@@ -12,14 +12,14 @@ import numpy as np
 from wam_analysis.contact_comparison import NOT_RECORDED, StepContact
 from wam_analysis.contact_list import BOUNCE, NO_LINK, NOT_CERTAIN, NOT_ESTIMATED, NOT_PLACED, CutBy
 from wam_analysis.demo_figure import save
-from wam_analysis.demo_summary import STEADY, DemoSummary, LoopReport, SteadyPress, steady_begin, summary_of
+from wam_analysis.demo_summary import DemoSummary, LoopReport, SteadyPress, summary_of
 from wam_analysis.demo_traces import TOPICS_READ
-from wam_analysis.reactions import BRIEF, FAULT, NOT_REACHED, sentences, within
 from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import bounded, plain
 from wam_analysis.unplanned_contact import LIMIT
 from wam_bag.bag import BagError, read
 from wam_description.status import DONE
+from wam_sim.reactions import STEADY, is_too_short, sentences, steady_begin, too_short, unmet, within
 from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
@@ -143,7 +143,7 @@ def verdict(summary: DemoSummary) -> tuple[VerdictAnswer, ...]:
     """Whether force, link and position were right, each with its worst value, and what was too hard in motion."""
     answers = (
         _force_verdict(summary.presses),
-        *_task_verdict(summary),
+        *_command_verdict(summary),
         _link_verdict(summary),
         _position_verdict(summary),
         *_false_verdict(summary),
@@ -175,20 +175,21 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
     return answer._replace(remark=remark)
 
 
-def _task_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
-    """What no force is known of, as a joint torque: whether it was refused, or in the end not reached; none if not."""
+def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
+    """Commands that were refused, or in the end not reached; none if there is none, and all could be assessed."""
     forces = {press.begin for press in summary.presses}
-    refused = missed = 0
+    refused = missed = brief = 0
     for step in summary.steps:
-        if (begin := steady_begin(step)) not in forces:
-            found = within(summary.reactions, begin, step.end)
-            is_refused = any(one.holds and one.name != FAULT for one in found)
-            is_missed = any(one.name == NOT_REACHED and one.end >= step.end - BRIEF for one in found)
-            refused, missed = refused + is_refused, missed + (is_missed and not is_refused)
+        holding = [one.holds for one in unmet(summary.reactions, step)]
+        missed += False in holding
+        refused += True in holding and steady_begin(step) not in forces  # that of a force is in its own answer
+        brief += not holding and is_too_short(summary.torques, step, summary.settling_time)
     counts = [f"{count} {what}" for count, what in ((refused, "refused"), (missed, "not reached")) if count]
-    if not counts:
+    if not counts and not brief:
         return []
-    return [VerdictAnswer("joint torques and tasks carried out", VerdictResult.NO, ", ".join(counts))]
+    result = VerdictResult.NO if counts else VerdictResult.NOTHING
+    remark = f"{brief} {too_short(summary.settling_time)}" * bool(brief)
+    return [VerdictAnswer("commands carried out", result, ", ".join(counts), remark)]
 
 
 def _link_verdict(summary: DemoSummary) -> VerdictAnswer:

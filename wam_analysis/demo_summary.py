@@ -19,17 +19,16 @@ from wam_analysis.contact_list import (
 from wam_analysis.demo_traces import NAN, RECORDED, Mask, Numbers, Traces, traces_of
 from wam_analysis.measures.runs import runs
 from wam_analysis.press_positions import NOWHERE, PressPositions, press_positions
-from wam_analysis.reactions import RecordedReaction, reactions_of, within
-from wam_analysis.task_forces import TaskForce, measured_force, task_forces
+from wam_analysis.task_forces import TaskForce, measured_force, task_forces, tasks_of
 from wam_analysis.unplanned_contact import UnplannedContacts, unplanned_contacts
 from wam_bag.bag import Bag, BagError
 from wam_bag.losses import RECORDING, losses
 from wam_control.force_hold import ForceReaction
 from wam_description.status import BEHIND, ENABLED, REAL_TIME_FACTOR, SLIPS, diagnosed_name
+from wam_sim.reactions import STEADY, RecordedReaction, reactions_of, steady_begin, watched_times, within
 from wam_sim.recording import RecordedRun, RecordedStep, messages_of, recorded_run, status_of
 
 UNFINISHED = "not finished: the recording ends before the scenario does"
-STEADY = 1.0  # s at the end of a step, taken as its steady state; a force that is commanded for less has none
 
 
 class SteadyPress(NamedTuple):
@@ -107,6 +106,8 @@ class DemoSummary(NamedTuple):
     namespace : of the arm, '/wam'.
     period : time between two instants of the traces, s.
     tasks : forces that tasks command.
+    torques : begin and end of each time in which a task commands torques of the same joints, ns.
+    settling_time : of the force loop, s; NaN where it was not recorded.
     contacts : all that were estimated.
     missed : true contacts that were not.
     unplanned : contacts without a command of a force, harder than allowed.
@@ -127,6 +128,8 @@ class DemoSummary(NamedTuple):
     steps: tuple[RecordedStep, ...]
     traces: Traces
     tasks: tuple[TaskForce, ...]
+    torques: tuple[tuple[int, int], ...]
+    settling_time: float
     presses: tuple[SteadyPress, ...]
     touches: tuple[StepContact, ...]
     contacts: tuple[ListedContact, ...]
@@ -188,6 +191,8 @@ def summary_of(run: RecordedRun) -> DemoSummary:
         steps=steps,
         traces=traces,
         tasks=tuple(tasks),
+        torques=tuple(watched_times(tasks_of(run), of_joints=True)),
+        settling_time=_settling_time(run),
         presses=presses,
         touches=touches,
         contacts=listed_contacts(traces, certainty, steps),
@@ -222,6 +227,13 @@ def _blind(run: RecordedRun, traces: Traces) -> Mask:
     return blind
 
 
+def _settling_time(run: RecordedRun) -> float:
+    try:
+        return float(run.parameters.node("force_loop").get("limits.settling_time", NAN))
+    except BagError:
+        return NAN
+
+
 def _length(run: RecordedRun, topic: str) -> int:
     columns = run.bag.topics.get(f"{run.namespace}/{topic}")
     return 0 if columns is None else len(columns.log_time_ns)
@@ -250,11 +262,6 @@ def _with_forces(reaction: RecordedReaction, traces: Traces) -> RecordedReaction
 def _end(traces: Traces, steps: Sequence[RecordedStep]) -> int:
     """When the recording ends, ns."""
     return max([int(stamp) for stamp in traces.stamp[-1:]] + [step.end for step in steps[-1:]], default=0)
-
-
-def steady_begin(step: RecordedStep) -> int:
-    """When what is taken as the steady state of a step begins, ns."""
-    return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
 
 
 def _presses(

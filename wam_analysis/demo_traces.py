@@ -19,6 +19,7 @@ Times = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 NAN = float("nan")
+LEAST = 5e-3  # N, below which a true force is printed as 0.00 N: a spring at its rest, which touches nothing
 CLOCK = 10**16  # ns, above which a stamp is of the clock of a system, which does not begin with the run
 
 HYPOTHESIS = ("probability", "position", "position_sd", "force_sd", "reasons")  # columns that are read
@@ -154,6 +155,7 @@ def traces_of(run: RecordedRun, tasks: Sequence[TaskForce] = ()) -> Traces:
             break
     commanded, measured = signal("force_command"), signal("force_measured")
     true = signal("sim/contact/wrench", _points(run, "sim/contact/point"))
+    true = true._replace(force=np.where(true.size[:, np.newaxis] < LEAST, 0.0, true.force))
     estimated = signal("contact/wrench", _points(run, "contact/point") or _points_of_hypotheses(run))
     covers = _controlled(run, base, np.where(estimated.acts & ~true.acts, estimated.frame, true.frame))
     for task in tasks:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from wam_analysis.held_messages import rows_before_gaps
 from wam_bag.bag import BagError, TableColumns
-from wam_control.task import AxisKind, task_of
+from wam_control.task import AxisKind, TaskCommand, task_of
 from wam_description.arm import Arm
 from wam_description.parameters import ParameterError
 from wam_description.signals import Table
@@ -51,6 +51,11 @@ def arm_of(run: RecordedRun) -> Arm | None:
 
 def task_forces(run: RecordedRun) -> list[TaskForce]:
     """The forces at points of links in all tasks of a run, in the order of time; none if the arm is not known."""
+    return [force for task, begin, end in tasks_of(run) for force in _of(task, begin, end)]
+
+
+def tasks_of(run: RecordedRun) -> list[tuple[TaskCommand, int, int]]:
+    """Each task of a run with start and end, ns; none if the arm is not known."""
     columns, arm = run.bag.topics.get(f"{run.namespace}/task_command"), arm_of(run)
     if not isinstance(columns, TableColumns) or not len(columns.stamp_ns) or arm is None:
         return []
@@ -62,21 +67,25 @@ def task_forces(run: RecordedRun) -> list[TaskForce]:
     lasts = [*(stamps[row] for row in gaps), stamps[-1]]  # of each stretch
     ends = [*(begin for begin, *_ in parts[1:]), stamps[-1]]
     return [
-        force
+        (task, begin, min(end, lasts[number]))
         for (begin, table, number), end in zip(parts, ends, strict=True)
-        for force in _of(table, begin, min(end, lasts[number]), arm)
+        if (task := _task(table, arm)) is not None
     ]
 
 
-def _of(table: Table, begin: int, end: int, arm: Arm) -> list[TaskForce]:
+def _task(table: Table, arm: Arm) -> TaskCommand | None:
     try:
-        task = task_of(table, arm)
+        return task_of(table, arm)
     except ParameterError:  # refused when it was commanded, too
-        return []
-    axes = task.axes if task else ()
-    forces = [(i, axis) for i, axis in enumerate(axes) if axis.kind is AxisKind.FORCE and axis.cover and axis.value]
+        return None
+
+
+def _of(task: TaskCommand, begin: int, end: int) -> list[TaskForce]:
+    forces = [
+        (i, axis) for i, axis in enumerate(task.axes) if axis.kind is AxisKind.FORCE and axis.cover and axis.value
+    ]
     return [
-        TaskForce(begin, end, i, len(forces) == 1, axis.cover, table.frame, np.array(axis.direction) * axis.value)
+        TaskForce(begin, end, i, len(forces) == 1, axis.cover, task.frame, np.array(axis.direction) * axis.value)
         for i, axis in forces
         if axis.value
     ]

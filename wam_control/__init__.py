@@ -31,6 +31,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``task_frame``                    - its law: strict priority, posture in what the axes leave; what 4 joints cannot do
 ``task_parameters``               - its limits
 ``torque_watch``                  - the commanded torque of a joint: reached, and known well enough
+``reaction_status``               - what the loop does instead of what is commanded, in its status and back
 ``task_control``                  - one task after the other: refuses, holds, watches
 ``bumpless_transfer``             - no jump of velocity where the law changes
 ``guard_supervision``             - the guard's part: admits a parameter set, scales its gains

@@ -1,7 +1,7 @@
 """When the force loop holds its position instead of controlling the commanded force, and why."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -16,7 +16,6 @@ from wam_control.force_measurement import STEADY, LowPass
 from wam_control.force_swing import Reversals, Shake
 from wam_control.sensing_advice import TURNS, Advice, OtherForces
 from wam_description.number_text import brief
-from wam_description.status import REFUSED
 
 Array = NDArray[np.float64]
 TOLERANCE = 0.1  # of the commanded force, within which it is reached, and at least limits.least_tolerance
@@ -87,16 +86,19 @@ class ForceReaction(IntEnum):
         )
 
 
-def most_serious(found: Sequence[tuple[ForceReaction, str]]) -> tuple[ForceReaction, str]:
-    """The first reaction that holds, else the first one that there is, with its reason."""
-    none = ForceReaction.NONE, ""
-    return max([none, *found], key=lambda one: (one[0].holds, one[0] is not ForceReaction.NONE))
+Found = tuple[ForceReaction, str]  # a reaction and its reason
+SERIOUS = (ForceReaction.CONTACT_FORCE, ForceReaction.NOT_REACHED)  # of those that do not hold
 
 
-def is_refused(facts: Mapping[str, str]) -> bool:
-    """Whether the force loop does not control what is commanded, by the facts of its status."""
-    held = {one.name.lower() for one in ForceReaction if one.holds}
-    return facts.get("reaction", "") in held or bool(facts.get(REFUSED))
+def by_seriousness(found: Iterable[Found]) -> dict[ForceReaction, str]:
+    """Each reaction that there is with its first reason, the most serious one first; one that holds is alone."""
+    there: dict[ForceReaction, str] = {}
+    for reaction, reason in found:
+        if reaction.holds:
+            return {reaction: reason}
+        if reaction is not ForceReaction.NONE:
+            there.setdefault(reaction, reason)
+    return {one: there[one] for one in dict.fromkeys((*SERIOUS, *there)) if one in there}
 
 
 class Refusal(NamedTuple):
@@ -265,8 +267,8 @@ class ForceHold:
         dt: float,
         pushed: float | None = None,
         others: Callable[[], OtherForces] | None = None,
-    ) -> tuple[ForceReaction, str]:
-        """Whether to hold, and why.
+    ) -> list[Found]:
+        """What to do instead of what is commanded, and why; nothing where it is obeyed.
 
         Parameters
         ----------
@@ -299,22 +301,21 @@ class ForceHold:
             self._other = f"{touched}; the arm goes back to where it was free until the command ends"
         weak = self._too_weak(case, parameters)
         if is_loaded:
-            return ForceReaction.NOT_SENSED, _loaded(case.unknown, case.meaning, desired)
+            return [(ForceReaction.NOT_SENSED, _loaded(case.unknown, case.meaning, desired))]
         if ended := self._ended(parameters, is_blind=bool(blind or weak)):
-            return ended
+            return [ended]
         if refusal := blind or weak or self._shaken(axis, desired, parameters) or self._too_slow(case, parameters):
-            return (
-                refusal.reaction,
-                f"{refusal.why}; the arm holds its position{self._advised(case, refusal, parameters, others)}",
-            )
+            why = f"{refusal.why}; the arm holds its position{self._advised(case, refusal, parameters, others)}"
+            return [(refusal.reaction, why)]
         self._advice.reset()
         is_double = not point.is_single and (is_strange or not point.is_pinned)
         self._double = self._double + dt if is_double else 0.0
         if self._double > CONFLICT:  # an impact looks like one for a moment, and a sudden hold is a jerk
-            return ForceReaction.SECOND_CONTACT, (
+            why = (
                 f"a second contact is nearly certain besides that on {point.cover}: the torques are not those of the "
                 "commanded force alone; the arm holds its position until the second contact has gone"
             )
+            return [(ForceReaction.SECOND_CONTACT, why)]
         # what is off already leaves less of the tolerance to what is not known
         left = max(1.0 - abs(desired - measured) / (TOLERANCE * desired), 0.0)
         is_touching, known = self.is_touching, parameters.sensing.reported_fraction * desired * left
@@ -333,13 +334,11 @@ class ForceHold:
         if is_late and is_touching and self._turns.count > FEW:
             self.share = SLOWED  # less would let the force creep away: motors at rest do not show it
             self._turns.reset()
-        elif is_cycling:
-            return ForceReaction.CYCLE, _cycle(self._turns, desired, parameters)
-        if missed:
-            return ForceReaction.NOT_REACHED, missed
-        if turned:
-            return ForceReaction.NOT_EXPLAINED, turned
-        return self._doubted(axis, point, force_sd, desired, unexplained, parameters)
+            is_cycling = False
+        found = [(ForceReaction.CYCLE, _cycle(self._turns, desired, parameters))] if is_cycling else []
+        found += [(ForceReaction.NOT_REACHED, missed)] if missed else []
+        found += [(ForceReaction.NOT_EXPLAINED, turned)] if turned else []
+        return found or [self._doubted(axis, point, force_sd, desired, unexplained, parameters)]
 
     def _not_sensed(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
         """Why the force is not measured well enough, None where it is.
@@ -399,8 +398,8 @@ class ForceHold:
         hold, still = ForceHold(), np.zeros(len(case.axis.lever))
         hold._shaking, hold._blocked = self._shaking_along(case.axis)  # as if the joints shook there as they do here
         largest = min(parameters.force_limit, parameters.limits.contact_force)
-        reaction, _ = hold.step(case.worse(RESERVE), still, 0.0, parameters, 0.0)
-        return case.desired <= largest and not reaction.holds
+        found = hold.step(case.worse(RESERVE), still, 0.0, parameters, 0.0)
+        return case.desired <= largest and not any(reaction.holds for reaction, _ in found)
 
     def _too_weak(self, case: ForceCase, parameters: ForceLoopParameters) -> Refusal | None:
         """Why the contact estimator would not detect the force, None where it would or something is touched."""
@@ -436,7 +435,7 @@ class ForceHold:
             return 1.0
         return CONFLICT / DOUBTED if point.is_doubtful else -FADING
 
-    def _ended(self, parameters: ForceLoopParameters, is_blind: bool) -> tuple[ForceReaction, str] | None:
+    def _ended(self, parameters: ForceLoopParameters, is_blind: bool) -> Found | None:
         """Why the arm holds until the command ends, None where it does not; `is_blind`: the force is not sensed."""
         if self._other:
             return ForceReaction.OTHER_LINK, self._other
@@ -501,7 +500,7 @@ class ForceHold:
         desired: float,
         unexplained: float,
         parameters: ForceLoopParameters,
-    ) -> tuple[ForceReaction, str]:
+    ) -> Found:
         """Why the measured force may not be the true one, where that lasts."""
         lasting = parameters.limits.settling_time
         if self._strange > lasting:

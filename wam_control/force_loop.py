@@ -21,7 +21,7 @@ from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, ForceAxis, PressedForce
 from wam_control.force_case import ForceCase
 from wam_control.force_command import CommandAdmission
-from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction, most_serious
+from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction, Found, by_seriousness
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
@@ -96,7 +96,7 @@ class ForceLoop:
     refused : number of refused commands.
     refusals : why a present command is refused, by topic; the last good one remains in force.
     fallback : why the estimated contact position is not used, '' if it is or if no contact is detected.
-    reaction, reason : what the loop does instead of what is commanded, and why; NONE and '' where it obeys.
+    reactions : what the loop does instead of what is commanded, and why, the most serious first; none where it obeys.
     """
 
     def __init__(
@@ -139,8 +139,18 @@ class ForceLoop:
         self.refused = 0
         self.refusals: dict[str, str] = {}
         self.fallback = ""
-        self.reaction, self.reason = ForceReaction.NONE, ""
+        self.reactions: dict[ForceReaction, str] = {}
         self._take(servo, parameters)
+
+    @property
+    def reaction(self) -> ForceReaction:
+        """The most serious one; NONE where the loop obeys."""
+        return next(iter(self.reactions), ForceReaction.NONE)
+
+    @property
+    def reason(self) -> str:
+        """Of the most serious reaction, '' where there is none."""
+        return next(iter(self.reactions.values()), "")
 
     @property
     def assessment(self) -> GuardAssessment | None:
@@ -280,7 +290,7 @@ class ForceLoop:
         if commands.refusals:
             self.refused += sum(reason != self.refusals.get(topic) for topic, reason in commands.refusals.items())
         self.refusals, self.fallback = commands.refusals, ""
-        self.reaction, self.reason = ForceReaction.NONE, ""
+        self.reactions = {}
         self._measurement.step(own, sensors, external, dt)
         is_touched = not own.is_estimated or bool(contact.cover) or self._hold.is_touching
         present = self._measurement.external if is_touched else [0.0] * self._n
@@ -296,10 +306,10 @@ class ForceLoop:
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
         push = self._push_on_arm(joints.position, contact, _known_position(out.point, task))
         limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
-        if limited.contact_force and not self.reaction.holds:
-            self._react(ForceReaction.CONTACT_FORCE, limited.contact_force)
-        elif limited.joint_end and not self.reaction.holds:
-            self._react(ForceReaction.JOINT_END, limited.joint_end)
+        if limited.contact_force:
+            self._react(*self.reactions.items(), (ForceReaction.CONTACT_FORCE, limited.contact_force))
+        if limited.joint_end:
+            self._react(*self.reactions.items(), (ForceReaction.JOINT_END, limited.joint_end))
         return ForceOutput(limited.velocity, *out[1:])
 
     def _whole(self, out: ForceOutput) -> WholeForce | None:
@@ -311,8 +321,8 @@ class ForceLoop:
             out.desired, None if pressed is None else lambda: axes.whole(self._joints, pressed, self._external[0])
         )
 
-    def _react(self, reaction: ForceReaction, reason: str) -> None:
-        self.reaction, self.reason = reaction, reason
+    def _react(self, *found: Found) -> None:
+        self.reactions = by_seriousness(found)
 
     def _reset(self, q: Sequence[float]) -> None:
         """Hold this posture and forget what was before."""
@@ -391,16 +401,15 @@ class ForceLoop:
         moved = np.array(q) - np.array(self._q_before or q)
         self._q_before = list(q)
         is_watching = self._is_watching(force_axis, moved, dt)
-        reaction, reason = self._reaction(q, force_axis, point, direction, (measured, free), desired, dt, command.frame)
-        self._react(reaction, reason)
+        self._react(*self._found(q, force_axis, point, direction, (measured, free), desired, dt, command.frame))
         self._remember(q, moved, contact, point, force_axis)
-        if reaction.holds:
+        if self.reaction.holds:
             measured -= -float(force_axis.sense @ self._unknown[0])
             excess = self._hold.excess(force_axis, measured, desired, self._torque_error(force_axis))
             factor = self._gain_factor(point, _triple(direction.tolist()), desired, dt)
             force = RetreatForce(force_axis, factor * scalar.velocity(0, -excess, -excess, dt) if excess else 0.0)
             velocity, effort = self._hold_still(q, contact, point, force, desired, dt)
-            self._react(reaction, reason + self._held.push)
+            self._react((self.reaction, self.reason + self._held.push))
             self.refusals["force_command"] = self.reason
             return out._replace(velocity=[] if is_open else velocity, effort=effort)
         if self._held.is_holding:
@@ -445,7 +454,7 @@ class ForceLoop:
         free = 0.5 * (measured + before) - float(axis.carried @ self._acceleration)
         return (measured, before, free) if self._hold.is_touching else (free, free, free)
 
-    def _reaction(
+    def _found(
         self,
         q: Sequence[float],
         axis: ForceAxis,
@@ -455,13 +464,14 @@ class ForceLoop:
         desired: float,
         dt: float,
         frame: str,
-    ) -> tuple[ForceReaction, str]:
+    ) -> list[Found]:
         """What the loop does instead of the command, and why; forces in N, the measured one without inertia, too."""
         if self._is_fast:
-            return ForceReaction.NOT_SENSED, (
+            why = (
                 f"the arm moved faster than {FAST:g} rad/s as the force began, and it is not known what it carries: it "
                 "comes to rest first"
             )
+            return [(ForceReaction.NOT_SENSED, why)]
         if self._resting is not None:
             self._judge(q, point, direction, self._resting)
         return self._hold.step(
@@ -669,9 +679,9 @@ class ForceLoop:
         self._judge_load(q)
         push = self._push(q, self._pushed_position(contact, _known_position(None, task)))
         found = self._tasks.step(task, q, self._external, contact, posture, self._rate, dt, self._unknown, push)
-        self._react(found.reaction, found.reason)
-        if found.reaction.holds:
-            self.refusals["task_command"] = found.reason
+        self.reactions = found.reactions
+        if self.reaction.holds:
+            self.refusals["task_command"] = self.reason
         elif self._tasks.is_touching:
             self._pressed_at = list(q)
         if found.has_changed:
@@ -703,13 +713,14 @@ class ForceLoop:
         return ForceOutput([factor * v for v in velocity], [share * value for value in torque])
 
     def _watch_torques(self, desired: Sequence[float], dt: float) -> None:
-        """React to the torques of the joints, N m, by the most serious of what they show."""
+        """React to the torques of the joints, N m."""
         values = (values.tolist() for values in (-self._external[0], self._push_sd, -self._unknown[0]))
-        found = [
-            watch.step(torque, measured, sd, self.parameters, dt, unknown, self._unknown[1])
-            for watch, torque, measured, sd, unknown in zip(self._torques, desired, *values, strict=True)
-        ]
-        self._react(*most_serious(found))
+        self.reactions = by_seriousness(
+            [
+                watch.step(torque, measured, sd, self.parameters, dt, unknown, self._unknown[1])
+                for watch, torque, measured, sd, unknown in zip(self._torques, desired, *values, strict=True)
+            ]
+        )
 
     def _point(self, contact: Contact, command: ForceCommand, direction: Array) -> ForcePoint:
         """Point of action of the force; where the loop relies on the estimate, a rejected one counts as refused."""

@@ -6,13 +6,13 @@ from wam_control.contact_table import contact_of
 from wam_control.force_hold import ForceReaction
 from wam_control.force_loop import ForceLoop, ForceLoopParameters, ForceOutput
 from wam_control.guard_report import Report
+from wam_control.reaction_status import facts_of
 from wam_control.task import TaskCommand, task_of
 from wam_control.trajectory_player import TrajectoryPlayer
 from wam_description.arm import Shared
 from wam_description.number_text import brief
 from wam_description.parameters import ParameterError
 from wam_description.signals import BASE, ZERO, Answer, ForceCommand, Level, NodeStatus, State, Table, Wrench
-from wam_description.status import REFUSED
 from wam_description.synchroniser import Inputs
 from wam_description.wiring import Followed, Input, Outputs, reaction
 
@@ -36,7 +36,9 @@ class ForceLoopNode:
         self._refusal = ""
         self._covers = shared.arm.covers.names
         self._timing = shared.timing
-        self._reported: tuple[Report, ForceReaction, bool, tuple[str, ...], str, bool, tuple[str, ...]] | None = None
+        self._reported: (
+            tuple[Report, tuple[ForceReaction, ...], bool, tuple[str, ...], str, bool, tuple[str, ...]] | None
+        ) = None
         self._reaction = ForceReaction.NONE
 
     @reaction(
@@ -135,7 +137,7 @@ class ForceLoopNode:
 
     def _status(self, command: Wrench | None, torque: State | None, task: TaskCommand | None) -> Outputs:
         """What the guard reports, how the loop reacts and what it refuses, where it has changed."""
-        report, reaction = self._loop.report, self._loop.reaction
+        report, reactions = self._loop.report, self._loop.reactions
         refused = self.refusals
         refused.pop("contact/hypotheses", None)
         advised, other = self._loop.is_advised, self._refusal or self._player.refusal
@@ -144,15 +146,13 @@ class ForceLoopNode:
             values = [*(command.force if command else ()), *(torque.effort if torque else ())]
             values += [axis.value or 0.0 for axis in task.axes] if task else []
             commanded = tuple(map(brief, values))
-        present = report, reaction, self._loop.is_pushed, tuple(refused), other, advised, commanded
+        present = report, tuple(reactions), self._loop.is_pushed, tuple(refused), other, advised, commanded
         if present == self._reported:
             return {}
         self._reported = present
-        problem = self._loop.reason or next(iter(refused.values()), "")
-        level = Level.WARN if report.is_warning or problem else Level.OK
-        facts = {**report.facts, "reaction": reaction.name.lower()}
-        facts |= {REFUSED: ", ".join(refused)} if refused else {}
-        return {"status": NodeStatus(level, problem or report.message, facts=facts)}
+        message, facts = facts_of(reactions, refused)
+        level = Level.WARN if report.is_warning or message else Level.OK
+        return {"status": NodeStatus(level, message or report.message, facts={**report.facts, **facts})}
 
     @property
     def refusals(self) -> dict[str, str]:

@@ -135,6 +135,12 @@ def task_of(table: Table | None, arm: Arm) -> TaskCommand | None:
     )
 
 
+def watched_axes(task: TaskCommand | None) -> tuple[TaskAxis, ...]:
+    """The axes of a task along which it is watched whether what is commanded is reached: forces and joint torques."""
+    axes = task.axes if task else ()
+    return tuple(axis for axis in axes if axis.kind is AxisKind.FORCE and (axis.joint >= 0 or axis.value))
+
+
 def is_pressing(table: Table) -> bool:
     """Whether the task of a message commands a force."""
     kind, value = (TASK_COLUMNS.index(name) for name in ("kind", "value"))

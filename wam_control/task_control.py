@@ -12,7 +12,7 @@ from wam_control.contact_position import ForcePoint, position_is_certain, slid_p
 from wam_control.feed_forward import FeedForward
 from wam_control.force_axis import ForceAxes, PressedForce
 from wam_control.force_case import ForceCase
-from wam_control.force_hold import ForceHold, ForceReaction, most_serious
+from wam_control.force_hold import ForceHold, ForceReaction, Found, by_seriousness
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_control.guard_supervision import Supervision
 from wam_control.held_arm import HeldArm, RetreatForce
@@ -38,7 +38,7 @@ class TaskOutput(NamedTuple):
     velocity, effort : of the joints (n,), rad/s and N m.
     measured, error : sum of the forces along the force axes, and of their errors, in the frame of the task (3,), N.
     rows : of each axis, as the topic task_axes has them.
-    reaction, reason : what is done instead of what is commanded, and why.
+    reactions : what is done instead of what is commanded, and why, the most serious first.
     has_changed : whether the law has changed since the period before.
     desired : N, of all its forces, where the task is nothing but forces of points, and one touches; else 0.
     pressed : the commanded force, where that is at one known position.
@@ -49,8 +49,7 @@ class TaskOutput(NamedTuple):
     measured: Array
     error: Array
     rows: tuple[AxisRow, ...]
-    reaction: ForceReaction
-    reason: str
+    reactions: dict[ForceReaction, str]
     has_changed: bool
     desired: float
     pressed: PressedForce | None
@@ -129,14 +128,16 @@ class TaskControl:
         anchors = self._find_anchors(states)
         forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
         self._refusal = self._refusal or self._beyond(task) or self._frame.refusal(states)
-        reaction, reason = (
-            (ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")
+        found = (
+            [(ForceReaction.TASK_REFUSED, f"{self._refusal}; the arm holds its position")]
             if self._refusal
             else self._watch(states, forces, torques[0], push.torque_sd, dt, unknown)
         )
-        if reaction.holds != self._held.is_holding:
+        reactions = by_seriousness(found)
+        holds = any(reaction.holds for reaction in reactions)
+        if holds != self._held.is_holding:
             has_changed = True
-            if reaction.holds:
+            if holds:
                 self._held.hold(q, own.limits.free_travel)
             else:
                 self._held.release()
@@ -156,7 +157,7 @@ class TaskControl:
             back = [self._back(*one, factor, dt) for one in zip(states, forces, self._holds, strict=True)]
             gain, limit = own.posture_gain, own.joint_speed_limit
             velocity, is_yielding = self._held.step(q, [one for one in back if one], push, gain, limit, dt)
-            reason += self._held.push
+            reactions = {reaction: reason + self._held.push for reaction, reason in reactions.items()}
             fed = np.zeros(len(q)) if is_yielding else None
         effort = [0.0] * len(q) if fed is None else self._feed_forward.step(fed, velocity, own, dt)
         for state, hold in zip(states, self._holds, strict=True):
@@ -166,7 +167,7 @@ class TaskControl:
         is_pressing = self.is_touching and all(state.point and state.axis.kind is AxisKind.FORCE for state in states)
         desired = math.fsum(map(_desired, states)) if is_pressing else 0.0
         pressed, has_changed = self._pressed(states) if is_pressing else None, has_changed or is_other
-        return TaskOutput(velocity, effort, measured, error, rows, reaction, reason, has_changed, desired, pressed)
+        return TaskOutput(velocity, effort, measured, error, rows, reactions, has_changed, desired, pressed)
 
     def _begin(self, task: TaskCommand) -> bool:
         """Take a task; whether it has other axes than the one before."""
@@ -249,9 +250,9 @@ class TaskControl:
         external_sd: Array,
         dt: float,
         unknown: tuple[Array, str],
-    ) -> tuple[ForceReaction, str]:
-        """What the force axes report, the most serious first."""
-        found = []
+    ) -> list[Found]:
+        """What the force axes report."""
+        found: list[Found] = []
         for state, force, hold, torque in zip(states, forces, self._holds, self._torques, strict=True):
             desired = _desired(state)
             if (joint := state.axis.joint) >= 0:
@@ -261,8 +262,8 @@ class TaskControl:
             elif state.sensed and state.point and desired:
                 error = -float(state.sensed.sense @ unknown[0])
                 case = ForceCase(state.sensed, state.point, desired, unknown=error, meaning=unknown[1])
-                found.append(hold.step(case, external, force, self._parameters, dt))
-        return most_serious(found)
+                found += hold.step(case, external, force, self._parameters, dt)
+        return found
 
     def _points(self, task: TaskCommand, contact: Contact) -> list[ForcePoint]:
         """Where each axis acts; an estimated position is the last certain one, at first the middle of the link."""

@@ -2,7 +2,7 @@
 
 import math
 
-from wam_control.force_hold import LEFT, TOLERANCE, UNLOAD, ForceReaction
+from wam_control.force_hold import LEFT, TOLERANCE, UNLOAD, ForceReaction, Found
 from wam_control.force_loop_parameters import ForceLoopParameters
 from wam_description.number_text import brief
 
@@ -33,7 +33,7 @@ class TorqueWatch:
         dt: float,
         unknown: float = 0.0,
         meaning: str = "",
-    ) -> tuple[ForceReaction, str]:
+    ) -> Found:
         """What to do instead of what is commanded, and why.
 
         Parameters

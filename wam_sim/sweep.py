@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wam_control.force_hold import ForceReaction, is_refused
-from wam_control.scenario import ScenarioStep, require_playable
+from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.reaction_status import stated
+from wam_control.scenario import NO_FORCE, ScenarioStep, require_playable
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
@@ -19,9 +20,12 @@ from wam_description.topics import STATUS
 from wam_description.wiring import raised
 from wam_sim.batch import Report, results
 from wam_sim.bus import TopicValue
+from wam_sim.reactions import RecordedReaction, is_too_short, lasting, too_short, unmet, watched_times
+from wam_sim.recording import RecordedStep
 from wam_sim.simulation import Simulation
 
 FORCE_LOOP = "force_loop"
+PlayedStep = tuple[ScenarioStep, int, int]  # with start and end, ns
 SETTLED = 0.5  # part of the time of one commanded force, after which the error counts as settled
 
 
@@ -44,12 +48,13 @@ class SweepResult(NamedTuple):
 
     Attributes
     ----------
-    failure : why the scenario failed, the parameters, a force or a task were refused, or a task (a joint torque is one)
-        did not reach in the end what it commands; '' where nothing was.
+    failure : why the scenario failed, the parameters, a force, a posture or a task were refused, or a task (a joint
+        torque is one) did not reach in the end what it commands; '' where nothing was.
     duration : of the arm's time, s.
     force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
         refused there, N.
     force_peak : largest true force, N.
+    unassessed : steps whose task commands a force or a torque too briefly to be reported as not reached; '' for none.
     """
 
     failure: str
@@ -57,6 +62,7 @@ class SweepResult(NamedTuple):
     force_rms: float
     force_worst: float
     force_peak: float
+    unassessed: str = ""
 
 
 def grid(axes: Sequence[Axis]) -> list[tuple[Any, ...]]:
@@ -132,14 +138,16 @@ def outcome(point: SweepPoint) -> SweepResult:
         return SweepResult(str(error), 0.0, nothing, nothing, nothing)
     except Exception as error:  # other runs go on
         return SweepResult(f"unexpected {raised(error)}", 0.0, nothing, nothing, nothing)
-    ends = [*begins[1:], run.driver.stamp]
-    tasks = [one for one in zip(point.steps, begins, ends, strict=False) if one[0].task is not None]
-    unmet = [f"{step.name} {why}" for step, begin, end in tasks if (why := _unmet(statuses, begin, end))]
-    return _measured(run, RigidBody(point.configuration.shared.arm), statuses, [failure, *unmet])
+    end = run.driver.stamp
+    reactions = lasting(((stamp, stated(status)) for stamp, status in statuses), end)
+    played = [*zip(point.steps, begins, [*begins[1:], end], strict=False)]
+    found = [failure, *_unmet(reactions, played)]
+    measured = _measured(run, RigidBody(point.configuration.shared.arm), reactions, found)
+    return measured._replace(unassessed=_unassessed(point.configuration, reactions, played))
 
 
 def _measured(
-    run: Simulation, body: RigidBody, statuses: Sequence[tuple[int, NodeStatus]], failures: Sequence[str]
+    run: Simulation, body: RigidBody, reactions: Sequence[RecordedReaction], failures: Sequence[str]
 ) -> SweepResult:
     truth = {row.stamp: row for row in run.rows.get("sim/contact/wrench", [])}
     joints = {row.stamp: row.values[: len(body.arm.joints.names)] for row in run.rows.get("sim/joint_states", [])}
@@ -151,7 +159,7 @@ def _measured(
         settled = held[int(SETTLED * len(held)) :]
         if not any(force[:3]):
             continue
-        if refusal := _refusal(statuses, settled[0].stamp, settled[-1].stamp):
+        if refusal := _refusal(reactions, settled[0].stamp, settled[-1].stamp):
             refusals.append(f"{math.hypot(*force[:3]):.3g} N in {held[0].frame} refused: {refusal}")
             continue
         errors += [_error(body, joints[row.stamp], row, truth[row.stamp]) for row in settled]
@@ -161,25 +169,32 @@ def _measured(
     return SweepResult(failure, run.driver.stamp * 1e-9, rms, max(map(abs, errors), default=math.nan), peak)
 
 
-def _during(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> list[NodeStatus]:
-    """What the force loop stated from one time to another, ns."""
-    before = [one for stamp, one in statuses if stamp <= begin]
-    return [*before[-1:], *(one for stamp, one in statuses if begin < stamp <= end)]
-
-
-def _refusal(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> str:
+def _refusal(reactions: Sequence[RecordedReaction], begin: int, end: int) -> str:
     """Why the force loop did not control a force between two times, ns; '' where it did."""
-    return next((one.message for one in _during(statuses, begin, end) if is_refused(one.facts)), "")
+    return next((one.reason for one in reactions if one.holds and one.begin <= end and one.end > begin), "")
 
 
-def _unmet(statuses: Sequence[tuple[int, NodeStatus]], begin: int, end: int) -> str:
-    """Why the task of a step, ns, was refused in its settled part, or is not reached at its end; '' where it is."""
-    settled, last = begin + int(SETTLED * (end - begin)), end - 1
-    if refusal := _refusal(statuses, settled, last):
-        return f"refused: {refusal}"
-    missed = ForceReaction.NOT_REACHED.name.lower()
-    at_end = _during(statuses, last, last)
-    return next((f"not reached: {one.message}" for one in at_end if one.facts.get("reaction") == missed), "")
+def _unmet(reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]) -> list[str]:
+    """Why the postures and tasks of steps are not met; a force is measured, and a refused one named there."""
+    return [
+        f"{step.name} {'refused' if why.holds else 'not reached'}: {why.reason}"
+        for step, begin, end in played
+        if step.commands_arm and step.force == NO_FORCE
+        for why in unmet(reactions, RecordedStep(step.name, begin, end, {}))
+    ]
+
+
+def _unassessed(
+    configuration: Configuration, reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]
+) -> str:
+    """Steps whose task commands a force or a torque too briefly to be assessed; '' where none was."""
+    if FORCE_LOOP not in configuration.shared.nodes:
+        return ""
+    settling = configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time
+    times = watched_times((step.task, begin, end) for step, begin, end in played)
+    steps = [RecordedStep(step.name, begin, end, {}) for step, begin, end in played]
+    brief = [one.name for one in steps if is_too_short(times, one, settling) and not unmet(reactions, one)]
+    return f"{', '.join(brief)}: {too_short(settling)}" if brief else ""
 
 
 def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: TopicValue) -> float:

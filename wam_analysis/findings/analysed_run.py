@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wam_analysis.demo_summary import STEADY, DemoSummary, summary_of
+from wam_analysis.demo_summary import DemoSummary, summary_of
 from wam_analysis.held_messages import rows_before_gaps
-from wam_analysis.reactions import BRIEF, RecordedReaction, within
 from wam_analysis.recorded import PredictionParameters, prediction_parameters
 from wam_bag.bag import Bag, JointColumns
+from wam_sim.reactions import BRIEF, STEADY, RecordedReaction, within
 from wam_sim.recording import RecordedRun, recorded_run
 
 Numbers = NDArray[np.float64]

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wam_analysis.demo_summary import STEADY
+from wam_analysis.demo_summary import DemoSummary
 from wam_analysis.findings.analysed_run import SHORTEST_HOLD, AnalysedRun
 from wam_analysis.findings.finding import Finding, Section, deviations, shown
 from wam_analysis.findings.guarded import Guarded
@@ -15,10 +15,10 @@ from wam_analysis.findings.prediction import LargestForce
 from wam_analysis.findings.swinging import swinging_findings, swinging_words
 from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
-from wam_analysis.reactions import FAULT, RecordedReaction, within
-from wam_analysis.reactions import sentences as reaction_sentences
 from wam_control.stability_guard import LARGEST
 from wam_description.signals import BASE
+from wam_sim.reactions import FAULT, STEADY, RecordedReaction, is_too_short, too_short, unmet, within
+from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
 SURE = 0.8  # confidence from which a limit cycle is reported as one
@@ -41,7 +41,7 @@ def force_section(recording: AnalysedRun, held: Sequence[HeldForce]) -> Section:
     sentences += [f"{text}." for name, found in other.items() for text in reaction_sentences(name, found, zero)]
     range_stated, range_findings = _dynamic_range(held)
     reactions = {one.hold.name: one.hold.reactions for one in held} | other
-    verdict = (*_reaction_verdict(reactions, zero), *_forces_verdict(held))
+    verdict = (*_reaction_verdict(reactions, zero), *_command_verdict(recording.summary), *_forces_verdict(held))
     flagged = [f"{text} {UNLIKE}" for text in deviations(tuple(findings))]
     every = (*findings, *range_findings)
     return Section("force", "Force", (*sentences, *flagged, *range_stated), every, lacking, verdict)
@@ -69,6 +69,16 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
         ]
         verdict += [f"{what}: {'; '.join(named)}."] if named else []
     return verdict
+
+
+def _command_verdict(summary: DemoSummary) -> list[str]:
+    """Steps whose command was not reached in the end, and those that are too short to assess, in a sentence each."""
+    found = [(step, unmet(summary.reactions, step)) for step in summary.steps]
+    missed = [step.name for step, why in found if not all(one.holds for one in why)]
+    settling = summary.settling_time
+    brief = [step.name for step, why in found if not why and is_too_short(summary.torques, step, settling)]
+    verdict = [f"NOT REACHED in the end: {'; '.join(missed)}."] if missed else []
+    return [*verdict, *([f"{'; '.join(brief)}: {too_short(settling)}."] if brief else [])]
 
 
 def _forces_verdict(held: Sequence[HeldForce]) -> tuple[str, ...]:

@@ -1,0 +1,122 @@
+"""What the force loop did instead of what was commanded, when and why; whether a step's command was met in the end."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from wam_control.reaction_status import HOLDING, NOT_REACHED, REFUSAL, stated
+from wam_control.task import TaskCommand, watched_axes
+from wam_sim.recording import RecordedRun, RecordedStep
+
+FAULT = "fault"
+BRIEF = 50_000_000  # ns; what lasts no longer into a step belongs to the one before
+STEADY = 1.0  # s at the end of a step, taken as its steady state; a force that is commanded for less has none
+
+
+class RecordedReaction(NamedTuple):
+    """A time in which a command was not simply obeyed.
+
+    Attributes
+    ----------
+    begin, end : ns.
+    name : of a `ForceReaction`, or FAULT of the driver, or REFUSAL of a command beyond a limit.
+    reason : in words, as it was reported when it began.
+    """
+
+    begin: int
+    end: int
+    name: str
+    reason: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the force was not controlled meanwhile."""
+        return self.name in HOLDING or self.name == FAULT
+
+
+def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple[RecordedReaction, ...]:
+    """The parts of reactions between two times, ns."""
+    parts = (one._replace(begin=max(one.begin, begin), end=min(one.end, end)) for one in reactions)
+    return tuple(one for one in parts if one.end - one.begin > BRIEF or (one.begin < one.end == end))
+
+
+def steady_begin(step: RecordedStep) -> int:
+    """When what is taken as the steady state of a step begins, ns."""
+    return max(step.end - round(STEADY * 1e9), (step.begin + step.end) // 2)
+
+
+def unmet(reactions: Sequence[RecordedReaction], step: RecordedStep) -> list[RecordedReaction]:
+    """Why what a step commands is not met: refused in its steady state, not reached at its end; nothing where it is."""
+    found = within(reactions, steady_begin(step), step.end)
+    refused = [one for one in found if one.holds and one.name != FAULT]
+    missed = [one for one in found if one.name == NOT_REACHED and one.end >= step.end - BRIEF]
+    return [*refused[:1], *missed[:1]]
+
+
+def watched_times(
+    tasks: Iterable[tuple[TaskCommand | None, int, int]], of_joints: bool = False
+) -> list[tuple[int, int]]:
+    """Begin and end of each time in which tasks, given with theirs in ns, command forces along the same axes.
+
+    With `of_joints` joint torques alone count: how far the force at a link is off, a report has from the simulator.
+    """
+    times: list[tuple[list[str], int, int]] = []
+    for task, begin, end in tasks:
+        axes, since = [axis.name for axis in watched_axes(task) if axis.joint >= 0 or not of_joints], begin
+        if times and (times[-1][0], times[-1][2]) == (axes, begin):
+            _, since, _ = times.pop()
+        times.append((axes, since, end))
+    return [(begin, end) for axes, begin, end in times if axes]
+
+
+def is_too_short(times: Sequence[tuple[int, int]], step: RecordedStep, settling_time: float) -> bool:
+    """Whether the task of a step commands a force that lasts too briefly to be assessed at its end.
+
+    Parameters
+    ----------
+    times : in which forces are commanded, see `watched_times`.
+    settling_time : of the force loop, s, after which a force that is off is reported.
+    """
+    parts = ((begin, min(end, step.end)) for begin, end in times)
+    return any(end > max(begin, step.begin) + BRIEF and end - begin <= 1e9 * settling_time for begin, end in parts)
+
+
+def too_short(settling_time: float) -> str:
+    """What `is_too_short` means, in words."""
+    limit = f"limits.settling_time, {settling_time:g} s"
+    return f"not assessed: force or torque of a task commanded for no longer than {limit}"
+
+
+def sentences(name: str, reactions: Sequence[RecordedReaction], zero: int) -> list[str]:
+    """One for each kind of reaction to a command of this name: when, from `zero` on, ns, how often and why."""
+    lines = []
+    for kind in dict.fromkeys(one.name for one in reactions):
+        first, *others = [one for one in reactions if one.name == kind]
+        verb = kind if kind == REFUSAL else f"{REFUSAL if first.holds else 'reported'} ({kind})"
+        again = f" and {len(others)} times more" if others else ""
+        begin, end = ((stamp - zero) / 1e9 for stamp in (first.begin, first.end))
+        lines.append(f"{name}: {verb} from {begin:.2f} to {end:.2f} s{again}: {first.reason}")
+    return lines
+
+
+def reactions_of(run: RecordedRun, end: int) -> tuple[RecordedReaction, ...]:
+    """All of a run up to its end, ns, in the order of time."""
+    of = {
+        name: [(stamp, status) for stamp, status in run.stamped_statuses() if status.node == name]
+        for name in ("force_loop", "driver")
+    }
+    loop = lasting(((stamp, stated(status)) for stamp, status in of["force_loop"]), end)
+    faults = ((stamp, {FAULT: status.fault} if status.fault else {}) for stamp, status in of["driver"])
+    return tuple(sorted((*loop, *lasting(faults, end))))
+
+
+def lasting(found: Iterable[tuple[int, Mapping[str, str]]], end: int) -> list[RecordedReaction]:
+    """Reactions from their reasons by name each time they change, ns; one that only changes its numbers goes on."""
+    over: list[RecordedReaction] = []
+    present: dict[str, RecordedReaction] = {}
+    for stamp, reasons in found:
+        over += [present.pop(name)._replace(end=stamp) for name in [*present] if name not in reasons]
+        for name, reason in reasons.items():
+            one = present.setdefault(name, RecordedReaction(stamp, end, name, reason))
+            if reason.startswith(one.reason):
+                present[name] = one._replace(reason=reason)  # with what would help, which is found later
+    return [one for one in (*over, *present.values()) if one.end > one.begin]
