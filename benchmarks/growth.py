@@ -21,7 +21,7 @@ from wam_analysis.drawing import STYLE, TRUE
 from wam_analysis.findings.analysis import TOPICS_READ, analyse_bag
 from wam_bag.bag import read
 from wam_control.scenario import ScenarioStep
-from wam_description.configuration import Configuration, packaged
+from wam_description.configuration import SHARED, Configuration, packaged
 from wam_description.rigid_body import RigidBody
 from wam_sim.batch import processes, results
 from wam_sim.simulated_bag import record
@@ -32,7 +32,11 @@ PICTURE: Final = Path(__file__).with_name("growth.png")
 KEPT: Final = RESULTS / "growth.jsonl"  # of each measurement when, where, work, size and cost in s
 RECENT: Final = 12 * 3600.0  # s; older ones may be of another source
 Costs = dict[str, dict[int, list[float]]]  # by work and size
-ARMS: Final = {4: "wam", 7: "barrett-wam7"}  # joints: configuration
+ARMS: Final = {4: "wam", 7: "barrett-wam7"}  # joints: configuration; none has more
+MORE: Final = 7  # joints behind those, each
+DISTANCE: Final = 0.03  # m behind the one before, with
+RATIO: Final = 1.0 / 9.7  # of joint to motor, and
+CABLE: Final = 0.6  # m of cable, which is soft enough for the plant's step and a light link
 RUNS: Final = 24  # of the batch
 FASTER: Final = (1.9, 1.95)  # two workers against one: must, aim
 POST, DEPTH = 0.05, 1e-3  # m, half length; how far the link is in its surface at the start
@@ -57,7 +61,11 @@ def seconds(work: Callable[[], Any]) -> float:
 
 def moving(name: str, length: float) -> tuple[Configuration, list[ScenarioStep]]:
     """A configuration whose arm is released and moves all joints."""
-    configuration = Configuration.load(packaged(name))
+    return of_joints(Configuration.load(packaged(name)), length)
+
+
+def of_joints(configuration: Configuration, length: float) -> tuple[Configuration, list[ScenarioStep]]:
+    """A configuration with steps that release its arm and move all joints."""
     posture = tuple(angle + 0.1 for angle in configuration.shared.arm.joints.start)
     release = ScenarioStep("release", 0.1 * length, request="enable")
     return configuration, [release, ScenarioStep("move", 0.9 * length, posture)]
@@ -65,8 +73,50 @@ def moving(name: str, length: float) -> tuple[Configuration, list[ScenarioStep]]
 
 def joints(count: int) -> float:
     """A direct run of the whole stack, for a second of the arm."""
-    run = Simulation(*moving(ARMS[count], LENGTH))
-    return seconds(run.play) / LENGTH
+    configuration, steps = moving(ARMS[min(count, max(ARMS))], LENGTH)
+    if count not in ARMS:
+        configuration, steps = of_joints(lengthened(configuration), LENGTH)
+    run, failures = Simulation(configuration, steps), list[str]()
+    cost = seconds(lambda: failures.append(run.play())) / LENGTH
+    if failures != [""]:
+        raise SystemExit(f"{count} joints: {failures[0]}")
+    return cost
+
+
+def lengthened(configuration: Configuration) -> Configuration:
+    """The production WAM with `MORE` joints behind its wrist, with motors as that of joint 6 and links as the last."""
+    shared = configuration.sections[SHARED]
+    stages, present = len(shared["arm.cables.stage_length"]), len(shared["arm.joints.names"])
+    added = range(present, present + MORE)
+    values: dict[str, Any] = {}
+    for section, flat in configuration.sections.items():
+        for key, given in flat.items():
+            if not isinstance(given, (list, tuple)) or len(given) not in (present, stages):
+                continue
+            more = [given[-1] if key.startswith("arm.links.") else given[-2]] * MORE
+            if given[-1] in (f"joint{present}", f"motor{present}", f"link{present}"):
+                more = [f"{given[-1].rstrip('0123456789')}{i + 1}" for i in added]
+            values[key if section == SHARED else f"{section}:{key}"] = [*given, *more]
+    for key in ("centre", "inertia", "product"):
+        given = shared[f"arm.links.{key}"]
+        values[f"arm.links.{key}"] = [*given, *(given[-3:] * MORE)]
+    transmission = np.diag([RATIO] * (present + MORE))
+    transmission[:present, :present] = np.reshape(shared["arm.joint_from_motor"], (present, present))
+    twist, length, offset = (shared[f"arm.joints.{key}"] for key in ("twist", "length", "offset"))
+    return configuration.with_values(
+        {
+            **values,
+            "arm.joint_from_motor": transmission.ravel().tolist(),
+            "arm.joints.twist": [*twist, *(0.5 * np.pi * (-1.0) ** i for i in added)],
+            "arm.joints.length": [
+                *length,
+                0.0,
+                *[DISTANCE] * (MORE - 1),
+            ],  # the cover of the wrist ends at the next joint
+            "arm.joints.offset": [*offset, *[0.0] * MORE],
+            "arm.cables.stage_length": [*shared["arm.cables.stage_length"], *[CABLE] * MORE],
+        }
+    )
 
 
 def contacts(count: int) -> float:
@@ -183,7 +233,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="wam_bench_") as folder:
         bags = Bags(Path(folder), 2.0 if given.quick else 20.0)
         works = [
-            Work("joints", joints, (4, 7), (4, 7)),
+            Work("joints", joints, (4, 14), (4, 7, 14)),
             Work("contacts", contacts, (1, 2), (1, 2, 4, 8)),
             Work("minutes read", bags.read, (1, 2), (1, 4, 10, 60)),
             Work("minutes analysed", bags.analysed, (1, 2), (1, 4, 10, 60)),
