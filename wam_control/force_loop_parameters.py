@@ -124,7 +124,7 @@ class ForceLoopParameters:
         return self.feedback == "contact_estimate"
 
     def impact_energy(self, force: float) -> float:
-        """Kinetic energy, J, with the impact (3.1) that `limits.impact` allows at a force, N; infinite where it is 0."""
+        """Kinetic energy, J, with the impact (3.1) that `limits.impact` allows at a force, N; infinite if it is 0."""
         own = self.limits
         return (own.impact * force) ** 2 / (2.0 * self.guard.contact_stiffness) if own.impact else math.inf
 
