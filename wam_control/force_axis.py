@@ -194,6 +194,10 @@ class ForceAxes:
         """Inertia at the joints with their armature (n, n), kg m^2, without rotors."""
         return self._body.mass_matrix(q) + self._armature
 
+    def moved_inertia(self, q: Sequence[float]) -> Array:
+        """The same with rotors: what hits a surface."""
+        return self.inertia(q) + self._rotors
+
     def lever(self, q: Sequence[float], cover: str, position: float, direction: Array) -> Array:
         """Torque on each joint per force (n,), m, along a direction (3,), base frame, at a position of a cover, m."""
         result: Array = direction @ self._jacobian(q, cover, position, direction)[0]

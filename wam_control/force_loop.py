@@ -25,12 +25,13 @@ from wam_control.force_hold import UNEXPLAINED, ForceHold, ForceReaction, Found,
 from wam_control.force_law import DelayLine
 from wam_control.force_loop_parameters import ForceLoopParameters, sensing_of
 from wam_control.force_measurement import STEADY, ForceMeasurement, LowPass
+from wam_control.given_way import GivenWay
 from wam_control.guard_report import Report
 from wam_control.guard_supervision import Supervision
 from wam_control.guard_watch import Watch
 from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, hybrid_velocity, posture_velocity
-from wam_control.motion_limits import MotionLimits, WholeForce
+from wam_control.motion_limits import AT_COMMANDED, AT_LEAST, AT_OTHER, BEGIN, MotionLimits, WholeForce
 from wam_control.posture_watch import PostureWatch
 from wam_control.pressed_pose import has_left
 from wam_control.sensing_advice import OtherForces, Turnable
@@ -115,7 +116,8 @@ class ForceLoop:
         self._admission = CommandAdmission(arm.joints, arm.covers, command_age)
         self._position = ContactPosition(arm.covers)
         self._contact_rejected = False
-        self._held = HeldArm(self._body)
+        self._given = GivenWay(self._body)
+        self._held = HeldArm(self._body, self._given)
         self._goes_back = False
         self._q_before: list[float] = []
         self._measurement = ForceMeasurement(self._body)
@@ -202,8 +204,8 @@ class ForceLoop:
         sensing = sensing_of(parameters)
         self._torque_sd = np.full(self._n, sensing.torque_sd)
         self._force_axes = ForceAxes(self._arm, self._body, sensing)
-        self._limits = MotionLimits(self._arm, self._body, parameters.limits, parameters.joint_speed_limit)
-        self._tasks = TaskControl(self._arm, self._body, self._force_axes, parameters, self._supervision)
+        self._limits = MotionLimits(self._arm, self._body, parameters.limits, parameters.joint_speed_limit, self._given)
+        self._tasks = TaskControl(self._arm, self._body, self._force_axes, parameters, self._supervision, self._given)
         self._transfer.restart()
 
     def tare(self) -> str:
@@ -282,6 +284,7 @@ class ForceLoop:
             if own.mode != "open_loop":
                 command = torque = None  # a force that is not measured would grow without bounds
         self._is_free = contact is not None and not contact.cover
+        self._given.step(joints.position, dt)
         self._motion.step(joints.velocity, STEADY, dt)
         self._rested = self._rested + dt if self._is_at_rest else 0.0
         contact = contact or NO_CONTACT
@@ -329,10 +332,28 @@ class ForceLoop:
         """The force that presses on something, and how it is known in all; None where none does."""
         if not out.desired:
             return None
-        axes, pressed = self._force_axes, out.pressed
-        return WholeForce(
-            out.desired, None if pressed is None else lambda: axes.whole(self._joints, pressed, self._external[0])
-        )
+        pressed = out.pressed
+        return WholeForce(out.desired, (lambda: self._whole_force(pressed)) if pressed else lambda: None)
+
+    def _whole_force(self, pressed: PressedForce) -> tuple[float, str]:
+        """The force in all, N, and its words: at its position, or on another link if it would be less there.
+
+        Torques that no force along the commanded direction gives may be those of a push on another link.  They may
+        look like a force along this one, which would have to be many times as large.
+        """
+        q, torques, axes = self._joints, self._external[0], self._force_axes
+        size = axes.whole(q, pressed, torques)
+        if size <= BEGIN * self.parameters.limits.whole_force * pressed.force:
+            return size, AT_COMMANDED
+        axis = axes.axis(q, pressed)
+        if axis.unexplained(torques) <= UNEXPLAINED * max(-float(axis.sense @ torques) / pressed.force, 1.0) ** 2:
+            return size, AT_COMMANDED
+        here = self._push(q, pressed[:2]).least(self._body, q), AT_LEAST
+        others = [
+            (self._push(q, (cover, MIDDLE * length)).least(self._body, q), AT_OTHER.format(cover))
+            for cover, length in self._other_covers(pressed)
+        ]
+        return min((size, AT_COMMANDED), max([here, *others]))
 
     def _react(self, *found: Found) -> None:
         self.reactions = by_seriousness(found)
@@ -340,6 +361,7 @@ class ForceLoop:
     def _reset(self, q: Sequence[float]) -> None:
         """Hold this posture and forget what was before."""
         self._admission.restart(q)
+        self._given.restart()
         self._posture_watch.restart()
         self._transfer.reset()
         self._filter.reset()
@@ -358,6 +380,8 @@ class ForceLoop:
         self._torques = [TorqueWatch(name) for name in self._arm.joints.names]
         self._external = self._external[0], self._external[0]
         self._resting = None
+        if axes != self._axes:
+            self._given.restart()
         self._axes = axes
         self._approached = [0.0] * self._n  # along the force: as its lever turns, the posture would pull this back
         self._held.release()
@@ -580,11 +604,11 @@ class ForceLoop:
         goes_back = self.reaction is ForceReaction.OTHER_LINK
         if not self._held.is_holding or goes_back != self._goes_back:
             self._goes_back = goes_back
-            self._held.hold(self._free_of(force.axis) if goes_back else q, own.limits.free_travel)
+            self._held.hold(self._free_of(force.axis) if goes_back else q)
             self._transfer.restart()
         push = self._push(q, self._pushed_position(contact, _known_position(point, None)))
         push = push._replace(allowed=min(push.allowed, desired))
-        velocity, is_yielding = self._held.step(q, [force], push, own.posture_gain, own.joint_speed_limit, dt)
+        velocity, is_yielding = self._held.step(q, [force], push, self._force_axes.moved_inertia(q), own)
         return velocity, self._feed_forward.step(np.zeros(self._n), velocity, own, dt) if is_yielding else still
 
     def _push(self, q: Sequence[float], where: tuple[str, float] | None) -> ArmPush:
@@ -678,7 +702,7 @@ class ForceLoop:
                 found = max(found, -float(axis.sense @ self._external[0]))
         return found
 
-    def _other_covers(self, point: ForcePoint) -> list[tuple[str, float]]:
+    def _other_covers(self, point: ForcePoint | PressedForce) -> list[tuple[str, float]]:
         """Names and lengths, m, of the covers on which the force is not commanded."""
         covers = self._arm.covers
         return [one for one in zip(covers.names, covers.length, strict=True) if one[0] != point.cover]

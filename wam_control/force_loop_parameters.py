@@ -1,5 +1,6 @@
 """Parameters of the force loop, and the laws built from them."""
 
+import math
 from dataclasses import dataclass
 
 from wam_control.force_axis import SensingParameters
@@ -121,6 +122,11 @@ class ForceLoopParameters:
     def is_estimated(self) -> bool:
         """Whether the estimated torques are fed back, in place of those of sensors."""
         return self.feedback == "contact_estimate"
+
+    def impact_energy(self, force: float) -> float:
+        """Kinetic energy, J, with the impact (3.1) that `limits.impact` allows at a force, N; infinite if it is 0."""
+        own = self.limits
+        return (own.impact * force) ** 2 / (2.0 * self.guard.contact_stiffness) if own.impact else math.inf
 
     def require_fit(self, arm: Arm) -> None:
         """Refuse parameters that do not fit the arm.

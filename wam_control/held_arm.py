@@ -1,5 +1,6 @@
 """An arm that holds its position instead of controlling a force, and gives way where it is pressed harder than that."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -8,6 +9,8 @@ from numpy.typing import NDArray
 
 from wam_control.arm_push import ArmPush
 from wam_control.force_axis import ForceAxis
+from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.given_way import GivenWay
 from wam_control.hybrid_velocity import posture_velocity
 from wam_description.number_text import brief
 from wam_description.rigid_body import RigidBody
@@ -33,16 +36,17 @@ class HeldArm:
     Parameters
     ----------
     body : kinematics of the arm.
+    given : how far the arm has given way.
     """
 
-    def __init__(self, body: RigidBody) -> None:
-        self._body = body
+    def __init__(self, body: RigidBody, given: GivenWay) -> None:
+        self._body, self._given = body, given
         self.release()
 
     def release(self) -> None:
         """Hold no longer."""
         self._at: list[float] = []
-        self._way, self._has_arrived, self._pushed = 0.0, False, 0.0
+        self._has_arrived, self._pushed = False, 0.0
 
     @property
     def is_holding(self) -> bool:
@@ -55,16 +59,21 @@ class HeldArm:
         if not self._pushed:
             return ""
         return (
-            f"; something touches the arm since, and has pushed with up to {brief(self._pushed)} N: the arm gives way, "
-            "by limits.free_travel at most"
+            f"; something touches the arm since, and has pushed with up to {brief(self._pushed)} N: the arm gives way "
+            "by limits.free_travel at most, unless that overpowers its motors"
         )
 
-    def hold(self, at: Sequence[float], way: float) -> None:
-        """Hold a posture (n,), rad, and give way by at most this way, m, in all."""
-        self._at, self._way, self._has_arrived, self._pushed = list(at), way, False, 0.0
+    def hold(self, at: Sequence[float]) -> None:
+        """Hold a posture (n,), rad."""
+        self._at, self._has_arrived, self._pushed = list(at), False, 0.0
 
     def step(
-        self, q: Sequence[float], forces: Sequence[RetreatForce], push: ArmPush, gain: float, limit: float, dt: float
+        self,
+        q: Sequence[float],
+        forces: Sequence[RetreatForce],
+        push: ArmPush,
+        inertia: Array,
+        parameters: ForceLoopParameters,
     ) -> tuple[list[float], bool]:
         """Joint velocities (n,), rad/s, of one outer period, and whether the arm gives way.
 
@@ -73,14 +82,18 @@ class HeldArm:
         q : joint angles (n,), rad.
         forces : that are commanded.
         push : what pushes.
-        gain, limit : speed per distance from the posture, 1/s, and the largest one of a joint, rad/s.
-        dt : outer period, s.
+        inertia : of the arm with its rotors at the joints (n, n), kg m^2.
+        parameters : of the force loop.
         """
-        back = posture_velocity(self._at, q, gain, limit)
+        limit = parameters.joint_speed_limit
+        energy = parameters.impact_energy(push.allowed)
+        back = _slowed(posture_velocity(self._at, q, parameters.posture_gain, limit), inertia, energy)
         self._has_arrived = self._has_arrived or max(abs(a - b) for a, b in zip(self._at, q, strict=True)) < ARRIVED
         least = push.least(self._body, q)
         is_yielding = least > push.allowed or any(force.speed for force in forces)
-        if self._way <= 0.0:
+        if is_yielding:
+            self._given.give()  # also where it may no further: what overpowers the motors still moves it
+        if self._given.way >= parameters.limits.free_travel:
             push, is_yielding = push._replace(gain=0.0), False
         velocity = np.array(back)
         if least:
@@ -95,7 +108,14 @@ class HeldArm:
         for force in forces:
             velocity += force.axis.move * force.speed
         velocity *= min(limit / max(float(np.abs(velocity).max()), SLOWEST), 1.0)
-        self._way -= float(np.linalg.norm(push.jacobian(self._body, q) @ velocity)) * dt
         if self._has_arrived:
             self._at = list(q)
         return velocity.tolist(), True
+
+
+def _slowed(velocity: list[float], inertia: Array, energy: float) -> list[float]:
+    """Velocities (n,), rad/s, with no more than this kinetic energy, J: something may be in the way."""
+    fast = np.array(velocity)
+    moving = 0.5 * float(fast @ inertia @ fast)
+    slow: list[float] = (fast * math.sqrt(energy / moving)).tolist() if moving > energy else velocity
+    return slow

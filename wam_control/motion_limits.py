@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wam_control.arm_push import ArmPush
+from wam_control.given_way import LASTING, GivenWay
 from wam_description.arm import Arm
 from wam_description.number_text import brief
 from wam_description.parameters import tunable
@@ -79,9 +80,9 @@ class LimitParameters:
     )
 
 
-REPORTED: Final = 0.2  # s, for which what pushes too hard is reported after the last time: a swing is one report
 AT_LEAST: Final = "at least {} N in all"
 AT_COMMANDED: Final = "{} N in all, if it acts where the commanded force does"
+AT_OTHER: Final = "at least {{}} N in all, if it acts in the middle of {}"
 AT_ESTIMATED: Final = "at least {} N in all, if the estimated contact is on the right link"
 
 
@@ -91,11 +92,11 @@ class WholeForce(NamedTuple):
     Attributes
     ----------
     desired : commanded, N, in all directions together.
-    measured : the one in all, N, where its position is known; None where it is not.
+    measured : the one in all, N, and its words, where the position of the commanded one is known; None where not.
     """
 
     desired: float
-    measured: Callable[[], float] | None
+    measured: Callable[[], tuple[float, str] | None]
 
 
 class Limited(NamedTuple):
@@ -118,11 +119,12 @@ class MotionLimits:
     body : its kinematics.
     parameters : the limits.
     fastest : speed of a joint, rad/s, with which the arm gives way at most.
+    given : how far it has.
     """
 
-    def __init__(self, arm: Arm, body: RigidBody, parameters: LimitParameters, fastest: float) -> None:
+    def __init__(self, arm: Arm, body: RigidBody, parameters: LimitParameters, fastest: float, given: GivenWay) -> None:
         self._joints, self._body, self._parameters, self._fastest = arm.joints, body, parameters, fastest
-        self._given = self._pushed = 0.0  # m by which the arm has given way, N in the present push
+        self._given, self._pushed = given, 0.0  # N, in the present push
         self._on = ""  # the cover that is pushed, '' where that is not known
         self._how_known = ""  # that force: a lower bound, or the one at an assumed position
         self._reason, self._reported = "", 0.0  # the last one, and for how long, s, it is reported still
@@ -147,16 +149,16 @@ class MotionLimits:
         """
         if not velocity:
             return Limited([], "", "")
-        slowed, force = self._against_the_world(list(velocity), q, push, dt, whole)
+        slowed, force = self._against_the_world(list(velocity), q, push, whole)
         stopped, end = self._before_the_ends(slowed, q)
         if force:
-            self._reason, self._reported = force, REPORTED
+            self._reason, self._reported = force, LASTING
         else:
             self._reported = max(self._reported - dt, 0.0)
         return Limited(stopped, end, self._reason if self._reported else "")
 
     def _against_the_world(
-        self, velocity: list[float], q: Sequence[float], push: ArmPush, dt: float, whole: WholeForce | None
+        self, velocity: list[float], q: Sequence[float], push: ArmPush, whole: WholeForce | None
     ) -> tuple[list[float], str]:
         """Against a force that has come near the largest one no faster than the force law towards that one."""
         on = push.position[0] if push.position else ""
@@ -165,25 +167,25 @@ class MotionLimits:
         force, allowed, how_known = self._push(q, push, whole)
         if not self._pushed and force <= BEGIN * allowed:
             return velocity, ""
-        has_room = self._given < self._parameters.free_travel
+        has_room = self._given.way < self._parameters.free_travel
         push = push._replace(allowed=allowed, gain=push.gain if has_room or force < allowed else 0.0)
         missing = push.correction(self._body, q, velocity, force, self._fastest)
         is_bound = bool(missing.any())
         if not is_bound and force <= BEGIN * allowed:
-            self._given = self._pushed = 0.0
+            self._pushed = 0.0
             return velocity, ""
         if force > self._pushed:
             self._pushed, self._how_known = force, how_known
         limited: list[float] = (np.array(velocity) + missing).tolist()
         if force > allowed:
-            self._given += float(np.linalg.norm(push.jacobian(self._body, q) @ limited)) * dt
+            self._given.give()
         if not is_bound and (force <= allowed or float(push.torques @ limited) > 0.0):
             return limited, ""  # by itself, the arm gives way fast enough
         limit = self._in_words(allowed, whole)
         return limited, (
             f"the world pushes with {self._how_known.format(brief(self._pushed))}; allowed: {limit}; from {BEGIN:g} of "
-            "that on the arm is slow against it, above it gives way by limits.free_travel at most: command a direction "
-            "or a posture away from it, or less force"
+            "that on the arm is slow against it, above it gives way by limits.free_travel at most, unless that "
+            "overpowers its motors: command a direction or a posture away from it, or less force"
         )
 
     def _push(self, q: Sequence[float], push: ArmPush, whole: WholeForce | None) -> tuple[float, float, str]:
@@ -192,7 +194,7 @@ class MotionLimits:
         most, allowed = own.contact_force, own.whole_force * whole.desired if whole else math.inf
         least = push.least(self._body, q, BEGIN * min(most, allowed))
         if whole and allowed < most:
-            force, words = (whole.measured(), AT_COMMANDED) if whole.measured else (least, AT_LEAST)
+            force, words = whole.measured() or (least, AT_LEAST)
             if force * most >= least * allowed:
                 return force, allowed, words
         return least, most, AT_ESTIMATED if push.is_estimated else AT_LEAST

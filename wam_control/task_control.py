@@ -14,6 +14,7 @@ from wam_control.force_axis import ForceAxes, PressedForce
 from wam_control.force_case import ForceCase
 from wam_control.force_hold import ForceHold, ForceReaction, Found, by_seriousness
 from wam_control.force_loop_parameters import ForceLoopParameters
+from wam_control.given_way import GivenWay
 from wam_control.guard_supervision import Supervision
 from wam_control.held_arm import HeldArm, RetreatForce
 from wam_control.hybrid_velocity import followed, posture_velocity
@@ -68,13 +69,20 @@ class TaskControl:
     axes : of forces, with their sensing.
     parameters : of the force loop.
     supervision : the guard of its gains.
+    given : how far the arm has given way.
     """
 
     def __init__(
-        self, arm: Arm, body: RigidBody, axes: ForceAxes, parameters: ForceLoopParameters, supervision: Supervision
+        self,
+        arm: Arm,
+        body: RigidBody,
+        axes: ForceAxes,
+        parameters: ForceLoopParameters,
+        supervision: Supervision,
+        given: GivenWay,
     ) -> None:
         self._frame = TaskFrame(arm, body, axes, parameters.task, parameters.sensing)
-        self._body, self._force_axes, self._held = body, axes, HeldArm(body)
+        self._body, self._force_axes, self._held, self._given = body, axes, HeldArm(body, given), given
         self._covers, self._parameters, self._supervision = arm.covers, parameters, supervision
         self._feed_forward = FeedForward(arm)
         self.restart()
@@ -124,6 +132,7 @@ class TaskControl:
         has_changed = self._begin(task)
         if has_changed:
             self._begun = list(q)
+            self._given.restart()
         states = self._frame.states(task, q, self._points(task, contact), self._begun)
         anchors = self._find_anchors(states)
         forces = [state.force(torques[0]) if state.axis.is_sensed else math.nan for state in states]
@@ -138,7 +147,7 @@ class TaskControl:
         if holds != self._held.is_holding:
             has_changed = True
             if holds:
-                self._held.hold(q, own.limits.free_travel)
+                self._held.hold(q)
             else:
                 self._held.release()
         factor, is_other = self._supervision.factor(lambda: self._guarded(states, q), dt)
@@ -155,8 +164,8 @@ class TaskControl:
             allowed = math.fsum(map(_desired, states)) or push.allowed
             push = push._replace(allowed=min(push.allowed, allowed))
             back = [self._back(*one, factor, dt) for one in zip(states, forces, self._holds, strict=True)]
-            gain, limit = own.posture_gain, own.joint_speed_limit
-            velocity, is_yielding = self._held.step(q, [one for one in back if one], push, gain, limit, dt)
+            inertia = self._force_axes.moved_inertia(q)
+            velocity, is_yielding = self._held.step(q, [one for one in back if one], push, inertia, own)
             reactions = {reaction: reason + self._held.push for reaction, reason in reactions.items()}
             fed = np.zeros(len(q)) if is_yielding else None
         effort = [0.0] * len(q) if fed is None else self._feed_forward.step(fed, velocity, own, dt)
