@@ -1,4 +1,4 @@
-"""Cost as the work grows: joints, contacts, minutes of a bag, points of a map, runs on one and two workers.
+"""Cost as the work grows: joints, contacts, minutes of a bag, points of a map, runs on workers.
 
 A run that is not quick keeps every cost as soon as it is known and draws `growth.png` next to this file: one that was
 interrupted, or was given `--only`, is continued by the next within some hours, which measures what is missing.
@@ -238,7 +238,7 @@ def main() -> None:
             Work("minutes read", bags.read, (1, 2), (1, 4, 10, 60)),
             Work("minutes analysed", bags.analysed, (1, 2), (1, 4, 10, 60)),
             Work("points of a map", stability_map, (100, 400), (10_000, 90_000, 1_000_000)),
-            Work("workers", lambda workers: batch(workers, 4 if given.quick else RUNS), (1, 2), (1, 2)),
+            Work("workers", lambda workers: batch(workers, 4 if given.quick else RUNS), (1, 2), (1, 2, 4)),
         ]
         names = [work.name for work in works]
         if given.only not in (None, *names):
