@@ -373,7 +373,7 @@ def test_torques_at_rest_of_an_undeclared_mass_are_no_torques_of_the_joints() ->
 
 def test_a_command_that_has_no_effect_in_a_mode_is_refused() -> None:
     loop = force_loop(ARM, WATCHING)
-    moved = [angle + 0.01 for angle in POSE]
+    moved = [angle + 0.05 for angle in POSE]
     for given, refused in (
         ({"posture": POSE, "torque": [1.0, 0.0, 0.0, 0.0]}, set()),
         ({"posture": POSE}, set()),
@@ -405,6 +405,18 @@ def test_a_posture_in_a_mode_that_follows_none_is_refused_if_the_arm_would_have_
             refusal = loop.refusals.get("joint_posture_command", "")
             why = f"joint_posture_command has no effect in the mode {mode}; set force_loop:mode to hybrid, or end"
             assert refusal.startswith(why) if posture is MOVED else not refusal
+
+
+@pytest.mark.parametrize("mode", ["joint_torque", "open_loop"])
+def test_a_posture_that_is_set_to_where_the_arm_is_does_not_ask_for_a_motion(mode: str) -> None:
+    """As a scenario does after a force, and with the last increment of a motion before a torque."""
+    loop, world = force_loop(ARM, replace(WATCHING, mode=mode)), World(400.0)
+    postures = [*[POSE] * 20, *[[POSE[0] + 0.2, *POSE[1:]]] * 20]
+    for k, posture in enumerate(postures):
+        q = [POSE[0] + 0.01 * k, *POSE[1:]]  # turned by the torques
+        joints = world.joints._replace(position=q)
+        loop.step(joints, world.sensors, NO_CONTACT, None, None, posture, None, DT)
+        assert "joint_posture_command" not in loop.refusals
 
 
 def test_with_a_task_other_commands_are_refused_as_far_as_it_leaves_nothing_for_them() -> None:

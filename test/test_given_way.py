@@ -66,6 +66,17 @@ def test_what_the_arm_moves_by_itself_is_taken_off_and_not_that_on_which_it_runs
     assert given.way == 0.0
 
 
+def test_bumps_on_the_way_to_and_fro_do_not_add_up() -> None:
+    given, q = GivenWay(BODY), POSE
+    for _ in range(5):
+        q = move(given, q, q + 0.1 * PUSHED, True)
+        rest(given, q)
+        elsewhere = move(given, q, POSE + 3.0 * PUSHED, False)
+        assert given.way == 0.0
+        q = move(given, elsewhere, q, False)
+        assert given.way == 0.0, "what the arm has moved by itself is not given back"
+
+
 def test_a_push_that_shakes_the_arm_is_counted_by_where_it_has_moved_it() -> None:
     given = GivenWay(BODY)
     for k in range(2000):

@@ -47,6 +47,10 @@ def test_another_goal_is_no_motion_however_far_it_is() -> None:
     assert not any(late(lambda time: 2.0 * (time > 0.3) - 1.5 * (time > 0.5), 3.0))
 
 
+def test_a_goal_that_is_set_elsewhere_within_a_noisy_stream_is_no_motion() -> None:
+    assert not any(late(lambda time: 0.5 * (time > 0.3) + 1e-5 * (round(time / DT) % 3), 2.0))
+
+
 def test_a_motion_that_goes_on_from_where_the_arm_is_begins_there() -> None:
     """As after a force, which has moved the arm away from its posture."""
     watch = PostureWatch(["elbow"])

@@ -106,7 +106,7 @@ class CommandAdmission:
         if posture is not None and (beyond := self._joints.beyond(posture)):
             refusals["joint_posture_command"] = beyond
             posture = self.posture if self._is_moved else None  # the last good one, if it was commanded
-        self._add_without_effect(refusals, parameters.mode, force, posture, torque, task)
+        self._add_without_effect(refusals, parameters.mode, q, force, posture, torque, task)
         has_ended = force is None and pressed  # the commanding node is gone: stop pressing and stay here
         self._has_lapsed = force is None and (self._has_lapsed or has_ended)
         if posture is not None and not self._has_lapsed:
@@ -125,6 +125,7 @@ class CommandAdmission:
         self,
         refusals: dict[str, str],
         mode: str,
+        q: Sequence[float],
         force: ForceCommand | None,
         posture: Sequence[float] | None,
         torque: Sequence[float] | None,
@@ -136,7 +137,7 @@ class CommandAdmission:
         if task is not None:
             is_of_force = is_of_torque = False
             is_of_posture = len(task.axes) < joints
-        self._is_ignored = not is_of_posture and posture is not None and (self._is_ignored or self._moves(posture))
+        self._is_ignored = not is_of_posture and posture is not None and (self._is_ignored or self._moves(posture, q))
         useless = {
             "force_command": not is_of_force and bool(_size(force)),
             "joint_posture_command": self._is_ignored,
@@ -152,11 +153,9 @@ class CommandAdmission:
                     "them"
                 )
 
-    def _moves(self, posture: Sequence[float]) -> bool:
-        """Whether a posture is another one than before; the first one, whether it is not where the arm is."""
-        if self._is_moved:
-            return list(posture) != self.posture
-        return any(abs(a - b) > ELSEWHERE for a, b in zip(posture, self.posture, strict=True))
+    def _moves(self, posture: Sequence[float], q: Sequence[float]) -> bool:
+        """Whether a posture is another one than before, and not where the arm is."""
+        return list(posture) != self.posture and any(abs(a - b) > ELSEWHERE for a, b in zip(posture, q, strict=True))
 
     def _refusal(self, commanded: float, name: str, limit: float, unit: str) -> str:
         return f"{commanded:.4g} {unit} is commanded; allowed: up to {name}, {limit:g} {unit}; {self._last}"

@@ -51,7 +51,7 @@ class GivenWay:
             self._is_pushed, self._before, self._begun = is_pushed, self.way, self._points(q)
         if is_pushed or self._before:
             moved = float(np.linalg.norm(self._points(q) - self._begun, axis=1).max())
-            self.way = self._before + moved if is_pushed else max(self._before - moved, 0.0)
+            self.way = self._before + moved if is_pushed else min(self.way, max(self._before - moved, 0.0))
 
     def _points(self, q: Sequence[float]) -> Array:
         """Ends of the covers, and the tool (m, 3), m: no point of the arm moves further than the fastest of them."""

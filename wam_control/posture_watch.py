@@ -53,11 +53,12 @@ class PostureWatch:
             return ""
         if has_moved and max(behind) > BEHIND and not self._late:
             k = behind.index(max(behind))
-            self._late = (
-                f"the commanded posture moves faster than the arm follows, {self._names[k]} with "
-                f"{abs(posture[k] - before[k]) / time:.3g} rad/s; allowed: joint_speed_limit, {limit:g} rad/s; the arm "
-                "goes on and is late: give the motion more time, or raise force_loop:joint_speed_limit"
-            )
+            if (speed := abs(posture[k] - before[k]) / time) > limit:  # otherwise it was set elsewhere at once, before
+                self._late = (
+                    f"the commanded posture moves faster than the arm follows, {self._names[k]} with "
+                    f"{speed:.3g} rad/s; allowed: joint_speed_limit, {limit:g} rad/s; the arm goes on and is late: "
+                    "give the motion more time, or raise force_loop:joint_speed_limit"
+                )
         most = (1.0 if has_rate or self._late else CAUGHT_UP) * limit * dt
         pairs = zip(posture, self._follower, q, strict=True)
         self._follower = [_nearer(goal, at + min(max(goal - at, -most), most), arm) for goal, at, arm in pairs]

@@ -12,6 +12,7 @@ import viser
 from viser import uplot
 
 from wam_analysis.drawing import COLOURS, HAND, LIKELY
+from wam_control.reaction_status import NONE, NOT_FOLLOWED, REACTION
 from wam_description.arm import Arm
 from wam_description.signals import BASE, Contact, Level, NodeStatus, Triple
 from wam_description.status import PAUSED
@@ -327,7 +328,7 @@ def status_page(snapshot: Snapshot, pushing: float = 0.0, pressing: float = 0.0)
 def press_text(snapshot: Snapshot, pressing: float) -> str:
     """What becomes of a commanded force, N, as HTML: the force loop may not do it."""
     loop = snapshot.statuses.get("force_loop")
-    if loop is not None and loop.facts.get("reaction", "none") != "none":
+    if loop is not None and loop.facts.get(REACTION, NONE) not in (NONE, NOT_FOLLOWED):
         text = f"commanded {pressing:.1f} N, not done: {html.escape(loop.message)}"
         return paragraph(text, DOTS[Level.ERROR])
     if not snapshot.measured:
