@@ -26,6 +26,7 @@ Modules ``*_node`` (``transform_node``, ``velocity_loop_node``, ``gravity_node``
 ``force_swing``                   - limit cycles of the measured force, and the shaking of the arm by a dither
 ``motion_limits``                 - limits of the velocities: ends of the joints; gives way above the contact force
 ``force_law``                     - error to velocity of one axis: saturation, deadband, G_I, G_P; delay line
+``given_way``                     - how far an arm has given way to what pushes it: one count per command
 ``posture_watch``                 - whether a posture moves faster than the arm follows
 ``hybrid_velocity``               - joint velocities of force and posture together
 ``task``                          - a task as data: axes of force, velocity, position, impedance
