@@ -126,7 +126,7 @@ class Driver:
         _require_springs(arm, parameters.world)
         self.amplifier = Amplifier(arm.motors, parameters.amplifier, random, true.motors.torque_constant)
         self._sensors = Sensors(arm, parameters.sensors, random)
-        # packed: objects that live so long drive those in use out of the processor's cache, which costs 3 % of a run
+        # packed: objects that live so long drive those in use out of the processor's caches (benchmarks/README.md)
         self._sample = Struct(f"q{4 * len(arm.motors.names)}d")
         self._packed = self._sample.pack
         self._recent: deque[bytes] = deque(maxlen=parameters.post_mortem_samples)

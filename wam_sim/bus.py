@@ -96,7 +96,8 @@ _Row = tuple[Any, ...]  # stamp and numbers of a message
 class _Kept:
     """The numbers of the messages of one topic, packed.
 
-    As objects they would take four times the memory, and drive those in use out of the processor's cache: 7 % of a run.
+    As objects they would take four times the memory, and drive those in use out of the processor's caches
+    (benchmarks/README.md).
 
     Parameters
     ----------
