@@ -311,10 +311,8 @@ class ForceLoop:
         velocity = self._transfer.step(out.velocity, joints.velocity, own.blend_time, dt)
         push = self._push_on_arm(joints.position, contact, _known_position(out.point, task))
         limited = self._limits.step(velocity, joints.position, push, dt, self._whole(out))
-        if limited.contact_force:
-            self._react(*self.reactions.items(), (ForceReaction.CONTACT_FORCE, limited.contact_force))
-        if limited.joint_end:
-            self._react(*self.reactions.items(), (ForceReaction.JOINT_END, limited.joint_end))
+        self._react_too(ForceReaction.CONTACT_FORCE, limited.contact_force)
+        self._react_too(ForceReaction.JOINT_END, limited.joint_end)
         self._watch_posture(commands, joints.position, dt)
         return ForceOutput(limited.velocity, *out[1:])
 
@@ -325,8 +323,7 @@ class ForceLoop:
             return
         limit = self.parameters.joint_speed_limit
         late = self._posture_watch.step(commands.posture, self._rate is not None, q, limit, dt)
-        if late:
-            self._react(*self.reactions.items(), (ForceReaction.NOT_FOLLOWED, late))
+        self._react_too(ForceReaction.NOT_FOLLOWED, late)
 
     def _whole(self, out: ForceOutput) -> WholeForce | None:
         """The force that presses on something, and how it is known in all; None where none does."""
@@ -357,6 +354,11 @@ class ForceLoop:
 
     def _react(self, *found: Found) -> None:
         self.reactions = by_seriousness(found)
+
+    def _react_too(self, reaction: ForceReaction, reason: str) -> None:
+        """React to this, too, where there is a reason."""
+        if reason:
+            self._react(*self.reactions.items(), (reaction, reason))
 
     def _reset(self, q: Sequence[float]) -> None:
         """Hold this posture and forget what was before."""
