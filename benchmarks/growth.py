@@ -59,12 +59,12 @@ def seconds(work: Callable[[], Any]) -> float:
     return time.process_time() - begin
 
 
-def moving(name: str, length: float) -> tuple[Configuration, list[ScenarioStep]]:
-    """A configuration whose arm is released and moves all joints."""
-    return of_joints(Configuration.load(packaged(name)), length)
+def named(name: str) -> Configuration:
+    """A configuration of the package."""
+    return Configuration.load(packaged(name))
 
 
-def of_joints(configuration: Configuration, length: float) -> tuple[Configuration, list[ScenarioStep]]:
+def moving(configuration: Configuration, length: float) -> tuple[Configuration, list[ScenarioStep]]:
     """A configuration with steps that release its arm and move all joints."""
     posture = tuple(angle + 0.1 for angle in configuration.shared.arm.joints.start)
     release = ScenarioStep("release", 0.1 * length, request="enable")
@@ -73,10 +73,9 @@ def of_joints(configuration: Configuration, length: float) -> tuple[Configuratio
 
 def joints(count: int) -> float:
     """A direct run of the whole stack, for a second of the arm."""
-    configuration, steps = moving(ARMS[min(count, max(ARMS))], LENGTH)
-    if count not in ARMS:
-        configuration, steps = of_joints(lengthened(configuration), LENGTH)
-    run, failures = Simulation(configuration, steps), list[str]()
+    configuration = named(ARMS[min(count, max(ARMS))])
+    run = Simulation(*moving(configuration if count in ARMS else lengthened(configuration), LENGTH))
+    failures: list[str] = []
     cost = seconds(lambda: failures.append(run.play())) / LENGTH
     if failures != [""]:
         raise SystemExit(f"{count} joints: {failures[0]}")
@@ -108,11 +107,8 @@ def lengthened(configuration: Configuration) -> Configuration:
             **values,
             "arm.joint_from_motor": transmission.ravel().tolist(),
             "arm.joints.twist": [*twist, *(0.5 * np.pi * (-1.0) ** i for i in added)],
-            "arm.joints.length": [
-                *length,
-                0.0,
-                *[DISTANCE] * (MORE - 1),
-            ],  # the cover of the wrist ends at the next joint
+            # the cover of the wrist ends at the next joint
+            "arm.joints.length": [*length, 0.0, *[DISTANCE] * (MORE - 1)],
             "arm.joints.offset": [*offset, *[0.0] * MORE],
             "arm.cables.stage_length": [*shared["arm.cables.stage_length"], *[CABLE] * MORE],
         }
@@ -121,7 +117,7 @@ def lengthened(configuration: Configuration) -> Configuration:
 
 def contacts(count: int) -> float:
     """A substep of the plant, the outer link on that many posts."""
-    arm = Configuration.load(packaged("wam")).shared.arm
+    arm = named("wam").shared.arm
     body, length, radius = RigidBody(arm), arm.covers.length[-1], arm.covers.radius[-1]
     along = np.linspace(0.2, 0.8, count) * length if count > 1 else [0.5 * length]
     root, tip, *posts = (np.array(body.point(FREE, arm.covers.names[-1], (x, 0.0, 0.0))) for x in (0.0, length, *along))
@@ -149,7 +145,7 @@ def stability_map(points: int) -> float:
 
 def played(_: int) -> int:
     """One run of the batch: the stamp at its end."""
-    run = Simulation(*moving("wam", LENGTH))
+    run = Simulation(*moving(named("wam"), LENGTH))
     run.play()
     return run.driver.stamp
 
@@ -172,7 +168,7 @@ class Bags:
     def _bag(self, minutes: int) -> Path:
         """A bag of this length; written the first time."""
         bag, short = self._folder / str(minutes), self._folder / "short"
-        if not short.exists() and (failure := record(*moving("wam", self._length), short)):
+        if not short.exists() and (failure := record(*moving(named("wam"), self._length), short)):
             raise SystemExit(failure)
         if not bag.exists():
             repeated(short, bag, 60.0 * minutes)

@@ -19,7 +19,7 @@ from wam_analysis.table import bounded, plain
 from wam_analysis.unplanned_contact import LIMIT
 from wam_bag.bag import BagError, read
 from wam_description.status import DONE
-from wam_sim.reactions import STEADY, is_too_short, sentences, steady_begin, too_short, unmet, within
+from wam_sim.reactions import STEADY, sentences, steady_begin, too_short, unassessed, unmet, within
 from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
@@ -178,13 +178,13 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
 def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
     """Commands that were refused, or in the end not reached; none if there is none, and all could be assessed."""
     forces = {press.begin for press in summary.presses}
-    refused = missed = brief = 0
+    refused = missed = 0
     for step in summary.steps:
         holding = [one.holds for one in unmet(summary.reactions, step)]
         missed += False in holding
         refused += True in holding and steady_begin(step) not in forces  # that of a force is in its own answer
-        brief += not holding and is_too_short(summary.torques, step, summary.settling_time)
     counts = [f"{count} {what}" for count, what in ((refused, "refused"), (missed, "not reached")) if count]
+    brief = len(unassessed(summary.reactions, summary.torques, summary.steps, summary.settling_time))
     if not counts and not brief:
         return []
     result = VerdictResult.NO if counts else VerdictResult.NOTHING

@@ -755,11 +755,11 @@ class ForceLoop:
     def _watch_torques(self, desired: Sequence[float], dt: float) -> None:
         """React to the torques of the joints, N m."""
         values = (values.tolist() for values in (-self._external[0], self._push_sd, -self._unknown[0]))
-        self.reactions = by_seriousness(
-            [
+        self._react(
+            *(
                 watch.step(torque, measured, sd, self.parameters, dt, unknown, self._unknown[1])
                 for watch, torque, measured, sd, unknown in zip(self._torques, desired, *values, strict=True)
-            ]
+            )
         )
 
     def _point(self, contact: Contact, command: ForceCommand, direction: Array) -> ForcePoint:

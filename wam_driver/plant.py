@@ -256,9 +256,8 @@ class Plant:
         for _ in range(count):
             if not (self._is_set and remains(velocity)):
                 self._set_friction()
-            if movers:
-                for mover in movers:
-                    mover.lead(data.time)
+            for mover in movers:
+                mover.lead(data.time)
             before = velocity
             mj_step1(model, data)
             if pushes:

@@ -84,6 +84,16 @@ def is_too_short(times: Sequence[tuple[int, int]], step: RecordedStep, settling_
     return any(end > max(begin, step.begin) + BRIEF and end - begin <= 1e9 * settling_time for begin, end in parts)
 
 
+def unassessed(
+    reactions: Sequence[RecordedReaction],
+    times: Sequence[tuple[int, int]],
+    steps: Sequence[RecordedStep],
+    settling_time: float,
+) -> list[RecordedStep]:
+    """The steps of whose command nothing is reported because it lasts too briefly; arguments as of `is_too_short`."""
+    return [one for one in steps if is_too_short(times, one, settling_time) and not unmet(reactions, one)]
+
+
 def too_short(settling_time: float) -> str:
     """What `is_too_short` means, in words."""
     limit = f"limits.settling_time, {settling_time:g} s"

@@ -20,12 +20,12 @@ from wam_description.topics import STATUS
 from wam_description.wiring import raised
 from wam_sim.batch import Report, results
 from wam_sim.bus import TopicValue
-from wam_sim.reactions import RecordedReaction, is_too_short, lasting, too_short, unmet, watched_times
+from wam_sim.reactions import RecordedReaction, lasting, too_short, unassessed, unmet, watched_times
 from wam_sim.recording import RecordedStep
 from wam_sim.simulation import Simulation
 
 FORCE_LOOP = "force_loop"
-PlayedStep = tuple[ScenarioStep, int, int]  # with start and end, ns
+PlayedStep = tuple[ScenarioStep, RecordedStep]  # and when it was played
 SETTLED = 0.5  # part of the time of one commanded force, after which the error counts as settled
 
 
@@ -141,7 +141,8 @@ def outcome(point: SweepPoint) -> SweepResult:
         return SweepResult(f"unexpected {raised(error)}", 0.0, nothing, nothing, nothing)
     end = run.driver.stamp
     reactions = lasting(((stamp, stated(status)) for stamp, status in statuses), end)
-    played = [*zip(point.steps, begins, [*begins[1:], end], strict=False)]
+    times = zip(point.steps, begins, [*begins[1:], end], strict=False)
+    played = [(step, RecordedStep(step.name, begin, last, {})) for step, begin, last in times]
     found = [failure, *_unmet(reactions, played)]
     measured = _measured(run, RigidBody(point.configuration.shared.arm), reactions, found)
     return measured._replace(unassessed=_unassessed(point.configuration, reactions, played))
@@ -179,9 +180,9 @@ def _unmet(reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]) 
     """Why the postures and tasks of steps are not met; a force is measured, and a refused one named there."""
     return [
         f"{step.name} {'refused' if why.holds else 'not reached'}: {why.reason}"
-        for step, begin, end in played
+        for step, recorded in played
         if step.commands_arm and step.force == NO_FORCE
-        for why in unmet(reactions, RecordedStep(step.name, begin, end, {}))
+        for why in unmet(reactions, recorded)
     ]
 
 
@@ -192,10 +193,9 @@ def _unassessed(
     if FORCE_LOOP not in configuration.shared.nodes:
         return ""
     settling = configuration.node(FORCE_LOOP, ForceLoopParameters).limits.settling_time
-    times = watched_times((step.task, begin, end) for step, begin, end in played)
-    steps = [RecordedStep(step.name, begin, end, {}) for step, begin, end in played]
-    brief = [one.name for one in steps if is_too_short(times, one, settling) and not unmet(reactions, one)]
-    return f"{', '.join(brief)}: {too_short(settling)}" if brief else ""
+    times = watched_times((step.task, recorded.begin, recorded.end) for step, recorded in played)
+    brief = unassessed(reactions, times, [recorded for _, recorded in played], settling)
+    return f"{', '.join(one.name for one in brief)}: {too_short(settling)}" if brief else ""
 
 
 def _error(body: RigidBody, q: Sequence[float], command: TopicValue, true: TopicValue) -> float:
