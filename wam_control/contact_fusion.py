@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 EVERY = 0.0299  # s, between moments: one and a half time constants of the observer, within which errors are alike
 MOST = 6  # past moments
 FINEST = 1e-3  # N m, sd of the errors of one moment, below which rounding decides what moments have in common
+ROUNDING = 1e-4  # difference of inner products that are equal but for rounding, above which it decides what they are
 MOVED = 2e-3  # rad, of any joint: in one pose the errors stay, and more moments show nothing
 TURNED = 0.15  # of the size of the force: sd of the change of its components from moment to moment
 SLIPS = 0.03  # m/rad: sd of the way of a contact along its link, per way of the joints
@@ -126,7 +127,7 @@ class ContactFusion:
         self.count = 1
 
     def gram(self, rows: Array, now: Torques) -> Array | None:
-        """Inner products of all moments, (links, 7, 7); None for no past, or another contact.
+        """Inner products of all moments, (links, 7, 7); None for no past, another contact, or where rounding decides.
 
         Parameters
         ----------
@@ -147,8 +148,14 @@ class ContactFusion:
         scale = np.array([1.0, *[1.0 / grown] * 6])
         rest = rows - (effects @ (past.predicts * scale)).transpose(0, 2, 1)
         precision = inverse(covariance - effects.dot(past.explains).dot(effects.T))
+        found: Array = (
+            past.gram * (scale[:, None] * scale) + rest @ precision @ rest.transpose(0, 2, 1)
+        ) / self._widening
+        if np.abs(found - found.transpose(0, 2, 1)).max() > ROUNDING:
+            self.reset()
+            return None
         self.count = 1 + past.moments
-        return (past.gram * (scale[:, None] * scale) + rest @ precision @ rest.transpose(0, 2, 1)) / self._widening
+        return found
 
     def remember(self, rows: Array, now: Torques, guess: Sequence[Guess], residual: float) -> None:
         """Take the present moment, with what was fitted to it.
