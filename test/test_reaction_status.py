@@ -81,6 +81,16 @@ def test_a_command_is_not_met_that_is_refused_or_in_the_end_not_reached() -> Non
     assert not unmet([refused._replace(end=2 * SECOND), late._replace(name="joint_end")], step)
 
 
+def test_a_command_is_not_met_with_more_force_than_allowed_in_all_of_its_steady_state() -> None:
+    step = RecordedStep("press", 0, 4 * SECOND, {})
+    hard = RecordedReaction(SECOND, 4 * SECOND, "contact_force", "13 N in all")
+    seen = hard._replace(begin=3 * SECOND)
+    assert unmet([hard], step) == [seen]
+    assert seen.outcome == "with too much force"
+    assert not unmet([hard._replace(begin=3_100_000_000)], step), "a push at the end is not held by the arm"
+    assert not unmet([hard._replace(end=3_500_000_000)], step)
+
+
 def test_torques_are_too_short_that_end_before_they_would_be_reported() -> None:
     torques, other = (TaskCommand(BASE, joint_axes(AxisKind.FORCE, (1.0, value))) for value in (2.0, 3.0))
     press = TaskAxis(AxisKind.FORCE, -1, "outer_link", 0.2, (0.0, 0.0, -1.0), 8.0)

@@ -15,6 +15,7 @@ from wam_description.configuration import Configuration, packaged
 from wam_description.parameters import ParameterError
 from wam_experiments.thesis import definition, sweeping
 from wam_sim import batch
+from wam_sim.simulation import Simulation
 from wam_sim.sweep import Axis, SweepPoint, SweepResult, drawn, grid, listed, outcome, points, sweep
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -81,6 +82,27 @@ def test_a_force_that_the_loop_refuses_is_a_failure_and_no_error(tmp_path: Path)
     found = pressed(tmp_path, "link", [20.0, 0.0, 0.0])
     assert found.failure.startswith("20 N in link refused: the force is measured with a standard deviation of inf N")
     assert math.isnan(found.force_rms)
+
+
+def test_a_force_that_is_commanded_too_briefly_is_named(tmp_path: Path) -> None:
+    file, found = tmp_path / "brief.yaml", []
+    for seconds in ("0.4", "1.0"):
+        file.write_text(STEPS.replace("0.4", seconds))
+        found.append(outcome(runs(file, (0.004,))[0]))
+    assert [one.unassessed for one in found] == ["20 N in link: commanded for less than 1 s", ""]
+    assert not any(one.failure for one in found)
+
+
+def test_a_direct_run_has_what_was_played_and_not_carried_out(tmp_path: Path) -> None:
+    file, found = tmp_path / "force.yaml", []
+    for newtons in ("[0.0, -20.0, 0.0]", "[20.0, 0.0, 0.0]"):
+        file.write_text(STEPS.replace("[0.0, -20.0, 0.0]", newtons))
+        run = Simulation(*runs(file, (0.004,))[0])
+        assert not run.play()
+        found.append(run.unmet)
+    assert not found[0]
+    assert found[1].startswith("press refused: the force is measured with a standard deviation of inf N")
+    assert [one.step.name for one in run.played] == ["release", "press"]
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -18,8 +19,9 @@ from wam_analysis.recorded import recorded_arm
 from wam_analysis.table import bounded, plain
 from wam_analysis.unplanned_contact import LIMIT
 from wam_bag.bag import BagError, read
+from wam_control.reaction_status import REFUSAL
 from wam_description.status import DONE
-from wam_sim.reactions import STEADY, sentences, steady_begin, too_short, unassessed, unmet, within
+from wam_sim.reactions import OUTCOMES, STEADY, sentences, steady_begin, too_short, unassessed, unmet, within
 from wam_sim.recording import recorded_run
 
 FORCE_TOLERANCE = 10.0  # % of the commanded force
@@ -64,6 +66,11 @@ class DemoReport(NamedTuple):
 
     text: str
     unmet: tuple[VerdictAnswer, ...]
+
+
+def not_as_it_should_be(answers: Sequence[object]) -> str:
+    """The answers that are NO, in a sentence."""
+    return f"not as it should be: {'; '.join(map(str, answers))}"
 
 
 def report(bag: Path, picture: Path | None = None, namespace: str = "") -> DemoReport:
@@ -176,14 +183,15 @@ def _force_verdict(presses: Sequence[SteadyPress]) -> VerdictAnswer:
 
 
 def _command_verdict(summary: DemoSummary) -> list[VerdictAnswer]:
-    """Commands that were refused, or in the end not reached; none if there is none, and all could be assessed."""
+    """Commands that were not carried out; none if there is none, and all could be assessed."""
     forces = {press.begin for press in summary.presses}
-    refused = missed = 0
+    outcomes: Counter[str] = Counter()
     for step in summary.steps:
-        holding = [one.holds for one in unmet(summary.reactions, step)]
-        missed += False in holding
-        refused += True in holding and steady_begin(step) not in forces  # that of a force is in its own answer
-    counts = [f"{count} {what}" for count, what in ((refused, "refused"), (missed, "not reached")) if count]
+        found = {one.outcome for one in unmet(summary.reactions, step)}
+        outcomes.update(
+            found - {REFUSAL} if steady_begin(step) in forces else found
+        )  # that of a force has its own answer
+    counts = [f"{outcomes[one]} {one}" for one in OUTCOMES if outcomes[one]]
     brief = len(unassessed(summary.reactions, summary.torques, summary.steps, summary.settling_time))
     if not counts and not brief:
         return []

@@ -8,8 +8,14 @@ from wam_description.status import REFUSED
 
 REACTION = "reaction"  # fact: the most serious one; where the message is more or less than its reason, each is a fact
 REFUSAL = "refused"  # in place of a reaction: a command is not taken, as it is beyond a limit or has no effect
-NONE, NOT_REACHED, NOT_FOLLOWED = (
-    one.name.lower() for one in (ForceReaction.NONE, ForceReaction.NOT_REACHED, ForceReaction.NOT_FOLLOWED)
+NONE, CONTACT_FORCE, NOT_REACHED, NOT_FOLLOWED = (
+    one.name.lower()
+    for one in (
+        ForceReaction.NONE,
+        ForceReaction.CONTACT_FORCE,
+        ForceReaction.NOT_REACHED,
+        ForceReaction.NOT_FOLLOWED,
+    )
 )
 NAMES = {one.name.lower() for one in ForceReaction} - {NONE}
 HOLDING = {REFUSAL, *(one.name.lower() for one in ForceReaction if one.holds)}

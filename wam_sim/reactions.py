@@ -3,11 +3,14 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from wam_control.reaction_status import HOLDING, NOT_FOLLOWED, NOT_REACHED, REFUSAL, stated
+from wam_control.reaction_status import CONTACT_FORCE, HOLDING, NOT_FOLLOWED, NOT_REACHED, REFUSAL, stated
+from wam_control.scenario import ScenarioStep
 from wam_control.task import TaskCommand, watched_axes
 from wam_sim.recording import RecordedRun, RecordedStep
 
 FAULT = "fault"
+TOO_MUCH, UNREACHED = "with too much force", "not reached"
+OUTCOMES = (REFUSAL, TOO_MUCH, UNREACHED)  # of a command that is not met
 BRIEF = 50_000_000  # ns; what lasts no longer into a step belongs to the one before
 STEADY = 1.0  # s at the end of a step, taken as its steady state; a force that is commanded for less has none
 
@@ -32,6 +35,20 @@ class RecordedReaction(NamedTuple):
         """Whether the force was not controlled meanwhile."""
         return self.name in HOLDING or self.name == FAULT
 
+    @property
+    def outcome(self) -> str:
+        """What became of a command that is not met because of it, one of `OUTCOMES`."""
+        if self.holds:
+            return REFUSAL
+        return TOO_MUCH if self.name == CONTACT_FORCE else UNREACHED
+
+
+class PlayedStep(NamedTuple):
+    """A step of a scenario and when it was played."""
+
+    step: ScenarioStep
+    recorded: RecordedStep
+
 
 def within(reactions: Sequence[RecordedReaction], begin: int, end: int) -> tuple[RecordedReaction, ...]:
     """The parts of reactions between two times, ns."""
@@ -45,15 +62,28 @@ def steady_begin(step: RecordedStep) -> int:
 
 
 def unmet(reactions: Sequence[RecordedReaction], step: RecordedStep) -> list[RecordedReaction]:
-    """Why what a step commands is not met: refused in its steady state, not reached at its end, a posture too fast.
+    """Why what a step commands is not met, nothing where it is.
 
-    Nothing where it is.
+    Refused in its steady state, with more force than allowed in all of it, not reached at its end, a posture too fast.
     """
-    found = within(reactions, steady_begin(step), step.end)
+    steady = steady_begin(step)
+    found = within(reactions, steady, step.end)
     refused = [one for one in found if one.holds and one.name != FAULT]
-    missed = [one for one in found if one.name == NOT_REACHED and one.end >= step.end - BRIEF]
+    at_end = [one for one in found if one.end >= step.end - BRIEF]
+    hard = [one for one in at_end if one.name == CONTACT_FORCE and one.begin <= steady]
+    missed = [one for one in at_end if one.name == NOT_REACHED]
     late = [one for one in within(reactions, step.begin, step.end) if one.name == NOT_FOLLOWED]
-    return [*refused[:1], *missed[:1], *late[:1]]
+    return [*refused[:1], *hard[:1], *missed[:1], *late[:1]]
+
+
+def unmet_in_words(reactions: Sequence[RecordedReaction], played: Iterable[PlayedStep]) -> list[str]:
+    """A sentence for each reason why what a step commands is not met."""
+    return [
+        f"{step.name} {why.outcome}: {why.reason}"
+        for step, recorded in played
+        if step.commands_arm
+        for why in unmet(reactions, recorded)
+    ]
 
 
 def watched_times(

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from wam_control.contact_estimator import ContactEstimate
+from wam_control.reaction_status import stated
 from wam_control.scenario import Scenario, ScenarioStep
 from wam_description.arm import Shared
 from wam_description.configuration import Configuration
@@ -23,6 +24,10 @@ from wam_driver.driver import Driver, DriverParameters
 from wam_driver.lockstep import unpublished
 from wam_driver.safety import Mode
 from wam_sim.bus import Bus, Rows, of_node
+from wam_sim.reactions import PlayedStep, RecordedReaction, lasting, unmet_in_words
+from wam_sim.recording import RecordedStep
+
+FORCE_LOOP, SCENARIO = "force_loop", "scenario"
 
 
 def _warn(node: str, status: NodeStatus) -> None:
@@ -52,10 +57,10 @@ class Simulation:
         steps: Sequence[ScenarioStep],
         controllers: Mapping[str, Any] | None = None,
     ) -> None:
-        entries = [name for name in configuration.shared.nodes if name not in ("scenario", "recorder")]
+        entries = [name for name in configuration.shared.nodes if name not in (SCENARIO, "recorder")]
         if "driver" not in entries:
             raise ParameterError(f"nodes are {', '.join(entries)}; a simulation needs the driver")
-        configuration = configuration.with_values({"nodes": [*entries, "scenario"], "timing.mode": "lockstep"})
+        configuration = configuration.with_values({"nodes": [*entries, SCENARIO], "timing.mode": "lockstep"})
         shared = configuration.shared
         self._timing = shared.timing
         self.driver = Driver(shared, configuration.node("driver", DriverParameters))
@@ -69,6 +74,9 @@ class Simulation:
         self._publish_states = self._bus.publisher("motor_states")
         self._currents: tuple[int, list[float]] = (0, [])
         self._reported: tuple[Mode, str] | None = None
+        self._steps = steps
+        self._begins: list[int] = []  # of the steps, ns
+        self._reasons: list[tuple[int, dict[str, str]]] = []  # why the force loop does not obey, each time this changes
         self.nodes: dict[str, Any] = {}
         self._synchronisers: dict[str, set[Synchroniser]] = {}
         for name, declaration in self._interface.declarations.items():
@@ -77,6 +85,9 @@ class Simulation:
         self._motors = len(shared.arm.motors.names)
         has_sensors = "joint_sensors" in self._interface.topics
         self._publish_sensors = self._bus.publisher("joint_sensors") if has_sensors else None
+        if FORCE_LOOP in self.nodes:
+            self.listen(STATUS, lambda stamp, status: self._reasons.append((stamp, stated(status))), FORCE_LOOP)
+        self.listen(STATUS, lambda stamp, status: self._begins.append(stamp) if status.step else None, SCENARIO)
 
     def _connect(
         self,
@@ -88,7 +99,7 @@ class Simulation:
     ) -> None:
         kind = declaration.parameter_class
         own = configuration.node(name, kind) if name in configuration.sections else build(kind, {})
-        more = (Scenario(steps, shared),) if name == "scenario" else ()
+        more = (Scenario(steps, shared),) if name == SCENARIO else ()
         node = declaration.make(shared, own, *more)
         self.nodes[name] = node
         self._settings[name] = dict(configuration.sections.get(name, {}))
@@ -116,9 +127,26 @@ class Simulation:
         return self._bus.rows
 
     @property
+    def reactions(self) -> list[RecordedReaction]:
+        """What the force loop did so far instead of what was commanded."""
+        return lasting(self._reasons, self.driver.stamp)
+
+    @property
+    def played(self) -> list[PlayedStep]:
+        """The steps that have begun so far, and when."""
+        ends = [*self._begins[1:], self.driver.stamp]
+        times = zip(self._steps, self._begins, ends, strict=False)
+        return [PlayedStep(step, RecordedStep(step.name, begin, end, {})) for step, begin, end in times]
+
+    @property
+    def unmet(self) -> str:
+        """Which steps were played and yet not carried out, and why; '' where all were."""
+        return "; ".join(unmet_in_words(self.reactions, self.played))
+
+    @property
     def scenario(self) -> Any:
         """The node that plays the task."""
-        return self.nodes["scenario"]
+        return self.nodes[SCENARIO]
 
     @property
     def estimate(self) -> ContactEstimate:
@@ -139,7 +167,10 @@ class Simulation:
         self._bus.listen(of_node(node, topic), take)
 
     def play(self) -> str:
-        """Play the scenario to its end; returns why it failed, '' where it did not."""
+        """Play the scenario to its end; returns why it was not played, '' where it was.
+
+        A force that the loop refuses does not end it: see `unmet`.
+        """
         while not self.step():
             pass
         failure: str = self.scenario.failure
@@ -153,7 +184,7 @@ class Simulation:
         if self._publish_sensors is not None:
             self._publish_sensors(stamp, driver.joint_sensors)
         self._publish_states(stamp, driver.motor_state)
-        if self.nodes["scenario"].done:
+        if self.nodes[SCENARIO].done:
             return True
         driver.command(*self._currents)
         driver.advance(0.0)

@@ -10,22 +10,26 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wam_control.force_loop_parameters import ForceLoopParameters
-from wam_control.reaction_status import stated
 from wam_control.scenario import NO_FORCE, ScenarioStep, require_playable
 from wam_description.configuration import Configuration
 from wam_description.parameters import ParameterError
 from wam_description.rigid_body import RigidBody
-from wam_description.signals import BASE, NodeStatus
-from wam_description.topics import STATUS
+from wam_description.signals import BASE
 from wam_description.wiring import raised
 from wam_sim.batch import Report, results
 from wam_sim.bus import TopicValue
-from wam_sim.reactions import RecordedReaction, lasting, too_short, unassessed, unmet, watched_times
-from wam_sim.recording import RecordedStep
-from wam_sim.simulation import Simulation
+from wam_sim.reactions import (
+    BRIEF,
+    STEADY,
+    PlayedStep,
+    RecordedReaction,
+    too_short,
+    unassessed,
+    unmet_in_words,
+    watched_times,
+)
+from wam_sim.simulation import FORCE_LOOP, Simulation
 
-FORCE_LOOP = "force_loop"
-PlayedStep = tuple[ScenarioStep, RecordedStep]  # and when it was played
 SETTLED = 0.5  # part of the time of one commanded force, after which the error counts as settled
 
 
@@ -55,7 +59,7 @@ class SweepResult(NamedTuple):
     force_rms, force_worst : of commanded minus true force in the settled part of each commanded force that was not
         refused there, N.
     force_peak : largest true force, N.
-    unassessed : steps whose task commands a force or a torque too briefly to be reported as not reached; '' for none.
+    unassessed : commands that last too briefly: forces to be steady, tasks to be reported as not reached; '' for none.
     """
 
     failure: str
@@ -126,26 +130,22 @@ def points(
 def outcome(point: SweepPoint) -> SweepResult:
     """Play the scenario and measure; refused parameters are a failure of this run alone."""
     nothing = math.nan
-    statuses: list[tuple[int, NodeStatus]] = []
-    begins: list[int] = []
     try:
         require_playable("the scenario", point.steps, point.configuration)
         run = Simulation(point.configuration, point.steps)
-        if FORCE_LOOP in run.nodes:
-            run.listen(STATUS, lambda stamp, status: statuses.append((stamp, status)), FORCE_LOOP)
-        run.listen(STATUS, lambda stamp, status: begins.append(stamp) if status.step else None, "scenario")
         failure = run.play()
     except ParameterError as error:
         return SweepResult(str(error), 0.0, nothing, nothing, nothing)
     except Exception as error:  # other runs go on
         return SweepResult(f"unexpected {raised(error)}", 0.0, nothing, nothing, nothing)
-    end = run.driver.stamp
-    reactions = lasting(((stamp, stated(status)) for stamp, status in statuses), end)
-    times = zip(point.steps, begins, [*begins[1:], end], strict=False)
-    played = [(step, RecordedStep(step.name, begin, last, {})) for step, begin, last in times]
-    found = [failure, *_unmet(reactions, played)]
+    reactions, played = run.reactions, run.played
+    postures = [
+        one for one in played if one.step.force == NO_FORCE
+    ]  # a force is measured, and a refused one named there
+    found = [failure, *unmet_in_words(reactions, postures)]
     measured = _measured(run, RigidBody(point.configuration.shared.arm), reactions, found)
-    return measured._replace(unassessed=_unassessed(point.configuration, reactions, played))
+    brief = filter(None, (measured.unassessed, _unassessed(point.configuration, reactions, played)))
+    return measured._replace(unassessed="; ".join(brief))
 
 
 def _measured(
@@ -155,35 +155,30 @@ def _measured(
     joints = {row.stamp: row.values[: len(body.arm.joints.names)] for row in run.rows.get("sim/joint_states", [])}
     errors: list[float] = []
     refusals: list[str] = []
+    brief: list[str] = []
     commands = [row for row in run.rows.get("force_command", []) if row.stamp in truth]
     for (_, *force), rows in groupby(commands, key=lambda row: (row.frame, *row.values)):
         held = list(rows)
         settled = held[int(SETTLED * len(held)) :]
         if not any(force[:3]):
             continue
+        command = f"{math.hypot(*force[:3]):.3g} N in {held[0].frame}"
         if refusal := _refusal(reactions, settled[0].stamp, settled[-1].stamp):
-            refusals.append(f"{math.hypot(*force[:3]):.3g} N in {held[0].frame} refused: {refusal}")
+            refusals.append(f"{command} refused: {refusal}")
             continue
+        if held[-1].stamp - held[0].stamp + BRIEF < 1e9 * STEADY:
+            brief.append(f"{command}: commanded for less than {STEADY:g} s")
         errors += [_error(body, joints[row.stamp], row, truth[row.stamp]) for row in settled]
     peak = max((math.hypot(*row.values[:3]) for row in truth.values()), default=0.0)
     rms = math.sqrt(sum(e * e for e in errors) / len(errors)) if errors else math.nan
     failure = "; ".join(filter(None, dict.fromkeys((*failures, *refusals))))
-    return SweepResult(failure, run.driver.stamp * 1e-9, rms, max(map(abs, errors), default=math.nan), peak)
+    largest = max(map(abs, errors), default=math.nan)
+    return SweepResult(failure, run.driver.stamp * 1e-9, rms, largest, peak, "; ".join(brief))
 
 
 def _refusal(reactions: Sequence[RecordedReaction], begin: int, end: int) -> str:
     """Why the force loop did not control a force between two times, ns; '' where it did."""
     return next((one.reason for one in reactions if one.holds and one.begin <= end and one.end > begin), "")
-
-
-def _unmet(reactions: Sequence[RecordedReaction], played: Sequence[PlayedStep]) -> list[str]:
-    """Why the postures and tasks of steps are not met; a force is measured, and a refused one named there."""
-    return [
-        f"{step.name} {'refused' if why.holds else 'not reached'}: {why.reason}"
-        for step, recorded in played
-        if step.commands_arm and step.force == NO_FORCE
-        for why in unmet(reactions, recorded)
-    ]
 
 
 def _unassessed(

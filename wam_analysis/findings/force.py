@@ -17,7 +17,7 @@ from wam_analysis.measures.force_accuracy import ForceAccuracy, dynamic_range
 from wam_analysis.measures.limit_cycle import FEWEST
 from wam_control.stability_guard import LARGEST
 from wam_description.signals import BASE
-from wam_sim.reactions import FAULT, STEADY, RecordedReaction, too_short, unassessed, unmet, within
+from wam_sim.reactions import FAULT, STEADY, TOO_MUCH, UNREACHED, RecordedReaction, too_short, unassessed, unmet, within
 from wam_sim.reactions import sentences as reaction_sentences
 from wam_theory.verdicts import Verdict
 
@@ -74,9 +74,10 @@ def _reaction_verdict(found: Mapping[str, Sequence[RecordedReaction]], zero: int
 def _command_verdict(summary: DemoSummary) -> list[str]:
     """Steps whose command was not reached in the end, and those that are too short to assess, in a sentence each."""
     reactions, steps, settling = summary.reactions, summary.steps, summary.settling_time
-    missed = [step.name for step in steps if not all(one.holds for one in unmet(reactions, step))]
+    found = [(step.name, {one.outcome for one in unmet(reactions, step)}) for step in steps]
+    named = {what: "; ".join(name for name, outcomes in found if what in outcomes) for what in (TOO_MUCH, UNREACHED)}
     brief = [step.name for step in unassessed(reactions, summary.torques, steps, settling)]
-    verdict = [f"NOT REACHED in the end: {'; '.join(missed)}."] if missed else []
+    verdict = [f"{what.upper()} in the end: {names}." for what, names in named.items() if names]
     return [*verdict, *([f"{'; '.join(brief)}: {too_short(settling)}."] if brief else [])]
 
 

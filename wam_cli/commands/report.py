@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from wam_analysis.demo_report import report
+from wam_analysis.demo_report import not_as_it_should_be, report
 from wam_cli.commands import take_arm, writable_picture
 
 
@@ -15,8 +15,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Print the report; nothing is written into the directory of the bag."""
+    """Print the report; nothing is written into the directory of the bag.  1 where it has a NO."""
     if given.picture:
         writable_picture("--picture", given.picture)
-    print(report(given.bag, given.picture, given.namespace or "").text)
-    return 0
+    made = report(given.bag, given.picture, given.namespace or "")
+    print(made.text)
+    if made.unmet:
+        print(f"\n{not_as_it_should_be(made.unmet)}")
+    return 1 if made.unmet else 0
